@@ -60,20 +60,20 @@ def test_a_frame_without_a_list_stays_the_same_object() -> None:
     assert mend(raw) is raw
 
 
-@pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
-def test_a_simulated_chip_lists_its_hot_pixels_and_mending_takes_them_out(cfa: str) -> None:
-    sensor = preset("low_noise", cfa)
-    pixel = replace(sensor.pixel, hot_pixel_share=0.01, hot_pixel_dark_current_e_per_s=1e6)
-    sensor = replace(sensor, pixel=pixel)
-    device = draw_device(sensor, (64, 64), np.random.default_rng(0))
-    raw = read_out(np.full((64, 64), 300.0), sensor, device, 0.01, np.random.default_rng(1))
-    assert device.hot is not None
-    assert raw.defects is not None
-    np.testing.assert_array_equal(raw.defects, np.argwhere(device.hot))
-    hot = tuple(raw.defects.T)
-    assert raw.electrons[hot].min() > 9000
-    # the median of 8 samples of 300 e- and 17.5 e- of noise: 5 standard deviations of 17.5 / sqrt(8 * 2 / pi)
-    assert np.abs(mend(raw).electrons[hot] - 300.0).max() < 5 * 17.5 / np.sqrt(16 / np.pi) + 0.5
+def test_a_simulated_chip_lists_its_hot_pixels_and_mending_takes_them_out() -> None:
+    for cfa in ["rgbw", "bayer"]:
+        sensor = preset("low_noise", cfa)
+        pixel = replace(sensor.pixel, hot_pixel_share=0.01, hot_pixel_dark_current_e_per_s=1e6)
+        sensor = replace(sensor, pixel=pixel)
+        device = draw_device(sensor, (64, 64), np.random.default_rng(0))
+        raw = read_out(np.full((64, 64), 300.0), sensor, device, 0.01, np.random.default_rng(1))
+        assert device.hot is not None, cfa
+        assert raw.defects is not None, cfa
+        np.testing.assert_array_equal(raw.defects, np.argwhere(device.hot))
+        hot = tuple(raw.defects.T)
+        assert raw.electrons[hot].min() > 9000, cfa
+        # the median of 8 samples of 300 e- and 17.5 e- of noise: 5 standard deviations of 17.5 / sqrt(8 * 2 / pi)
+        assert np.abs(mend(raw).electrons[hot] - 300.0).max() < 5 * 17.5 / np.sqrt(16 / np.pi) + 0.5, cfa
 
 
 def test_a_remosaiced_frame_holds_no_hot_pixel_and_no_list() -> None:
@@ -85,10 +85,10 @@ def test_a_remosaiced_frame_holds_no_hot_pixel_and_no_list() -> None:
     assert np.abs(bayer.dn.astype(int) - 310).max() <= 1
 
 
-@pytest.mark.parametrize("places", [[(0, 8)], [(-1, 0)], [(0, 0, 0)], [(0.5, 1.0)], [["a", "b"]]])
-def test_a_list_that_does_not_fit_the_frame_is_refused(places: object) -> None:
-    with pytest.raises(InputError, match=r"^defects: .* is not allowed; give rows and columns inside \(8, 8\)"):
-        frame(np.zeros((8, 8)), RGBW, places)  # type: ignore[arg-type]
+def test_a_list_that_does_not_fit_the_frame_is_refused() -> None:
+    for places in [[(0, 8)], [(-1, 0)], [(0, 0, 0)], [(0.5, 1.0)], [["a", "b"]]]:
+        with pytest.raises(InputError, match=r"^defects: .* is not allowed; give rows and columns inside \(8, 8\)"):
+            frame(np.zeros((8, 8)), RGBW, places)  # type: ignore[arg-type]
 
 
 def test_a_list_is_kept_in_the_frames_order_each_once() -> None:

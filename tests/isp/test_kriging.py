@@ -55,19 +55,19 @@ def test_white_noise_comes_out_with_the_stated_variance(name):
     np.testing.assert_allclose((found[inner] ** 2).mean((0, 1)), gain[inner].mean((0, 1)), rtol=4.5 * error)
 
 
-@pytest.mark.parametrize(("name", "period"), [("bayer", 2), ("quad_bayer", 4)])
-def test_grey_detail_at_the_colours_own_period_is_taken_for_colour(name, period):
+def test_grey_detail_at_the_colours_own_period_is_taken_for_colour():
     """The limit of what a mosaic tells: 2 pixels a period of Bayer, 4 of quad Bayer, whatever develops it.
 
     A grey pattern of squares, light ones where R is, dark ones where B is, makes the samples that an even orange field
     makes; since planes come out exactly, the field is what is found.
     """
-    tile, (rows, columns) = MOSAICS[name], np.indices((32, 32))
-    wave = sum(np.where(x % period < period // 2, 5.0, -5.0) for x in (rows, columns))
-    grey = np.repeat(100.0 + wave[..., None], 3, axis=-1)
-    orange = np.broadcast_to([110.0, 100.0, 90.0], grey.shape)
-    np.testing.assert_array_equal(mosaic(grey, tile), mosaic(orange, tile))
-    np.testing.assert_allclose(krige(mosaic(grey, tile), tile, np.full(3, 5.0))[0], orange, atol=1e-7)
+    for name, period in [("bayer", 2), ("quad_bayer", 4)]:
+        tile, (rows, columns) = MOSAICS[name], np.indices((32, 32))
+        wave = sum(np.where(x % period < period // 2, 5.0, -5.0) for x in (rows, columns))
+        grey = np.repeat(100.0 + wave[..., None], 3, axis=-1)
+        orange = np.broadcast_to([110.0, 100.0, 90.0], grey.shape)
+        np.testing.assert_array_equal(mosaic(grey, tile), mosaic(orange, tile))
+        np.testing.assert_allclose(krige(mosaic(grey, tile), tile, np.full(3, 5.0))[0], orange, atol=1e-7)
 
 
 def response(name, period, grey):

@@ -19,21 +19,21 @@ def exposure(electrons, tile=RGBW, **changes):
     return raw_image(np.rint(np.asarray(electrons) + 100), tile, **changes)
 
 
-@pytest.mark.parametrize("tile", TILES)
-def test_a_colour_is_unseen_from_the_closed_form_on(tile):
+def test_a_colour_is_unseen_from_the_closed_form_on():
     """At S = a W + 4 sqrt(S + s^2) and W = 200 e-, a = 1: 268.74 e-; S = 4 sqrt(S + s^2) where W is dark: 17.9 e-."""
-    for white_e, name in product((0.0, 200.0), "RGB"):
-        size = 4 * len(tile), 4 * len(tile[0])
-        sites = np.argwhere(mask(tile, name, size))
-        row, column = sites[len(sites) // 2]
-        root = 2.0 * white_e + 16.0
-        bound_e = (root + np.sqrt(root**2 - 4.0 * (white_e**2 - 16.0 * DARK_E**2))) / 2.0
-        for light_e, found in ((np.floor(bound_e), False), (np.ceil(bound_e), True)):
-            electrons = np.where(mask(tile, "W", size), white_e, 0.0)
-            electrons[row, column] = light_e
-            _, unseen = without_unseen(exposure(electrons, tile), NEUTRAL)
-            assert unseen[row, column] == found, (name, white_e)
-            assert unseen.sum() == found
+    for tile in TILES:
+        for white_e, name in product((0.0, 200.0), "RGB"):
+            size = 4 * len(tile), 4 * len(tile[0])
+            sites = np.argwhere(mask(tile, name, size))
+            row, column = sites[len(sites) // 2]
+            root = 2.0 * white_e + 16.0
+            bound_e = (root + np.sqrt(root**2 - 4.0 * (white_e**2 - 16.0 * DARK_E**2))) / 2.0
+            for light_e, found in ((np.floor(bound_e), False), (np.ceil(bound_e), True)):
+                electrons = np.where(mask(tile, "W", size), white_e, 0.0)
+                electrons[row, column] = light_e
+                _, unseen = without_unseen(exposure(electrons, tile), NEUTRAL)
+                assert unseen[row, column] == found, (name, white_e)
+                assert unseen.sum() == found, tile
 
 
 def test_at_the_border_what_is_even_is_seen():
@@ -68,15 +68,15 @@ def test_a_lamp_that_w_sees_and_one_beside_full_w_are_seen():
     assert kept is raw
 
 
-@pytest.mark.parametrize("tile", TILES)
-def test_what_is_even_is_seen_whatever_w_tells_and_a_line_isnt(tile):
+def test_what_is_even_is_seen_whatever_w_tells_and_a_line_isnt():
     """A field in the colours alone, as where charge leaves its pixel, up to the border; a line has two of the eight."""
-    shape = 4 * len(tile), 4 * len(tile[0])
-    field = np.where(mask(tile, "W", shape), 0.0, 1000.0)
-    assert not without_unseen(exposure(field, tile), NEUTRAL)[1].any()
-    for row in range(shape[0]):
-        line = np.where(np.arange(shape[0])[:, None] == row, field, 0.0)
-        assert np.array_equal(without_unseen(exposure(line, tile), NEUTRAL)[1], line > 0)
+    for tile in TILES:
+        shape = 4 * len(tile), 4 * len(tile[0])
+        field = np.where(mask(tile, "W", shape), 0.0, 1000.0)
+        assert not without_unseen(exposure(field, tile), NEUTRAL)[1].any(), tile
+        for row in range(shape[0]):
+            line = np.where(np.arange(shape[0])[:, None] == row, field, 0.0)
+            assert np.array_equal(without_unseen(exposure(line, tile), NEUTRAL)[1], line > 0), tile
 
 
 def test_a_w_of_less_light_explains_as_much_as_a_neutral_asks():
@@ -88,29 +88,29 @@ def test_a_w_of_less_light_explains_as_much_as_a_neutral_asks():
         assert unseen.sum() == found
 
 
-@pytest.mark.parametrize(("level_e", "dark_e"), [(0.01, 0.3), (0.3, 1.5), (10.0, 1.5), (1000.0, 31.0)])
-def test_in_flat_fields_nothing_is_unseen_that_counts(level_e, dark_e):
+def test_in_flat_fields_nothing_is_unseen_that_counts():
     """Colours as bright as W, the least favourable: beyond 4 standard deviations lie 3.2e-5 of 196 608 normal samples.
 
     These are 6, and 50 with a chance under 1e-20.
     """
-    rng = np.random.default_rng(5)
-    electrons = rng.poisson(level_e, (512, 512)) + rng.normal(0.0, dark_e, (512, 512))
-    raw = exposure(electrons + 300, black_dn=400.0, read_noise_e=dark_e, dsnu_e=0.0)
-    _, unseen = without_unseen(raw, np.ones(4) / 10)
-    assert unseen.sum() < 50
+    for level_e, dark_e in [(0.01, 0.3), (0.3, 1.5), (10.0, 1.5), (1000.0, 31.0)]:
+        rng = np.random.default_rng(5)
+        electrons = rng.poisson(level_e, (512, 512)) + rng.normal(0.0, dark_e, (512, 512))
+        raw = exposure(electrons + 300, black_dn=400.0, read_noise_e=dark_e, dsnu_e=0.0)
+        _, unseen = without_unseen(raw, np.ones(4) / 10)
+        assert unseen.sum() < 50, (level_e, dark_e)
 
 
-@pytest.mark.parametrize("at", [(0, 0), (0, 1), (1, 0)])
-def test_a_lamp_of_one_pixel_is_drawn_there_alone_and_neutral(at):
+def test_a_lamp_of_one_pixel_is_drawn_there_alone_and_neutral():
     """The smallest case, one sample of a colour in the dark, was a coloured block of 7 x 7 pixels."""
-    electrons = np.random.default_rng(3).normal(0.0, 1.5, (32, 32))
-    place = 16 + at[0], 16 + at[1]
-    electrons[place] = 15_000.0
-    rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
-    assert rgb[place] == pytest.approx(15_000.0, rel=1e-3)
-    rgb[place] = 0.0
-    assert np.abs(rgb).max() < 3.0
+    for at in [(0, 0), (0, 1), (1, 0)]:
+        electrons = np.random.default_rng(3).normal(0.0, 1.5, (32, 32))
+        place = 16 + at[0], 16 + at[1]
+        electrons[place] = 15_000.0
+        rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
+        assert rgb[place] == pytest.approx(15_000.0, rel=1e-3), at
+        rgb[place] = 0.0
+        assert np.abs(rgb).max() < 3.0, at
 
 
 def test_a_row_of_colours_is_drawn_even():

@@ -127,10 +127,10 @@ def test_a_plain_matrix_stands_at_any_noise_and_takes_w_as_it_is_for_luminance()
         assert plain.luminance(noise).tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
-@pytest.mark.parametrize("matrix", [np.ones((2, 3)), np.full((3, 3), np.nan), np.ones(9)])
-def test_what_is_no_matrix_is_refused(matrix: np.ndarray) -> None:
-    with pytest.raises(InputError, match=r"^matrix: shape .* is not allowed; give 3x3 finite numbers"):
-        ColourFit.of(matrix)
+def test_what_is_no_matrix_is_refused() -> None:
+    for matrix in [np.ones((2, 3)), np.full((3, 3), np.nan), np.ones(9)]:
+        with pytest.raises(InputError, match=r"^matrix: shape .* is not allowed; give 3x3 finite numbers"):
+            ColourFit.of(matrix)
 
 
 def test_matrix_is_exact_for_a_camera_that_sees_as_the_observer_does() -> None:
@@ -145,13 +145,13 @@ def test_matrix_is_exact_for_a_camera_that_sees_as_the_observer_does() -> None:
     assert (xyz / white) @ matrix.T == pytest.approx(target, abs=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("responses", "surfaces", "name"),
-    [(np.ones((3, 7)), SURFACES, "responses"), (np.ones((3, 40)), np.ones((2, 40)), "reflectances")],
-)
-def test_shapes_that_do_not_fit_are_refused(responses: np.ndarray, surfaces: np.ndarray, name: str) -> None:
-    with pytest.raises(InputError, match=f"^{name}: .*; give"):
-        fit_matrix(responses, NM, np.ones(40), surfaces)
+def test_shapes_that_do_not_fit_are_refused() -> None:
+    for responses, surfaces, name in [
+        (np.ones((3, 7)), SURFACES, "responses"),
+        (np.ones((3, 40)), np.ones((2, 40)), "reflectances"),
+    ]:
+        with pytest.raises(InputError, match=f"^{name}: .*; give"):
+            fit_matrix(responses, NM, np.ones(40), surfaces)
 
 
 def test_matrix_takes_bands_of_uneven_widths() -> None:

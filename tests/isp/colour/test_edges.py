@@ -44,34 +44,38 @@ def edge(shares, light_e=LIGHT_E):
     return planes
 
 
-@pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
-def test_every_channel_gets_the_share_of_the_pixel_s_own_sample(tile):
+def test_every_channel_gets_the_share_of_the_pixel_s_own_sample():
     """The picture, in whole electrons, comes back exactly up to the border, though each plane has its own edge."""
-    truth = edge([0.4] * 4)
-    even = even_edges(frame(truth, tile), edge(MISPLACED), np.ones(4), OPEN)
-    assert even == pytest.approx(truth, rel=1e-5)
+    for tile in [*RGBW_PHASES, RGBW_4X4, quad(RGBW)]:
+        truth = edge([0.4] * 4)
+        even = even_edges(frame(truth, tile), edge(MISPLACED), np.ones(4), OPEN)
+        assert even == pytest.approx(truth, rel=1e-5), tile
 
 
-@pytest.mark.parametrize("tile", RGBW_PHASES)
-def test_where_w_is_full_the_neighbours_tell_along_the_edge(tile):
+def test_where_w_is_full_the_neighbours_tell_along_the_edge():
     """Across, shares are 0 and 1; along, 0.4: (2 (1 + s) 0.4 + s 1) / (2 (1 + s) + 2 s) with s = 0.001."""
-    light_e = np.array([1510.0, 3030.0, 1408.0, 15_000.0])
-    raw = frame(edge([0.4] * 4, light_e), tile)
-    even = even_edges(raw, edge(MISPLACED, light_e), np.ones(4), np.ones((16, 16)))
-    shares = ((even[:, 8] - DARK_E) / (light_e - DARK_E))[:, :3]
-    filled = (2 * 1.001 * 0.4 + 0.001) / (2 * 1.001 + 0.002)
-    expected = np.where(mask(tile, "W", (16, 16))[:, 8:9], filled, 0.4)
-    assert shares == pytest.approx(np.broadcast_to(expected, (16, 3)), abs=1e-5)
+    for tile in RGBW_PHASES:
+        light_e = np.array([1510.0, 3030.0, 1408.0, 15_000.0])
+        raw = frame(edge([0.4] * 4, light_e), tile)
+        even = even_edges(raw, edge(MISPLACED, light_e), np.ones(4), np.ones((16, 16)))
+        shares = ((even[:, 8] - DARK_E) / (light_e - DARK_E))[:, :3]
+        filled = (2 * 1.001 * 0.4 + 0.001) / (2 * 1.001 + 0.002)
+        expected = np.where(mask(tile, "W", (16, 16))[:, 8:9], filled, 0.4)
+        assert shares == pytest.approx(np.broadcast_to(expected, (16, 3)), abs=1e-5), tile
 
 
-@pytest.mark.parametrize("tile", RGBW_PHASES)
-def test_a_channel_of_little_contrast_has_no_say(tile):
+def test_a_channel_of_little_contrast_has_no_say():
     """Green rises by 1200 of 4000 e-, at another place; red gets the others' 0.4 at green's pixels as well."""
-    dark_e, light_e = np.array([10.0, 2800.0, 8.0, 100.0]), np.array([1510.0, 4000.0, 1408.0, 10_100.0])
-    truth, planes = (np.where(np.arange(16)[:, None] < 8, dark_e, light_e)[None].repeat(16, axis=0) for _ in range(2))
-    truth[:, 8], planes[:, 8] = (dark_e + np.array(t) * (light_e - dark_e) for t in ([0.4, 0.9, 0.4, 0.4], MISPLACED))
-    even = even_edges(frame(truth, tile), planes, np.ones(4), OPEN)
-    assert even[2:-2, 8, 0] == pytest.approx(610.0, rel=2e-3)  # 2 in 1000 of what lies across
+    for tile in RGBW_PHASES:
+        dark_e, light_e = np.array([10.0, 2800.0, 8.0, 100.0]), np.array([1510.0, 4000.0, 1408.0, 10_100.0])
+        truth, planes = (
+            np.where(np.arange(16)[:, None] < 8, dark_e, light_e)[None].repeat(16, axis=0) for _ in range(2)
+        )
+        truth[:, 8], planes[:, 8] = (
+            dark_e + np.array(t) * (light_e - dark_e) for t in ([0.4, 0.9, 0.4, 0.4], MISPLACED)
+        )
+        even = even_edges(frame(truth, tile), planes, np.ones(4), OPEN)
+        assert even[2:-2, 8, 0] == pytest.approx(610.0, rel=2e-3), tile  # 2 in 1000 of what lies across
 
 
 def test_a_channel_whose_contrast_is_noise_stays():
@@ -84,11 +88,11 @@ def test_a_channel_whose_contrast_is_noise_stays():
     assert even[:, 8, :2] == pytest.approx(truth[:, 8, :2], abs=3.0)
 
 
-@pytest.mark.parametrize("alpha", [0.0, 1.0])
-def test_where_samples_lie_on_their_planes_no_edge_was_missed(alpha):
-    planes = edge(MISPLACED)
-    even = even_edges(frame(planes), planes, np.ones(4), np.full((16, 16), alpha))
-    assert even == pytest.approx(planes, rel=1e-6)
+def test_where_samples_lie_on_their_planes_no_edge_was_missed():
+    for alpha in [0.0, 1.0]:
+        planes = edge(MISPLACED)
+        even = even_edges(frame(planes), planes, np.ones(4), np.full((16, 16), alpha))
+        assert even == pytest.approx(planes, rel=1e-6), alpha
 
 
 def test_contrast_within_the_noise_changes_nothing():
@@ -117,13 +121,13 @@ def test_in_rims_all_channels_get_the_colours_mean_share_where_samples_tell_noth
     assert even[:, [2, 14]] == pytest.approx(planes[:, [2, 14]], rel=1e-6)
 
 
-@pytest.mark.parametrize("alpha", [OPEN, MIXED, OPEN + 1.0])
-def test_a_colour_that_is_full_nearby_is_not_lowered(alpha):
-    light_e = LIGHT_E * [1.0, 5.0, 1.0, 1.4]  # green and W: 15 000 e-
-    planes = edge([0.2, 1.0, 0.2, 1.0], light_e)
-    even = even_edges(frame(edge([0.6] * 4, light_e)), planes, np.ones(4), alpha)
-    assert np.array_equal(even[:, 8, 1], planes[:, 8, 1])
-    assert (even[:, 8, [0, 2]] > planes[:, 8, [0, 2]]).all()
+def test_a_colour_that_is_full_nearby_is_not_lowered():
+    for alpha in [OPEN, MIXED, OPEN + 1.0]:
+        light_e = LIGHT_E * [1.0, 5.0, 1.0, 1.4]  # green and W: 15 000 e-
+        planes = edge([0.2, 1.0, 0.2, 1.0], light_e)
+        even = even_edges(frame(edge([0.6] * 4, light_e)), planes, np.ones(4), alpha)
+        assert np.array_equal(even[:, 8, 1], planes[:, 8, 1]), alpha
+        assert (even[:, 8, [0, 2]] > planes[:, 8, [0, 2]]).all(), alpha
 
 
 def test_colours_that_do_not_rise_together_keep_their_own_edges():
@@ -133,15 +137,15 @@ def test_colours_that_do_not_rise_together_keep_their_own_edges():
     assert np.array_equal(even_edges(frame(planes), planes, np.ones(4), MIXED), planes)
 
 
-@pytest.mark.parametrize(("width", "grey"), [(1, True), (2, False)])
-def test_a_lamp_smaller_than_2_x_2_has_no_colour_in_rims(width, grey):
+def test_a_lamp_smaller_than_2_x_2_has_no_colour_in_rims():
     """Its colours, balanced, are their mean; over the dark by c^2, here 1."""
-    gains = np.array([2.0, 1.0, 3.0, 0.2])
-    planes = np.zeros((16, 16, 4))
-    planes[5 : 5 + width, 5 : 5 + width] = [4000.0, 2000.0, 1000.0, 15_000.0]
-    balanced = even_edges(frame(planes), planes, gains, MIXED)[5, 5] * gains
-    expected = np.full(4, (8000.0 + 2000.0 + 3000.0) / 3) if grey else [8000.0, 2000.0, 3000.0, 3000.0]
-    assert balanced == pytest.approx(expected, rel=1e-5)
+    for width, grey in [(1, True), (2, False)]:
+        gains = np.array([2.0, 1.0, 3.0, 0.2])
+        planes = np.zeros((16, 16, 4))
+        planes[5 : 5 + width, 5 : 5 + width] = [4000.0, 2000.0, 1000.0, 15_000.0]
+        balanced = even_edges(frame(planes), planes, gains, MIXED)[5, 5] * gains
+        expected = np.full(4, (8000.0 + 2000.0 + 3000.0) / 3) if grey else [8000.0, 2000.0, 3000.0, 3000.0]
+        assert balanced == pytest.approx(expected, rel=1e-5), (width, grey)
 
 
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
@@ -167,14 +171,14 @@ def test_both_engines_agree(monkeypatch, tile, shape):
         assert np.array_equal(even_edges(raw, planes, gains, alpha), whole), pixels
 
 
-@pytest.mark.parametrize("shape", SHAPES[1:])
-def test_tiny_frames(shape):
-    rng = np.random.default_rng(2)
-    planes, raw = rng.uniform(0.0, 5000.0, (*shape, 4)), frame(rng.uniform(0.0, 5000.0, (*shape, 4)))
-    for alpha in (0.0, 0.5, 1.0):
-        even = even_edges(raw, planes, np.ones(4), np.full(shape, alpha))
-        assert np.isfinite(even).all()
-        assert (even >= 0.0).all()
+def test_tiny_frames():
+    for shape in SHAPES[1:]:
+        rng = np.random.default_rng(2)
+        planes, raw = rng.uniform(0.0, 5000.0, (*shape, 4)), frame(rng.uniform(0.0, 5000.0, (*shape, 4)))
+        for alpha in (0.0, 0.5, 1.0):
+            even = even_edges(raw, planes, np.ones(4), np.full(shape, alpha))
+            assert np.isfinite(even).all(), shape
+            assert (even >= 0.0).all(), shape
 
 
 def test_a_frame_of_no_contrast_in_its_colours_moves_w_alone():
@@ -191,18 +195,18 @@ def test_a_frame_of_no_contrast_in_its_colours_moves_w_alone():
     assert np.array_equal(even_edges(frame(truth), planes, np.ones(4), np.zeros((40, 40)))[:, :20], alone[:, :20])
 
 
-@pytest.mark.parametrize(("size", "row", "column"), list(product((3, 4, 5), (0, 1), (0, 1))))
-def test_a_small_full_patch_shows_no_tile(size, row, column):
+def test_a_small_full_patch_shows_no_tile():
     """The smallest case: a neutral patch, full in W, in a field of a hundredth of it.
 
     Green, red and blue agree within a tenth of the patch at every pixel; before, they differed by up to 0.8 of it.
     """
-    levels, shape = dict(zip(channels(RGBW), (0.1, 0.2, 0.1, 1.0), strict=True)), (32, 32)
-    light = np.full(shape, 400.0)
-    light[14 + row : 14 + row + size, 14 + column : 14 + column + size] = 40_000.0
-    electrons = np.zeros(shape)
-    for name, level in levels.items():
-        electrons[mask(RGBW, name, shape)] = level * light[mask(RGBW, name, shape)]
-    raw = raw_image(np.minimum(np.rint(electrons), 15_000) + 100)
-    rgb = picture_interleaved(raw, np.eye(3), balance=np.array(list(levels.values()))).rgb
-    assert np.ptp(rgb, axis=2).max() < 0.1 * 8000.0
+    for size, row, column in product((3, 4, 5), (0, 1), (0, 1)):
+        levels, shape = dict(zip(channels(RGBW), (0.1, 0.2, 0.1, 1.0), strict=True)), (32, 32)
+        light = np.full(shape, 400.0)
+        light[14 + row : 14 + row + size, 14 + column : 14 + column + size] = 40_000.0
+        electrons = np.zeros(shape)
+        for name, level in levels.items():
+            electrons[mask(RGBW, name, shape)] = level * light[mask(RGBW, name, shape)]
+        raw = raw_image(np.minimum(np.rint(electrons), 15_000) + 100)
+        rgb = picture_interleaved(raw, np.eye(3), balance=np.array(list(levels.values()))).rgb
+        assert np.ptp(rgb, axis=2).max() < 0.1 * 8000.0, (size, row, column)

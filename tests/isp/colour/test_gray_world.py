@@ -23,8 +23,8 @@ def test_uncertain_channel_falls_back_to_calibrated_gain_and_says_so() -> None:
     assert gains == pytest.approx([2.0 / 1.0, 1.0, 3.0])
 
 
-@pytest.mark.parametrize(("means", "errors"), [(MEANS, np.array([0.1, 5.0, 0.1])), (np.zeros(3), np.zeros(3))])
-def test_uncertain_green_or_no_light_makes_all_gains_calibrated(means: np.ndarray, errors: np.ndarray) -> None:
-    gains, certain = gray_world(means, errors, NEUTRAL, green=1)
-    assert not certain.any()
-    assert gains == pytest.approx([2.0, 1.0, 2.5])
+def test_uncertain_green_or_no_light_makes_all_gains_calibrated() -> None:
+    for means, errors in [(MEANS, np.array([0.1, 5.0, 0.1])), (np.zeros(3), np.zeros(3))]:
+        gains, certain = gray_world(means, errors, NEUTRAL, green=1)
+        assert not certain.any(), (means, errors)
+        assert gains == pytest.approx([2.0, 1.0, 2.5]), (means, errors)

@@ -1,7 +1,6 @@
 """The closed form against textbook LMMSE, against signals drawn from the prior, and in its limits."""
 
 import numpy as np
-import pytest
 from numpy.testing import assert_allclose
 
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
@@ -92,17 +91,17 @@ def test_pooling_keeps_mean_and_covariance() -> None:
     assert_allclose(covariance(pooled(prior), 0), second - np.outer(mean, mean), atol=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("scale", "noise"),
-    [
+def test_error_falls_with_light_and_a_larger_well_and_rises_with_noise() -> None:
+    for scale, noise in [
         (11.0, Noise(dark_e=2.0, prnu=0.01, full_e=100.0)),  # more light
         (10.0, Noise(dark_e=1.0, prnu=0.01, full_e=100.0)),  # less dark noise
         (10.0, Noise(dark_e=2.0, prnu=0.0, full_e=100.0)),  # pixels that are alike
         (10.0, Noise(dark_e=2.0, prnu=0.01, full_e=np.inf)),  # an endless well
-    ],
-)
-def test_error_falls_with_light_and_a_larger_well_and_rises_with_noise(scale: float, noise: Noise) -> None:
-    assert error(mixture(3), scale, noise) < error(mixture(3), 10.0, Noise(dark_e=2.0, prnu=0.01, full_e=100.0))
+    ]:
+        assert error(mixture(3), scale, noise) < error(mixture(3), 10.0, Noise(dark_e=2.0, prnu=0.01, full_e=100.0)), (
+            scale,
+            noise,
+        )
 
 
 def test_without_samples_the_error_is_that_of_the_prior() -> None:

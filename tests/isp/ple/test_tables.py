@@ -104,33 +104,35 @@ def test_one_component_is_the_textbooks_linear_estimate():
     assert by.variance == pytest.approx([left[channel::4].mean() for channel in range(4)], rel=1e-4)
 
 
-@pytest.mark.parametrize("pilot_noise", [None, 0.05, 2.0])
-def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked(pilot_noise):
+def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
     """By the normal density of samples and, where there is a pilot, of its four means together."""
-    # 16 samples, fewer than the directions of other patches: all but one direction is held against each component
-    rng, light_e = np.random.default_rng(4), 50.0
-    rows = tuple(4 * (4 * y + x) + LETTERS.index(BAYER[y % 2][x % 2]) for y in range(4) for x in range(4))
-    mix, at = mixture(own_prior(), 4), np.array(rows)
-    table = Table(mix, Sampling(4, rows, GAINS, (1.8,) * 4, 0.01), light_e)
-    seen = np.eye(64)[at]
-    electrons = (np.tile(GAINS, 16) * light_e * (mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)))[:, at]
-    noise = (electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2)
-    if pilot_noise is not None:
-        seen = np.concatenate([seen, table.average])
-        pilot = pilot_noise / (table.turn[0].T @ table.turn[0]).diagonal()
-        noise = np.concatenate([noise, np.tile(pilot, (len(noise), 1))], axis=1)
-    means = table.values @ seen.T
-    whole = mix.covariances * table.slopes[:, :, None] * table.slopes[:, None]
-    whole += table.drift[:, :, None] * table.drift[:, None]
-    covariances = seen @ whole @ seen.T + noise[:, :, None] * np.eye(len(seen))
-    draws = [rng.multivariate_normal(*component, 20) for component in zip(means, covariances, strict=True)]
-    samples = np.concatenate(draws)
-    off = samples[:, None] - means
-    squares = np.einsum("nki,kij,nkj->nk", off, np.linalg.inv(covariances), off, optimize=True)
-    likelihood = mix.log_weights - 0.5 * (np.linalg.slogdet(covariances)[1] + squares)
-    known = np.concatenate([_with_1(samples[:, :16]), samples[:, 16:]], axis=1).astype(np.float32)
-    variances = None if pilot_noise is None else np.full(len(known), pilot_noise, np.float32)
-    chosen, misfit = pick(table, known, variances)
-    missed = likelihood.max(axis=1) - likelihood[np.arange(len(known)), chosen]
-    assert (missed > 0.01).mean() < 0.01
-    assert misfit.mean() == pytest.approx(1.0, abs=0.1)
+    for pilot_noise in [None, 0.05, 2.0]:
+        # 16 samples, fewer than the directions of other patches: all but one direction is held against each component
+        rng, light_e = np.random.default_rng(4), 50.0
+        rows = tuple(4 * (4 * y + x) + LETTERS.index(BAYER[y % 2][x % 2]) for y in range(4) for x in range(4))
+        mix, at = mixture(own_prior(), 4), np.array(rows)
+        table = Table(mix, Sampling(4, rows, GAINS, (1.8,) * 4, 0.01), light_e)
+        seen = np.eye(64)[at]
+        electrons = (np.tile(GAINS, 16) * light_e * (mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)))[
+            :, at
+        ]
+        noise = (electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2)
+        if pilot_noise is not None:
+            seen = np.concatenate([seen, table.average])
+            pilot = pilot_noise / (table.turn[0].T @ table.turn[0]).diagonal()
+            noise = np.concatenate([noise, np.tile(pilot, (len(noise), 1))], axis=1)
+        means = table.values @ seen.T
+        whole = mix.covariances * table.slopes[:, :, None] * table.slopes[:, None]
+        whole += table.drift[:, :, None] * table.drift[:, None]
+        covariances = seen @ whole @ seen.T + noise[:, :, None] * np.eye(len(seen))
+        draws = [rng.multivariate_normal(*component, 20) for component in zip(means, covariances, strict=True)]
+        samples = np.concatenate(draws)
+        off = samples[:, None] - means
+        squares = np.einsum("nki,kij,nkj->nk", off, np.linalg.inv(covariances), off, optimize=True)
+        likelihood = mix.log_weights - 0.5 * (np.linalg.slogdet(covariances)[1] + squares)
+        known = np.concatenate([_with_1(samples[:, :16]), samples[:, 16:]], axis=1).astype(np.float32)
+        variances = None if pilot_noise is None else np.full(len(known), pilot_noise, np.float32)
+        chosen, misfit = pick(table, known, variances)
+        missed = likelihood.max(axis=1) - likelihood[np.arange(len(known)), chosen]
+        assert (missed > 0.01).mean() < 0.01, pilot_noise
+        assert misfit.mean() == pytest.approx(1.0, abs=0.1), pilot_noise

@@ -20,21 +20,21 @@ def raw(values: np.ndarray, cfa: Tile = RGBW) -> RawImage:
     return raw_image(np.rint(values), cfa, black_dn=0.0, white_dn=15_000.0, dsnu_e=0.0)
 
 
-@pytest.mark.parametrize("cfa", RGBW_PHASES)
-def test_where_nothing_saturates_it_is_the_first_interpolation(cfa: Tile) -> None:
-    values = np.rint(np.random.default_rng(0).uniform(100, 10_000, (21, 24)))
-    picture = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES)
-    np.testing.assert_allclose(picture.rgb, adams_planes(values, cfa), rtol=1e-12)
+def test_where_nothing_saturates_it_is_the_first_interpolation() -> None:
+    for cfa in RGBW_PHASES:
+        values = np.rint(np.random.default_rng(0).uniform(100, 10_000, (21, 24)))
+        picture = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES)
+        np.testing.assert_allclose(picture.rgb, adams_planes(values, cfa), rtol=1e-12)
 
 
-@pytest.mark.parametrize("cfa", RGBW_PHASES)
-def test_where_w_is_full_the_colours_stand_alone(cfa: Tile) -> None:
-    values = np.rint(np.random.default_rng(1).uniform(100, 10_000, (24, 40)))
-    values[:, :20][mask(cfa, "W", (24, 40))[:, :20]] = 15_000
-    rgb = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES).rgb
-    alone = np.stack([fill(values, cfa, channel) for channel in "RGB"], axis=-1)
-    np.testing.assert_allclose(rgb[:, : 19 + REACH - 1], alone[:, : 19 + REACH - 1], rtol=1e-12)
-    np.testing.assert_allclose(rgb[:, 21 + REACH :], adams_planes(values, cfa)[:, 21 + REACH :], rtol=1e-12)
+def test_where_w_is_full_the_colours_stand_alone() -> None:
+    for cfa in RGBW_PHASES:
+        values = np.rint(np.random.default_rng(1).uniform(100, 10_000, (24, 40)))
+        values[:, :20][mask(cfa, "W", (24, 40))[:, :20]] = 15_000
+        rgb = PROCESSORS["rgbw_gindele"].develop(raw(values, cfa), np.eye(3), balance=ONES).rgb
+        alone = np.stack([fill(values, cfa, channel) for channel in "RGB"], axis=-1)
+        np.testing.assert_allclose(rgb[:, : 19 + REACH - 1], alone[:, : 19 + REACH - 1], rtol=1e-12)
+        np.testing.assert_allclose(rgb[:, 21 + REACH :], adams_planes(values, cfa)[:, 21 + REACH :], rtol=1e-12)
 
 
 def test_a_sites_own_detail_is_added_as_a_quarter_of_its_laplacian() -> None:
@@ -46,38 +46,38 @@ def test_a_sites_own_detail_is_added_as_a_quarter_of_its_laplacian() -> None:
     assert white[[6, 6, 10, 10], [6, 10, 6, 10]] == pytest.approx(np.zeros(4))
 
 
-@pytest.mark.parametrize("cfa", RGBW_PHASES)
-def test_more_reflection_changes_nothing(cfa: Tile) -> None:
-    mosaic = np.random.default_rng(2).uniform(100, 1000, (19, 22))
-    more = luminance_plane(np.pad(mosaic, 8, mode="reflect"), cfa)[8:-8, 8:-8]
-    np.testing.assert_allclose(luminance_plane(mosaic, cfa), more, rtol=1e-12)
+def test_more_reflection_changes_nothing() -> None:
+    for cfa in RGBW_PHASES:
+        mosaic = np.random.default_rng(2).uniform(100, 1000, (19, 22))
+        more = luminance_plane(np.pad(mosaic, 8, mode="reflect"), cfa)[8:-8, 8:-8]
+        np.testing.assert_allclose(luminance_plane(mosaic, cfa), more, rtol=1e-12)
 
 
-@pytest.mark.parametrize("cfa", RGBW_PHASES)
-def test_a_grey_ramp_is_reproduced_in_any_direction(cfa: Tile) -> None:
-    rows, columns = np.indices((22, 25))
-    ramp = 1000.0 + 7.0 * rows - 11.0 * columns
-    white = luminance_plane(ramp, cfa)
-    inside = (slice(5, -5), slice(5, -5))  # reflection bends the ramp at the border
-    assert white[inside] == pytest.approx(ramp[inside], abs=1e-9)
-    assert adams_planes(ramp, cfa)[inside] == pytest.approx(np.repeat(ramp[inside][..., None], 3, 2), abs=1e-9)
+def test_a_grey_ramp_is_reproduced_in_any_direction() -> None:
+    for cfa in RGBW_PHASES:
+        rows, columns = np.indices((22, 25))
+        ramp = 1000.0 + 7.0 * rows - 11.0 * columns
+        white = luminance_plane(ramp, cfa)
+        inside = (slice(5, -5), slice(5, -5))  # reflection bends the ramp at the border
+        assert white[inside] == pytest.approx(ramp[inside], abs=1e-9), cfa
+        assert adams_planes(ramp, cfa)[inside] == pytest.approx(np.repeat(ramp[inside][..., None], 3, 2), abs=1e-9), cfa
 
 
-@pytest.mark.parametrize(("cfa", "axis"), list(product(RGBW_PHASES, (0, 1))))
-def test_w_beside_its_sites_is_taken_along_a_straight_edge_not_across(cfa: Tile, axis: int) -> None:
-    # A grey edge along an axis, once its diagonal sites know W: those beside W's own have two neighbours on their side
-    # of the edge and, across it, one on each; the Laplacian is as large across. So nothing is blurred there.
-    edge = np.where(np.indices((20, 20))[axis] < 10, 100.0, 900.0)
-    white = luminance_plane(edge, cfa)
-    row, column = divmod("".join(cfa).index("W"), 2)
-    opposite = mask(cfa, cfa[1 - row][1 - column], (20, 20))
-    known = opposite & (white != edge)  # diagonal sites at the edge: both diagonals cross it
-    beside = ~opposite & ~mask(cfa, "W", (20, 20))
-    reached = np.zeros((20, 20), dtype=bool)
-    for shift, one in product((1, -1), (0, 1)):
-        reached |= np.roll(known, shift, one)
-    np.testing.assert_array_equal(white[beside & ~reached], edge[beside & ~reached])
-    assert known.any()
+def test_w_beside_its_sites_is_taken_along_a_straight_edge_not_across() -> None:
+    for cfa, axis in product(RGBW_PHASES, (0, 1)):
+        # A grey edge along an axis, once its diagonal sites know W: those beside W's own have two neighbours on their
+        # side of the edge and, across it, one on each; the Laplacian is as large across. So nothing is blurred there.
+        edge = np.where(np.indices((20, 20))[axis] < 10, 100.0, 900.0)
+        white = luminance_plane(edge, cfa)
+        row, column = divmod("".join(cfa).index("W"), 2)
+        opposite = mask(cfa, cfa[1 - row][1 - column], (20, 20))
+        known = opposite & (white != edge)  # diagonal sites at the edge: both diagonals cross it
+        beside = ~opposite & ~mask(cfa, "W", (20, 20))
+        reached = np.zeros((20, 20), dtype=bool)
+        for shift, one in product((1, -1), (0, 1)):
+            reached |= np.roll(known, shift, one)
+        np.testing.assert_array_equal(white[beside & ~reached], edge[beside & ~reached])
+        assert known.any(), (cfa, axis)
 
 
 def test_the_smaller_gradient_wins_on_a_diagonal() -> None:

@@ -1,6 +1,7 @@
 """Piecewise linear estimation as a processor: flat fields, highlights, and other curves."""
 
 import warnings
+from itertools import product
 
 import numpy as np
 import pytest
@@ -29,11 +30,11 @@ def grey(tile, level_e):
     return raw_image(np.rint(np.minimum(electrons, FULL_E)) + 100, tile)
 
 
-@pytest.mark.parametrize(("name", "tile"), PHASES)
-def test_a_flat_grey_field_stays_flat_and_grey_in_every_phase(name, tile):
-    # the estimate leans on the prior: by 1 in 1000 at 1000 e-
-    rgb = PROCESSORS[name].develop(grey(tile, np.full((17, 20), 1000.0)), np.eye(3)).rgb
-    assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1e-3)
+def test_a_flat_grey_field_stays_flat_and_grey_in_every_phase():
+    for name, tile in PHASES:
+        # the estimate leans on the prior: by 1 in 1000 at 1000 e-
+        rgb = PROCESSORS[name].develop(grey(tile, np.full((17, 20), 1000.0)), np.eye(3)).rgb
+        assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1e-3), (name, tile)
 
 
 @pytest.mark.sample(1)
@@ -47,20 +48,19 @@ def test_highlights_stay_grey_and_end_at_greens_full_well(name):
     assert rgb[:, -20:] == pytest.approx(np.full((24, 20, 3), FULL_E), rel=1e-3)
 
 
-@pytest.mark.parametrize("light", ["D65", "2856K", "sodium_high", "sodium_low", "LED-B3", "LED-V1", "moonlight"])
-@pytest.mark.parametrize("name", INDEX)
-def test_the_own_curves_are_known_under_any_light(name, light):
-    (neutral,) = neutral_electrons(preset("low_noise"), [light])
-    assert not curves_differ(own_prior(), neutral[INDEX[name]], INDEX[name])
+def test_the_own_curves_are_known_under_any_light():
+    for name, light in product(INDEX, ["D65", "2856K", "sodium_high", "sodium_low", "LED-B3", "LED-V1", "moonlight"]):
+        (neutral,) = neutral_electrons(preset("low_noise"), [light])
+        assert not curves_differ(own_prior(), neutral[INDEX[name]], INDEX[name]), (light, name)
 
 
 # `wide` under 2856 K reads as the own curves do under LEDs: that one isn't seen.
-@pytest.mark.parametrize(("name", "light"), [("narrow", "D65"), ("narrow", "2856K"), ("wide", "D65")])
-def test_other_curves_are_warned_of_in_one_line(name, light):
-    (neutral,) = neutral_electrons(preset(f"studies/configs/sensors/{name}.toml"), [light])
-    raw = grey(RGBW_PHASES[0], np.full((16, 16), 1000.0))
-    with pytest.warns(UserWarning, match=r"^curves: a neutral reads .*`rodcone train`$"):
-        PROCESSORS["ple_rgbw"].develop(raw, np.eye(3), neutral=neutral)
+def test_other_curves_are_warned_of_in_one_line():
+    for name, light in [("narrow", "D65"), ("narrow", "2856K"), ("wide", "D65")]:
+        (neutral,) = neutral_electrons(preset(f"studies/configs/sensors/{name}.toml"), [light])
+        raw = grey(RGBW_PHASES[0], np.full((16, 16), 1000.0))
+        with pytest.warns(UserWarning, match=r"^curves: a neutral reads .*`rodcone train`$"):
+            PROCESSORS["ple_rgbw"].develop(raw, np.eye(3), neutral=neutral)
 
 
 def test_own_curves_are_not_warned_of():
@@ -100,31 +100,28 @@ def test_on_a_2x2_tile_any_mosaics_processor_is_that_mosaics_own(name, tile):
     assert np.array_equal(*pictures)
 
 
-@pytest.mark.parametrize("tile", [("W",), ("GW", "WG"), ("RW", "WW")])
-def test_one_or_two_channels_make_a_grey_picture(tile):
-    names = channels(tile)
-    fit = ColourFit(names, np.full(len(names), 0.3), np.full((len(names),) * 2, 0.1), np.full((len(names), 3), 0.1))
-    neutral = own_prior().neutral_e[["RGBW".index(name) for name in names]]
-    for matrix in (np.eye(3), fit):
-        rgb = PROCESSORS["ple"].develop(grey(tile, np.full((17, 20), 1000.0)), matrix, neutral=neutral).rgb
-        level = 1000.0 if "G" in names else neutral[-1] * 1000.0
-        assert rgb == pytest.approx(np.full(rgb.shape, level), rel=2e-3)
+def test_one_or_two_channels_make_a_grey_picture():
+    for tile in [("W",), ("GW", "WG"), ("RW", "WW")]:
+        names = channels(tile)
+        fit = ColourFit(names, np.full(len(names), 0.3), np.full((len(names),) * 2, 0.1), np.full((len(names), 3), 0.1))
+        neutral = own_prior().neutral_e[["RGBW".index(name) for name in names]]
+        for matrix in (np.eye(3), fit):
+            rgb = PROCESSORS["ple"].develop(grey(tile, np.full((17, 20), 1000.0)), matrix, neutral=neutral).rgb
+            level = 1000.0 if "G" in names else neutral[-1] * 1000.0
+            assert rgb == pytest.approx(np.full(rgb.shape, level), rel=2e-3), tile
 
 
-@pytest.mark.parametrize(
-    ("tile", "shape"),
-    [
+def test_what_the_prior_cant_develop_is_refused_in_one_line():
+    for tile, shape in [
         (("RC", "CB"), (16, 16)),
         (("RY", "YB"), (16, 16)),
         (("RGB",) * 3, (16, 16)),
         (("RG" * 4,) * 8, (16, 16)),
         (("W",), (1, 9)),
-    ],
-)
-def test_what_the_prior_cant_develop_is_refused_in_one_line(tile, shape):
-    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use any_mosaic") as error:
-        PROCESSORS["ple"].develop(raw_image(np.full(shape, 500), tile), np.eye(3))
-    assert "\n" not in str(error.value)
+    ]:
+        with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use any_mosaic") as error:
+            PROCESSORS["ple"].develop(raw_image(np.full(shape, 500), tile), np.eye(3))
+        assert "\n" not in str(error.value), (tile, shape)
 
 
 def test_other_curves_of_a_quad_mosaic_are_warned_of():

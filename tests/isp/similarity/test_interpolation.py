@@ -36,37 +36,39 @@ def test_weights_of_a_pixels_pairs_add_up_to_the_share_of_interpolated_letters()
         assert np.broadcast_to(total, has_pairs[0].shape) == pytest.approx(has_pairs.mean(axis=0))
 
 
-@pytest.mark.parametrize("step", [3.0, 40.0])
-@pytest.mark.parametrize("column", [8, 9])
-def test_a_step_in_closed_form(column, step):
+def test_a_step_in_closed_form():
     """One column on either side: of the four kinds of pairs all but those along a column differ by the step."""
-    mosaic = np.where(np.arange(18) < column, 20.0, 20.0 + step) * np.ones((16, 18))
-    share = 1 / 4 + 1 / 8 + 1 / 8  # along the row, and both diagonals
-    expected = np.zeros(18)
-    expected[[column - 1, column]] = max(share * step**2 / 4 - 3 / 8, 0.0)
-    variance = interpolation_variance(mosaic, RGBW, 1)
-    assert variance[1:-1] == pytest.approx(np.tile(expected, (14, 1)), abs=1e-12)
-    assert certainty(mosaic, RGBW, 1)[5, column] == pytest.approx(1 / (1 + expected[column] / 9))
-    # A patch adds up what its pixels have: rows alike, columns under it.
-    five = interpolation_variance(mosaic, RGBW, 5)
-    before_noise_is_cut = np.full(18, -3 / 8)
-    before_noise_is_cut[[column - 1, column]] += share * step**2 / 4
-    sums = np.convolve(before_noise_is_cut, np.ones(5), "same") * 5
-    assert five[5:-5, 4:-4] == pytest.approx(np.tile(np.maximum(sums, 0.0), (6, 1))[:, 4:-4], abs=1e-9)
+    for column, step in product([8, 9], [3.0, 40.0]):
+        mosaic = np.where(np.arange(18) < column, 20.0, 20.0 + step) * np.ones((16, 18))
+        share = 1 / 4 + 1 / 8 + 1 / 8  # along the row, and both diagonals
+        expected = np.zeros(18)
+        expected[[column - 1, column]] = max(share * step**2 / 4 - 3 / 8, 0.0)
+        variance = interpolation_variance(mosaic, RGBW, 1)
+        assert variance[1:-1] == pytest.approx(np.tile(expected, (14, 1)), abs=1e-12), (step, column)
+        assert certainty(mosaic, RGBW, 1)[5, column] == pytest.approx(1 / (1 + expected[column] / 9)), (step, column)
+        # A patch adds up what its pixels have: rows alike, columns under it.
+        five = interpolation_variance(mosaic, RGBW, 5)
+        before_noise_is_cut = np.full(18, -3 / 8)
+        before_noise_is_cut[[column - 1, column]] += share * step**2 / 4
+        sums = np.convolve(before_noise_is_cut, np.ones(5), "same") * 5
+        assert five[5:-5, 4:-4] == pytest.approx(np.tile(np.maximum(sums, 0.0), (6, 1))[:, 4:-4], abs=1e-9), (
+            step,
+            column,
+        )
 
 
-@pytest.mark.parametrize("tile", TILES)
-def test_noise_alone_makes_none_on_average(tile):
+def test_noise_alone_makes_none_on_average():
     """The mean before the cut at 0 is 0: shown where a wide sum leaves little of the scatter."""
-    noise = np.random.default_rng(5).normal(size=(200, 200))
-    patch = 41
-    # Far from the border no pair is cut. A sum scatters by less than patch * sqrt(10), as few neighbours correlate; cut
-    # at 0 its mean is 0.4 of that, so once that is far beyond chance.
-    variance = interpolation_variance(noise, tile, patch)[60:-60, 60:-60]
-    assert variance.mean() < patch * math.sqrt(10)
-    loud = interpolation_variance(1.1 * noise, tile, patch)[60:-60, 60:-60].mean()
-    share = float(np.mean(sum(opposite_pairs(tile).values())))
-    assert loud == pytest.approx(patch**2 * share * (1.1**2 - 1) / 2, abs=3 * patch * math.sqrt(10))
+    for tile in TILES:
+        noise = np.random.default_rng(5).normal(size=(200, 200))
+        patch = 41
+        # Far from the border no pair is cut. A sum scatters by less than patch * sqrt(10), as few neighbours correlate;
+        # cut at 0 its mean is 0.4 of that, so once that is far beyond chance.
+        variance = interpolation_variance(noise, tile, patch)[60:-60, 60:-60]
+        assert variance.mean() < patch * math.sqrt(10), tile
+        loud = interpolation_variance(1.1 * noise, tile, patch)[60:-60, 60:-60].mean()
+        share = float(np.mean(sum(opposite_pairs(tile).values())))
+        assert loud == pytest.approx(patch**2 * share * (1.1**2 - 1) / 2, abs=3 * patch * math.sqrt(10)), tile
 
 
 def test_pairs_tell_what_all_samples_of_the_planes_would():
@@ -90,11 +92,11 @@ def test_tiny_frames():
             assert np.isfinite(variance).all()
 
 
-@pytest.mark.parametrize("start", [(0, 0), (0, 1), (1, 0), (1, 1)])
-def test_a_neutral_edge_between_samples_gets_no_coloured_fringe(start):
+def test_a_neutral_edge_between_samples_gets_no_coloured_fringe():
     """All letters see the same step. Trusting the distances, each colour chooses a side: half the step between them."""
-    tile = tuple(row[start[1] :] + row[: start[1]] for row in RGBW[start[0] :] + RGBW[: start[0]])
-    electrons = np.where(np.arange(32) < 15, 400.0, 4000.0) * np.ones((24, 32))
-    raw = raw_image(electrons, tile, black_dn=0.0, white_dn=60000.0, read_noise_e=2.0, dsnu_e=0.0)
-    spread = np.ptp(reconstruct(raw), axis=2)[8:-8]
-    assert spread.max() < 0.2 * 3600.0
+    for start in [(0, 0), (0, 1), (1, 0), (1, 1)]:
+        tile = tuple(row[start[1] :] + row[: start[1]] for row in RGBW[start[0] :] + RGBW[: start[0]])
+        electrons = np.where(np.arange(32) < 15, 400.0, 4000.0) * np.ones((24, 32))
+        raw = raw_image(electrons, tile, black_dn=0.0, white_dn=60000.0, read_noise_e=2.0, dsnu_e=0.0)
+        spread = np.ptp(reconstruct(raw), axis=2)[8:-8]
+        assert spread.max() < 0.2 * 3600.0, start

@@ -41,18 +41,18 @@ def test_every_mosaic_that_the_page_offers_is_developed(processor):
         assert np.ptp(photograph(small_transport(), controls).picture) > 0, mosaic
 
 
-@pytest.mark.parametrize("frames", [1, 3])
-def test_without_any_noise_raw_is_the_rounded_expectation(frames):
+def test_without_any_noise_raw_is_the_rounded_expectation():
     """Shot noise and all other terms off; a full well is the converter's top."""
-    quiet = dict.fromkeys(("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s"), 0.0)
-    for level in (0.01, 25.0, 3000.0):
-        controls = Controls(level_cd_m2=level, pixel=quiet, shot_noise=False, frames=frames, seed=3)
-        exposed = photograph(small_transport(), controls).exposed
-        sensor, raw = exposed.sensor, exposed.raw
-        collected_e = np.minimum(exposed.expected_e, sensor.pixel.full_well_e)
-        wanted_dn = np.rint(collected_e / sensor.gain_e_per_dn)
-        assert sensor.black_dn == 0  # five standard deviations of nothing
-        np.testing.assert_allclose(raw.electrons, frames * wanted_dn * sensor.gain_e_per_dn, rtol=1e-12)
+    for frames in [1, 3]:
+        quiet = dict.fromkeys(("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s"), 0.0)
+        for level in (0.01, 25.0, 3000.0):
+            controls = Controls(level_cd_m2=level, pixel=quiet, shot_noise=False, frames=frames, seed=3)
+            exposed = photograph(small_transport(), controls).exposed
+            sensor, raw = exposed.sensor, exposed.raw
+            collected_e = np.minimum(exposed.expected_e, sensor.pixel.full_well_e)
+            wanted_dn = np.rint(collected_e / sensor.gain_e_per_dn)
+            assert sensor.black_dn == 0, frames  # five standard deviations of nothing
+            np.testing.assert_allclose(raw.electrons, frames * wanted_dn * sensor.gain_e_per_dn, rtol=1e-12)
 
 
 def test_without_shot_noise_read_noise_is_all_that_moves():
@@ -111,15 +111,15 @@ def test_the_level_is_reached_and_powers_are_shares():
     assert np.allclose(twice.exposed.expected_e, once.exposed.expected_e, rtol=1e-12)
 
 
-@pytest.mark.parametrize("lamp", [Lamp("A"), Lamp("6500K"), Lamp(table=GAUSSIAN)])
-def test_another_spectrum_keeps_the_groups_luminance(lamp):
-    transport = small_transport()
-    lit = photograph(transport, Controls(lamps={"sky": lamp})).exposed.transport
-    nm, width = np.arange(360.5, 830.0), np.ones(470)
-    before, after = (
-        luminance(each.groups["sky"].spectrum.band_average(nm, width), nm, width) for each in (transport, lit)
-    )
-    assert after == pytest.approx(before, rel=1e-9)
+def test_another_spectrum_keeps_the_groups_luminance():
+    for lamp in [Lamp("A"), Lamp("6500K"), Lamp(table=GAUSSIAN)]:
+        transport = small_transport()
+        lit = photograph(transport, Controls(lamps={"sky": lamp})).exposed.transport
+        nm, width = np.arange(360.5, 830.0), np.ones(470)
+        before, after = (
+            luminance(each.groups["sky"].spectrum.band_average(nm, width), nm, width) for each in (transport, lit)
+        )
+        assert after == pytest.approx(before, rel=1e-9), lamp
 
 
 def test_lamps_that_give_no_light_are_refused():

@@ -301,18 +301,15 @@ def test_notes_of_an_answer_are_few_and_short(session, monkeypatch):
 WIDE = {"neighbourhood": 41.0, "patch": 9.0}
 
 
-@pytest.mark.parametrize(
-    ("controls", "pixels", "shown"),
-    [
+def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_ended():
+    for controls, pixels, shown in [
         (Controls(), 2048**2, Controls()),
         (Controls(settings=WIDE), 64**2, Controls(settings=WIDE)),
         (Controls(settings=WIDE), 256**2, Controls()),
         (Controls(processor="interleaved_paper", settings=WIDE), 256**2, Controls(processor="interleaved_paper")),
         (Controls(processor="ple_bayer", mosaic="bayer"), 64**2, Controls(processor="bayer", mosaic="bayer")),
-    ],
-)
-def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_ended(controls, pixels, shown):
-    assert stand_in(controls, pixels) == shown
+    ]:
+        assert stand_in(controls, pixels) == shown, (controls, pixels, shown)
 
 
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):

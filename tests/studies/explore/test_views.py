@@ -20,34 +20,34 @@ ALL_TERMS = {
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("terms", [{}, ALL_TERMS, {"crosstalk": 0.1}, {"column_gain_spread": 0.02}])
-def test_the_sources_of_noise_add_up_to_the_noise_model(terms):
-    exposed = photograph(small_transport(), Controls(pixel=terms)).exposed
-    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
-    for row, column in ((0, 0), (13, 21), (39, 47)):
-        sources = noise_sources_e(exposed, row, column)
-        total = sources.pop("total")
-        assert total**2 == pytest.approx(variance[row, column], rel=1e-12)
-        assert sum(sigma**2 for sigma in sources.values()) == pytest.approx(total**2, rel=1e-9)
+def test_the_sources_of_noise_add_up_to_the_noise_model():
+    for terms in [{}, ALL_TERMS, {"crosstalk": 0.1}, {"column_gain_spread": 0.02}]:
+        exposed = photograph(small_transport(), Controls(pixel=terms)).exposed
+        variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+        for row, column in ((0, 0), (13, 21), (39, 47)):
+            sources = noise_sources_e(exposed, row, column)
+            total = sources.pop("total")
+            assert total**2 == pytest.approx(variance[row, column], rel=1e-12), terms
+            assert sum(sigma**2 for sigma in sources.values()) == pytest.approx(total**2, rel=1e-9), terms
 
 
-@pytest.mark.parametrize("terms", [{}, ALL_TERMS, {"column_gain_spread": 0.02, "hot_pixel_share": 0.0}])
-def test_without_shot_noise_the_budget_is_that_of_the_other_terms(terms):
+def test_without_shot_noise_the_budget_is_that_of_the_other_terms():
     """By hand: PRNU, hot pixels as a chip has them, column gains, fixed offsets, read noise, steps of the converter."""
-    exposed = photograph(small_transport(), Controls(pixel=terms, shot_noise=False)).exposed
-    pixel_, time_s, sources = exposed.sensor.pixel, exposed.exposure_s, noise_sources_e(exposed, 13, 21)
-    signal_e = spread_charge(exposed.expected_e, pixel_.crosstalk)[13, 21]
-    share, hot_e = pixel_.hot_pixel_share, pixel_.hot_pixel_dark_current_e_per_s * time_s
-    collected_e2 = (pixel_.prnu * signal_e) ** 2 + share * (1 - share) * hot_e**2
-    mean_e = signal_e + pixel_.dark_current_e_per_s * time_s + share * hot_e
-    gains_e2 = pixel_.column_gain_spread**2 * (collected_e2 + mean_e**2)
-    dark_e2 = pixel_.read_noise_e**2 + pixel_.fixed_dark_e**2 + exposed.sensor.gain_e_per_dn**2 / 12
-    assert (sources["shot noise"], sources["dark current"]) == (0.0, 0.0)
-    assert sources["total"] == pytest.approx((collected_e2 + gains_e2 + dark_e2) ** 0.5, rel=1e-9)
-    noisy = replace(exposed, shot_noise=True)
-    drawn_e = (exposed.expected_e + pixel_.dark_current_e_per_s * time_s + share * hot_e).mean()
-    less = noise_scale_e(noisy) ** 2 - noise_scale_e(exposed) ** 2
-    assert less == pytest.approx((1 + pixel_.column_gain_spread**2) * drawn_e, rel=1e-9)
+    for terms in [{}, ALL_TERMS, {"column_gain_spread": 0.02, "hot_pixel_share": 0.0}]:
+        exposed = photograph(small_transport(), Controls(pixel=terms, shot_noise=False)).exposed
+        pixel_, time_s, sources = exposed.sensor.pixel, exposed.exposure_s, noise_sources_e(exposed, 13, 21)
+        signal_e = spread_charge(exposed.expected_e, pixel_.crosstalk)[13, 21]
+        share, hot_e = pixel_.hot_pixel_share, pixel_.hot_pixel_dark_current_e_per_s * time_s
+        collected_e2 = (pixel_.prnu * signal_e) ** 2 + share * (1 - share) * hot_e**2
+        mean_e = signal_e + pixel_.dark_current_e_per_s * time_s + share * hot_e
+        gains_e2 = pixel_.column_gain_spread**2 * (collected_e2 + mean_e**2)
+        dark_e2 = pixel_.read_noise_e**2 + pixel_.fixed_dark_e**2 + exposed.sensor.gain_e_per_dn**2 / 12
+        assert (sources["shot noise"], sources["dark current"]) == (0.0, 0.0), terms
+        assert sources["total"] == pytest.approx((collected_e2 + gains_e2 + dark_e2) ** 0.5, rel=1e-9), terms
+        noisy = replace(exposed, shot_noise=True)
+        drawn_e = (exposed.expected_e + pixel_.dark_current_e_per_s * time_s + share * hot_e).mean()
+        less = noise_scale_e(noisy) ** 2 - noise_scale_e(exposed) ** 2
+        assert less == pytest.approx((1 + pixel_.column_gain_spread**2) * drawn_e, rel=1e-9), terms
 
 
 def test_the_light_budget_of_a_pixel():
@@ -91,11 +91,11 @@ def test_noise_is_grey_on_average_and_its_spread_is_the_models():
     assert noise_scale_e(shot.exposed) > 0
 
 
-@pytest.mark.parametrize("sensor", ["dual_gain", "staggered", "split_pixel"])
-def test_noise_of_several_readings_is_grey_on_average(sensor):
-    shot = photograph(small_transport(), Controls(sensor=sensor, level_cd_m2=1.0))
-    grey = VIEWS["noise"](shot)[..., 0].astype(float)
-    assert grey.mean() == pytest.approx(127.5, abs=3.0)
+def test_noise_of_several_readings_is_grey_on_average():
+    for sensor in ["dual_gain", "staggered", "split_pixel"]:
+        shot = photograph(small_transport(), Controls(sensor=sensor, level_cd_m2=1.0))
+        grey = VIEWS["noise"](shot)[..., 0].astype(float)
+        assert grey.mean() == pytest.approx(127.5, abs=3.0), sensor
 
 
 def test_terms_that_belong_to_readings_are_refused_in_one_line():
@@ -104,18 +104,18 @@ def test_terms_that_belong_to_readings_are_refused_in_one_line():
             photograph(small_transport(), Controls(sensor="dual_gain", **changed))
 
 
-@pytest.mark.parametrize("crosstalk", [0.0, 0.2])
-def test_crosstalk_is_no_noise(crosstalk):
+def test_crosstalk_is_no_noise():
     """Where light alone is noisy, noise over the square root of what each pixel collects has a variance of 1."""
-    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": crosstalk}
-    controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0)
-    shot = photograph(small_transport(), controls)
-    exposed = shot.exposed
-    sigma_e = noise_scale_e(exposed)
-    seen_e = (VIEWS["noise"](shot)[..., 0] / 127.5 - 1) * MOST_SIGMAS * sigma_e
-    variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
-    # The mean of 1920 squares spreads by 3.2 %, noise beyond black and white and steps of 8 bits move it by 2 %.
-    assert (seen_e**2 / variance).mean() == pytest.approx(1.0, abs=0.2)
+    for crosstalk in [0.0, 0.2]:
+        quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0, "crosstalk": crosstalk}
+        controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0)
+        shot = photograph(small_transport(), controls)
+        exposed = shot.exposed
+        sigma_e = noise_scale_e(exposed)
+        seen_e = (VIEWS["noise"](shot)[..., 0] / 127.5 - 1) * MOST_SIGMAS * sigma_e
+        variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
+        # The mean of 1920 squares spreads by 3.2 %, noise beyond black and white and steps of 8 bits move it by 2 %.
+        assert (seen_e**2 / variance).mean() == pytest.approx(1.0, abs=0.2), crosstalk
 
 
 def test_snr_is_of_what_a_pixel_collects():

@@ -32,11 +32,11 @@ def test_what_lies_outside_reads_as_the_end() -> None:
         pu21_encode([1.0, np.nan])
 
 
-@pytest.mark.parametrize("level", [20.0, 256.0, 500.0])
-def test_a_hundredth_of_the_peak_of_256_is_40_db_at_any_luminance(level: float) -> None:
-    truth = decode(np.full((8, 8), level))
-    picture = decode(np.where(np.indices((8, 8)).sum(axis=0) % 2, level + 2.56, level - 2.56))
-    assert pu21_psnr_db(picture, truth) == pytest.approx(40.0, abs=1e-6)
+def test_a_hundredth_of_the_peak_of_256_is_40_db_at_any_luminance() -> None:
+    for level in [20.0, 256.0, 500.0]:
+        truth = decode(np.full((8, 8), level))
+        picture = decode(np.where(np.indices((8, 8)).sum(axis=0) % 2, level + 2.56, level - 2.56))
+        assert pu21_psnr_db(picture, truth) == pytest.approx(40.0, abs=1e-6), level
 
 
 def test_the_same_error_in_cd_m2_counts_for_less_in_daylight() -> None:

@@ -39,23 +39,25 @@ def observer() -> SensorConfig:
     return camera(curves)
 
 
-@pytest.mark.parametrize("cfa", ["bayer", "rgbw"])
-def test_colour_matrices_take_each_illuminants_white_to_its_neutral(cfa: str) -> None:
-    colours = calibrate(low_noise(cfa), illuminant("D50"))
-    neutral_d65 = neutral_response("RGBW"[: len(colours.neutral)])
-    assert colours.xyz_to_camera_d65 @ white_xyz("D65") == pytest.approx(neutral_d65 / neutral_d65[1], rel=1e-12)
-    under_a = calibrate(low_noise(cfa), illuminant("A")).neutral
-    assert colours.xyz_to_camera_a @ white_xyz("A") == pytest.approx(under_a, rel=1e-12)
-    assert abs(under_a[2] / neutral_d65[2] * neutral_d65[1] - 1) > 0.3  # lamp light holds much less blue
+def test_colour_matrices_take_each_illuminants_white_to_its_neutral() -> None:
+    for cfa in ["bayer", "rgbw"]:
+        colours = calibrate(low_noise(cfa), illuminant("D50"))
+        neutral_d65 = neutral_response("RGBW"[: len(colours.neutral)])
+        assert colours.xyz_to_camera_d65 @ white_xyz("D65") == pytest.approx(neutral_d65 / neutral_d65[1], rel=1e-12), (
+            cfa
+        )
+        under_a = calibrate(low_noise(cfa), illuminant("A")).neutral
+        assert colours.xyz_to_camera_a @ white_xyz("A") == pytest.approx(under_a, rel=1e-12), cfa
+        assert abs(under_a[2] / neutral_d65[2] * neutral_d65[1] - 1) > 0.3, cfa  # lamp light holds much less blue
 
 
-@pytest.mark.parametrize("cfa", ["bayer", "rgbw"])
-def test_forward_matrices_take_a_balanced_neutral_to_d50(cfa: str) -> None:
-    colours = calibrate(low_noise(cfa), illuminant("D65"))
-    for matrix in (colours.camera_to_xyz_a, colours.camera_to_xyz_d65):
-        assert matrix.sum(axis=1) == pytest.approx(D50, rel=1e-12)
-    if cfa == "rgbw":
-        assert not colours.camera_to_xyz_d65[:, 3].any()  # W carries no colour
+def test_forward_matrices_take_a_balanced_neutral_to_d50() -> None:
+    for cfa in ["bayer", "rgbw"]:
+        colours = calibrate(low_noise(cfa), illuminant("D65"))
+        for matrix in (colours.camera_to_xyz_a, colours.camera_to_xyz_d65):
+            assert matrix.sum(axis=1) == pytest.approx(D50, rel=1e-12), cfa
+        if cfa == "rgbw":
+            assert not colours.camera_to_xyz_d65[:, 3].any(), cfa  # W carries no colour
 
 
 def test_as_shot_values_are_those_of_the_light_asked_for() -> None:
@@ -115,19 +117,16 @@ def test_speed_of_a_camera_without_green_is_not_noted() -> None:
     assert iso_speed(camera({"R": flat(), "G": blind, "B": flat()})) is None
 
 
-@pytest.mark.parametrize(
-    ("curves", "cfa", "message"),
-    [
+def test_what_cannot_be_calibrated_is_refused() -> None:
+    for curves, cfa, message in [
         (
             {"R": flat(), "G": flat(0.5), "B": Spectrum(np.array([900.0, 950.0]), np.array([1.0, 1.0]))},
             ("RG", "GB"),
             r"responses: B collects nothing under the light",
         )
-    ],
-)
-def test_what_cannot_be_calibrated_is_refused(curves: dict[str, Spectrum], cfa: tuple[str, ...], message: str) -> None:
-    with pytest.raises(InputError, match=message):
-        calibrate(camera(curves, cfa), illuminant("D65"))
+    ]:
+        with pytest.raises(InputError, match=message):
+            calibrate(camera(curves, cfa), illuminant("D65"))
 
 
 def test_three_equal_channels_are_refused() -> None:

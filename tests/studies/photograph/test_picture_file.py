@@ -1,6 +1,7 @@
 """Developed pictures as files: read back by Pillow, LittleCMS and tifffile, which didn't write them."""
 
 from io import BytesIO
+from itertools import product
 from pathlib import Path
 
 import numpy as np
@@ -19,15 +20,15 @@ def profile(content: bytes) -> ImageCms.ImageCmsProfile:
     return ImageCms.ImageCmsProfile(BytesIO(content))
 
 
-@pytest.mark.parametrize("name", ENCODINGS)
-def test_littlecms_reads_the_profile_and_takes_the_picture_to_srgb(name: str) -> None:
-    made = profile(icc_profile(ENCODINGS[name]))
-    assert ImageCms.getProfileDescription(made).strip() == ENCODINGS[name].title
-    assert (made.profile.version, made.profile.xcolor_space.strip()) == (4.4, "RGB")
-    picture = Image.fromarray(np.rint(encode(LINEAR, name) * 255).astype(np.uint8))
-    there = np.asarray(ImageCms.profileToProfile(picture, made, ImageCms.createProfile("sRGB")), dtype=float)
-    # 8 bits before and after: up to half a level each, times at most 1.3 for a P3 number seen in sRGB
-    assert np.abs(there - 255 * encode(LINEAR, "srgb")).max() <= 1.6
+def test_littlecms_reads_the_profile_and_takes_the_picture_to_srgb() -> None:
+    for name in ENCODINGS:
+        made = profile(icc_profile(ENCODINGS[name]))
+        assert ImageCms.getProfileDescription(made).strip() == ENCODINGS[name].title, name
+        assert (made.profile.version, made.profile.xcolor_space.strip()) == (4.4, "RGB"), name
+        picture = Image.fromarray(np.rint(encode(LINEAR, name) * 255).astype(np.uint8))
+        there = np.asarray(ImageCms.profileToProfile(picture, made, ImageCms.createProfile("sRGB")), dtype=float)
+        # 8 bits before and after: up to half a level each, times at most 1.3 for a P3 number seen in sRGB
+        assert np.abs(there - 255 * encode(LINEAR, "srgb")).max() <= 1.6, name
 
 
 def test_a_p3_png_says_so_twice() -> None:
@@ -46,18 +47,17 @@ def test_an_srgb_png_says_srgb_alone() -> None:
     assert b"cICP" not in content
 
 
-@pytest.mark.parametrize("name", ENCODINGS)
-@pytest.mark.parametrize("bits", [8, 16])
-def test_a_tiff_holds_the_numbers_and_the_profile(bits: int, name: str) -> None:
-    encoded = encode(LINEAR, name)
-    with tifffile.TiffFile(BytesIO(to_tiff(quantise(encoded, bits), name))) as file:
-        page = file.pages[0]
-        np.testing.assert_array_equal(page.asarray(), np.rint(encoded * (2**bits - 1)))
-        assert (page.bitspersample, page.photometric.name) == (bits, "RGB")
-        assert page.iccprofile == icc_profile(ENCODINGS[name])
-    if bits == 8:
-        with Image.open(BytesIO(to_tiff(quantise(encoded, bits), name))) as picture:
-            np.testing.assert_array_equal(np.asarray(picture), np.rint(encoded * 255))
+def test_a_tiff_holds_the_numbers_and_the_profile() -> None:
+    for bits, name in product([8, 16], ENCODINGS):
+        encoded = encode(LINEAR, name)
+        with tifffile.TiffFile(BytesIO(to_tiff(quantise(encoded, bits), name))) as file:
+            page = file.pages[0]
+            np.testing.assert_array_equal(page.asarray(), np.rint(encoded * (2**bits - 1)))
+            assert (page.bitspersample, page.photometric.name) == (bits, "RGB"), (name, bits)
+            assert page.iccprofile == icc_profile(ENCODINGS[name]), (name, bits)
+        if bits == 8:
+            with Image.open(BytesIO(to_tiff(quantise(encoded, bits), name))) as picture:
+                np.testing.assert_array_equal(np.asarray(picture), np.rint(encoded * 255))
 
 
 @pytest.mark.parametrize("ending", ["png", "TIF", "tiff"])

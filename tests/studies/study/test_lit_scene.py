@@ -37,13 +37,13 @@ def transport(luminances: tuple[float, float] = (100.0, 3.0)) -> Transport:
     return replace(flat, light=Halves(halves, 0 * halves), variance=0 * halves, groups=groups)
 
 
-@pytest.mark.parametrize("spectrum", ["A", "F11", "LED-B3"])
-def test_another_spectrum_keeps_the_luminance_of_each_light(spectrum: str) -> None:
-    lit = under(transport(), spectrum).relight()
-    # bands of 10 nm against the 1 nm in which an illuminant is brought to 1 cd/m^2: 1 % with the lines of F11
-    np.testing.assert_allclose(lit.luminance(), [[100.0, 3.0]] * 2, rtol=0.01)
-    shape = illuminant(spectrum).band_average(NM, np.full(NM.size, 10.0))
-    np.testing.assert_allclose(lit.values[0, 0], shape * 100.0, rtol=1e-6)
+def test_another_spectrum_keeps_the_luminance_of_each_light() -> None:
+    for spectrum in ["A", "F11", "LED-B3"]:
+        lit = under(transport(), spectrum).relight()
+        # bands of 10 nm against the 1 nm in which an illuminant is brought to 1 cd/m^2: 1 % with the lines of F11
+        np.testing.assert_allclose(lit.luminance(), [[100.0, 3.0]] * 2, rtol=0.01)
+        shape = illuminant(spectrum).band_average(NM, np.full(NM.size, 10.0))
+        np.testing.assert_allclose(lit.values[0, 0], shape * 100.0, rtol=1e-6)
 
 
 def test_own_changes_nothing_and_a_spectrum_has_its_luminance() -> None:
@@ -52,17 +52,15 @@ def test_own_changes_nothing_and_a_spectrum_has_its_luminance() -> None:
     assert spectral_luminance(illuminant("A") * 7.0) == pytest.approx(7.0, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("level", "per_cd_m2", "luminance"), [("25cd/m2", None, 25.0), ("25cd/m2", 4.0, 25.0), ("500lux", 4.0, 125.0)]
-)
-def test_levels_become_luminances(level: str, per_cd_m2: float | None, luminance: float) -> None:
-    assert level_luminance(level, per_cd_m2) == luminance
+def test_levels_become_luminances() -> None:
+    for level, per_cd_m2, luminance in [("25cd/m2", None, 25.0), ("25cd/m2", 4.0, 25.0), ("500lux", 4.0, 125.0)]:
+        assert level_luminance(level, per_cd_m2) == luminance, (level, per_cd_m2, luminance)
 
 
-@pytest.mark.parametrize("per_cd_m2", [None, 0.0])
-def test_lux_need_light_on_a_plane(per_cd_m2: float | None) -> None:
-    with pytest.raises(InputError, match="give it in cd/m2"):
-        level_luminance("500lux", per_cd_m2)
+def test_lux_need_light_on_a_plane() -> None:
+    for per_cd_m2 in [None, 0.0]:
+        with pytest.raises(InputError, match="give it in cd/m2"):
+            level_luminance("500lux", per_cd_m2)
 
 
 def test_the_longer_side_is_as_asked_and_a_file_keeps_its_own_proportions(tmp_path: Path) -> None:

@@ -35,16 +35,14 @@ def test_mosaics_are_those_of_the_processors_each_once() -> None:
     assert mosaics(replace(STUDY, processors=("bayer", "interleaved"))) == ("bayer", "rgbw")
 
 
-@pytest.mark.parametrize(
-    ("text", "seconds"), [("auto", None), ("10ms", 0.01), ("0.5 s", 0.5), ("200us", 2e-4), ("1e-2s", 0.01)]
-)
-def test_exposures_are_times_with_a_unit_or_auto(text: str, seconds: float | None) -> None:
-    assert parse_exposure(text) == (None if seconds is None else pytest.approx(seconds, rel=1e-15))
+def test_exposures_are_times_with_a_unit_or_auto() -> None:
+    for text, seconds in [("auto", None), ("10ms", 0.01), ("0.5 s", 0.5), ("200us", 2e-4), ("1e-2s", 0.01)]:
+        assert parse_exposure(text) == (None if seconds is None else pytest.approx(seconds, rel=1e-15)), (text, seconds)
 
 
-@pytest.mark.parametrize(("value", "name"), [("/a/b/desk.exr", "desk.exr"), ("low_noise", "low_noise"), (3, "3")])
-def test_files_are_called_by_their_own_names(value: object, name: str) -> None:
-    assert label(value) == name
+def test_files_are_called_by_their_own_names() -> None:
+    for value, name in [("/a/b/desk.exr", "desk.exr"), ("low_noise", "low_noise"), (3, "3")]:
+        assert label(value) == name, (value, name)
 
 
 def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:
@@ -54,24 +52,22 @@ def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:
     assert replace(STUDY, sensors=sensors).exposures == ("auto:information",)
 
 
-@pytest.mark.parametrize(
-    ("processors", "stated", "balances"),
-    [
+def test_white_balances_left_out_are_the_processors() -> None:
+    for processors, stated, balances in [
         (("interleaved", "bayer"), (), ("as-shot",)),
         (("interleaved_paper",), (), ("gray-world",)),  # it belongs to the published method
         (("bayer", "interleaved_paper"), (), ("as-shot", "gray-world")),
         (("interleaved_paper",), ("as-shot",), ("as-shot",)),
-    ],
-)
-def test_white_balances_left_out_are_the_processors(
-    processors: tuple[str, ...], stated: tuple[str, ...], balances: tuple[str, ...]
-) -> None:
-    assert replace(STUDY, processors=processors, white_balances=stated).white_balances == balances
+    ]:
+        assert replace(STUDY, processors=processors, white_balances=stated).white_balances == balances, (
+            processors,
+            stated,
+            balances,
+        )
 
 
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
+def test_faults_are_told_in_one_line() -> None:
+    for changes, words in [
         ({"levels": ()}, "levels: [] is not allowed; give one or more"),
         ({"seeds": (1, 1)}, "seeds: ['1', '1']"),
         ({"scenes": (SceneChoice("a/x.exr"), SceneChoice("b/x.exr"))}, "files under names of their own"),
@@ -96,13 +92,11 @@ def test_white_balances_left_out_are_the_processors(
         ({"render": replace(STUDY.render, noise_share=0.0)}, "render.noise_share"),
         ({"lens": replace(STUDY.lens, veiling_glare=2.0)}, "lens.veiling_glare"),
         ({"budget": replace(STUDY.budget, monte_carlo=0.2)}, "within budget.total"),
-    ],
-)
-def test_faults_are_told_in_one_line(changes: dict[str, object], words: str) -> None:
-    with pytest.raises(InputError) as told:
-        replace(STUDY, **changes)  # type: ignore[arg-type]
-    assert words in str(told.value)
-    assert "\n" not in str(told.value)
+    ]:
+        with pytest.raises(InputError) as told:
+            replace(STUDY, **changes)  # type: ignore[arg-type]
+        assert words in str(told.value), (changes, words)
+        assert "\n" not in str(told.value), (changes, words)
 
 
 def test_the_near_infrared_asks_for_lights_that_are_known_there() -> None:
@@ -115,7 +109,7 @@ def test_the_near_infrared_asks_for_lights_that_are_known_there() -> None:
         assert "\n" not in str(error.value)
 
 
-@pytest.mark.parametrize("range_nm", [(380.0,), (780.0, 380.0), (200.0, 780.0), (380.0, 1200.0), (380.0, 400.0)])
-def test_a_range_without_lights_or_without_a_band_is_refused(range_nm: tuple[float, ...]) -> None:
-    with pytest.raises(InputError, match="range_nm: "):
-        replace(STUDY, render=replace(STUDY.render, range_nm=range_nm))
+def test_a_range_without_lights_or_without_a_band_is_refused() -> None:
+    for range_nm in [(380.0,), (780.0, 380.0), (200.0, 780.0), (380.0, 1200.0), (380.0, 400.0)]:
+        with pytest.raises(InputError, match="range_nm: "):
+            replace(STUDY, render=replace(STUDY.render, range_nm=range_nm))

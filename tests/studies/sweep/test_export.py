@@ -13,10 +13,10 @@ from studies.sweep.database import COLUMNS, add, open_results, want
 from studies.sweep.export import read_rows, to_csv, write_csv
 
 
-@pytest.mark.parametrize("start", ["=", "+", "-", "@", "\t", "\r"])
-def test_a_text_that_a_spreadsheet_would_run_is_quoted(start: str) -> None:
-    table = list(csv.reader(StringIO(to_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")]), newline="")))
-    assert table[1][COLUMNS.index("scene")] == f"'{start}cmd|' /C calc'!A0"
+def test_a_text_that_a_spreadsheet_would_run_is_quoted() -> None:
+    for start in ["=", "+", "-", "@", "\t", "\r"]:
+        table = list(csv.reader(StringIO(to_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")]), newline="")))
+        assert table[1][COLUMNS.index("scene")] == f"'{start}cmd|' /C calc'!A0", start
 
 
 def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
