@@ -9,9 +9,9 @@ import sys
 from pathlib import Path
 
 import pytest
+from command_line import call, check_refusals
 
 from rodcone.memory import Limit, file_extent, memory, memory_limits
-from studies.commands.cli import main
 
 COMMANDS = {
     "render": ["render", "still_life", "--height", "4000", "--width", "4000", "-o", "out/picture.exr"],
@@ -67,17 +67,13 @@ def test_the_need_is_the_one_that_a_dry_run_tells(tmp_path: Path) -> None:
     assert f"needs about {dry[1]} GB;" in in_five_gb(COMMANDS["sweep"], tmp_path)[2]
 
 
-@pytest.mark.parametrize("arguments", [["capture", "flat_field", "--size", "32", "--spp", "4", "-o", "shot.tif"]])
-def test_force_goes_on(
-    arguments: list[str], capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_force_goes_on(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("rodcone.memory.memory_limits", lambda: [Limit("a test's", -1e12)])
-    for more, code, files in (([], 2, []), (["--force"], 0, ["shot.json", "shot.tif"])):
-        with pytest.raises(SystemExit) as stopped:
-            main([*arguments, *more])
-        assert (stopped.value.code, sorted(os.listdir())) == (code, files)
-    assert "allowed: -" in capsys.readouterr().err
+    arguments = "flat_field --size 32 --spp 4 -o shot.tif"
+    check_refusals("capture", [(arguments, "allowed: -")], tmp_path)
+    assert call(["capture", *arguments.split(), "--force"])[0] == 0
+    assert sorted(os.listdir()) == ["shot.json", "shot.tif"]
 
 
 def system(root: Path, **files: str) -> Path:

@@ -67,19 +67,6 @@ def test_a_fresh_installation_has_a_measured_camera(tmp_path, monkeypatch):
     assert err.count("\n") == 1
 
 
-@pytest.mark.thorough
-@pytest.mark.usefixtures("cameras")
-def test_the_gallery_draws_each_measured_camera(tmp_path, monkeypatch):
-    path = tmp_path / "cameras.svg"
-    assert call(["list", "sensors", "-o", path])[0] == 0
-    assert "Maker Model One" in path.read_text("utf-8")
-    monkeypatch.delenv(VARIABLE)
-    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
-    assert call(["list", "sensors", "-o", path])[0] == 0
-    assert "Maker Model One" not in path.read_text("utf-8")
-    assert "Nikon D5100*" in path.read_text("utf-8")
-
-
 @pytest.mark.usefixtures("cameras")
 def test_an_anchor_makes_it_absolute_and_what_is_missing_is_told(tmp_path):
     path = tmp_path / "one.toml"

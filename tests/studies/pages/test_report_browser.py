@@ -25,21 +25,23 @@ from studies.pages.report_pictures import ReportPictures, opened
 pytestmark = CHROME.NEEDED
 
 
+def written(folder: Path, results: ReportData, pictures: ReportPictures | None = None) -> Path:
+    """The page of a report, in a folder."""
+    file = folder / "report.html"
+    file.write_text(render_report(results, pictures or SAMPLE.sample_pictures(results)), encoding="utf-8")
+    return file
+
+
 @pytest.fixture(scope="module")
 def report(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of made-up results."""
-    file: Path = tmp_path_factory.mktemp("report") / "report.html"
-    file.write_text(render_report(*standard()), encoding="utf-8")
-    return file
+    return written(tmp_path_factory.mktemp("report"), *standard())
 
 
 @pytest.fixture(scope="module")
 def axes(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of several exposures and seeds."""
-    results = SAMPLE.sample_axes()
-    file: Path = tmp_path_factory.mktemp("axes") / "report.html"
-    file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
-    return file
+    return written(tmp_path_factory.mktemp("axes"), SAMPLE.sample_axes())
 
 
 def shown(page: Any) -> dict[str, Any]:
@@ -80,15 +82,6 @@ def pick(page: Any, control: str, value: object) -> None:
     """Choose a value of a select or an input."""
     chosen = f"one.value = {value!r}; one.dispatchEvent(new Event('input'))"
     page.evaluate(f"(() => {{ const one = {control}; {chosen} }})()")
-
-
-@pytest.mark.thorough
-def test_page_is_quiet_and_asks_for_nothing(browser: Any, report: Path) -> None:
-    page = CHROME.open_page(browser, report)
-    page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
-    shown(page)
-    assert CHROME.requests(page) == []
-    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough
@@ -268,9 +261,7 @@ def compared() -> ReportData:
 @pytest.fixture(scope="module")
 def four(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The page of `compared`."""
-    file: Path = tmp_path_factory.mktemp("four") / "report.html"
-    file.write_text(render_report(compared(), SAMPLE.sample_pictures(compared())), encoding="utf-8")
-    return file
+    return written(tmp_path_factory.mktemp("four"), compared())
 
 
 @pytest.mark.thorough
@@ -399,9 +390,7 @@ def test_marks_and_bands_of_the_charts_lie_where_the_rows_say(browser: Any, four
 def test_a_study_in_which_nothing_competes_shows_its_camera_beside_the_reference(browser: Any, tmp_path: Path) -> None:
     for levels in (3, 1):
         results = SAMPLE.sample_report(levels=levels, cameras=("bayer",), sensors=SAMPLE.SENSORS[:1])
-        file = tmp_path / "alone.html"
-        file.write_text(render_report(results, SAMPLE.sample_pictures(results)), encoding="utf-8")
-        page = CHROME.open_page(browser, file)
+        page = CHROME.open_page(browser, written(tmp_path, results))
         assert shown(page)["names"] == ["A: Bayer, bilinear", "B: Reference, 256 samples"]
         assert page.evaluate("document.querySelectorAll('#drawn [data-metric=psnr_db] .mark').length") == levels
         assert page.evaluate("document.querySelector('#lead')") is None
@@ -438,10 +427,8 @@ def test_exposures_are_chosen_and_compared(browser: Any, axes: Path) -> None:
 def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of two scenes under two spectra, of which one condition's pictures are left out."""
     results = SAMPLE.sample_views()
-    pictures = SAMPLE.sample_pictures(results)
     folder = tmp_path_factory.mktemp("views")
-    file: Path = folder / "report.html"
-    file.write_text(render_report(results, pictures), encoding="utf-8")
+    file = written(folder, results)
     # One of the two that are left out lies beside the page, the other is gone.
     name = results.cells[-2].first.picture  # type: ignore[union-attr]
     (folder / "pictures" / name).parent.mkdir(parents=True)

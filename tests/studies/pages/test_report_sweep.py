@@ -15,11 +15,11 @@ import numpy as np
 import pytest
 import report_sample as REPORTS
 import sweep_sample as SAMPLE
+from command_line import call, check_refusals
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from rodcone.errors import InputError
-from studies.commands.cli import main
 from studies.commands.report import write_report
 from studies.pages.report import group_views, render_report
 from studies.pages.report_compare import Comparison
@@ -220,33 +220,25 @@ def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path:
 
 
 @pytest.mark.thorough
-def test_the_command_writes_the_page_whole_and_prints_its_path(
-    out: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
-    for arguments, place in ((["-o", str(tmp_path / "r.html")], tmp_path / "r.html"), ([], out / "report.html")):
-        with pytest.raises(SystemExit) as stopped:
-            main(["report", str(out), *arguments])
-        assert (stopped.value.code, capsys.readouterr().out) == (0, f"{place}\n")
+def test_the_command_writes_the_page_whole_and_prints_its_path(out: Path, tmp_path: Path) -> None:
+    for arguments, place in ((["-o", tmp_path / "r.html"], tmp_path / "r.html"), ([], out / "report.html")):
+        assert call(["report", out, *arguments])[:2] == (0, f"{place}\n")
         assert place.read_text("utf-8").lstrip().startswith("<!doctype html>")
     (out / "report.html").unlink()
-    for arguments, code in ((["--pictures", "0"], 2), (["-o", str(tmp_path / "absent" / "r.html")], 1)):
-        with pytest.raises(SystemExit) as stopped:
-            main(["report", str(out), *arguments])
-        assert stopped.value.code == code
-        assert capsys.readouterr().err.count("\n") == 1
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["r.html"]
+    check_refusals(f"report {out}", [("--pictures 0", "pictures: 0")], out)
+    check_refusals(f"report {out}", [(f"-o {tmp_path}/absent/r.html", "choose another place")], tmp_path, code=1)
 
 
 def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_path: Path) -> None:
-    shutil.copytree(out / "pictures", tmp_path / "swept" / "pictures")
-    with closing(sqlite3.connect(out / FILE)) as base, closing(sqlite3.connect(tmp_path / "swept" / FILE)) as copy:
-        base.backup(copy)
+    part = copied(out, tmp_path)
+    (part / "pictures").unlink()
+    shutil.copytree(out / "pictures", part / "pictures")
     (tmp_path / "secret").write_bytes(b"not for the report")
-    picture = tmp_path / "swept" / "pictures" / read_rows(out)[0].picture
+    picture = part / "pictures" / read_rows(out)[0].picture
     picture.unlink()
     picture.symlink_to(tmp_path / "secret")
     with pytest.raises(InputError, match="does not lie in"):
-        sweep_report(tmp_path / "swept")
+        sweep_report(part)
 
 
 @pytest.mark.thorough

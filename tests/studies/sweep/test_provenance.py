@@ -18,7 +18,6 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from rodcone.llvm import LIBLLVM
 from studies.budget.ledger import Plan
-from studies.commands.cli import main
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
@@ -194,42 +193,3 @@ def test_a_report_over_mixed_cells_is_refused_in_one_line(tmp_path: Path) -> Non
         add(base, replace(found[-1], variant="llvm_ad_spectral"))
     with pytest.raises(InputError, match="Mitsuba variant"):
         sweep_report(out)
-
-
-IN_NUMPY = """
-import sys
-from studies.commands.cli import main
-main(sys.argv[1:])
-"""
-
-
-def in_numpy(*arguments: str) -> str:
-    """What the command prints in a process that has no LLVM."""
-    environment = {**os.environ, "DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"}
-    command = [sys.executable, "-c", IN_NUMPY, *arguments]
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
-
-
-@pytest.mark.thorough
-@pytest.mark.skipif(backend() != "llvm", reason="two engines are to meet in one folder")
-def test_a_folder_swept_without_a_backend_and_then_with_one_holds_no_mean_of_both(tmp_path: Path) -> None:
-    """The second sweep makes all anew; each row tells its own engine, threads and LLVM."""
-    SAMPLE.picture(tmp_path / "scene.exr")
-    study, out = tmp_path / "study.toml", tmp_path / "out"
-    study.write_text(
-        'scenes = [{source = "scene.exr", light = "E"}]\nlevels = ["1cd/m2"]\nprocessors = ["interleaved"]\n', "utf-8"
-    )
-    in_numpy("sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated")
-    (slow,) = read_rows(out)
-    assert (slow.development_engine, slow.threads, json.loads(slow.versions)["llvm"]) == ("numpy", 1, "none")
-    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated", "--json"]
-    with pytest.raises(SystemExit):
-        main(command)
-    (fast,) = read_rows(out)
-    assert (fast.development_engine, json.loads(fast.versions)["llvm"]) == ("llvm", versions()["llvm"])
-    assert len(read_rows(out, everything=True)) == 1
-    environment = sweep_report(out)[0].environment
-    assert environment["engine of development"] == "llvm"
-    assert environment["threads"] == str(fast.threads)

@@ -10,9 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sweep_sample as SAMPLE
+from command_line import call
 
 from rodcone.errors import InputError
-from studies.commands.cli import main
 from studies.pages.report import render_report
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import SceneChoice
@@ -93,8 +93,7 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Row]]:
     SAMPLE.picture(folder / "scene.exr")
     text = 'scenes = [{source = "scene.exr", light = "E"}]\nlevels = ["1cd/m2", "25cd/m2"]\nprocessors = ["bayer"]\n'
     (folder / "study.toml").write_text(text + "seeds = [0, 1, 2]\n", "utf-8")
-    with pytest.raises(SystemExit):
-        main(["sweep", str(folder / "study.toml"), "-o", str(folder / "out"), "--workers", "1", "--as-stated"])
+    call(["sweep", folder / "study.toml", "-o", folder / "out", "--workers", "1", "--as-stated"])
     return folder, read_rows(folder / "out")
 
 
@@ -150,11 +149,9 @@ def flipped(seed: int) -> Callable[[bytes], bytes]:
 DAMAGES |= {f"bits flipped, seed {seed}": flipped(seed) for seed in (*range(24), 58)}  # 58: a key in its table alone
 
 
-def told_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> int:
+def told_in_one_line(arguments: list[str]) -> int:
     """Exit code of a command that says what is wrong, if anything, in one line."""
-    with pytest.raises(SystemExit) as stopped:
-        main(arguments)
-    code, err = int(stopped.value.code or 0), capsys.readouterr().err
+    code, _, err = call(arguments)
     assert code in (0, 2)
     assert code == 0 or (err.count("\n") == 1 and err.startswith("rodcone: ")), err
     return code
@@ -163,19 +160,18 @@ def told_in_one_line(arguments: list[str], capsys: pytest.CaptureFixture[str]) -
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("name", DAMAGES)
 def test_a_damaged_ledger_is_one_line_and_no_row_is_another(
-    name: str, whole: tuple[Path, list[Row]], tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    name: str, whole: tuple[Path, list[Row]], tmp_path: Path
 ) -> None:
     folder, right = whole
     out = tmp_path / "out"
     shutil.copytree(folder / "out", out)
     (out / FILE).write_bytes(DAMAGES[name]((out / FILE).read_bytes()))
-    capsys.readouterr()
     for command in (["report"], ["export", "-o", str(tmp_path / "t.csv"), "--all"]):
-        told_in_one_line([command[0], str(out), *command[1:]], capsys)
+        told_in_one_line([command[0], str(out), *command[1:]])
     with suppress(InputError):
         assert [row for row in read_rows(out, everything=True) if row not in right] == []
     command = ["sweep", str(folder / "study.toml"), "-o", str(out), "--workers", "1", "--as-stated"]
-    if told_in_one_line(command, capsys) == 0:
+    if told_in_one_line(command) == 0:
         assert [row.key for row in read_rows(out)] == [row.key for row in right], "made again where it had to be"
 
 
