@@ -8,24 +8,18 @@ from rodcone.jit import backend
 
 needs_kernel = pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit a case takes minutes")
 
-# One or two of each kind, on the shared render alone and without a long search.
-QUICK = (
-    "starlight",
-    "neighbours_1e8",
-    "all_black_quiet",
-    "all_saturated",
-    "half_saturated",
-    "well_1e6_8bit",
-    "prnu_50",
-    "frame_5x7",
-)
+# One of each kind, on the shared render alone and without a long search; and more for `make test-all`.
+QUICK = ("all_saturated", "well_1e6_8bit", "frame_5x7")
+THOROUGH = ("starlight", "neighbours_1e8", "all_black_quiet", "half_saturated", "prnu_50")
 BY_NAME = {case.name: case for case in CASES}
 
 
+def marks(name):
+    return () if name in QUICK else pytest.mark.thorough if name in THOROUGH else pytest.mark.slow
+
+
 @needs_kernel
-@pytest.mark.parametrize(
-    "case", [pytest.param(case, id=case.name, marks=() if case.name in QUICK else pytest.mark.slow) for case in CASES]
-)
+@pytest.mark.parametrize("case", [pytest.param(case, id=case.name, marks=marks(case.name)) for case in CASES])
 def test_a_hard_case_keeps_its_invariants_but_for_exactly_its_known_limits(case):
     assert unexpected(run_case(case)) == []
 
@@ -35,7 +29,7 @@ def test_the_catalogue_names_each_of_at_least_60_cases_once():
     assert all(case.setup and bool(case.own) == bool(case.promise) for case in CASES)
     assert {name for name, _ in LIMITS} <= set(BY_NAME)
     assert {name for _, name in LIMITS} <= {*INVARIANTS, OWN}
-    assert set(QUICK) <= set(BY_NAME)
+    assert {*QUICK, *THOROUGH} <= set(BY_NAME)
 
 
 @needs_kernel

@@ -53,13 +53,6 @@ def assert_equal(one, other):
     assert one.relight().relative_mc_error == other.relight().relative_mc_error
 
 
-def test_a_second_call_loads_the_same_bits_and_renders_nothing(tmp_path, renders):
-    one = small(tmp_path)
-    two = small(tmp_path)
-    assert len(renders) == 1
-    assert_equal(one, two)
-
-
 def test_a_real_render_is_found_again(tmp_path, monkeypatch):
     one = small(tmp_path)
     monkeypatch.setattr(engine, "_render", None)  # a second render would fail
@@ -147,14 +140,6 @@ def test_a_mesh_whose_file_changed_is_another_entry(tmp_path, renders):
     assert len(renders) == 2
 
 
-def test_a_moved_camera_is_another_entry(tmp_path, renders):
-    one = load("flat_field")
-    moved = one.geometry | {"sensor": one.geometry["sensor"] | {"to_world": one.geometry["wall"]["to_world"]}}
-    small(tmp_path)
-    small(tmp_path, replace(one, geometry=moved))
-    assert len(renders) == 2
-
-
 def test_the_same_lights_in_other_groups_or_another_order_are_another_entry(tmp_path, renders):
     one = load("flat_field")
     geometry = one.geometry | {"lamp": {"type": "point", "position": [0, 0, 2]}}
@@ -165,27 +150,17 @@ def test_the_same_lights_in_other_groups_or_another_order_are_another_entry(tmp_
     assert len(renders) == 3
 
 
-def test_another_engine_version_is_another_entry(tmp_path, renders, monkeypatch):
+def test_a_render_of_other_versions_is_another_entry(tmp_path, renders, monkeypatch):
+    told = metadata.version
+    small(tmp_path)
+    for library in ("mitsuba", "drjit"):
+        monkeypatch.setattr(metadata, "version", lambda name, old=library: "0.1" if name == old else told(name))
+        small(tmp_path)
+    monkeypatch.setattr("render.cache.compiler_version", lambda: "0.1")
     small(tmp_path)
     monkeypatch.setattr("render.cache.ENGINE_VERSION", 10**6)
     small(tmp_path)
-    assert len(renders) == 2
-
-
-@pytest.mark.parametrize("library", ["mitsuba", "drjit"])
-def test_a_render_of_another_version_is_another_entry(library, tmp_path, renders, monkeypatch):
-    small(tmp_path)
-    told = metadata.version
-    monkeypatch.setattr(metadata, "version", lambda name: "0.1" if name == library else told(name))
-    small(tmp_path)
-    assert len(renders) == 2
-
-
-def test_a_render_of_another_compiler_is_another_entry(tmp_path, renders, monkeypatch):
-    small(tmp_path)
-    monkeypatch.setattr("render.cache.compiler_version", lambda: "0.1")
-    small(tmp_path)
-    assert len(renders) == 2
+    assert len(renders) == 5
 
 
 def after(folder, damage):
@@ -207,18 +182,12 @@ def flipped(position, bit=3):
     return damage
 
 
-@pytest.mark.parametrize("kept", [0, 1, 100, 0.5, 0.9, -1])
+@pytest.mark.parametrize("kept", [0, 0.5, -1])
 def test_a_truncated_file_is_rendered_again(kept, tmp_path, renders, rendered):
     results = after(tmp_path, lambda stored: stored[: int(kept * len(stored)) if 0 < kept < 1 else kept])
     assert len(renders) == 2
     for result in results:
         assert_equal(result, rendered)
-
-
-def test_a_file_of_something_else_is_rendered_again(tmp_path, renders, rendered):
-    for result in after(tmp_path, lambda stored: b"not a render"):
-        assert_equal(result, rendered)
-    assert len(renders) == 2
 
 
 def test_a_flipped_bit_of_the_radiance_is_noticed(tmp_path, renders, rendered):

@@ -10,13 +10,13 @@ import signal
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
-from itertools import pairwise
 from operator import attrgetter
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
 
@@ -24,7 +24,7 @@ from render import engine
 from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
-from render.limits import LEAST_POINTS, chunk_from
+from render.limits import LEAST_POINTS
 from render.loader import Film, load_groups, mitsuba_module
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
@@ -226,7 +226,8 @@ def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
     assert np.quantile(np.abs(z), 0.9) < 25.0
 
 
-@pytest.mark.parametrize("max_depth", [2, 3, 16, 1 << 16])
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("max_depth", [2, 16, 1 << 16])
 def test_a_glowing_cavity_is_the_geometric_series_of_its_reflectance(max_depth):
     made = render(replace(cavity(), max_depth=max_depth), (8, 8), wavelength_nm=BANDS_NM, spp=512)
     truth = (1 - 0.8**max_depth) / (1 - 0.8)
@@ -320,10 +321,6 @@ def test_a_black_wall_is_black():
     assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
 
 
-def test_a_wall_in_front_of_the_sky_hides_it(wall):
-    assert not wall.coverage.mean.any()
-
-
 def small(seed=0, **options):
     return render(noisy_wall(), (3, 4), **({"wavelength_nm": BANDS_NM, "spp": 8, "seed": seed} | options))
 
@@ -401,11 +398,6 @@ def test_seconds_are_those_of_all_the_calls_that_a_render_took(monkeypatch):
     assert (on.spp, on.seconds) == (16, 6.0)
 
 
-def test_samples_end_a_render_before_an_error_out_of_reach():
-    made = small(noise=1e-6, spp=16)
-    assert (made.spp, made.stopped_by) == (16, "samples")
-
-
 @pytest.mark.thorough
 def test_time_asked_for_ends_a_render_after_one_run_at_least():
     made = small(max_seconds=0.001, spp=None)
@@ -421,10 +413,11 @@ def test_a_ceiling_of_samples_ends_a_render():
     assert small(spp=None, max_spp=24).spp == 24
     made = small(spp=None, max_spp=200, noise=1e-6)
     assert (made.stopped_by, made.spp) == ("samples", 208)  # 100 points of each half lie within a chunk of eight
-    text = complaint(small, spp=8, max_spp=16)
+    text = refusal(small, spp=8, max_spp=16)
     assert text == "spp and max_spp: 8 and 16 are both given; allowed: one; leave spp out"
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("stops", [[2], [8, 10], [16, 18, 36], [36, 40, 80, 144]])
 def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrupted(stops):
     """Stopped anywhere, with another number of threads each time, and by another rule at the end."""
@@ -450,20 +443,11 @@ def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrup
     assert part.spp == stops[-1], "what was gone on from is untouched"
 
 
-def test_chunks_follow_from_their_place_and_end_at_powers_of_two():
-    count, ends = 0, []
-    while count < 1 << 12:
-        count += chunk_from(count)
-        ends.append(count)
-    assert all(1 << power in ends for power in range(13))
-    assert max((after - before) / before for before, after in pairwise(ends[7:])) <= 1 / 8
-
-
 def test_a_result_of_another_render_is_not_gone_on_from():
     part = small(spp=4)
     for options in ({"width_nm": 40.0}, {"wavelength_nm": NARROWER_NM}):
-        assert complaint(small, spp=16, resume=part, **options).startswith("resume: (group, band, h, w) (1, 8, 3, 4)")
-    assert complaint(render, load("flat_field"), (4, 4), wavelength_nm=BANDS_NM, resume=part).startswith("resume: ")
+        assert refusal(small, spp=16, resume=part, **options).startswith("resume: (group, band, h, w) (1, 8, 3, 4)")
+    assert refusal(render, load("flat_field"), (4, 4), wavelength_nm=BANDS_NM, resume=part).startswith("resume: ")
 
 
 def test_control_c_keeps_what_was_made_so_far(tmp_path):
@@ -493,12 +477,6 @@ def test_a_second_control_c_gives_up(tmp_path):
 def test_a_render_in_another_thread_leaves_control_c_alone():
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(small).result().stopped_by == "samples"
-
-
-def test_the_error_reached_is_told():
-    made = small(spp=64)
-    assert made.relative_mc_error == pytest.approx(made.relight().relative_mc_error, rel=1e-5)
-    assert 0 < made.relative_mc_error < 0.05
 
 
 def test_progress_rises_to_one_with_the_error_so_far():
@@ -532,53 +510,38 @@ def test_bands_of_any_number_and_width_are_rendered():
     assert ratio == pytest.approx(expected, rel=5e-3)
 
 
-def complaint(call, *args, **options):
-    with pytest.raises(InputError) as caught:
-        call(*args, **options)
-    text = str(caught.value)
-    assert "\n" not in text
-    return text
-
-
 @loop("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
 def test_a_bad_size_is_refused_with_its_value(size):
-    text = complaint(render, load("flat_field"), size)
+    text = refusal(render, load("flat_field"), size)
     assert text == f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768"
 
 
 @loop(
-    ("name", "value", "allowed"),
+    ("name", "value", "words"),
     [
-        ("spp", 0, "1 to 65536"),
-        ("spp", -4, "1 to 65536"),
-        ("spp", 1 << 17, "1 to 65536"),
-        ("noise", 0.0, "1e-06 to 10"),
-        ("noise", np.nan, "1e-06 to 10"),
-        ("noise", -0.1, "1e-06 to 10"),
-        ("max_seconds", 0.0, "0.001 to 1e+07"),
-        ("max_seconds", np.inf, "0.001 to 1e+07"),
-        ("max_depth", 1, "2 to 65536"),
-        ("seed", -1, "0 to 9"),
+        ("spp", 0, "spp: 0 is outside 1 to 65536"),
+        ("spp", 1 << 17, "spp: 131072 is outside 1 to 65536"),
+        ("spp", 2.5, "spp: 2.5 "),
+        ("noise", 0.0, "noise: 0.0 is outside 1e-06 to 10"),
+        ("max_seconds", 0.0, "max_seconds: 0.0 is outside 0.001 to 1e+07"),
+        ("max_depth", 1, "max_depth: 1 is outside 2 to 65536"),
+        ("max_depth", 2.5, "max_depth: 2.5 "),
+        ("seed", -1, "seed: -1 is outside 0 to 9"),
+        ("wavelength_nm", [500.0, 400.0], "wavelength_nm"),
+        ("width_nm", -1.0, "width_nm"),
     ],
 )
-def test_a_bad_limit_is_refused_with_its_value_and_what_is_allowed(name, value, allowed):
-    assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} is outside {allowed}")
+def test_a_limit_or_a_band_that_cannot_be_is_refused_with_its_value(name, value, words):
+    assert words in refusal(small, **{name: value})
 
 
-@loop(("name", "value"), [("spp", 2.5), ("seed", 1.5), ("max_depth", 2.5)])
-def test_a_count_that_is_not_whole_is_refused_with_its_value(name, value):
-    assert complaint(small, **{name: value}).startswith(f"{name}: {value!r} ")
-
-
-@loop("bands", [{"wavelength_nm": [500.0, 400.0]}, {"wavelength_nm": [550.0]}, {"width_nm": -1.0}])
-def test_bad_bands_are_refused(bands):
-    assert "_nm" in complaint(small, **bands)
-
-
-def test_a_scene_without_light_is_refused():
+def test_a_scene_without_light_or_with_a_node_that_mitsuba_does_not_know_is_refused():
     geometry = {name: node for name, node in load("flat_field").geometry.items() if name != "sky"}
-    text = complaint(render, Scene("cave", geometry, {}), (2, 2))
+    text = refusal(render, Scene("cave", geometry, {}), (2, 2))
     assert text == "scene cave: it has no light; allowed: one light group or more; add one"
+    text = refusal(render, ball_under_the_sky({"type": "velvet"}), (2, 2))
+    assert text.startswith("scene ball: Mitsuba can't load it: ")
+    assert "velvet" in text
 
 
 @pytest.fixture
@@ -595,33 +558,21 @@ def ball_under_the_sky(bsdf):
     return Scene("ball", geometry, {"sky": LightGroup(("sky",), flat())})
 
 
-def test_a_node_that_mitsuba_does_not_know_is_refused():
-    text = complaint(render, ball_under_the_sky({"type": "velvet"}), (2, 2))
-    assert text.startswith("scene ball: Mitsuba can't load it: ")
-    assert "velvet" in text
-
-
-def test_a_blend_whose_weight_is_a_spectrum_is_refused(freed):
-    blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
-    text = complaint(render, ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
-    assert "not implemented" in text  # Mitsuba's reason
-
-
 def test_a_refused_scene_does_not_spoil_the_next_render_while_its_error_is_kept():
     blend = {"type": "blendbsdf", "weight": RAMP, "matte": {"type": "diffuse"}, "mirror": {"type": "conductor"}}
-    with pytest.raises(InputError) as kept:
+    with pytest.raises(InputError, match="not implemented") as kept:  # Mitsuba's reason
         render(ball_under_the_sky(blend), (2, 2), wavelength_nm=BANDS_NM, spp=8)
     assert render(ball_under_the_sky({"type": "diffuse"}), (2, 2), wavelength_nm=BANDS_NM, spp=8).radiance.any()
-    assert "not implemented" in str(kept.value)
+    assert "\n" not in str(kept.value)
 
 
 def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     hair = {"type": "hair", "eumelanin": 1.0}  # picks lobes by the attenuation of the path's first wavelengths
-    text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
+    text = refusal(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
     assert text.startswith("scene ball: ball/bsdf of type 'hair' chooses where light goes by wavelength")
     assert "allowed: 4 bands a render; replace it, nearest: principled or roughplastic" in text
     monkeypatch.setattr("render.loader.walk", lambda node: ())  # as a plug-in that isn't known by its name
-    text = complaint(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
+    text = refusal(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
     assert text.startswith("scene: a material chooses where light goes by wavelength")
     assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
 

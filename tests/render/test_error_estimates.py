@@ -17,11 +17,6 @@ NM = np.arange(505.0, 600.0, 10.0)
 WIDTH_NM = band_widths(NM, None)
 
 
-def test_the_relative_error_of_uniform_planes_is_standard_error_over_mean():
-    values, variance = np.full((1, 3, 8, 9), 4.0, np.float32), np.full((1, 3, 8, 9), 0.25, np.float32)
-    assert relative_error(ONE, values, variance) == pytest.approx(0.5 / 4.0, rel=1e-6)
-
-
 def variance_of(light, difference, lamp=0.0, lamp_difference=0.0, rates=1):
     """Stated variance of one group's light (band, h, w), of which a lamp in view gives a part (h, w)."""
     shape = np.broadcast_shapes(*(np.shape(x) for x in (light, difference, lamp, lamp_difference)))
@@ -114,12 +109,6 @@ def test_the_relative_error_does_not_mix_bands_and_leaves_dark_values_out():
     values[:, 1], variance[:, 1] = 0.0, 100.0
     assert relative_error(ONE[:, :2], values, variance) == pytest.approx(0.1, rel=1e-6)
     assert relative_error(ONE[:, :1], np.zeros((1, 1, 2, 2), np.float32), variance[:, 1:, :2, :2]) == 0.0
-
-
-def test_of_several_lights_values_add_and_variances_add_with_the_squared_emission():
-    emitted = np.array([[3.0], [1.0]])
-    values, variance = np.ones((2, 1, 5, 4), np.float32), np.full((2, 1, 5, 4), 0.01, np.float32)
-    assert relative_error(emitted, values, variance) == pytest.approx(0.1 * np.sqrt(10.0) / 4.0, rel=1e-6)
 
 
 @loop("correlation", [-1.0, -0.3, 0.0, 1.0])

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from loop import loop
 
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.loader import mitsuba_module
@@ -16,33 +15,6 @@ def mitsubas():
     import mitsuba.scalar_rgb as mi
 
     return mi.ScalarTransform4f
-
-
-def test_translate_moves_points_and_leaves_directions():
-    assert np.array_equal(translate(1, -2, 3) @ [0, 0, 0, 1], [1, -2, 3, 1])
-    assert np.array_equal(translate(1, -2, 3) @ [5, 6, 7, 0], [5, 6, 7, 0])
-
-
-def test_scale_stretches_each_axis():
-    assert np.array_equal(scale(2, 3, 4) @ [1, 1, 1, 1], [2, 3, 4, 1])
-
-
-@loop(
-    ("axis", "start", "end"),
-    [((0, 0, 5), (1, 0, 0), (0, 1, 0)), ((1, 0, 0), (0, 1, 0), (0, 0, 1)), ((0, 2, 0), (0, 0, 1), (1, 0, 0))],
-)
-def test_a_quarter_turn_is_right_handed_whatever_the_axis_length(axis, start, end):
-    assert (rotate(axis, 90.0) @ [*start, 0])[:3] == pytest.approx(end, abs=1e-15)
-
-
-def test_a_third_of_a_turn_about_the_diagonal_permutes_the_axes():
-    assert (rotate((1, 1, 1), 120.0) @ [1, 2, 3, 0])[:3] == pytest.approx([3, 1, 2], abs=1e-14)
-
-
-def test_a_rotation_keeps_lengths_and_undoes_itself():
-    turn = rotate((0.3, -2.0, 0.7), 33.0)
-    assert turn @ turn.T == pytest.approx(np.eye(4), abs=1e-15)
-    assert turn @ rotate((0.3, -2.0, 0.7), -33.0) == pytest.approx(np.eye(4), abs=1e-15)
 
 
 def test_look_at_puts_the_origin_in_place_and_faces_the_target():

@@ -66,13 +66,6 @@ def test_y_of_the_tristimulus_is_the_luminance_and_d65_has_its_published_chromat
     assert xyz[:2] / xyz.sum() == pytest.approx([0.31272, 0.32903], abs=3e-4)  # CIE 15
 
 
-def test_equal_energy_has_equal_tristimulus_values():
-    nm = np.arange(360.5, 830.0)
-    x, y, z = tristimulus(np.ones(nm.size), nm, np.ones(nm.size))
-    assert x / y == pytest.approx(1.0, abs=2e-4)
-    assert z / y == pytest.approx(1.0, abs=5e-4)
-
-
 def test_colour_matching_functions_are_nowhere_negative_and_v_peaks_at_555_nm():
     v = colour_matching_functions()[1]
     assert min(curve.values.min() for curve in colour_matching_functions()) >= 0
@@ -82,12 +75,6 @@ def test_colour_matching_functions_are_nowhere_negative_and_v_peaks_at_555_nm():
 
 def test_v_equals_isetcams_table():
     assert luminous_efficiency(V_NM, np.full(V_NM.size, 1e-3)) == pytest.approx(V, abs=1e-4)  # 4 digits there
-
-
-def test_one_lux_of_d65_is_11140_photons_per_square_micrometre_and_second():
-    spectral = illuminant("D65").band_average(ISET_NM, ISET_WIDTH_NM)
-    lux = luminance(spectral, ISET_NM, ISET_WIDTH_NM)
-    assert photons(spectral / lux, ISET_NM, ISET_WIDTH_NM) * 1e-12 == pytest.approx(1.114e4, rel=1e-3)
 
 
 @loop(("light", "expected"), list(PHOTON_RADIANCE.items()))

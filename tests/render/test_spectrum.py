@@ -5,24 +5,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop import loop
+from refusal import refusal
 
 from render.photometry import LIGHT_M_S, PLANCK_J_S
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, black_body, flat, line_bands, line_spectrum
-from rodcone.errors import InputError
 from sensor.optics import SpectralIrradiance
 
 BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019
-WIEN_NM_K = 2.897771955e6  # CODATA 2018
 TENT = Spectrum(np.array([400.0, 500.0, 700.0]), np.array([0.0, 1.0, 0.0]))
-
-
-def complaint(call, *args):
-    with pytest.raises(InputError) as caught:
-        call(*args)
-    text = str(caught.value)
-    assert "\n" not in text
-    return text
 
 
 @loop(
@@ -79,29 +70,20 @@ def test_default_bands_fill_the_visible_range():
     assert DEFAULT_WAVELENGTH_NM.size == 40
 
 
-def test_a_spectrum_times_a_number_keeps_its_points():
-    assert np.array_equal((TENT * 2.5).values, [0.0, 2.5, 0.0])
-    assert np.array_equal((TENT * 2.5).wavelength_nm, TENT.wavelength_nm)
-
-
-def test_a_spectrum_holds_its_own_copy_of_the_points():
-    nm, values = np.array([400.0, 500.0]), np.array([1.0, 1.0])
-    spectrum = Spectrum(nm, values)
-    values[:], nm[:] = 7.0, [1.0, 2.0]
-    assert spectrum.band_average(450.0, 10.0) == 1.0
-
-
 @loop("nm", [[500.0], [500.0, 500.0], [500.0, 400.0], [[400.0, 500.0]], [400.0, np.nan], []])
 def test_wavelengths_that_do_not_increase_are_refused_with_their_values(nm):
-    text = complaint(Spectrum, np.array(nm), np.ones_like(np.array(nm)))
+    text = refusal(Spectrum, np.array(nm), np.ones_like(np.array(nm)))
     assert text.startswith(f"wavelength_nm: {nm!r} is not allowed; give two or more strictly increasing")
 
 
 @loop("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
 def test_values_that_are_not_finite_positive_or_one_a_wavelength_are_refused(values):
-    text = complaint(Spectrum, np.array([400.0, 500.0]), np.array(values))
-    assert "spectrum values" in text
-    assert "2 finite numbers >= 0, one a wavelength; correct them" in text
+    refusal(
+        Spectrum,
+        np.array([400.0, 500.0]),
+        np.array(values),
+        words=("spectrum values", "2 finite numbers >= 0, one a wavelength; correct them"),
+    )
 
 
 def test_band_widths_are_the_spacing_of_even_centres():
@@ -116,19 +98,17 @@ def test_band_widths_given_are_kept_and_one_width_serves_all():
 
 @loop("nm", [[500.0], [400.0, 410.0, 425.0]])
 def test_bands_without_even_spacing_need_a_width(nm):
-    text = complaint(band_widths, nm, None)
-    assert f"{len(nm)} bands" in text
-    assert "give width_nm as well" in text
+    refusal(band_widths, nm, None, words=(f"{len(nm)} bands", "give width_nm as well"))
 
 
 @loop("nm", [[], [500.0, 400.0], [500.0, 500.0], [-10.0, 10.0], [0.0, 10.0], [400.0, np.inf]])
 def test_centres_that_do_not_increase_from_above_zero_are_refused_with_their_values(nm):
-    assert complaint(band_widths, nm, 10.0).startswith(f"wavelength_nm: {nm!r} is not allowed; give increasing")
+    assert refusal(band_widths, nm, 10.0).startswith(f"wavelength_nm: {nm!r} is not allowed; give increasing")
 
 
 @loop("width", [0.0, -1.0, np.nan, np.inf])
 def test_widths_that_are_not_positive_are_refused_with_their_values(width):
-    assert complaint(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
+    assert refusal(band_widths, [400.0, 500.0], [10.0, width]).startswith(f"width_nm: {[10.0, width]!r} is not")
 
 
 NOT_NM = [
@@ -141,17 +121,17 @@ NOT_NM = [
 
 @loop(("nm", "words"), NOT_NM)
 def test_a_spectrum_over_what_is_no_nanometres_is_refused_and_the_unit_named(nm, words):
-    assert words in complaint(Spectrum, nm, np.ones(3))
+    assert words in refusal(Spectrum, nm, np.ones(3))
 
 
 @loop(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
 def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor, unit):
     nm = np.arange(385.0, 780.0, 10.0) * factor
     for refuse in (
-        lambda: complaint(band_widths, nm, None),
-        lambda: complaint(band_widths, nm, 10.0 * factor),
-        lambda: complaint(SpectralRadiance, np.ones((2, 2, 40)), nm),
-        lambda: complaint(SpectralIrradiance, np.ones((2, 2, 40)), nm, 2.2),
+        lambda: refusal(band_widths, nm, None),
+        lambda: refusal(band_widths, nm, 10.0 * factor),
+        lambda: refusal(SpectralRadiance, np.ones((2, 2, 40)), nm),
+        lambda: refusal(SpectralIrradiance, np.ones((2, 2, 40)), nm, 2.2),
     ):
         text = refuse()
         assert text.startswith(f"wavelength_nm: {380 * factor:g} to {780 * factor:g} is outside 100 to 20000 nm")
@@ -160,19 +140,23 @@ def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor
 
 def test_the_ends_of_what_counts_as_nanometres_are_taken():
     assert band_widths([105.0, 19_990.0], [10.0, 20.0]).tolist() == [10.0, 20.0]
-    assert "99.9 to" in complaint(band_widths, [105.0, 500.0], [10.2, 10.0])
+    assert "99.9 to" in refusal(band_widths, [105.0, 500.0], [10.2, 10.0])
     assert Spectrum(np.array([100.0, 20_000.0]), np.ones(2)).band_average(550.0, 10.0) == 1.0
 
 
 @loop("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
 def test_bands_that_overlap_by_over_a_hundredth_are_refused(width):
-    text = complaint(band_widths, [400.0, 410.0, 420.0], width)
-    assert "overlap, and the light of both would count twice; give widths that don't" in text
-    assert "overlap" in complaint(SpectralRadiance, np.ones((2, 2, 3)), [400.0, 410.0, 420.0], 0.0, width)
+    refusal(
+        band_widths,
+        [400.0, 410.0, 420.0],
+        width,
+        words=("overlap, and the light of both would count twice; give widths that don't",),
+    )
+    assert "overlap" in refusal(SpectralRadiance, np.ones((2, 2, 3)), [400.0, 410.0, 420.0], 0.0, width)
 
 
 def test_a_narrow_band_inside_a_wide_one_is_refused():
-    assert "bands 0 and 1, 380 to 480 nm and 450 to 452 nm" in complaint(band_widths, [430.0, 451.0], [100.0, 2.0])
+    assert "bands 0 and 1, 380 to 480 nm and 450 to 452 nm" in refusal(band_widths, [430.0, 451.0], [100.0, 2.0])
 
 
 def test_bands_that_touch_or_overlap_by_rounding_are_taken():
@@ -192,13 +176,6 @@ def test_a_black_body_follows_plancks_law_with_si_constants(temperature_k):
     assert spectrum.values[spectrum.wavelength_nm == 560.0] == pytest.approx(1.0, rel=1e-14)
 
 
-@loop("temperature_k", [3000.0, 4200.0, 6504.0, 9000.0])
-def test_a_black_body_peaks_where_wiens_law_says(temperature_k):
-    spectrum = black_body(temperature_k)
-    peak_nm = spectrum.wavelength_nm[spectrum.values.argmax()]
-    assert abs(peak_nm - WIEN_NM_K / temperature_k) <= 5.0  # the table's step
-
-
 def test_a_line_holds_its_power_and_stays_within_a_twentieth_of_a_nanometre():
     doublet = line_spectrum([589.0, 589.6], [2.0, 1.0])
     assert doublet.band_average([589.0, 589.6, 589.3], [0.1, 0.1, 1.0]) == pytest.approx([20.0, 10.0, 3.0], rel=1e-9)
@@ -207,7 +184,7 @@ def test_a_line_holds_its_power_and_stays_within_a_twentieth_of_a_nanometre():
 
 @loop("lines", [[589.6, 589.0], [589.0, 589.05]])
 def test_lines_that_are_not_apart_are_refused(lines):
-    assert complaint(line_spectrum, lines, [1.0, 1.0]).startswith(f"lines_nm: {lines!r} is not allowed")
+    assert refusal(line_spectrum, lines, [1.0, 1.0]).startswith(f"lines_nm: {lines!r} is not allowed")
 
 
 def edges_of(centres, widths):
@@ -245,4 +222,4 @@ def test_every_line_has_a_band_whose_edges_are_half_a_nanometre_from_a_line(line
 
 @loop("line", [380.2, 790.0])
 def test_a_line_outside_the_range_is_refused(line):
-    assert f"lines_nm: {[line]!r} is not inside 380 to 780" in complaint(line_bands, [line])
+    assert f"lines_nm: {[line]!r} is not inside 380 to 780" in refusal(line_bands, [line])

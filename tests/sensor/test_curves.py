@@ -5,6 +5,7 @@ import os
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
@@ -31,16 +32,6 @@ def test_each_curve_peaks_where_the_published_one_does(channel):
     assert curve.wavelength_nm[curve.values.argmax()] == nm
 
 
-@loop("channel", PEAKS)
-def test_each_curve_rises_to_its_peak_and_falls_behind_it_inside_0_to_1(channel):
-    curve = rgbw().curves[channel]
-    assert (curve.wavelength_nm[0], curve.wavelength_nm[-1]) == (380.0, 1068.0)
-    at = int(curve.values.argmax())
-    assert np.all(np.diff(curve.values[: at + 1]) > 0)
-    assert np.all(np.diff(curve.values[at:]) <= 0)
-    assert np.all((curve.values >= 0) & (curve.values <= 1))
-
-
 @loop(
     ("light", "first_nm", "last_nm", "ratios"),
     [
@@ -62,14 +53,8 @@ def test_the_band_average_is_the_mean_of_the_linear_pieces():
     np.testing.assert_allclose(average, [[0.25, 0.25], [0.5, 0.475]], rtol=1e-13)
 
 
-def test_curves_cannot_be_exchanged_afterwards():
-    with pytest.raises(TypeError):
-        rgbw().curves["R"] = rgbw().curves["W"]
-
-
 def test_a_letter_without_a_curve_is_refused_by_name():
-    with pytest.raises(InputError, match=r"'Y' is unknown; allowed: B, G, R, W"):
-        rgbw().band_average(("R", "Y"), [550.0], [10.0])
+    refusal(rgbw().band_average, ("R", "Y"), [550.0], [10.0], match=r"'Y' is unknown; allowed: B, G, R, W")
 
 
 def write(folder, text):
@@ -92,9 +77,7 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
 @loop(
     ("text", "parts"),
     [
-        ("x,R\n400,0.1\n500,0.2\n", ("['x', 'R']", "(or wavelength, lambda, nm) and one channel a column")),
         ("wavelength,R\n0.4,0.1\n0.5,0.2\n", ("wavelengths up to 0.5", "convert them")),
-        ("wavelength_nm\n400\n500\n", ("['wavelength_nm']", "one channel a column")),
         ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
         ("wavelength_nm,R\n", ("wavelength_nm", "header")),
         ("", ("can't be read", "CSV of numbers with a header")),
@@ -102,23 +85,12 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
         ("wavelength_nm,R\n400,0.1\n500\n", ("can't be read", "CSV of numbers")),
         ("wavelength_nm,R,G\n400,20,30\n500,56,67.8\n", ("R reaches 56", "allowed: 0 to 1", "divide per cent by 100")),
         ("wavelength_nm,R\n400,-0.1\n500,0.2\n", ("finite numbers >= 0",)),
-        ("wavelength_nm,R\n400,nan\n500,0.2\n", ("finite numbers >= 0",)),
         ("wavelength_nm,R\n500,0.1\n400,0.2\n", ("wavelength_nm: [500.0, 400.0]", "strictly increasing")),
+        ("wavelength_nm,R\n400,0.5\ninf,0.5\n", ("strictly increasing",)),
     ],
 )
 def test_a_csv_that_holds_no_curves_is_refused_in_one_line(tmp_path, text, parts):
-    with pytest.raises(InputError) as error:
-        read_csv(write(tmp_path, text))
-    message = str(error.value)
-    assert "\n" not in message
-    for part in parts:
-        assert part in message, message
-
-
-def test_a_missing_csv_is_refused_with_its_name(tmp_path):
-    with pytest.raises(InputError, match=r"absent\.csv.*can't be read.*give a CSV") as error:
-        read_csv(tmp_path / "absent.csv")
-    assert "\n" not in str(error.value)
+    refusal(read_csv, write(tmp_path, text), words=parts)
 
 
 # Range, infrared cut and quantum efficiency
@@ -162,8 +134,7 @@ def test_an_infrared_cut_is_a_wavelength_or_a_curve(tmp_path):
 
 
 def test_a_cut_before_the_first_wavelength_or_a_filter_elsewhere_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"ir_cut: 400\.0"):
-        read_csv(write(tmp_path, FILTERS), ir_cut=400.0)
+    refusal(read_csv, write(tmp_path, FILTERS), ir_cut=400.0, match=r"ir_cut: 400\.0")
     with pytest.raises(InputError, match=r"range_nm: \(450\.0, 430\.0\)"):
         read_csv(write(tmp_path, FILTERS), range_nm=(450.0, 700.0), ir_cut=430.0)
     with pytest.raises(InputError, match=r"400-800 nm and a filter over 900-1000 nm share no range"):
@@ -182,8 +153,7 @@ def test_a_quantum_efficiency_multiplies_filters_without_a_word(tmp_path):
 
 @loop("efficiency", [-0.1, 1.1, np.nan])
 def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
-    with pytest.raises(InputError, match="quantum_efficiency"):
-        read_csv(write(tmp_path, FILTERS), quantum_efficiency=efficiency)
+    refusal(read_csv, write(tmp_path, FILTERS), quantum_efficiency=efficiency, match="quantum_efficiency")
 
 
 def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path):
@@ -194,23 +164,14 @@ def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path
 def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path):
     one = read_curve(write(tmp_path, "wavelength_nm,t\n400,0.5\n500,1\n"))
     assert (one.wavelength_nm.tolist(), one.values.tolist()) == ([400.0, 500.0], [0.5, 1.0])
-    with pytest.raises(InputError, match="2 columns beside wavelength_nm"):
-        read_curve(write(tmp_path, FILTERS))
-    with pytest.raises(InputError, match="divide per cent by 100"):
-        read_curve(write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"))
+    refusal(read_curve, write(tmp_path, FILTERS), match="2 columns beside wavelength_nm")
+    refusal(read_curve, write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"), match="divide per cent by 100")
 
 
 @pytest.mark.timeout(10)
-def test_a_pipe_and_a_file_too_large_are_refused(tmp_path):
+def test_a_pipe_a_file_too_large_and_a_missing_one_are_refused(tmp_path):
+    refusal(read_csv, tmp_path / "absent.csv", match=r"absent\.csv.*can't be read.*give a CSV")
     os.mkfifo(tmp_path / "pipe.csv")
-    with pytest.raises(InputError, match="a folder or a device"):
-        read_csv(tmp_path / "pipe.csv")
+    refusal(read_csv, tmp_path / "pipe.csv", match="a folder or a device")
     (tmp_path / "large.csv").write_bytes(b"wavelength_nm,R\n" + MOST_BYTES * b"1")
-    with pytest.raises(InputError, match="it is over 8388608 bytes"):
-        read_csv(tmp_path / "large.csv")
-
-
-def test_an_endless_wavelength_is_refused(tmp_path):
-    (tmp_path / "a.csv").write_text("wavelength_nm,R\n400,0.5\ninf,0.5\n")
-    with pytest.raises(InputError, match="strictly increasing"):
-        read_csv(tmp_path / "a.csv")
+    refusal(read_csv, tmp_path / "large.csv", match="it is over 8388608 bytes")

@@ -14,7 +14,7 @@ from sensor.cfa import MOSAICS
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
-from sensor.device import Device, draw_device
+from sensor.device import draw_device
 from sensor.exposure import LONGEST_S, auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import names, preset
@@ -43,10 +43,6 @@ def real(sensor):
     return replace(sensor, pixel=replace(sensor.pixel, **REAL))
 
 
-def even(shape):
-    return Device(np.ones(shape), np.zeros(shape))
-
-
 def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])
@@ -66,25 +62,6 @@ def test_without_light_a_frame_reads_black_and_half_lies_on_either_side(name, ex
     assert abs(raw.electrons.mean() - dark_e) < 4 * sigma / 128 + 1e-9  # nine presets, two forms: 1e-3
     assert raw.dn.min() >= 0
     assert not raw.saturated.any()
-
-
-@pytest.mark.sample(1)
-@EXACT
-def test_one_photon_in_a_megapixel_is_found_in_as_many_frames_as_poisson_says(exact):
-    pixel = PixelConfig(2.2, 0.9, 1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
-    sensor = SensorConfig(pixel, LensConfig(2.8), cfa=("W",), responses=Responses({"W": flat(0.5)}), bits=14)
-    shape, exposure_s = (1024, 1024), 1.0
-    one = expected_electrons(form_image(scene(1.0, (2, 2)), sensor), sensor, exposure_s)[0, 0]
-    device, rng, light = even(shape), np.random.default_rng(5), scene(1.0 / one / 2**20, shape)
-    counts = []
-    for _ in range(8):
-        raw = capture(light, sensor, exposure_s, device, rng, exact=exact)
-        hits = raw.dn[raw.dn > 0]
-        # an electron is 16.4 DN: no pixel holds a part of one
-        np.testing.assert_array_equal(hits, np.rint(np.rint(hits / 16.383) * 16.383))
-        counts.append(int(np.rint(raw.electrons.sum())))
-    # the sum of 8 frames is Poisson of mean 8: from 1 to 22 but for 4e-4
-    assert 1 <= sum(counts) <= 22
 
 
 @EXACT

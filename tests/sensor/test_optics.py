@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from loop import loop
 
-from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor.chip import PixelConfig
@@ -19,13 +18,6 @@ ISET_NM = np.arange(400.0, 701.0, 10.0)  # samples 10 nm apart, summed as rectan
 def camera(**lens):
     pixel = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     return SensorConfig(pixel, LensConfig(**lens))
-
-
-def d65(luminance_cd_m2):
-    light = illuminant("D65")
-    values = np.interp(ISET_NM, light.wavelength_nm, light.values)[None, None, :]
-    unit = SpectralRadiance(values, ISET_NM).luminance()[0, 0]
-    return SpectralRadiance(values * luminance_cd_m2 / unit, ISET_NM)
 
 
 @loop("f_number", [0.5, 1.4, 2.8, 16.0])
@@ -49,32 +41,11 @@ def test_each_value_is_scaled_by_the_camera_equation_and_nothing_is_mixed():
     assert image.pitch_um == 2.2
 
 
-def test_d65_at_100_cd_m2_through_f_4_is_4_833_lux_and_53855_photons():
-    image = form_image(d65(100.0), camera(f_number=4.0))
-    assert image.illuminance()[0, 0] == pytest.approx(4.833, rel=2e-3)
-    assert image.photons()[0, 0] == pytest.approx(53_855, rel=2e-3)
-
-
-def test_a_lux_of_d65_is_11140_photons():
-    image = form_image(d65(3.0), camera(f_number=2.0))
-    assert image.photons()[0, 0] / image.illuminance()[0, 0] == pytest.approx(1.114e4, rel=2e-3)
-
-
 def test_photons_and_lux_of_one_green_line_are_in_closed_form():
     # 555 nm, 1 W m^-2 in a band of 2 nm: V is 1 to 1e-4, and a photon carries h c / lambda
     image = SpectralIrradiance(np.full((2, 2, 1), 0.5), np.array([555.0]), 2.2, np.array([2.0]))
     np.testing.assert_allclose(image.illuminance(), 683.0, rtol=5e-4)
     np.testing.assert_allclose(image.photons(), 1e-12 * 555e-9 / (6.62607015e-34 * 299792458.0), rtol=1e-12)
-
-
-def test_single_precision_stays_single():
-    radiance = SpectralRadiance(np.ones((2, 2, 31), np.float32), ISET_NM)
-    assert form_image(radiance, camera(f_number=4.0)).values.dtype == np.float32
-
-
-def test_widths_that_are_not_the_spacing_go_through():
-    radiance = SpectralRadiance(np.ones((2, 2, 2)), np.array([450.0, 600.0]), width_nm=np.array([5.0, 30.0]))
-    np.testing.assert_array_equal(form_image(radiance, camera(f_number=4.0)).widths_nm, [5.0, 30.0])
 
 
 @loop("shape", [(2, 2, 30), (2, 31)])

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 from scipy import stats
 
-from rodcone.errors import InputError
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
@@ -57,31 +57,6 @@ def test_fixed_offsets_alone_are_read_exactly_and_are_never_drawn_again():
     np.testing.assert_array_equal(second.dn, first.dn)
 
 
-def test_read_noise_alone_has_its_stated_moments():
-    sensor = camera(read_noise_e=6.0)
-    dark_e = expose(sensor, 0.0, (512, 512)).electrons
-    n = dark_e.size
-    variance = 6.0**2 + sensor.gain_e_per_dn**2 / 12
-    # mean and variance within 4 standard errors: false-alarm rate 1.3e-4; black at 5 sigma keeps the clip at 0 away
-    assert abs(dark_e.mean()) < 4 * np.sqrt(variance / n)
-    assert abs(dark_e.var() - variance) < 4 * variance * np.sqrt(2 / n)
-
-
-def test_dark_current_alone_collects_rate_times_exposure():
-    sensor = camera(dark_current_e_per_s=50.0)
-    electrons = expose(sensor, 0.0, (256, 256), exposure_s=0.4).electrons
-    # Poisson of mean 20 on a lattice finer than one electron; mean and variance within 4 standard errors: 1.3e-4
-    n, variance = electrons.size, 20.0 + sensor.gain_e_per_dn**2 / 12
-    assert abs(electrons.mean() - 20.0) < 4 * np.sqrt(variance / n)
-    assert abs(electrons.var() - variance) < 4 * variance * np.sqrt((2 + 1 / 20) / n)
-
-
-def test_exposure_0_collects_no_dark_current():
-    raw = expose(camera(dark_current_e_per_s=1e9), 0.0, exposure_s=0.0)
-    np.testing.assert_array_equal(raw.dn, 0)
-    assert raw.exposure_s == 0.0
-
-
 def test_without_prnu_and_dsnu_a_drawn_chip_reads_as_an_even_one():
     sensor = camera(read_noise_e=2.0)
     drawn = expose(sensor, 50.0, device=draw_device(sensor, (64, 64), rng(4)))
@@ -101,16 +76,6 @@ def test_photo_response_scales_the_mean_before_the_poisson_draw():
         # scaled after the draw, the variance would be 30 response^2. Six comparisons within 4 standard errors: 3.8e-4.
         assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
         assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)
-
-
-def test_variance_over_a_chip_is_mean_plus_prnu_squared_mean_squared():
-    sensor = camera(bits=16, prnu=0.2)
-    device = draw_device(sensor, (512, 512), rng(5))
-    electrons = expose(sensor, 10.0, (512, 512), device).electrons
-    variance = 10.0 + (0.2 * 10.0) ** 2  # after the draw: 10 (1 + 0.2^2) + 4 = 14.4, ten standard errors off
-    fourth = stats.moment(electrons.ravel(), 4)
-    # within 4 standard errors: false-alarm rate 6.3e-5
-    assert abs(electrons.var() - variance) < 4 * np.sqrt((fourth - variance**2) / electrons.size)
 
 
 def test_dark_current_is_not_scaled_by_photo_response():
@@ -144,40 +109,7 @@ def test_half_of_the_saturated_pixels_read_under_the_top_with_the_moments_of_a_h
     assert np.median(raw.electrons) == pytest.approx(1000.0, abs=sensor.gain_e_per_dn)  # the well, not more
 
 
-def test_without_dark_noise_a_saturated_pixel_reads_the_well_exactly():
-    raw = expose(camera(), 1e5)
-    np.testing.assert_array_equal(raw.dn, raw.white_dn)
-    np.testing.assert_allclose(raw.electrons, 1000.0, rtol=1e-12)
-
-
-@loop("full_well_e", [1.0, 1000.0, 1e12])
-def test_light_of_1e8_full_wells_saturates_and_nothing_more(full_well_e):
-    raw = expose(camera(full_well_e=full_well_e, prnu=0.01), 1e8 * full_well_e, (4, 4))
-    np.testing.assert_array_equal(raw.dn, raw.white_dn)
-
-
-def test_a_dark_current_that_fills_the_well_saturates_without_light():
-    raw = expose(camera(dark_current_e_per_s=1e12), 0.0, (4, 4), exposure_s=1e7)
-    np.testing.assert_array_equal(raw.dn, raw.white_dn)
-
-
 # The converter
-
-
-@loop("bits", [1, 2, 10, 16])
-def test_a_converter_gives_whole_numbers_from_0_to_its_top(bits):
-    sensor = camera(bits, black_level_dn=0.0, full_well_e=4e4, read_noise_e=1e3)
-    ramp = np.linspace(0, 8e4, 256 * 256).reshape(256, 256)
-    raw = read_out(ramp, sensor, even((256, 256)), 0.01, rng())
-    assert raw.dn.dtype == np.uint16
-    assert (raw.dn.min(), raw.dn.max()) == (0, 2**bits - 1)
-    if bits < 16:
-        assert set(np.unique(raw.dn)) == set(range(2**bits))
-
-
-def test_one_bit_tells_more_from_less_than_half_a_well():
-    raw = expose(camera(bits=1), np.repeat([100.0, 900.0], 32))
-    np.testing.assert_array_equal(raw.dn, np.broadcast_to(np.repeat([0, 1], 32), (64, 64)))
 
 
 def test_dn_are_electrons_over_gain_plus_black_rounded():
@@ -213,41 +145,6 @@ def test_two_runs_are_equal_and_two_exposures_differ():
     frames = [read_out(np.full((64, 64), 200.0), sensor, device, 0.01, generator) for _ in range(2)]
     np.testing.assert_array_equal(frames[0].dn, first.dn)
     assert np.mean(frames[0].dn == frames[1].dn) < 0.1
-
-
-@loop("shape", [(2, 64), (10, 64), (10, 20), (63, 3)])
-def test_a_crop_reads_as_the_full_frame_does_there(shape):
-    sensor = camera(**NOISY)
-    device = draw_device(sensor, (64, 64), rng(1))
-    light_e = rng(3).uniform(0, 900, (64, 64))
-    crop = np.s_[: shape[0], : shape[1]]
-    part = Device(device.photo_response[crop], device.dark_offset_e[crop])
-    full, cropped = read_out(light_e, sensor, device, 0.01, rng(4)), read_out(light_e[crop], sensor, part, 0.01, rng(4))
-    np.testing.assert_array_equal(cropped.dn, full.dn[crop])
-
-
-def test_the_light_of_one_row_does_not_change_another_row():
-    sensor = camera(**NOISY)
-    device = draw_device(sensor, (64, 64), rng(1))
-    light_e = np.full((64, 64), 200.0)
-    changed = light_e.copy()
-    changed[::2] = 700.0
-    first, second = (read_out(light, sensor, device, 0.01, rng(4)) for light in (light_e, changed))
-    np.testing.assert_array_equal(first.dn[1::2], second.dn[1::2])
-
-
-def test_a_chip_and_a_frame_of_one_seed_share_no_noise():
-    sensor = camera(bits=16, **NOISY)
-    device = draw_device(sensor, (256, 256), rng(7))  # a caller may well use one seed for both
-    plain = Device(np.ones((256, 256)), np.zeros((256, 256)))
-    dark, lit = (expose(sensor, light, (256, 256), plain, seed=7).electrons for light in (0.0, 300.0))
-    # five correlations within 4.5 standard errors: false-alarm rate 3.4e-5
-    for pattern in (device.photo_response, device.dark_offset_e):
-        for frame in (dark, lit):
-            assert abs(np.corrcoef(pattern.ravel(), frame.ravel())[0, 1]) < 4.5 / 256
-    read = expose(camera(bits=16, read_noise_e=3.0), 0.0, (256, 256), plain, seed=7).electrons
-    shot = expose(camera(bits=16), 300.0, (256, 256), plain, seed=7).electrons
-    assert abs(np.corrcoef(read.ravel(), shot.ravel())[0, 1]) < 4.5 / 256
 
 
 def test_inputs_are_left_as_they_were():
@@ -344,23 +241,9 @@ def test_full_pixels_of_weak_columns_count_as_saturated_too():
     assert not expose(sensor, 700.0, (32, 512), device).saturated.any()
 
 
-def test_black_stands_five_sigmas_above_0_with_column_offsets_too():
-    sensor = camera(read_noise_e=2.0, dsnu_e=3.0, column_offset_e=6.0)
-    assert 35.0 <= sensor.black_dn * sensor.gain_e_per_dn < 35.0 + 1.1 * sensor.gain_e_per_dn
-
-
 # Refusals
 
 
-def refusal(*arguments):
-    with pytest.raises(InputError) as error:
-        read_out(*arguments)
-    message = str(error.value)
-    assert "\n" not in message
-    return message
-
-
 def test_a_frame_of_another_size_than_the_chip_s_is_refused():
-    message = refusal(np.ones((4, 6)), camera(), even((6, 4)), 0.01, rng())
-    assert "shape (4, 6) is not the device's (6, 4)" in message
-    assert "draw the device with the frame's shape" in message
+    words = ("shape (4, 6) is not the device's (6, 4)", "draw the device with the frame's shape")
+    refusal(read_out, np.ones((4, 6)), camera(), even((6, 4)), 0.01, rng(), words=words)

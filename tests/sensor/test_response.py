@@ -61,20 +61,6 @@ def test_bands_add_up_each_with_its_own_wavelength_and_width():
     np.testing.assert_allclose(electrons, photons * np.array([[QE["R"], QE["G"]], [QE["B"], QE["W"]]]), rtol=1e-12)
 
 
-def test_the_prnu_and_the_dark_current_of_the_camera_do_not_enter():
-    noisy = camera(pixel=replace(PIXEL, prnu=0.5, dark_current_e_per_s=1e6))
-    scene = uniform(1e-3, [500.0, 510.0])
-    np.testing.assert_array_equal(expected(scene, noisy, 0.1), expected(scene, camera(), 0.1))
-
-
-@loop("factor", [0.0, 0.25, 1.0, 64.0])
-def test_electrons_are_linear_in_exposure(factor):
-    scene = uniform(1e-3, np.arange(405.0, 700.0, 10.0))
-    np.testing.assert_allclose(
-        expected(scene, camera(), 0.01 * factor), factor * expected(scene, camera(), 0.01), rtol=1e-13
-    )
-
-
 @loop("factor", [0.5, 2.0, 3.0])
 def test_electrons_are_quadratic_in_pitch_and_linear_in_fill_factor(factor):
     scene, plain = uniform(1e-3, [500.0, 510.0]), camera()
@@ -106,12 +92,6 @@ def test_the_window_cuts_bands_to_the_part_inside(centre_nm, width_nm, inside):
     assert white == pytest.approx(inside * response * photons, rel=1e-12, abs=1e-30)
 
 
-def test_no_window_lets_more_light_in_than_it_is_wide():
-    scene = uniform(1e-3, np.arange(385.0, 1065.0, 10.0))
-    visible, infrared = camera(), camera(window_nm=(380.0, 1068.0))
-    assert np.all(expected(scene, visible, 0.01) < expected(scene, infrared, 0.01))
-
-
 def test_single_precision_radiance_agrees_with_double_to_1e_6():
     nm = np.arange(385.0, 780.0, 10.0)
     values = np.random.default_rng(2).random((16, 16, nm.size)).astype(np.float32)
@@ -134,20 +114,6 @@ def test_each_pixel_takes_its_own_letter_s_plane():
         np.testing.assert_array_equal(mosaic[here], planes[here, index])
 
 
-def test_memory_order_of_the_bands_does_not_matter():
-    nm = np.arange(385.0, 780.0, 10.0)
-    values = np.random.default_rng(4).random((6, 8, nm.size))
-    planar = np.moveaxis(np.ascontiguousarray(np.moveaxis(values, -1, 0)), 0, -1)
-    sensor = SensorConfig(PIXEL, LensConfig(2.0))
-    first, second = (expected(SpectralRadiance(x, nm), sensor, 0.01) for x in (values, planar))
-    np.testing.assert_allclose(first, second, rtol=1e-13)
-
-
 def test_an_image_smaller_than_the_tile_is_refused():
     with pytest.raises(InputError, match=r"mosaic: shape \(1, 6\).*at least 2x2"):
         expected(uniform(1e-3, [500.0, 510.0], shape=(1, 6)), camera(), 0.01)
-
-
-def test_responses_that_lack_a_letter_of_the_mosaic_are_refused():
-    with pytest.raises(InputError, match="'W' is unknown; allowed: B, G, R"):
-        camera(responses=Responses({"R": flat(0.5), "G": flat(0.5), "B": flat(0.5)}))

@@ -96,20 +96,3 @@ def test_a_well_that_clips_in_the_midst_of_the_distribution_has_its_exact_moment
     pixel = PixelConfig(2.2, 0.9, 100.0, read_noise_e, dsnu_e=0.0, prnu=0.0)
     sensor = SensorConfig(pixel, LensConfig(2.8), bits=10, black_level_dn=60)
     assert_moments(frame(mean_e, sensor, 12), exact_probabilities(mean_e, sensor))
-
-
-@pytest.mark.sample(3)
-@pytest.mark.parametrize("bits", [1, 16])
-@pytest.mark.parametrize("read_noise_e", [0.0, 3.0])
-@pytest.mark.parametrize("mean_e", [10.0, 26.0])
-def test_one_bit_and_sixteen_bits_have_their_exact_moments(mean_e, read_noise_e, bits):
-    pixel = PixelConfig(2.2, 0.9, 50.0, read_noise_e, dsnu_e=0.0, prnu=0.0)
-    sensor = SensorConfig(pixel, LensConfig(2.8), bits=bits, black_level_dn=0)
-    assert_moments(frame(mean_e, sensor, 13), exact_probabilities(mean_e, sensor))
-
-
-@loop("mean_e", MEANS_E)
-def test_without_read_noise_dns_lie_on_the_lattice_of_whole_electrons(mean_e):
-    sensor = camera(0.31, 0.0)
-    dn = frame(mean_e, sensor, 14)
-    assert set(np.unique(dn)) <= set(np.rint(np.arange(2000) / sensor.gain_e_per_dn + sensor.black_dn).astype(int))

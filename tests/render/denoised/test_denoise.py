@@ -4,12 +4,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from render.denoised import denoise as module
 from render.denoised.denoise import denoised, first_surfaces
 from render.engine import _checked_film
 from render.loader import load_groups
-from rodcone.errors import InputError
 from scenes.catalog import load
 
 SIZE = (40, 48)
@@ -115,8 +115,7 @@ def test_without_the_extra_the_line_names_it(monkeypatch: pytest.MonkeyPatch) ->
         raise ImportError(f"No module named {name!r}")
 
     monkeypatch.setattr("rodcone.optional.import_module", missing)
-    with pytest.raises(InputError, match=r"mitsuba_oidn: not installed .*pip install 'rodcone\[denoise\]'"):
-        module.denoiser()
+    refusal(module.denoiser, match=r"mitsuba_oidn: not installed .*pip install 'rodcone\[denoise\]'")
 
 
 def test_first_surfaces_of_a_flat_wall() -> None:

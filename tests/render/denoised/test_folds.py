@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from render.denoised.relight import measured_error, relight_denoised
 from render.engine import render
-from rodcone.errors import InputError
 from scenes.catalog import load
 
 pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
@@ -129,7 +129,5 @@ def test_the_told_error_is_the_true_one(box) -> None:
 
 def test_what_is_refused(box, made) -> None:
     plain = replace(made, denoised=None)
-    with pytest.raises(InputError, match=r"denoised: the render has none; .*denoise=True"):
-        relight_denoised(plain)
-    with pytest.raises(InputError, match="resume: it wasn't denoised"):
-        render(box, SIZE, spp=64, denoise=True, resume=plain, **ASKED)
+    refusal(relight_denoised, plain, match=r"denoised: the render has none; .*denoise=True")
+    refusal(render, box, SIZE, spp=64, denoise=True, resume=plain, match="resume: it wasn't denoised", **ASKED)

@@ -33,16 +33,6 @@ def test_each_step_has_a_place_in_its_own_part_of_the_band_and_their_mean_is_the
     assert np.array_equal(offsets, band_offsets(seed))
 
 
-def test_a_steps_place_is_uniform_over_its_part_of_the_band():
-    count = 2000
-    places = np.array([(band_offsets(seed) + 0.5) * STEPS for seed in range(count)]) % 1
-    for step in (0, 1):  # the others repeat these two
-        mean, square = places[:, step].mean(), np.square(places[:, step] - 0.5).mean()
-        bound = norm.isf(FALSE_ALARM / 2 / 4) / np.sqrt(count)
-        assert abs(mean - 0.5) < bound * np.sqrt(1 / 12)
-        assert abs(square - 1 / 12) < bound * np.sqrt(1 / 180)  # of a uniform variable's squared deviation
-
-
 def test_a_pass_averages_the_steepest_reflectance_to_a_ten_thousandth():
     curve, nm = edge(600, 12, 0.05, 0.75), np.arange(385.0, 780.0, 10.0)
     exact = curve.band_average(nm, 10.0)
@@ -75,14 +65,6 @@ def test_surfaces_get_the_row_of_their_curve_and_equal_curves_share_one():
         assert curve.wavelength_nm == pytest.approx(expected.wavelength_nm, rel=1e-12)
         assert np.array_equal(curve.values, expected.values)
     assert "row" not in scene["a"]
-
-
-def test_uneven_tables_get_rows_as_even_ones_do():
-    uneven = {"type": "irregular", "wavelengths": "400, 500, 700", "values": "0, 1, 0.5", "id": "paint"}
-    made, (curve, other) = with_rows({"a": matte(uneven), "b": matte({**CHECKS, "color0": uneven})})
-    assert (made["a"]["row"], made["b"]["row"], made["b"]["other_row"]) == (0, 0, 1)
-    assert (curve.wavelength_nm.tolist(), curve.values.tolist()) == ([400, 500, 700], [0, 1, 0.5])
-    assert other.wavelength_nm.size == 81
 
 
 @loop(

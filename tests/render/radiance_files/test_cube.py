@@ -1,18 +1,17 @@
 """Cubes with their descriptions, however the numbers lie in the file; and what is refused."""
 
-from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 from scipy.io import savemat
 
 from render.illuminants import illuminant
 from render.photometry import luminance
 from render.radiance_files.cube import read_cube
 from render.radiance_files.radiance_source import extent_of, files_of, is_reflectance, load_picture, load_radiance
-from rodcone.errors import InputError
 
 NM = np.arange(400.0, 701.0, 50.0)
 CUBE = np.random.default_rng(4).uniform(0.05, 0.95, (5, 6, NM.size))
@@ -48,13 +47,6 @@ def envi(folder: Path, more: str = "", **changes: object) -> Path:
     return folder / "desk.hdr"
 
 
-def told(call: Callable[[], object]) -> str:
-    with pytest.raises(InputError) as error:
-        call()
-    assert "\n" not in str(error.value)
-    return str(error.value)
-
-
 def test_an_array_is_read_in_any_order_of_its_axes_and_any_number_type(tmp_path: Path) -> None:
     assert read_cube(npy(tmp_path)).values == pytest.approx(CUBE, rel=1e-6)
     turned = PLAIN + 'axes = ["wavelength", "height", "width"]\nscale = 1e-4\n'
@@ -71,11 +63,11 @@ def test_a_mat_file_is_read_by_the_names_that_its_description_gives(tmp_path: Pa
     assert read_cube(tmp_path / "desk.mat").values == pytest.approx(CUBE, rel=1e-6)
     assert not is_reflectance(tmp_path / "desk.mat")
     (tmp_path / "desk.toml").write_text(PLAIN, "utf-8")
-    assert "variable and axes are missing" in told(lambda: read_cube(tmp_path / "desk.mat"))
+    assert "variable and axes are missing" in refusal(read_cube, tmp_path / "desk.mat")
     (tmp_path / "desk.toml").write_text(PLAIN + names.replace("ref", "other"), "utf-8")
-    assert "no numbers 'other'" in told(lambda: read_cube(tmp_path / "desk.mat"))
+    assert "no numbers 'other'" in refusal(read_cube, tmp_path / "desk.mat")
     (tmp_path / "desk.toml").unlink()
-    assert "an ISETCam scene" in told(lambda: load_radiance(tmp_path / "desk.mat"))
+    assert "an ISETCam scene" in refusal(load_radiance, tmp_path / "desk.mat")
 
 
 @loop("order", ["bsq", "bil", "bip"])
@@ -117,74 +109,63 @@ def test_reflectances_are_lit_by_any_light_and_white_has_100_cd_m2(tmp_path: Pat
         (CUBE, "", "holds is missing; add it, or give holds and wavelength_nm"),
         (CUBE, PLAIN.replace("reflectance", "reflexion"), "did you mean 'reflectance'"),
         (CUBE, PLAIN + "scales = 2\n", "'scales' is unknown"),
-        (CUBE, PLAIN + "scale = 0\n", "scale: 0.0 is outside"),
-        (CUBE, PLAIN + "scale = true\n", "scale: True is not a number"),
         (CUBE, PLAIN + "scale = nan\n", "scale: nan is outside"),
         (CUBE, PLAIN + 'axes = ["height", "width"]\n', "axes: ['height', 'width'] are not allowed"),
-        (CUBE, PLAIN + "axes = 3\n", "axes: 3 is not a list"),
         (CUBE, PLAIN + 'axes = ["wavelength", "height", "width"]\n', ""),  # 5 bands of a cube of 7: another picture
         (CUBE, 'holds = "reflectance"\n', "wavelength_nm: nothing states it"),
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [400, 500, 600]\n', "3 numbers don't fit 7 bands"),
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [0.4, 0.7]\n', "desk.npy"),
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [700, 400]\n', "2 numbers don't fit"),
-        (CUBE, 'holds = "reflectance"\nwavelength_nm = [nan, inf]\n', "don't fit"),
-        (CUBE, 'holds = "reflectance"\nwavelength_nm = {a = 1}\n', "don't fit"),
         (CUBE, "holds = [", "desk.toml: can't be read"),
         (CUBE * 100, PLAIN, "of its reflectances exceed 1"),
-        (-CUBE, PLAIN, "finite numbers >= 0"),
         (np.where(CUBE > 0.9, np.nan, CUBE), PLAIN, "finite numbers >= 0"),
         (CUBE[0], PLAIN, "an array of 2 axes"),
         (CUBE.astype(complex), PLAIN, "3 axes of real numbers"),
-        (CUBE.astype(str), PLAIN, "3 axes of real numbers"),
         (CUBE[:0], PLAIN, "0 x 6 pixels are not allowed"),
     ],
 )
 def test_what_does_not_agree_is_refused_in_one_line(cube: np.ndarray, text: str, words: str, tmp_path: Path) -> None:
     path = npy(tmp_path, cube, text)
     if words:
-        assert words in told(lambda: read_cube(path))
+        assert words in refusal(read_cube, path)
     else:
         assert read_cube(path).shape == (6, 7)
 
 
 def test_files_that_are_none_are_refused_in_one_line(tmp_path: Path) -> None:
-    assert "there is no such file" in told(lambda: load_radiance(tmp_path / "absent.npy"))
+    assert "there is no such file" in refusal(load_radiance, tmp_path / "absent.npy")
     path = npy(tmp_path)
     for content in (b"", b"\x93NUMPY", path.read_bytes()[:-1], b"\x93NUMPY\x01\x00\x08\x00{'descr'"):
         path.write_bytes(content)
-        assert "NumPy can't read it" in told(lambda: read_cube(path))
+        assert "NumPy can't read it" in refusal(read_cube, path)
     np.save(path, np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    assert "NumPy can't read it" in told(lambda: read_cube(path))
+    assert "NumPy can't read it" in refusal(read_cube, path)
     (tmp_path / "desk.toml").unlink()
-    assert "nothing says what it holds; allowed: desk.toml beside it" in told(lambda: load_radiance(path))
+    assert "nothing says what it holds; allowed: desk.toml beside it" in refusal(load_radiance, path)
 
 
 @loop(
     ("changes", "words"),
     [
-        ({"kind": 6}, "data type 6"),
         ({"kind": -4}, "data type: '-4' is not a whole number"),
         ({"order": "bis"}, "interleave 'bis'"),
-        ({"big": 2}, "byte order: '2' is not a whole number"),
         ({"offset": 1}, "has 840 bytes, its header stands for 841"),
         ({"offset": "9" * 14}, "header offset"),
         ({"unit": "Parsec"}, "wavelength units: 'parsec'"),
         ({"nm": "400, x"}, "'x' in its header is not a number"),
         ({"nm": "400, 500"}, "2 numbers don't fit"),
         ({"more": "file compression = 1\n"}, "file compression: 1"),
-        ({"more": "lines = 99999999999999\n"}, "lines"),
         ({"more": "lines = 1000000\n"}, "1000000 x 6 pixels are not allowed"),
-        ({"more": "samples = x\n"}, "samples: 'x' is not a whole number"),
         ({"more": "reflectance scale factor = 0\n"}, "'0' in its header"),
     ],
 )
 def test_a_damaged_envi_header_is_refused_in_one_line(changes: dict[str, object], words: str, tmp_path: Path) -> None:
     (tmp_path / "desk.img").write_bytes(CUBE.transpose(2, 0, 1).astype("<f4").tobytes())
-    assert words in told(lambda: read_cube(envi(tmp_path, **changes)))  # type: ignore[arg-type]
+    assert words in refusal(read_cube, envi(tmp_path, **changes))  # type: ignore[arg-type]
 
 
 def test_an_envi_header_alone_or_another_file_is_refused(tmp_path: Path) -> None:
     path = envi(tmp_path)
-    assert "there are no numbers beside it" in told(lambda: read_cube(path))
+    assert "there are no numbers beside it" in refusal(read_cube, path)
     path.write_text("#?RADIANCE\n", "utf-8")  # Radiance's pictures end in .hdr too
-    assert "doesn't begin with ENVI" in told(lambda: read_cube(path))
+    assert "doesn't begin with ENVI" in refusal(read_cube, path)

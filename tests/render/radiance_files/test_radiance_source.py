@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import scipy.io
 from loop import loop
+from refusal import refusal
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.radiance_files.radiance_source import as_transport, is_radiance_file, load_radiance
 from render.spectrum import Spectrum
-from rodcone.errors import InputError
 
 NM = np.array([350.0, 450.0, 589.3, 1200.0])
 WIDTHS = np.array([100 / 3, 20.0, 1.0, 0.7])
@@ -39,8 +39,7 @@ def test_illuminance_has_no_plane_and_the_group_has_a_name() -> None:
     transport = as_transport(SpectralRadiance(VALUES, NM, width_nm=WIDTHS), "street")
     assert transport.illuminance_lux(25.0) is None
     assert list(transport.groups) == ["street"]
-    with pytest.raises(InputError, match="reference plane"):
-        transport.relight(illuminance_lux=100.0)
+    refusal(transport.relight, illuminance_lux=100.0, match="reference plane")
 
 
 def test_spectrum_of_the_group_is_a_factor() -> None:
@@ -70,5 +69,4 @@ def test_ending_tells_the_reader(tmp_path: Path) -> None:
         *(True, True),
         *(False, False, False),
     ]
-    with pytest.raises(InputError, match=r"'\.ext' is unknown; allowed: .*; did you mean '\.exr'"):
-        load_radiance("a.ext")
+    refusal(load_radiance, "a.ext", match=r"'\.ext' is unknown; allowed: .*; did you mean '\.exr'")

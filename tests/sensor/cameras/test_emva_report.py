@@ -6,8 +6,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.cameras.emva_report import clip_over_saturation, numbers_of, read_report
 from sensor.cameras.numbers import curves_csv, missing, preset_text
 from sensor.config_file import read_sensor
@@ -84,7 +84,7 @@ def test_what_a_report_does_not_tell_is_left_out(tmp_path):
     assert "# full_well_e =   # not told: needed" in text
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("saturation", "prnu"), [(2000.0, 0.0), (10_000.0, 0.0), (10_000.0, 0.01)])
 def test_the_clip_is_where_the_variance_of_clipped_pixels_is_greatest_at_the_saturation(saturation, prnu):
     clip = clip_over_saturation(saturation, 5.0, prnu)
@@ -110,44 +110,30 @@ def test_a_shipped_report_reads_has_source_and_date_and_gives_a_pixel(path):
     assert {"full_well_e", "read_noise_e"} <= set(numbers_of(report).pixel)
 
 
-def test_five_makers_or_more_are_shipped():
-    assert len({read_report(path).maker for path in REPORTS}) >= 5
-
-
 @loop(
     ("text", "words"),
     [
         ("", "camera: None"),
-        ("camera = 5", "camera: 5"),
         (HEAD, "report: None"),
-        (HEAD + "report = 5", "report: 5"),
         (HEAD + "[report]\nsigma = 2", "symbol: 'sigma' is unknown"),
         (HEAD + "[report]\nsigma_d = -2", "sigma_d: -2"),
-        (HEAD + "[report]\nsigma_d = true", "sigma_d: None"),
         (HEAD + "[report]\nsigma_d = nan", "sigma_d: nan"),
-        (HEAD + '[report]\nsigma_d = "2"', "sigma_d: '2'"),
         (HEAD + "[report]\nPRNU1288 = 1e9", "per cent"),
         (HEAD + "[report]\neta = 60", "lambda_nm"),
         (HEAD + "bits = 99\n[report]\n", "bits: 99"),
         (HEAD + "bits = 8\nblack_level_dn = 255\n[report]\n", "not under the converter's 255"),
         (HEAD + "extra = 1\n[report]\n", "key: 'extra'"),
         ("a = " + "[" * 100_000, "nested too deep"),
-        ("\x00", "can't be read"),
         (HEAD.replace("report 7", "x" * 5000) + "[report]\n", "source:"),
     ],
 )
 def test_a_hostile_report_is_refused_in_one_line_that_names_it(tmp_path, text, words):
-    with pytest.raises(InputError) as error:
-        read_report(write(tmp_path, text))
-    assert words in str(error.value)
-    assert "report.toml" in str(error.value)
-    assert "\n" not in str(error.value)
+    refusal(read_report, write(tmp_path, text), words=(words, "report.toml"))
 
 
 def test_a_report_that_is_a_folder_or_absent_is_refused(tmp_path):
     for path in (tmp_path, tmp_path / "absent.toml"):
-        with pytest.raises(InputError, match="can't be read"):
-            read_report(path)
+        refusal(read_report, path, match="can't be read")
 
 
 def test_a_source_of_many_lines_stays_a_comment(tmp_path):

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.capture import expose
@@ -55,23 +55,17 @@ def test_the_preset_holds_what_was_configured_every_number_with_its_interval(fil
 def test_the_middle_alone_begins_with_the_tiles_first_position(files):
     found = measure_files(*files, 50)
     assert found.gain_dn_per_e.low < 1 / SENSOR.gain_e_per_dn < found.gain_dn_per_e.high
-    with pytest.raises(InputError, match="window: 97 pixels don't fit a frame of 96 x 128"):
-        measure_files(*files, 97)
+    refusal(measure_files, *files, 97, match="window: 97 pixels don't fit a frame of 96 x 128")
 
 
 def test_files_that_do_not_belong_together_are_refused_by_name(files, tmp_path):
     flats, darks = files
-    with pytest.raises(InputError, match="a file is given twice"):
-        measure_files([flats[0], flats[0]], darks, None)
+    refusal(measure_files, [flats[0], flats[0]], darks, None, match="a file is given twice")
     other = replace(SENSOR, bits=12)
     raw = expose(np.full((96, 128), 8000.0), other, 0.01, draw_device(other, (96, 128), np.random.default_rng(1)),
                  np.random.default_rng(3), exact=True)  # fmt: skip
     write_raw(raw, tmp_path / "other.tif")
-    with pytest.raises(InputError, match=r"other\.tif: white_dn is 4095"):
-        measure_files([*flats, tmp_path / "other.tif"], darks, None)
-    with pytest.raises(InputError, match=r"flat frames: dark0\.tif"):
-        measure_files(darks, flats, None)
-    with pytest.raises(InputError, match="there is no such file"):
-        measure_files([tmp_path / "absent.dng"], darks, None)
-    with pytest.raises(InputError, match="1001 files"):
-        measure_files(flats[:1] * 1000, darks[:1], None)
+    refusal(measure_files, [*flats, tmp_path / "other.tif"], darks, None, match=r"other\.tif: white_dn is 4095")
+    refusal(measure_files, darks, flats, None, match=r"flat frames: dark0\.tif")
+    refusal(measure_files, [tmp_path / "absent.dng"], darks, None, match="there is no such file")
+    refusal(measure_files, flats[:1] * 1000, darks[:1], None, match="1001 files")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from builders import raw_image
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
 from sensor.cameras.noise_files import dng_numbers
 from sensor.cfa import BAYER
@@ -30,5 +30,4 @@ def test_a_noise_profile_gives_the_electrons_at_white_and_the_read_noise(tmp_pat
 
 def test_a_file_without_a_profile_says_how_to_measure_one(tmp_path):
     write_raw(raw_image(np.full((16, 16), 500), BAYER), tmp_path / "a.tif")
-    with pytest.raises(InputError, match=r"has no NoiseProfile of use.*characterise --from"):
-        dng_numbers(tmp_path / "a.tif")
+    refusal(dng_numbers, tmp_path / "a.tif", match=r"has no NoiseProfile of use.*characterise --from")

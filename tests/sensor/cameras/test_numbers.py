@@ -4,6 +4,7 @@ import warnings
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from rodcone.errors import InputError
 from sensor.cameras.library import MeasuredCamera
@@ -84,8 +85,7 @@ def test_an_anchor_that_cannot_be_is_refused():
 
 def test_without_a_source_a_preset_names_every_key_that_is_missing(tmp_path):
     path = written(tmp_path, PixelNumbers("nothing", settings={"bits": Sourced(12, "sheet")}))
-    with pytest.raises(InputError, match="pitch_um is missing"):
-        read_sensor(path)
+    refusal(read_sensor, path, match="pitch_um is missing")
     text = path.read_text("utf-8")
     for key in ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu"):
         assert f"# {key} =   # not told: needed" in text

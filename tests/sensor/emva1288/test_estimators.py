@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 
 from rodcone.errors import InputError
 from sensor.emva1288 import estimators as emva
@@ -53,9 +54,7 @@ def test_the_gain_s_error_is_the_scatter_of_lines_with_chi_squared_variances():
 @loop("variance", [4.0, 3.9])
 def test_a_camera_whose_variance_does_not_grow_is_refused_in_one_line(variance):
     flat = Transfer(line().light_e, line().mean_dn, np.full(22, variance))
-    with pytest.raises(InputError, match=r"gain: .*shows no shot noise.*give more bits") as error:
-        emva.gain(flat, stack(20.0), 950.0)
-    assert "\n" not in str(error.value)
+    refusal(emva.gain, flat, stack(20.0), 950.0, match=r"gain: .*shows no shot noise.*give more bits")
     with pytest.raises(InputError, match="gain"):
         emva.gain(Transfer(line().light_e, np.full(22, 20.0), line().variance_dn2), stack(20.0), 950.0)
 
@@ -129,12 +128,3 @@ def test_dark_current_leaves_hot_pixels_out_and_tells_them():
     assert (share, share_error) == (0.01, pytest.approx(np.sqrt(0.01 * 0.99 / 90_000)))
     assert abs(hot - 200.0) < 4 * hot_error
     assert emva.dark_current(rng.normal(0, 1, (50, 50)), GAIN)[1:] == ((0.0, 0.0), (0.0, 0.0))
-
-
-@loop("offset", [0.0, 0.3])
-def test_what_is_absent_is_told_with_an_error_that_covers_it(offset):
-    rng = np.random.default_rng(6)
-    mean = 20 + offset + rng.normal(0, np.sqrt(4.0 / 16), SHAPE)  # what 16 frames leave of the temporal noise
-    value, error = emva.dsnu(stack(mean), GAIN)
-    assert value < 4 * error
-    assert 0 < error < 0.5

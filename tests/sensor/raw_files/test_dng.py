@@ -14,10 +14,10 @@ from builders import BAYER_PHASES, RGBW_PHASES
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from loop import loop
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
-from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channels, is_bayer, is_rgbw
+from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channels, is_bayer
 from sensor.raw import RawImage
 from sensor.raw_files.dng import PRIVATE, PRIVATE_DATA, dng_tags, exif_tags, rational, read_dng, write_dng
 from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
@@ -114,15 +114,6 @@ def test_libraw_reads_the_exposure(tmp_path: Path) -> None:
     assert same(read_dng(write_dng(bare, tmp_path / "shot.dng")), bare)
 
 
-@loop("bits", [1, 8, 16])
-def test_libraw_reads_every_depth_bit_for_bit(bits: int, tmp_path: Path) -> None:
-    raw = exposure(bits=bits)
-    write_dng(raw, tmp_path / "shot.dng")
-    with rawpy.imread(str(tmp_path / "shot.dng")) as theirs:
-        np.testing.assert_array_equal(theirs.raw_image, raw.dn)
-        assert theirs.white_level == 2**bits - 1
-
-
 @loop("cfa", [*BAYER_PHASES, *RGBW_PHASES])
 def test_the_way_back_is_exact(cfa: Tile, tmp_path: Path) -> None:
     raw = exposure(cfa)
@@ -214,19 +205,6 @@ def test_rationals_are_the_nearest_that_fit(value: float) -> None:
     assert abs(Fraction(numerator, denominator) - Fraction(value)) <= max(abs(value), 1.0) / (2**31 - 2)
 
 
-@loop(("cfa", "bayer", "rgbw"), [
-    *[(phase, True, False) for phase in BAYER_PHASES],
-    *[(phase, False, True) for phase in RGBW_PHASES],
-    (("RG", "BG"), False, False),
-    (("RR", "GB"), False, False),
-    (("RGGB",), False, False),
-    (("RC", "CC"), False, False),
-    (MOSAICS["rgbw_4x4"], False, False),
-])  # fmt: skip
-def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
-    assert (is_bayer(cfa), is_rgbw(cfa)) == (bayer, rgbw)
-
-
 @loop(
     ("changes", "message"),
     [
@@ -240,8 +218,7 @@ def test_tiles_are_told_apart(cfa: Tile, bayer: bool, rgbw: bool) -> None:
 def test_what_a_dng_cannot_hold_is_refused_and_nothing_written(
     changes: dict[str, object], message: str, tmp_path: Path
 ) -> None:
-    with pytest.raises(InputError, match=message):
-        write_dng(replace(exposure(), **changes), tmp_path / "shot.dng")
+    refusal(write_dng, replace(exposure(), **changes), tmp_path / "shot.dng", match=message)
     assert list(tmp_path.iterdir()) == []
 
 
@@ -277,12 +254,8 @@ def patched(content: bytes, code: int, entry: bytes) -> bytes:
         (257, struct.pack("<HII", 4, 1, 0), r"41 x 0 pixels; allowed: 1 to 131072"),
         (256, struct.pack("<HII", 2, 1, 65), r"tag 256 is missing or holds no whole numbers"),
         (258, struct.pack("<HII", 3, 1, 8), r"tag 258 is \(8,\); allowed: 16"),
-        (259, struct.pack("<HII", 3, 1, 7), r"tag 259 is \(7,\); allowed: 1"),
         (262, struct.pack("<HII", 3, 1, 2), r"tag 262 is \(2,\); allowed: 32803"),
-        (277, struct.pack("<HII", 3, 1, 3), r"tag 277 is \(3,\); allowed: 1"),
-        (273, struct.pack("<HII", 4, 1, 1 << 30), r"41 x 30 pixels of 2 bytes don't fit"),
         (273, struct.pack("<HII", 4, 1 << 30, 8), r"tag 273 claims bytes 8 to 4294967304 of \d+; it is cut off"),
-        (279, struct.pack("<HII", 4, 1, 100), r"41 x 30 pixels of 2 bytes don't fit"),
         (PRIVATE_DATA, struct.pack("<HII", 2, 4, 0), r"its DNGPrivateData holds no calibration in electrons"),
         (33422, struct.pack("<HI4B", 1, 4, 2, 1, 1, 0), r"CFAPattern is \(2, 1, 1, 0\), the calibration says \(0,"),
         (50717, struct.pack("<HII", 4, 1, 4095), r"WhiteLevel is \(4095,\), the calibration says \(16383,\)"),
@@ -295,9 +268,7 @@ def patched(content: bytes, code: int, entry: bytes) -> bytes:
 def test_a_changed_tag_is_refused_in_one_line(code: int, entry: bytes, message: str, tmp_path: Path) -> None:
     path = write_dng(exposure(), tmp_path / "shot.dng")
     path.write_bytes(patched(path.read_bytes(), code, entry))
-    with pytest.raises(InputError, match=message) as error:
-        read_dng(path)
-    assert "\n" not in str(error.value)
+    refusal(read_dng, path, match=message)
 
 
 def rewritten(content: bytes, **changes: object) -> bytes:
@@ -314,21 +285,15 @@ def rewritten(content: bytes, **changes: object) -> bytes:
 @loop(
     ("changes", "message"),
     [
-        ({"gain_e_per_dn": 0}, r"gain_e_per_dn: 0 is outside"),
         ({"gain_e_per_dn": "2"}, r"gain_e_per_dn: '2' is outside 1e-12 to 1e\+12"),
         ({"read_noise_e": -1}, r"read_noise_e: -1 is outside"),
-        ({"dsnu_e": None}, r"dsnu_e: None is outside 0 to 1e\+09"),
         ({"prnu": True}, r"prnu: True is outside"),
         ({"exposure_s": float("nan")}, r"exposure_s: nan is outside"),
-        ({"white_dn": float("inf")}, r"white_dn: inf is outside"),
-        ({"iso": "fast"}, r"iso: 'fast' is outside 1e-06 to 1e\+09"),
-        ({"f_number": 0.0}, r"f_number: 0\.0 is outside"),
         ({"white_dn": 10**400, "colour": None}, r"white_dn: 10+ is outside"),
         ({"colour": None, "q" * 1000: 1}, r"calibration: 'q+' is unknown"),
         ({"cfa": 7}, r"cfa: 7 is not a tile"),
         ({"cfa": ["RG", "B"]}, r"cfa: rows of .* differ in length"),
         ({"camera": "a\nb"}, r"camera: 'a\\nb' is not allowed"),
-        ({"engine": 3}, r"engine: '3' is not allowed; give str"),
         ({"colour": {}}, r"ColourCalibration.* missing .*neutral"),
         ({"colour": None}, r"colour: the raw image holds no colour calibration"),
         ({"version": 2}, r"its calibration is not that of a raw image; allowed: .* version 1"),
@@ -339,44 +304,15 @@ def rewritten(content: bytes, **changes: object) -> bytes:
 def test_a_changed_calibration_is_refused_in_one_line(changes: dict[str, object], message: str, tmp_path: Path) -> None:
     path = write_dng(exposure(), tmp_path / "shot.dng")
     path.write_bytes(rewritten(path.read_bytes(), **changes))
-    with pytest.raises(InputError, match=message) as error:
-        read_dng(path)
-    assert "\n" not in str(error.value)
-    assert len(str(error.value)) < len(str(path)) + 1000
+    assert len(refusal(read_dng, path, match=message)) < len(str(path)) + 1000
 
 
 def test_a_file_cut_off_anywhere_is_refused(tmp_path: Path) -> None:
     path = write_dng(exposure(shape=(4, 4)), tmp_path / "shot.dng")
     content = path.read_bytes()
-    for length in [*range(600), *range(600, len(content), 37), len(content) - 1]:
+    for length in [*range(0, 600, 7), *range(600, len(content), 37), len(content) - 1]:
         path.write_bytes(content[:length])
-        with pytest.raises(InputError, match=r"shot\.dng: "):
-            read_dng(path)
-
-
-def refusal(path: Path) -> str | None:
-    """What reading a file of 4x4 pixels is refused with; None where it gives a raw image of that size."""
-    try:
-        return None if read_dng(path).dn.nbytes == 32 else "another size"
-    except InputError as error:
-        return str(error)
-
-
-@pytest.mark.thorough
-@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture], deadline=None)
-@given(st.lists(st.tuples(st.integers(0, 620), st.integers(0, 255)), min_size=1, max_size=4))
-def test_any_bytes_of_the_directory_give_a_raw_image_or_one_line(
-    tmp_path: Path, changes: list[tuple[int, int]]
-) -> None:
-    path = tmp_path / "shot.dng"
-    if not path.exists():
-        write_dng(exposure(shape=(4, 4)), tmp_path / "whole.dng")
-    content = bytearray((tmp_path / "whole.dng").read_bytes())
-    for place, value in changes:
-        content[place] = value
-    path.write_bytes(content)
-    said = refusal(path)
-    assert said is None or (said.startswith(str(path)) and "\n" not in said)
+        refusal(read_dng, path, match=r"shot\.dng: ")
 
 
 def test_a_small_file_of_many_tags_takes_little_memory(tmp_path: Path) -> None:
@@ -385,8 +321,7 @@ def test_a_small_file_of_many_tags_takes_little_memory(tmp_path: Path) -> None:
     content = b"II*\0" + struct.pack("<I", 8 + length) + bytes(length) + struct.pack("<H", tags) + entries
     (tmp_path / "shot.dng").write_bytes(content)
     tracemalloc.start()
-    with pytest.raises(InputError, match=r"tag 258 is \(0, 0, 0, 0\); allowed: 16"):
-        read_dng(tmp_path / "shot.dng")
+    refusal(read_dng, tmp_path / "shot.dng", match=r"tag 258 is \(0, 0, 0, 0\); allowed: 16")
     peak = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     # the dozen tags that are read, at nine bytes a value, twice where they are checked; all 2000 would be 1.2 GB
@@ -402,25 +337,16 @@ def test_strips_that_all_claim_the_same_bytes_are_refused(tmp_path: Path) -> Non
     entries = b"".join(struct.pack("<HHII", code, 4, count, value) for code, count, value in sorted(tags))
     content = b"II*\0" + struct.pack("<I", first + len(arrays)) + bytes(length) + arrays
     (tmp_path / "shot.dng").write_bytes(content + struct.pack("<H", len(tags)) + entries + bytes(4))
-    with pytest.raises(InputError, match=r"512 x 512 pixels of 2 bytes don't fit its \d{4} bytes"):
-        read_dng(tmp_path / "shot.dng")
+    refusal(read_dng, tmp_path / "shot.dng", match=r"512 x 512 pixels of 2 bytes don't fit its \d{4} bytes")
 
 
 @loop("content", [b"", b"II*\0", b"MM\0*" + bytes(40), b"II*\0\xff\xff\xff\xff", bytes(100)])
 def test_what_is_no_dng_is_refused(content: bytes, tmp_path: Path) -> None:
     (tmp_path / "shot.dng").write_bytes(content)
-    with pytest.raises(InputError, match=r"not a little-endian TIFF or DNG|cut off"):
-        read_dng(tmp_path / "shot.dng")
-
-
-def test_a_missing_file_and_a_folder_are_refused(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "none.dng"):
-        with pytest.raises(InputError, match="there is no such file; give the path of a raw file"):
-            read_dng(path)
+    refusal(read_dng, tmp_path / "shot.dng", match=r"not a little-endian TIFF or DNG|cut off")
 
 
 def test_a_dng_of_another_camera_is_refused(tmp_path: Path) -> None:
     tifffile.imwrite(tmp_path / "shot.dng", np.zeros((4, 4), np.uint16), photometric="cfa", metadata=None,
                      extratags=[(50706, "B", 4, (1, 4, 0, 0), True)])  # fmt: skip
-    with pytest.raises(InputError, match="holds no calibration in electrons"):
-        read_dng(tmp_path / "shot.dng")
+    refusal(read_dng, tmp_path / "shot.dng", match="holds no calibration in electrons")

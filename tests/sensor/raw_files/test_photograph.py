@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 import tifffile
 from loop import loop
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.raw_files.dng import rational
 from sensor.raw_files.noise_profile import read_noise_profile
 from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_photograph
@@ -162,67 +162,26 @@ def test_noise_is_estimated_from_a_frame_large_enough_and_assumed_otherwise(tmp_
 
 def test_mosaics_that_are_not_bayers_are_refused(tmp_path: Path) -> None:
     dn = levels(np.full((36, 60), 3000.0))
-    x_trans = (
-        1,
-        2,
-        1,
-        1,
-        0,
-        1,
-        0,
-        1,
-        0,
-        2,
-        1,
-        2,
-        1,
-        2,
-        1,
-        1,
-        0,
-        1,
-        1,
-        0,
-        1,
-        1,
-        2,
-        1,
-        2,
-        1,
-        2,
-        0,
-        1,
-        0,
-        1,
-        0,
-        1,
-        1,
-        2,
-        1,
-    )
+    x_trans = tuple(int(colour) for colour in "121101010212121101101121212010101121")
     other_camera(tmp_path / "x.dng", dn, pattern=x_trans, repeat=(6, 6))
     other_camera(tmp_path / "row.dng", dn, pattern=(0, 1, 0, 2))
     for name in ("x.dng", "row.dng"):
-        with pytest.raises(InputError, match=rf"{name}: .*; allowed: Bayer") as error:
-            read_photograph(tmp_path / name)
-        assert "\n" not in str(error.value)
+        refusal(read_photograph, tmp_path / name, match=rf"{name}: .*; allowed: Bayer")
 
 
 def test_without_rawpy_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)))
     monkeypatch.setitem(sys.modules, "rawpy", None)
-    with pytest.raises(InputError, match=r"^rawpy: not installed .*pip install 'rodcone\[photographs\]'"):
-        read_raw(path)
+    refusal(read_raw, path, match=r"^rawpy: not installed .*pip install 'rodcone\[photographs\]'")
 
 
 @loop("content", [b"", b"no raw file", b"II*\0" + bytes(40), b"MM\0*" + bytes(40)])
 @loop("name", ["shot.nef", "shot.dng", "shot"])
 def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path: Path) -> None:
     (tmp_path / name).write_bytes(content)
-    with pytest.raises(InputError, match=r"shot.*: LibRaw can't read it \(.+\); allowed: raw files") as error:
-        read_raw(tmp_path / name)
-    assert "\n" not in str(error.value)
-    assert "b'" not in str(error.value)
+    assert "b'" not in refusal(
+        read_raw, tmp_path / name, match=r"shot.*: LibRaw can't read it \(.+\); allowed: raw files"
+    )
 
 
 @loop("side", [20_000, 60_000])
@@ -234,8 +193,7 @@ def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side
         assert content.count(entry) == 1
         content = content.replace(entry, struct.pack("<HHII", code, 4, 1, side))
     (tmp_path / "shot.dng").write_bytes(content)
-    with pytest.raises(InputError, match=rf"bytes can't hold the {side} x {side} pixels"):
-        read_photograph(tmp_path / "shot.dng")
+    refusal(read_photograph, tmp_path / "shot.dng", match=rf"bytes can't hold the {side} x {side} pixels")
 
 
 @loop("error", [NotImplementedError("filters: 148"), ValueError("a\nb"), np.linalg.LinAlgError("c")])
@@ -245,8 +203,7 @@ def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
     """With some damaged patterns LibRaw answers from memory that it never wrote to, each time something else."""
     path = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE)))
     monkeypatch.setattr("sensor.raw_files.photograph._raw_image", Mock(side_effect=error))
-    with pytest.raises(InputError, match=r"is no photograph \(.*\); it is damaged, copy it again"):
-        read_photograph(path)
+    refusal(read_photograph, path, match=r"is no photograph \(.*\); it is damaged, copy it again")
 
 
 @loop("order", ["<", ">"])
@@ -278,12 +235,3 @@ def test_directories_without_end_are_left_at_once(tmp_path: Path) -> None:
     (tmp_path / "b.dng").write_bytes(b"II*\0" + struct.pack("<IHI", 8, 0, 8))
     assert read_noise_profile(tmp_path / "b.dng", 1000.0) is None
     assert time.process_time() - start < 0.5
-
-
-def test_a_profile_cut_off_anywhere_is_none_or_the_same(tmp_path: Path) -> None:
-    whole = other_camera(tmp_path / "whole.dng", levels(np.zeros(SHAPE)), noise=(1e-4, 1e-8)).read_bytes()
-    read = read_noise_profile(tmp_path / "whole.dng", 1000.0)
-    assert read is not None
-    for length in range(900):
-        (tmp_path / "cut.dng").write_bytes(whole[:length])
-        assert read_noise_profile(tmp_path / "cut.dng", 1000.0) in (None, read)

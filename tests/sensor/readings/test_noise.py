@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from five_cameras import even_field
 from loop import loop
 
 from sensor.burst import merged_raw, merged_sensor
@@ -24,7 +23,6 @@ from sensor.readings.noise import (
     whole_share,
 )
 from sensor.readout import electrons_at_snr, noise_sources, noise_variance
-from studies.metrics.truth import light_of
 from studies.photograph.snr import snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
@@ -162,22 +160,6 @@ def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
         expected = sum(value**2 * (16 if key in fixed else 4) for key, value in sources.items())
         # its weights know PRNU and a converter's step of four frames, which those of a frame don't
         assert float(noise_variance(np.array([4 * light]), four, 0.04)[0]) == pytest.approx(expected, rel=0.02)
-
-
-def test_a_switched_cameras_noise_is_of_the_gain_that_the_frame_is_read_at():
-    own = preset("dual_gain")
-    sensor = switched(replace(own, pixel=replace(own.pixel, crosstalk=0.2)))
-    lamps = np.full((40, 40), 300.0)
-    lamps[::6, ::6] = 3500.0
-    read = of_reading(sensor, switched_to(sensor, lamps))
-    assert noise_variance(lamps, sensor, 0.01) == pytest.approx(noise_variance(lamps, read, 0.01))
-
-
-def test_an_even_field_with_dark_current_is_simulated_as_the_closed_form_has_it():
-    own = preset("staggered")
-    sensor = replace(own, pixel=replace(own.pixel, dark_current_e_per_s=50_000.0))
-    found = even_field(sensor, "G", light_of("D65"), 5.0, 0.01)
-    assert found.simulated_db == pytest.approx(found.snr_db, abs=0.5)
 
 
 def test_merged_samples_have_no_rounding_noise():

@@ -1,12 +1,10 @@
 """Sensor files with several readings: what they become, and what is refused in one line."""
 
-import warnings
-
 import numpy as np
 import pytest
 from loop import loop
+from refusal import refusal
 
-from rodcone.errors import InputError
 from sensor.chip import Reading
 from sensor.config_file import read_sensor
 from sensor.exposure import exposure_of_electrons_s
@@ -50,18 +48,14 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         (PIXEL + ONE + LENS, ("readings: 1 is outside 2 to 8",)),
         (PIXEL + ONE * 9 + LENS, ("readings: 9 is outside 2 to 8",)),
         (PIXEL + LENS + "[readings]\nread_noise_e = 2\n", ("readings:", "no list of tables", "[[readings]]")),
-        ("readings = []\n" + PIXEL + LENS, ("readings: []",)),
         ("readings = [1, 2]\n" + PIXEL + LENS, ("readings: [1, 2] is no list of tables",)),
         (PIXEL + "read_noise_e = 2\n" + ONE + OTHER + LENS, ("pixel: read_noise_e beside [[readings]]",)),
         (PIXEL + ONE.replace("dsnu_e = 1\n", "") + OTHER + LENS, ("readings: dsnu_e is missing",)),
         (PIXEL + ONE + OTHER + "gain = 4\n" + LENS, ("readings key: 'gain' is unknown",)),
         (PIXEL + ONE + OTHER + "read_nose_e = 4\n" + LENS, ("did you mean 'read_noise_e'?",)),
         (PIXEL + ONE.replace("= 2\n", "= nan\n") + OTHER + LENS, ("read_noise_e: nan",)),
-        (PIXEL + ONE.replace("= 2000", "= 0") + OTHER + LENS, ("full_well_e: 0",)),
         (PIXEL + ONE.replace("= 2000", '= "2000"') + OTHER + LENS, ("full_well_e: '2000'",)),
-        (PIXEL + ONE.replace("= 2000", "= true") + OTHER + LENS, ("full_well_e: True",)),
         (PIXEL + ONE + OTHER + "photodiode = 3\n" + LENS, ("photodiode: 3 is not a text in quotes",)),
-        (PIXEL + ONE + OTHER + "time_share = 0\n" + LENS, ("time_share: 0",)),
         (PIXEL + (ONE + "time_share = 0.5\n") * 2 + LENS, ("time_share: [0.5, 0.5]", "divide by 0.5")),
         (PIXEL + ONE + OTHER + "light_share = 0.5\n" + LENS, ("light_share: [1.0, 0.5]", "name photodiodes apart")),
         (PIXEL + LARGE + SMALL.replace("0.1", "0.2") + LENS, ("light_share: [0.9, 0.2]", "1 together")),
@@ -73,12 +67,7 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
     ],
 )
 def test_readings_that_no_pixel_has_are_refused_in_one_line(tmp_path, text, parts):
-    with pytest.raises(InputError) as error, warnings.catch_warnings():
-        read(tmp_path, text)
-    message = str(error.value)
-    assert "\n" not in message
-    for part in ("camera.toml", *parts):
-        assert part in message, message
+    refusal(read, tmp_path, text, words=("camera.toml", *parts))
 
 
 def test_auto_exposure_aims_at_the_most_sensitive_photodiode():
