@@ -68,10 +68,6 @@ def test_a_chip_that_does_not_hold_a_tile_is_refused(shape):
     )
 
 
-def test_a_seed_instead_of_a_generator_is_refused():
-    refusal(draw_device, camera(), (8, 8), 7, match=r"rng: 7 is not a NumPy Generator")
-
-
 # Columns and hot pixels
 
 REAL = {"column_gain_spread": 0.01, "column_offset_e": 3.0, "hot_pixel_share": 0.02}
