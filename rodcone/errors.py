@@ -85,14 +85,16 @@ def require_fields(value: object, place: str = "") -> None:
     """Raise `InputError` where a field of a dataclass is of another kind than its annotation says, or out of range.
 
     Numbers, text, flags, classes and tuples of these; arrays and mappings say more than an annotation, and are left.
-    ``Annotated[float, (low, high, fix)]`` is a number from low to high; `place` stands before the field's name.
+    ``Annotated[float, (low, high, fix)]`` is a number from low to high, of `int` a whole one; `place` stands before the
+    field's name.
     """
     owner: Any = type(value)
     for name, kind in _kinds(owner).items():
         given = getattr(value, name)
         if get_origin(kind) is Annotated:
             if given is not None or not _fits(None, kind.__origin__):
-                require_range(f"{place}{name}", given, *kind.__metadata__[0])
+                check = require_range if _fits(0.5, kind.__origin__) else require_whole
+                check(f"{place}{name}", given, *kind.__metadata__[0])
         elif not _fits(given, kind):
             words = kind.__name__ if isinstance(kind, type) else str(kind)
             raise InputError(f"{place}{name}: {str(given)[:80]!r} is not allowed; give {words}")

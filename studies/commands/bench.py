@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError
 from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
@@ -38,8 +38,6 @@ def bench(
     require_ending(out, ".json")
     if parse_level(task.level)[1] != "cd/m2":
         raise InputError(f"level: {task.level!r} is not allowed; give a mean luminance such as 25cd/m2")
-    for name in ("size", "picture"):
-        require_whole(name, getattr(task, name), 16, 4096, "give pixels")
     work = stages(task, load(task.scene), preset(task.sensor))
     out.parent.mkdir(parents=True, exist_ok=True)
     results: dict[str, Any] = {

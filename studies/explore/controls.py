@@ -4,12 +4,12 @@ import json
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, field, replace
 from types import MappingProxyType
-from typing import Any
+from typing import Annotated, Any
 
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, is_light_file
-from rodcone.errors import InputError, require_keys, require_range, require_whole, unknown
+from rodcone.errors import InputError, require_fields, require_keys, require_range, unknown
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
@@ -47,7 +47,7 @@ class Lamp:
     """
 
     spectrum: str = OWN
-    power: float = 1.0
+    power: Annotated[float, (0.0, 1e9, "give a factor of 0 or more")] = 1.0
     table: tuple[tuple[float, float], ...] = ()
 
 
@@ -97,10 +97,10 @@ class Controls:
     """
 
     lamps: Mapping[str, Lamp] = field(default_factory=dict)
-    level_cd_m2: float = 25.0
+    level_cd_m2: Annotated[float, (1e-6, 1e9, "give a mean luminance above 0")] = 25.0
     reference_light: str = LIGHT
     exposure: str = AUTO_INFORMATION
-    exposure_s: float = LONGEST_S
+    exposure_s: Annotated[float, (1e-9, 1e4, "give seconds above 0")] = LONGEST_S
     sensor: str = "low_noise"
     mosaic: str = "rgbw"
     lens: Mapping[str, float] = field(default_factory=dict)
@@ -110,16 +110,12 @@ class Controls:
     processor: str = "interleaved"
     settings: Mapping[str, float] = field(default_factory=dict)
     white_balance: str = AS_SHOT
-    seed: int = 0
-    exposure_number: int = 0
-    frames: int = 1
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
+    exposure_number: Annotated[int, (0, 2**31, "give a whole number")] = 0
+    frames: Annotated[int, (1, MOST_FRAMES, "give the exposures of a burst")] = 1
 
     def __post_init__(self) -> None:
-        require_range("level_cd_m2", self.level_cd_m2, 1e-6, 1e9, "give a mean luminance above 0")
-        require_range("exposure_s", self.exposure_s, 1e-9, 1e4, "give seconds above 0")
-        require_whole("seed", self.seed, 0, 2**31, "give a whole number")
-        require_whole("exposure_number", self.exposure_number, 0, 2**31, "give a whole number")
-        require_whole("frames", self.frames, 1, MOST_FRAMES, "give the exposures of a burst")
+        require_fields(self)
         known = (
             ("exposure", self.exposure, (*RULES, TIME)),
             ("processor", self.processor, PROCESSORS),
@@ -131,7 +127,7 @@ class Controls:
                 raise unknown(name, value, allowed)
         illuminant(self.reference_light)
         for name, lamp in self.lamps.items():
-            require_range(f"lamps[{name!r}].power", lamp.power, 0.0, 1e9, "give a factor of 0 or more")
+            require_fields(lamp, f"lamps[{name!r}].")
         for what, given, allowed in (("lens", self.lens, LENS), ("pixel", self.pixel, PIXEL)):
             require_keys(what, given, allowed)
         require_keys("settings", self.settings, SETTINGS if self.processor in ADJUSTABLE else ())

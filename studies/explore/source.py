@@ -3,6 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -12,13 +13,13 @@ from render.radiance_files.radiance_source import extent_of, is_radiance_file, i
 from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
-from rodcone.errors import require_range, require_whole
+from rodcone.errors import require_fields
 from rodcone.memory import memory, require_memory
 from studies.study.scene_source import LIGHT, check_radiance_file, open_radiance_file, open_scene
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
-_LEAST_BANDS, _MOST_SIDE = 4, 2048
+_LEAST_BANDS = 4
 
 
 @dataclass(frozen=True)
@@ -71,12 +72,15 @@ class RenderOptions:
         Run even where more memory is needed than is free.
     """
 
-    size: int | None = None
-    spp: int = 64
-    band_nm: float = 20.0
-    seed: int = 0
+    size: Annotated[int | None, (16, 2048, "give the picture's longer side in pixels")] = None
+    spp: Annotated[int, (1, 1 << 16, "give samples a pixel")] = 64
+    band_nm: Annotated[float, (1.0, 100.0, "give nanometres")] = 20.0
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     force: bool = False
+
+    def __post_init__(self) -> None:
+        require_fields(self)
 
 
 def of_transport(transport: Transport) -> Source:
@@ -92,11 +96,6 @@ def open_source(source: str, options: RenderOptions) -> Source:
     InputError
         For what isn't there, can't be read, or needs more memory than is free.
     """
-    require_whole("spp", options.spp, 1, 1 << 16, "give samples a pixel")
-    require_range("band_nm", options.band_nm, 1.0, 100.0, "give nanometres")
-    require_whole("seed", options.seed, 0, 2**31, "give a whole number")
-    if options.size is not None:
-        require_whole("size", options.size, 16, _MOST_SIDE, "give the picture's longer side in pixels")
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)

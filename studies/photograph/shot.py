@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +16,7 @@ from render.radiance_files.radiance_source import extent_of, is_radiance_file, i
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
-from rodcone.errors import InputError, require_absent, require_fields, require_whole
+from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
@@ -106,12 +106,12 @@ class Order:
     light: tuple[str, ...] = ()
     chart: str | None = None
     white_balance: str = AS_SHOT
-    size: int | None = None
+    size: Annotated[int | None, (1, 8192, "give the picture's longer side in pixels")] = None
     height: int | None = None
     width: int | None = None
-    spp: int = 64
-    frames: int = 1
-    seed: int = 0
+    spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 64
+    frames: Annotated[int, (1, MOST_FRAMES, "give exposures of a burst")] = 1
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     extend: str | None = None
     force: bool = False
@@ -236,11 +236,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
     check_ending(Path(order.out), sensor.cfa)
-    require_whole("spp", order.spp, 1, 1 << 16, "give samples per pixel")
-    require_whole("frames", order.frames, 1, MOST_FRAMES, "give exposures of a burst")
-    require_whole("seed", order.seed, 0, 2**31, "give a whole number")
     if order.size is not None:
-        require_whole("size", order.size, 1, 8192, "give the picture's longer side in pixels")
         require_absent("beside --size", height=order.height, width=order.width)
     if order.white_balance == GRAY_WORLD:
         raise InputError(

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import TypeVar
+from typing import Annotated, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ from render.radiance import SpectralRadiance
 from render.scene import Scene
 from render.spectrum import Floats
 from render.transport import Transport
+from rodcone.errors import require_fields
 from sensor.capture import capture
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -69,14 +70,17 @@ class Bench:
     scene: str = "still_life"
     sensor: str = "low_noise"
     level: str = "25cd/m2"
-    size: int = 40
-    picture: int = 128
+    size: Annotated[int, (16, 4096, "give pixels")] = 40
+    picture: Annotated[int, (16, 4096, "give pixels")] = 128
     bands: tuple[int, ...] = (4, 8, 20, MOST_BANDS)
     samples: tuple[int, ...] = (32, 128, 512)
     neighbourhoods: tuple[int, ...] = (9, 15, 21)
     patches: tuple[int, ...] = (3, 5)
     repeats: int = 1
     seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_fields(self)
 
     @property
     def level_cd_m2(self) -> float:

@@ -1,6 +1,7 @@
 """What is modelled: how each scene is rendered, and what each condition's image holds."""
 
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 from render.radiance import SpectralRadiance
 from sensor.config import LensConfig, SensorConfig
@@ -34,9 +35,9 @@ class LensTerms:
         Angle of view for cos^4.
     """
 
-    diffraction: float | None = None
-    veiling_glare: float | None = None
-    horizontal_view_deg: float | None = None
+    diffraction: Annotated[float | None, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = None
+    veiling_glare: Annotated[float | None, (0.0, 1.0, "give a fraction, 0 for none")] = None
+    horizontal_view_deg: Annotated[float | None, (0.0, 175.0, "give degrees, 0 for none")] = None
 
     def on(self, lens: LensConfig) -> LensConfig:
         """Return a lens with the terms that are stated."""

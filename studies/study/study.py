@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from isp.processors.own import processor_of, require_consent, user_file
 from render.illuminants import illuminant
@@ -85,13 +85,13 @@ class RenderLimits:
         Photograph the denoised light (`render.denoised`): its measured error is then the pictures' Monte Carlo share.
     """
 
-    size: int | None = None
-    band_nm: float = 20.0
-    spp: int = 512
-    max_seconds: float | None = None
-    seed: int = 0
+    size: Annotated[int | None, (16, 8192, "give the picture's longer side in pixels")] = None
+    band_nm: Annotated[float, (1.0, 100.0, "give nanometres")] = 20.0
+    spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 512
+    max_seconds: Annotated[float | None, (1e-3, 1e7, "give seconds")] = None
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     range_nm: tuple[float, float] = VISIBLE_NM
-    noise_share: float | None = None
+    noise_share: Annotated[float | None, (1e-6, 1e3, "give a share of the noise variance: 0.03")] = None
     denoise: bool = False
 
 
@@ -99,7 +99,7 @@ class RenderLimits:
 class BudgetShares:
     """Noise variance that a plan's approximations may add, over the sensor's own: together, and Monte Carlo's."""
 
-    total: float = 0.10
+    total: Annotated[float, (1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")] = 0.10
     monte_carlo: float = 0.03
 
 
@@ -160,8 +160,8 @@ class Study:
     frames: tuple[int, ...] = (1,)
     name: str = "study"
     title: str = ""
-    longest_exposure_s: float = LONGEST_S
-    sensor_side_um: float | None = None
+    longest_exposure_s: Annotated[float, (1e-9, 1e6, "give seconds above 0")] = LONGEST_S
+    sensor_side_um: Annotated[float | None, (1.0, 1e6, "give micrometres, or leave it out")] = None
     render: RenderLimits = field(default_factory=RenderLimits)
     lens: LensTerms = field(default_factory=LensTerms)
     budget: BudgetShares = field(default_factory=BudgetShares)
@@ -173,13 +173,13 @@ class Study:
         for name in _LISTS:  # from Python they may be lists, and files Paths
             if isinstance(values := getattr(self, name), list | tuple):
                 object.__setattr__(self, name, tuple(str(x) if isinstance(x, Path) else x for x in values))
-        for part in (self, self.render, self.lens, self.budget):
-            require_fields(part)
+        for place in ("", "render.", "lens.", "budget."):
+            require_fields(getattr(self, place.rstrip("."), self), place)
         balances = self.white_balances or tuple(dict.fromkeys(map(default_balance, self.processors)))
         object.__setattr__(self, "white_balances", balances)
         _check_axes(self)
         _check_cameras(self)
-        _check_numbers(self)
+        _check_shares_and_sizes(self)
 
     @cached_property
     def equal_area(self) -> EqualArea | None:
@@ -267,29 +267,14 @@ def _check_cameras(study: Study) -> None:
             vary(sensor, mosaic)
 
 
-def _check_numbers(study: Study) -> None:
-    limits, lens, budget = study.render, study.lens, study.budget
-    if study.sensor_side_um is not None:
-        require_range("sensor_side_um", study.sensor_side_um, 1.0, 1e6, "give micrometres, or leave it out")
-        for name in study.sensors:
-            pitch_um = preset(name).site_pitch_um
-            across, most = round(study.sensor_side_um / pitch_um), f"{16 * pitch_um:g} to {8192 * pitch_um:g}"
-            fix = f"{study.sensor_side_um:g} um is given; give {most}"
-            require_whole(f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, fix)
-    if limits.size is not None:
-        require_whole("render.size", limits.size, 16, 8192, "give the picture's longer side in pixels")
-    require_whole("render.spp", limits.spp, 1, 1 << 16, "give samples per pixel")
-    require_whole("render.seed", limits.seed, 0, 2**31, "give a whole number")
-    for name, value, low, high, fix in (
-        ("longest_exposure_s", study.longest_exposure_s, 1e-9, 1e6, "give seconds above 0"),
-        ("render.band_nm", limits.band_nm, 1.0, 100.0, "give nanometres"),
-        ("render.max_seconds", limits.max_seconds, 1e-3, 1e7, "give seconds"),
-        ("render.noise_share", limits.noise_share, 1e-6, 1e3, "give a share of the noise variance: 0.03"),
-        ("lens.diffraction", lens.diffraction, 0.0, 100.0, "give 1 for an ideal lens, 0 for none"),
-        ("lens.veiling_glare", lens.veiling_glare, 0.0, 1.0, "give a fraction, 0 for none"),
-        ("lens.horizontal_view_deg", lens.horizontal_view_deg, 0.0, 175.0, "give degrees, 0 for none"),
-        ("budget.total", budget.total, 1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1"),
-        ("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total"),
-    ):
-        if value is not None:
-            require_range(name, value, low, high, fix)
+def _check_shares_and_sizes(study: Study) -> None:
+    budget, side_um = study.budget, study.sensor_side_um
+    require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
+    if side_um is None:
+        return
+    for name in study.sensors:
+        pitch_um = preset(name).site_pitch_um
+        across, fix = round(side_um / pitch_um), f"give {16 * pitch_um:g} to {8192 * pitch_um:g}"
+        require_whole(
+            f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, f"{side_um:g} um is given; {fix}"
+        )
