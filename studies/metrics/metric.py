@@ -64,3 +64,8 @@ MEANINGS = {
     PATCHES.key: "Signal over noise within the chart's patches.",
 }  # fmt: skip
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
+# Metrics that say much the same: the largest of each family is named, and none is a vote.
+FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))
+# One of each family, known on every scene: an undecided one leaves a level so, and two levels whose pictures are alike
+# by all of them give one picture. PU21 weighs errors by the light.
+DECIDING = (PSNR, SSIM, DELTA_E, FLIP)

@@ -7,29 +7,12 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.metrics.metric import (
-    CHART,
-    DELTA_E,
-    DELTA_E_95,
-    FLIP,
-    METRICS,
-    MTF50,
-    PATCHES,
-    PSNR,
-    PU21,
-    S_CIELAB,
-    S_CIELAB_95,
-    SSIM,
-    Metric,
-)
+from studies.metrics.metric import DECIDING, DELTA_E, FAMILIES, METRICS, PSNR, Metric
 from studies.pages.report_data import ReportCell
 from studies.pages.report_text import NBSP, camera_name, duration, fixed, lead_text, significant
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 
-# Metrics that say much the same: the largest of each family is named, and none is a vote.
-FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))
-DECIDING = (PSNR, SSIM, DELTA_E, FLIP)  # known on every scene: one that is undecided leaves the level so
 CLEARLY = 2.0  # times what a person sees
 SAME_TIME = 1.01  # exposure times whose ratio is below count as one
 # The same method on both mosaics, the one with a white pixel first; and what the paper compares.

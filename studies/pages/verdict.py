@@ -7,11 +7,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.metrics.confidence import Floats, half_width
-from studies.metrics.metric import DELTA_E, FLIP, METRICS, PSNR, SSIM, Metric
+from studies.metrics.metric import DECIDING, METRICS, PSNR, Metric
 
 AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"
 OUTCOMES = (AHEAD, LEVEL, BEHIND)
-SAME_BY = (PSNR, SSIM, DELTA_E, FLIP)  # by which two light levels give one picture; PU21 weighs errors by the light
 
 Figures = Mapping[str, Floats]  # by a metric's key, (level, seed); NaN where a figure is unknown
 
@@ -49,10 +48,10 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
 def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
     """Part neighbouring light levels into runs in which neither side's picture changes by what a person sees.
 
-    Of the metrics `SAME_BY`, each level is compared with the first of its run.
+    Of the metrics `DECIDING`, each level is compared with the first of its run.
     """
     runs: list[list[int]] = []
-    sides = [side[metric.key].mean(axis=-1) / metric.seen for metric in SAME_BY for side in (ours, theirs)]
+    sides = [side[metric.key].mean(axis=-1) / metric.seen for metric in DECIDING for side in (ours, theirs)]
     figures = np.nan_to_num(np.array(sides), nan=np.inf, posinf=np.inf).T
     for level, now in enumerate(figures):
         before = figures[runs[-1][0]] if runs else None
