@@ -64,15 +64,14 @@ def own_camera(sensor: str, mosaic: str) -> SensorConfig:
     return vary(preset(sensor), mosaic)
 
 
-def camera_of(controls: Controls, base: SensorConfig | None = None) -> SensorConfig:
-    """Sensor with its lens as the controls have it; `own` is that of `own_camera`, where it has been read before.
+def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
+    """Sensor with its lens as the controls have it; `base` is that of `own_camera`.
 
     Raises
     ------
     InputError
         For a file that describes no camera, or a term out of range.
     """
-    base = base or own_camera(controls.sensor, controls.mosaic)
     if base.chip.binning:
         raise InputError(
             f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
