@@ -58,14 +58,14 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
 
 def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
     """Steps of a raw image's noise, each with what its piece of the transform is moved by to meet the one before."""
-    found: list[tuple[NoiseStep, float]] = []
+    joined: list[tuple[NoiseStep, float]] = []
     before, offset = NoiseStep(0.0, 1.0, raw.dark_noise_e, 0.0, raw.prnu), 0.0
     for step in raw.noise_steps:
         seam_e = np.array(step.from_e)
         offset += float(_piece(seam_e, before) - _piece(seam_e, step))
-        found.append((step, offset))
+        joined.append((step, offset))
         before = step
-    return found
+    return joined
 
 
 def _piece(electrons: NDArray[Any], step: NoiseStep) -> NDArray[Any]:
@@ -84,12 +84,12 @@ def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.f
     Before the first step `unstabilise`. Beyond one, where noise is tens of electrons and more, its mean is k / 4
     electrons off at most.
     """
-    found = unstabilise(stable, raw.dark_noise_e)
+    electrons = unstabilise(stable, raw.dark_noise_e)
     for step, offset in _joined(raw):
         dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
         bright = unstabilise(step.shot * (stable - offset), dark_e) / step.shot
-        found = np.where(stable >= _piece(np.array(step.from_e), step) + offset, bright, found)
-    return found
+        electrons = np.where(stable >= _piece(np.array(step.from_e), step) + offset, bright, electrons)
+    return electrons
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:

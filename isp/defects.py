@@ -38,8 +38,8 @@ def mend(raw: RawImage) -> RawImage:
         for ring in range(1, _RINGS + 1):
             rows = slice(max(row - ring * down, 0), row + ring * down + 1)
             columns = slice(max(column - ring * across, 0), column + ring * across + 1)
-            found = sound_dn((rows, columns), name)
-            if found.size:
+            samples = sound_dn((rows, columns), name)
+            if samples.size:
                 break
-        dn[row, column] = median_dn(found) if found.size else of_frame(name)
+        dn[row, column] = median_dn(samples) if samples.size else of_frame(name)
     return replace(raw, dn=dn, defects=None)

@@ -119,15 +119,15 @@ def _weights(
     between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
     distance = np.hypot(rows[:, None] - rows, columns[:, None] - columns)
     covariance = between[channel[:, None], channel] * np.exp(-distance / LENGTH) + np.eye(rows.size)
-    asked = between[:, channel] * np.exp(-np.hypot(rows, columns) / LENGTH)
+    target_covariance = between[:, channel] * np.exp(-np.hypot(rows, columns) / LENGTH)
 
     # Lagrange's multipliers: planes of each channel by itself come out exactly.
-    own = channel == np.arange(len(names))[:, None]
-    planes = np.concatenate([own, own * rows, own * columns]).astype(np.float64)
+    sampled = channel == np.arange(len(names))[:, None]
+    planes = np.concatenate([sampled, sampled * rows, sampled * columns]).astype(np.float64)
     system = np.block([[covariance, planes.T], [planes, np.zeros((len(planes), len(planes)))]])
     target = np.concatenate([np.eye(len(names)), np.zeros((len(names), 2 * len(names)))], axis=1)
-    wanted = np.concatenate([asked, target], axis=1).T
+    right_side = np.concatenate([target_covariance, target], axis=1).T
     if np.linalg.matrix_rank(planes) == len(planes):
-        return np.asarray(np.linalg.solve(system, wanted)[: rows.size].T)
+        return np.asarray(np.linalg.solve(system, right_side)[: rows.size].T)
     # A small frame shows too few samples of a channel for its slope: the least squares then.
-    return np.asarray(np.linalg.lstsq(system, wanted, rcond=None)[0][: rows.size].T)
+    return np.asarray(np.linalg.lstsq(system, right_side, rcond=None)[0][: rows.size].T)

@@ -15,7 +15,7 @@ from rodcone.brief import brief
 from rodcone.colour_spaces import white_of
 from rodcone.errors import InputError, require_fields, require_range
 from rodcone.jit import Backend
-from rodcone.notebook import html_of, preview_png
+from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
 from rodcone.types import real_array
 from sensor.cfa import channels
@@ -98,12 +98,6 @@ class Picture:
 
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)
-
-    def _repr_html_(self) -> str:
-        facts = {"white balance": ", ".join(f"{channel}: {source}" for channel, source in self.balance.items())}
-        if self.snr is not None:
-            facts["frame SNR of green"] = f"{self.snr:.3g}, W's share of the luminance {self.substitution or 0:.2g}"
-        return html_of("Picture", facts | {"engine": self.engine}, self._repr_png_())
 
 
 def finish(

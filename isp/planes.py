@@ -101,14 +101,14 @@ def _tent_sums(
     total, weight = np.zeros(counts, values.dtype), np.zeros(counts, values.dtype)
     for i, j in np.argwhere(tents).tolist():
         # Pixels whose sample at this step of the tent lies in the frame, and these samples.
-        own, seen = [], []
+        pixels, samples = [], []
         for start, length, pace, count in zip((phase[0] + i, phase[1] + j), values.shape, size, counts, strict=True):
             low = max(-((start - radius) // pace), 0)
             high = max(min(-((start - radius - length) // pace), count), low)
-            own.append(slice(low, high))
-            seen.append(slice(start - radius + low * pace, start - radius + high * pace, pace))
-        total[tuple(own)] += tents[i, j] * values[tuple(seen)]
-        weight[tuple(own)] += tents[i, j]
+            pixels.append(slice(low, high))
+            samples.append(slice(start - radius + low * pace, start - radius + high * pace, pace))
+        total[tuple(pixels)] += tents[i, j] * values[tuple(samples)]
+        weight[tuple(pixels)] += tents[i, j]
     return total, weight
 
 

@@ -119,14 +119,14 @@ def render(
     # What there is already
     earlier = _checked_earlier(resume, scene, film, denoise)
     if cache is not None:
-        found = load_transport(Path(cache), scene, film, seed, denoised=denoise)
-        earlier = max((x for x in (earlier, found) if x), key=lambda x: x.spp, default=None)
+        stored = load_transport(Path(cache), scene, film, seed, denoised=denoise)
+        earlier = max((x for x in (earlier, stored) if x), key=lambda x: x.spp, default=None)
     if earlier is not None:
         meter = earlier.meter or meter  # it may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
-    own: Step | None = (lambda what, share: None) if progress else None
-    with told(own) as step:
+    silent: Step | None = (lambda what, share: None) if progress else None
+    with told(silent) as step:
         step(render_words(np.inf), 0.0)
         show = progress or (lambda share, error: step(render_words(error), share))
         try:

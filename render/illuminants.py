@@ -88,8 +88,8 @@ def _measured(path: str) -> Spectrum:
         lamp = Spectrum(nm, values)
         return unit_luminance(lamp * (1.0 / float(lamp.values.max())))  # in any unit, so of any size
     except (InputError, ZeroDivisionError) as error:
-        told = one_line(error) if isinstance(error, InputError) else "it gives no visible light"
-        raise InputError(f"illuminant: {path!r}: {told}") from None
+        reason = one_line(error) if isinstance(error, InputError) else "it gives no visible light"
+        raise InputError(f"illuminant: {path!r}: {reason}") from None
 
 
 @cache

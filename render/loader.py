@@ -185,8 +185,8 @@ def _is(part: Any, kind: Any) -> bool:
     if any(node.get("type") == "ref" for _, node in walk({"": part})):
         return False
     mi = mitsuba_module()
-    own = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
-    return bool(kind == (own.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
+    python_plugins = {"matte": mi.ObjectType.BSDF}  # a plug-in written in Python, whose kind Mitsuba doesn't tell
+    return bool(kind == (python_plugins.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
 
 
 def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> Loaded:

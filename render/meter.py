@@ -47,9 +47,9 @@ class Meter:
     @cached_property
     def _irradiance(self) -> Irradiance:
         film = replace(self.film, size=(METER_PIXELS, METER_PIXELS))
-        found = None if self.folder is None else load_irradiance(self.folder, self.scene, film, self.seed)
-        if found is not None:
-            return found
+        stored = None if self.folder is None else load_irradiance(self.folder, self.scene, film, self.seed)
+        if stored is not None:
+            return stored
         try:
             made = _measured(self.scene, film, self.seed)
         except InputError as error:

@@ -10,7 +10,7 @@ from render.spectrum import band_widths
 from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, require_fields, require_range
-from rodcone.notebook import html_of, preview_png
+from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
 from rodcone.types import Floats, real_array
 
@@ -87,16 +87,6 @@ class SpectralRadiance:
 
     def _repr_png_(self) -> bytes:
         return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB_ROUNDED.T)
-
-    def _repr_html_(self) -> str:
-        first, last = (float(self.wavelength_nm[i] + way * self.widths_nm[i] / 2) for i, way in ((0, -1), (-1, 1)))
-        facts = {
-            "size": f"{self.shape[0]} x {self.shape[1]} pixels",
-            "bands": f"{self.wavelength_nm.size} over {first:g} to {last:g} nm",
-            "mean luminance": f"{self.luminance().mean():.3g} cd/m²",
-            "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
-        }
-        return html_of("SpectralRadiance", facts, self._repr_png_())
 
 
 def check_values(name: str, values: NDArray[np.floating], signed: bool = False) -> None:

@@ -12,7 +12,6 @@ from render.published_spectra import optical_constant
 from render.spectrum import Spectrum
 from rodcone.brief import brief
 from rodcone.errors import InputError, one_line, require_fields, unknown
-from rodcone.notebook import html_of
 from rodcone.plots import draw_curves, png_of
 from rodcone.types import Floats
 
@@ -144,19 +143,12 @@ class Scene:
         kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
         return kinds == ["constant"] and not lights.coloured
 
-    def _repr_html_(self) -> str:
-        others = ("sensor", *emitter_paths(self.geometry))
-        facts = {
-            "lights": ", ".join(self.groups),
-            "shapes": str(sum(isinstance(part, dict) and key not in others for key, part in self.geometry.items())),
-            "lux are measured on": self.reference_plane or "nothing: give levels in cd/m²",
-        }
+    def _repr_png_(self) -> bytes:
         curves = {
             name: (group.spectrum.wavelength_nm, group.power * group.spectrum.values)
             for name, group in self.groups.items()
         }
-        lights = png_of(lambda axes: draw_curves(curves, axes, x="wavelength, nm", y="emission, per nm"))
-        return html_of(f"Scene {self.name}", facts, lights)
+        return png_of(lambda axes: draw_curves(curves, axes, x="wavelength, nm", y="emission, per nm"))
 
     @property
     def description(self) -> Node:
@@ -180,10 +172,10 @@ class Scene:
         return result
 
 
-def film_size(own: tuple[int, int], longest: int | None) -> tuple[int, int]:
+def film_size(proportions: tuple[int, int], longest: int | None) -> tuple[int, int]:
     """Height and width, or their proportions with the longer side that was asked for."""
-    scale = 1.0 if longest is None else longest / max(own)
-    return max(1, round(own[0] * scale)), max(1, round(own[1] * scale))
+    scale = 1.0 if longest is None else longest / max(proportions)
+    return max(1, round(proportions[0] * scale)), max(1, round(proportions[1] * scale))
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:

@@ -25,18 +25,18 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
 
     Mitsuba makes a surface black outside its table, and a metal a perfect mirror: both would pass for knowledge.
     """
-    asked = f"scene {scene.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and"
+    prefix = f"scene {scene.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and"
     paths = emitter_paths(scene.geometry)
     low, high = SUNSKY_NM
     if "sunsky" in paths.values() and (shortest_nm < low or longest_nm > high):
         raise InputError(
-            f"{asked} a sunsky is known over {low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, "
+            f"{prefix} a sunsky is known over {low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, "
             "constant and directional"
         )
-    for path, (low, high), held in _surfaces(scene.geometry, paths):
+    for path, (low, high), extends in _surfaces(scene.geometry, paths):
         if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:
-            extend = ", or hold its end values beyond: extend='hold' or --extend hold" if held else ""
-            raise InputError(f"{asked} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
+            extend = ", or hold its end values beyond: extend='hold' or --extend hold" if extends else ""
+            raise InputError(f"{prefix} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
 
 
 def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
@@ -71,8 +71,8 @@ def _surfaces(scene: Node, emitters: Container[str]) -> Iterator[tuple[str, tupl
         if path in emitters:
             continue
         table = _named(scene, str(node.get("id"))) if node.get("type") == "ref" else node
-        if found := _range_nm(table):
-            yield path, found, table["type"] not in _WITHIN_CIE
+        if range_nm := _range_nm(table):
+            yield path, range_nm, table["type"] not in _WITHIN_CIE
         pending += [(f"{path}/{key}", part) for key, part in node.items() if isinstance(part, dict)]
 
 

@@ -7,7 +7,6 @@ from numpy.typing import ArrayLike
 
 from rodcone.brief import brief
 from rodcone.errors import InputError
-from rodcone.notebook import html_of
 from rodcone.plots import Axes, draw_curves, png_of
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
 from rodcone.types import real_array
@@ -61,13 +60,8 @@ class Spectrum:
         """Draw the curve into Matplotlib's axes, new ones by default."""
         return draw_curves({"": (self.wavelength_nm, self.values)}, axes, x="wavelength, nm", y="value")
 
-    def _repr_html_(self) -> str:
-        nm, values = self.wavelength_nm, self.values
-        facts = {
-            "range": f"{nm[0]:g} to {nm[-1]:g} nm, {nm.size} points",
-            "values": f"{values.min():.4g} to {values.max():.4g}, most at {nm[values.argmax()]:g} nm",
-        }
-        return html_of("Spectrum", facts, png_of(self.plot))
+    def _repr_png_(self) -> bytes:
+        return png_of(self.plot)
 
     def __mul__(self, factor: float) -> "Spectrum":
         """Return the spectrum times a number."""

@@ -19,7 +19,6 @@ from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_keys, require_kind, require_range
-from rodcone.notebook import html_of
 from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
@@ -230,16 +229,6 @@ class Transport:
 
     def _repr_png_(self) -> bytes:
         return self.relight()._repr_png_()
-
-    def _repr_html_(self) -> str:
-        facts = {
-            "size": f"{self.radiance.shape[2]} x {self.radiance.shape[3]} pixels, {self.wavelength_nm.size} bands",
-            "lights": ", ".join(self.groups),
-            "samples": f"{self.spp:.0f} a pixel, {self.seconds:.1f} s",
-            "Monte Carlo error": f"{self.relative_mc_error:.2g} of the value",
-            "integrator": f"{self.integrator}, {self.variant}",
-        }
-        return html_of("Transport, under the scene's own lights", facts, self._repr_png_())
 
     def _lights(
         self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None

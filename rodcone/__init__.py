@@ -97,8 +97,8 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'rodcone' has no attribute {name!r}")
     module, attribute = _PUBLIC[name]
-    found = getattr(import_module(module), attribute)
-    globals()[name] = found if isinstance(found, type) else door(name, found)
+    value = getattr(import_module(module), attribute)
+    globals()[name] = value if isinstance(value, type) else door(name, value)
     return globals()[name]
 
 

@@ -19,7 +19,7 @@ class InputError(ValueError):
     """
 
     def __init__(self, message: str) -> None:
-        plain = "".join(each if each.isprintable() else each.encode("unicode_escape").decode() for each in message)
+        plain = "".join(x if x.isprintable() else x.encode("unicode_escape").decode() for x in message)
         super().__init__(cut(plain))
 
 

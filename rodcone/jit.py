@@ -27,8 +27,8 @@ def backend() -> Backend:
 
 def compiler_version() -> str:
     """Version of the LLVM or CUDA that kernels are compiled by, ``none`` on ``numpy``."""
-    found = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
-    return ".".join(map(str, found())) if found else "none"
+    version = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
+    return ".".join(map(str, version())) if version else "none"
 
 
 def arrays() -> Any:

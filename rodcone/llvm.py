@@ -50,8 +50,8 @@ def _system_library() -> Path | None:
 
 def find_llvm() -> Path | None:
     """Library that Dr.Jit is told to use, None where there is none of version 17 or more."""
-    own = os.environ.get("DRJIT_LIBLLVM_PATH")
-    return Path(own) if own else _wheel_library() or _system_library()
+    stated_path = os.environ.get("DRJIT_LIBLLVM_PATH")
+    return Path(stated_path) if stated_path else _wheel_library() or _system_library()
 
 
 def _loaded_too_early() -> Path | None:

@@ -39,13 +39,13 @@ class Limit:
     name : str
     free : float
         Bytes that are not in use.
-    each : bool
+    per_process : bool
         Whether every process has it for itself.
     """
 
     name: str
     free: float
-    each: bool = False
+    per_process: bool = False
 
 
 def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: bool = False) -> Memory:
@@ -65,8 +65,8 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: 
     rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + other) + _RUN_BYTES * groups
     worker = PROCESS_BYTES + _CELL_BYTES * pixels
     if workers <= 1:  # the render is let go of before the first cell
-        own = max(rendering, workers * worker)
-        return Memory(own, own)
+        peak_bytes = max(rendering, workers * worker)
+        return Memory(peak_bytes, peak_bytes)
     return Memory(rendering + workers * worker, max(rendering, worker))
 
 
@@ -81,13 +81,13 @@ def require_memory(need: Memory, force: bool = False) -> None:
 
     What this process holds already is part of what the run needs. The message names the need and the least limit.
     """
-    held = _pages(1)
-    for limit in sorted([] if force else memory_limits(), key=lambda each: each.free):
-        needed, whose = (need.largest, "a process of the run") if limit.each else (need.total, "the run")
-        if needed > held + limit.free:
+    resident = _pages(1)
+    for limit in sorted([] if force else memory_limits(), key=lambda limit: limit.free):
+        needed, whose = (need.largest, "a process of the run") if limit.per_process else (need.total, "the run")
+        if needed > resident + limit.free:
             raise InputError(
-                f"memory: {whose} needs about {needed / GB:.1f} GB; allowed: {(held + limit.free) / GB:.1f} GB, which "
-                f"is {limit.name}; take a smaller picture, fewer bands or workers, or go on with --force"
+                f"memory: {whose} needs about {needed / GB:.1f} GB; allowed: {(resident + limit.free) / GB:.1f} GB, "
+                f"which is {limit.name}; take a smaller picture, fewer bands or workers, or go on with --force"
             )
 
 
@@ -123,8 +123,8 @@ def _groups(root: Path) -> Iterator[Limit]:
             top, names = mount / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
         else:
             continue
-        own = top / place.lstrip("/")
-        for folder in (own, *own.parents):
+        innermost = top / place.lstrip("/")
+        for folder in (innermost, *innermost.parents):
             with suppress(OSError, LookupError, ValueError):
                 yield _group_limit(folder, *names)
             if folder == top:

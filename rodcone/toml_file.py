@@ -135,13 +135,13 @@ def _tuple_of(converter: Converter, kind: Any) -> Callable[[Any, Any], Any]:
         kinds = items[:1] * len(value) if items[-1] is Ellipsis else items
         if len(kinds) != len(value):
             raise InputError(f"{value!r} has {len(value)} values; allowed: {len(kinds)}")
-        return tuple(converter.structure(each, item) for each, item in zip(value, kinds, strict=True))
+        return tuple(converter.structure(part, item) for part, item in zip(value, kinds, strict=True))
 
     return take
 
 
 def _first_fault(error: BaseValidationError, fix: str) -> str:
-    fault = min(error.exceptions, key=lambda each: not isinstance(each, ForbiddenExtraKeysError))
+    fault = min(error.exceptions, key=lambda exception: not isinstance(exception, ForbiddenExtraKeysError))
     if isinstance(fault, ForbiddenExtraKeysError):
         return str(unknown("key", sorted(fault.extra_fields)[0], [field.name for field in fields(fault.cl)]))
     if isinstance(fault, KeyError):

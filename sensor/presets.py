@@ -29,7 +29,7 @@ def preset_file(name: str) -> Path:
         For an unknown name.
     """
     if name not in _NAMES:
-        if " " in name and name.lower() in {each.lower() for each in measured_cameras()}:
+        if " " in name and name.lower() in {camera.lower() for camera in measured_cameras()}:
             raise InputError(
                 f"sensor preset: {name!r} is a measured response without a pixel; allowed: a preset or a .toml file; "
                 f"make one: rodcone new preset low_noise --camera {name!r} -o camera.toml"

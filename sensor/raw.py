@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_fields
-from rodcone.notebook import html_of, preview_png
+from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
 from sensor.calibration import ColourCalibration
 from sensor.cfa import Tile, channels, check_covers, check_tile, mask
@@ -140,16 +140,6 @@ class RawImage:
 
     def _repr_png_(self) -> bytes:
         return preview_png(np.maximum(self.electrons, 0.0))
-
-    def _repr_html_(self) -> str:
-        facts = {
-            "size": f"{self.shape[0]} x {self.shape[1]} pixels, mosaic {' / '.join(self.cfa)}",
-            "exposure": f"{self.exposure_s * 1e3:.4g} ms",
-            "range": f"black {self.black_dn:.4g} to white {self.white_dn:.6g} DN, {self.gain_e_per_dn:.3g} e-/DN",
-            "mean": f"{self.electrons.mean():.4g} e-, dark noise {self.dark_noise_e:.3g} e-",
-            "saturated": f"{self.saturated.mean():.2%}",
-        }
-        return html_of("RawImage", facts, self._repr_png_())
 
     @property
     def shape(self) -> tuple[int, int]:

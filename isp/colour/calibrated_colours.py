@@ -36,14 +36,14 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     if len(names) != 3:
         green = names.index("G") if "G" in names else 0
         # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
-        found = []
+        candidates = []
         for name, xy in (("a", A_XY), ("d65", D65_XY)):
             from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
             neutral = from_xyz @ white
             to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
             stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)
-            found.append((np.abs(stops - stops[green]).max(), from_xyz @ to_xyz / neutral[:, None]))
-        rows = np.vstack([rows, min(found, key=lambda pair: pair[0])[1][len(rows) :]])
+            candidates.append((np.abs(stops - stops[green]).max(), from_xyz @ to_xyz / neutral[:, None]))
+        rows = np.vstack([rows, min(candidates, key=lambda pair: pair[0])[1][len(rows) :]])
     unexplained = np.diag([0.0 if three and index < 3 else UNEXPLAINED**2 for index in range(len(names))])
     cross = rows @ MOMENTS_SRGB
     moments = cross @ rows.T + unexplained

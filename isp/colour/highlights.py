@@ -30,6 +30,6 @@ def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | N
     clipped = saturated_nearby(raw, "".join(colour_channels(raw.cfa)), reach)
     if not clipped.any():
         return balanced
-    held = balanced.copy()
-    held[clipped] = np.minimum(rows_at(balanced, clipped), raw.full_well_e)
-    return held
+    limited = balanced.copy()
+    limited[clipped] = np.minimum(rows_at(balanced, clipped), raw.full_well_e)
+    return limited

@@ -50,9 +50,9 @@ def measured() -> Mapping[str, NoiseGains]:
     return {
         name: NoiseGains(
             np.array(table["snr_db"], float),
-            np.array(found["factors"], float)[:, None] * np.array(found["errors"], float),
+            np.array(entry["factors"], float)[:, None] * np.array(entry["errors"], float),
         )
-        for name, found in table["processors"].items()
+        for name, entry in table["processors"].items()
     }
 
 

@@ -41,21 +41,21 @@ class SpectralPrior:
 def load_prior(name: str) -> SpectralPrior:
     """Prior of `PRIORS` by name."""
     with np.load(PRIORS[name], allow_pickle=False) as file:
-        held = {key: np.asarray(file[key], dtype=np.float64) for key in file.files if key != "source"}
+        arrays = {key: np.asarray(file[key], dtype=np.float64) for key in file.files if key != "source"}
         source = str(file["source"])
-    shape = (len(held["weights"]), PATCH**2, held["spectra"].shape[1])
-    directions = held["basis"].shape[1]
+    shape = (len(arrays["weights"]), PATCH**2, arrays["spectra"].shape[1])
+    directions = arrays["basis"].shape[1]
     factors = np.zeros((shape[0], directions, directions))
-    factors[:, *np.tril_indices(directions)] = held["factors"]
+    factors[:, *np.tril_indices(directions)] = arrays["factors"]
     return SpectralPrior(
-        edges_nm=held["edges_nm"],
-        spectra=held["spectra"],
+        edges_nm=arrays["edges_nm"],
+        spectra=arrays["spectra"],
         patches=Gaussians(
-            weights=held["weights"] / held["weights"].sum(),
-            means=(held["mean"] + held["centres"] @ held["basis"].T).reshape(shape),
-            factors=(held["basis"] @ factors).reshape(*shape, directions),
-            rest=held["rest"],
+            weights=arrays["weights"] / arrays["weights"].sum(),
+            means=(arrays["mean"] + arrays["centres"] @ arrays["basis"].T).reshape(shape),
+            factors=(arrays["basis"] @ factors).reshape(*shape, directions),
+            rest=arrays["rest"],
         ),
-        reflectances=held["reflectances"],
+        reflectances=arrays["reflectances"],
         source=source,
     )

@@ -159,8 +159,8 @@ def list_threads(
         np.arange(first, end, step, dtype=np.int32)
         for first, end, step in zip((rows[0], 0), ends, pattern.block, strict=True)
     ]
-    some = np.full((len(lines[0]), len(lines[1])), pattern.white is None)
-    whole = some
+    any_full = np.full((len(lines[0]), len(lines[1])), pattern.white is None)
+    all_full = any_full
     if pattern.white is not None and alpha is not None:
         # What a block may reach in any phase: [first - (tile - 1) - reach, first + block + reach).
         rows_of, columns_of = (
@@ -169,14 +169,14 @@ def list_threads(
                 lines, pattern.tile, pattern.block, (first_row, 0), alpha.shape, strict=True
             )
         )
-        some = _any_in_boxes(alpha > 0.0, rows_of, columns_of)
-        whole = ~_any_in_boxes(alpha < 1.0, rows_of, columns_of)
+        any_full = _any_in_boxes(alpha > 0.0, rows_of, columns_of)
+        all_full = ~_any_in_boxes(alpha < 1.0, rows_of, columns_of)
     white = [cell for cell, channel in enumerate(pattern.cells) if channel == pattern.white]
     colours = [cell for cell, channel in enumerate(pattern.cells) if channel != pattern.white]
     shares: dict[Guide, list[tuple[NDArray[np.bool_], list[int]]]] = {
-        "W": [(~some, [0])],
-        "channel": [(some & whole, colours), (some, white)],
-        "mixed": [(some & ~whole, colours)],
+        "W": [(~any_full, [0])],
+        "channel": [(any_full & all_full, colours), (any_full, white)],
+        "mixed": [(any_full & ~all_full, colours)],
     }
     return {guide: _threads(pattern, lines, share, ends, guide) for guide, share in shares.items()}
 

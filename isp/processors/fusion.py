@@ -115,8 +115,8 @@ def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
 
     Differences that belong to a much larger luminance than a full W can tell would turn noise into colour.
     """
-    own = luminance_of_srgb(rgb)
-    scale = np.where(own > luminance, luminance / np.maximum(own, 1e-12), 1.0)
+    of_colours = luminance_of_srgb(rgb)
+    scale = np.where(of_colours > luminance, luminance / np.maximum(of_colours, 1e-12), 1.0)
     full = saturated_nearby(raw, "W", 1)[..., None]
     return np.where(full, rgb * scale[..., None], with_luminance(rgb, luminance))
 

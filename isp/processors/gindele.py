@@ -76,7 +76,7 @@ def require_rgbw(cfa: Tile) -> None:
         raise InputError(f"cfa: {cfa} is not 2x2 RGBW; allowed here: R, G, B and W once each; use another processor")
 
 
-def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[int, int], ...]) -> Plane:
+def _along_smaller_gradient(white: Plane, colour: Plane, directions: tuple[tuple[int, int], ...]) -> Plane:
     """Mean of the two neighbours in `white`, corrected by a quarter of the own colour's Laplacian.
 
     Adams & Hamilton's classifier: difference of the neighbours plus the Laplacian's size.
@@ -84,7 +84,7 @@ def _along_smaller_gradient(white: Plane, own: Plane, directions: tuple[tuple[in
     estimates, classifiers = [], []
     for down, right in directions:
         before, after = (np.roll(white, (sign * down, sign * right), (0, 1)) for sign in (1, -1))
-        laplacian = 2 * own - sum(np.roll(own, (2 * sign * down, 2 * sign * right), (0, 1)) for sign in (1, -1))
+        laplacian = 2 * colour - sum(np.roll(colour, (2 * sign * down, 2 * sign * right), (0, 1)) for sign in (1, -1))
         estimates.append((before + after) / 2 + laplacian / 4)
         classifiers.append(np.abs(before - after) + np.abs(laplacian))
     first, second = estimates

@@ -42,8 +42,8 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
     for name, factor in zip(channels(raw.cfa), gains, strict=True):
         factors[sites == name] = factor
     values = electrons * factors
-    held = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    return np.where(held, np.minimum(values, raw.full_well_e), values), sources
+    clipped = saturated_nearby(raw, "RGB", 1) & (sites != "W")
+    return np.where(clipped, np.minimum(values, raw.full_well_e), values), sources
 
 
 def to_rgb(raw: RawImage, planes: Image, colours: ColourFit, reach: int) -> Image:

@@ -37,17 +37,17 @@ def user_file(name: str) -> tuple[Path, str] | None:
 
 def require_consent(what: str, name: str, trust_code: bool) -> None:
     """Raise `InputError` for an unknown processor, or one of the user's own without consent to run it."""
-    own = user_file(name)
-    if own is None and name in _RENAMED:
+    user_code = user_file(name)
+    if user_code is None and name in _RENAMED:
         raise InputError(
             f"{what}: {name!r} of rodcone 0.1.0 is gone; allowed: rodcone list processors; use {_RENAMED[name]}"
         )
-    if own is None and name not in NAMED:
+    if user_code is None and name not in NAMED:
         raise unknown(what, name, PROCESSORS)
-    if own is not None and not trust_code:
+    if user_code is not None and not trust_code:
         raise InputError(
-            f"{what}: {name!r} is Python code, which may do all that you may; allowed with consent: read {own[0]}, "
-            "then add --trust-code (in Python trust_code=True)"
+            f"{what}: {name!r} is Python code, which may do all that you may; allowed with consent: read "
+            f"{user_code[0]}, then add --trust-code (in Python trust_code=True)"
         )
 
 
@@ -59,8 +59,8 @@ def own_version(name: str) -> dict[str, str]:
     InputError
         For a file that can't be read.
     """
-    own = user_file(name)
-    return {} if own is None else {own[0].name: digest_bytes(_read(own[0]))}
+    user_code = user_file(name)
+    return {} if user_code is None else {user_code[0].name: digest_bytes(_read(user_code[0]))}
 
 
 def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Processor:
@@ -80,28 +80,28 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     InputError
         For a file that can't be read, is another than expected, fails, or holds no such function.
     """
-    own = user_file(name)
-    if own is None:
+    user_code = user_file(name)
+    if user_code is None:
         return NAMED[name]
-    path, attribute = own
+    path, attribute = user_code
     content = _read(path)
     if expected is not None and expected.get(path.name) != digest_bytes(content):
         raise InputError(
             f"processors: {str(path)!r} on {platform.node()} isn't the file that the sweep began with; allowed: the "
             "same bytes; run rodcone sweep again, or give the workers the same file"
         )
-    found = getattr(_module(path, content), attribute, None)
-    stated = found if isinstance(found, Processor) else Processor(OWN, found, path.name, colours=(), unit="")  # type: ignore[arg-type]
-    if not callable(stated.picture) or isinstance(found, type):
+    value = getattr(_module(path, content), attribute, None)
+    processor = value if isinstance(value, Processor) else Processor(OWN, value, path.name, colours=(), unit="")  # type: ignore[arg-type]
+    if not callable(processor.picture) or isinstance(value, type):
         raise InputError(
             f"processors: {path} has no function {attribute!r}; allowed: def {attribute}(raw, matrix, *, balance), or "
             f"a Processor of that name; name what the file defines"
         )
 
     def picture(raw: RawImage, colours: Any, **options: Any) -> Picture:
-        return _checked(name, raw, _run(path, stated.picture, raw, colours, **options))
+        return _checked(name, raw, _run(path, processor.picture, raw, colours, **options))
 
-    return replace(stated, picture=picture)
+    return replace(processor, picture=picture)
 
 
 def _read(path: Path) -> bytes:
@@ -133,8 +133,8 @@ def _run(path: Path, function: Any, raw: RawImage, colours: Any, **options: Any)
     except InputError:
         raise
     except (Exception, SystemExit) as error:
-        told = f"{_failure(path, error)}; it was given a mosaic of {'/'.join(raw.cfa)}"
-        raise InputError(f"processors: {told}") from error
+        failure = f"{_failure(path, error)}; it was given a mosaic of {'/'.join(raw.cfa)}"
+        raise InputError(f"processors: {failure}") from error
 
 
 def _failure(path: Path, error: BaseException) -> str:
@@ -148,16 +148,16 @@ def _failure(path: Path, error: BaseException) -> str:
     return f"{path} fails{where} ({type(error).__name__}: {one_line(error)}); mend it there"
 
 
-def _checked(name: str, raw: RawImage, made: Any) -> Picture:
+def _checked(name: str, raw: RawImage, output: Any) -> Picture:
     """Picture of what a user's function gave, or `InputError` where that is none."""
-    picture = made if isinstance(made, Picture) else None
+    picture = output if isinstance(output, Picture) else None
     try:
-        rgb = np.asarray(made.rgb if picture is not None else made, dtype=np.float64)
+        rgb = np.asarray(output.rgb if picture is not None else output, dtype=np.float64)
     except (TypeError, ValueError):
         rgb = np.empty(0)
     if rgb.shape != (*raw.shape, 3) or not np.isfinite(rgb).all():
         raise InputError(
-            f"processors: {name!r} gave {type(made).__name__} of shape {rgb.shape}; allowed: a Picture, or finite "
+            f"processors: {name!r} gave {type(output).__name__} of shape {rgb.shape}; allowed: a Picture, or finite "
             f"linear sRGB of shape {(*raw.shape, 3)}; return that"
         )
     return picture or Picture(rgb, {})

@@ -94,8 +94,8 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
                 stacklevel=2,
             )
         white_e[index] = balance.neutral / balance.neutral[names.index(unit)] * prior.neutral_e[LETTERS.index(unit)]
-    found, variance = reconstruct(raw, prior, white_e)
-    planes = found.astype(np.float64)
+    estimate, variance = reconstruct(raw, prior, white_e)
+    planes = estimate.astype(np.float64)
     gains, sources = balance.gains(raw, planes)
     # The posterior variance is all of the error: no factor on it, as weighted means of samples need.
     noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)

@@ -56,8 +56,8 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         bound += raw.dark_noise_e**2
         for step in raw.noise_steps:
             beyond = light >= step.from_e
-            some = light[beyond]
-            bound[beyond] = step.shot * some + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * some) ** 2
+            bright_e = light[beyond]
+            bound[beyond] = step.shot * bright_e + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * bright_e) ** 2
         np.sqrt(bound, out=bound)
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2

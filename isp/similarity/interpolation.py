@@ -68,8 +68,8 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
             change = mosaic[first + row : last + row, behind] - mosaic[first - row : last - row, before]
             change *= change
             change -= 2.0  # the noise of both, of unit variance
-            own, inside = first % len(tile), slice(across, max(width - across, across))
-            change *= shares[own : own + last - first, :width][:, inside]
+            phase, inside = first % len(tile), slice(across, max(width - across, across))
+            change *= shares[phase : phase + last - first, :width][:, inside]
             total[first:last, inside] += change
     if patch > 1:
         total = box_sums(np.pad(total, patch // 2, mode="reflect"), (patch, patch))

@@ -82,8 +82,9 @@ def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Plane
 def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Planes) -> Planes:
     """Indirect light of one light group without most of its noise, shape (band, h, w).
 
-    A denoiser smooths what is no noise too, however many samples there are. So the noisy light is mixed in, by what
-    each is off: the one by the halves' difference, the other by how well a half, denoised, foretells the other half.
+    The result is m = x + s (D(x) - x) for noisy light x and a denoiser D, which smooths detail as well as noise. s in 0
+    to 1 minimises the expected squared error of m: the variance of x follows from half the difference of the halves,
+    the error of D from two-fold cross-validation, one half denoised against the other.
 
     Parameters
     ----------
@@ -104,7 +105,7 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
     unit = np.maximum(albedo, np.float32(LEAST_ALBEDO))
     unit *= np.float32((indirect / unit).mean(dtype=np.float64))
     hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
-    few, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
+    reduced, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
     # Denoise the whole and each half
     guide = _last(normal)
     options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True}
@@ -115,10 +116,10 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
         made = [library.denoise(_last(planes[three]), **options) for three in filled.reshape(-1, _PLANES)]
         return np.concatenate([np.moveaxis(image, -1, 0) for image in made])[: len(planes)]
 
-    even, odd = np.maximum(few + error, 0), np.maximum(few - error, 0)
+    even, odd = np.maximum(reduced + error, 0), np.maximum(reduced - error, 0)
     share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
-    mixed = few + share * (filtered(few) - few)
-    return np.asarray(np.maximum(np.tensordot(_way_back(light, few), mixed, 1), 0) * unit)
+    mixed = reduced + share * (filtered(reduced) - reduced)
+    return np.asarray(np.maximum(np.tensordot(_way_back(light, reduced), mixed, 1), 0) * unit)
 
 
 def _denoised_share(error: Planes, missed: tuple[Planes, Planes]) -> Planes:
@@ -148,10 +149,10 @@ def _hats(bands: int) -> Planes:
     return np.asarray(hats / hats.sum(axis=1, keepdims=True), np.float32)
 
 
-def _way_back(bands: Planes, few: Planes) -> Planes:
+def _way_back(bands: Planes, reduced: Planes) -> Planes:
     """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
-    here, asked = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (few, bands))
-    return np.asarray(asked @ here.T @ np.linalg.pinv(here @ here.T, rcond=ROUNDING), np.float32)
+    source, target = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (reduced, bands))
+    return np.asarray(target @ source.T @ np.linalg.pinv(source @ source.T, rcond=ROUNDING), np.float32)
 
 
 def _last(planes: Planes) -> Planes:

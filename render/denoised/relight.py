@@ -41,9 +41,9 @@ def relight_denoised(
         raise InputError("denoised: the render has none; allowed: a render with denoise=True; render it so")
     folded = replace(transport, light=made.folds)
     denoised = replace(transport, light=Halves(made.radiance, transport.light.difference))
-    asked: dict[str, Any] = {"powers": powers, "luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
-    picture = denoised.relight(spectra, **asked)
-    one, other = folded.relight_halves(spectra, **asked)
+    level: dict[str, Any] = {"powers": powers, "luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
+    picture = denoised.relight(spectra, **level)
+    one, other = folded.relight_halves(spectra, **level)
     luminance = picture.luminance()
     upper = measured_error(luminance - one.luminance(), luminance - other.luminance(), np.ones(picture.shape)).upper
     mean = float(luminance.mean())

@@ -167,11 +167,11 @@ def _read_mat(path: Path, described: Description) -> Stored:
             "variable and axes are missing; a .mat doesn't tell which of its arrays is the cube; give "
             f'variable = "NAME" and axes = {list(AXES)} in the array\'s own order'
         )
-    found = read_numbers(path, [name, *([nm] if isinstance(nm, str) else [])])
+    numbers = read_numbers(path, [name, *([nm] if isinstance(nm, str) else [])])
     for key in (name, nm):
-        if isinstance(key, str) and key not in found:
+        if isinstance(key, str) and key not in numbers:
             raise InputError(f"it has no numbers {key!r}; give the name of a variable of the file")
-    return Stored(found[name], described.axes, found[nm] if isinstance(nm, str) else None)
+    return Stored(numbers[name], described.axes, numbers[nm] if isinstance(nm, str) else None)
 
 
 _READERS = {".npy": _read_npy, ".hdr": _read_envi, ".mat": _read_mat}

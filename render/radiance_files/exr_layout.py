@@ -49,13 +49,13 @@ def radiance_channels(names: Iterable[str]) -> dict[str, float]:
         need a light before there is radiance.
     """
     names = list(names)
-    found = {name: match for name in names if (match := _SPECTRAL.fullmatch(name))}
-    kinds = {match[1] for match in found.values()}
+    matches = {name: match for name in names if (match := _SPECTRAL.fullmatch(name))}
+    kinds = {match[1] for match in matches.values()}
     if "T" in kinds:
         raise InputError(
             "it holds reflectances (T channels); allowed: radiance (S0 channels); light it, then save that"
         )
-    nm = {name: _to_nm(name, match) for name, match in found.items() if match[1] == "S0"}
+    nm = {name: _to_nm(name, match) for name, match in matches.items() if match[1] == "S0"}
     if not nm:
         shown = ", ".join(sorted(names)[:8]) + (", ..." if len(names) > 8 else "")
         raise InputError(f"it has the channels {shown}; allowed: spectral ones such as S0.550,0nm; save it as spectral")

@@ -53,10 +53,10 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
-    found = read_numbers(path, _KEYS)
+    numbers = read_numbers(path, _KEYS)
     try:
-        from_basis = "mcCOEF" in found and not any(key.startswith("scene/") for key in found)
-        nm, shape, photons = _from_basis(found) if from_basis else _stored(found)
+        from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
+        nm, shape, photons = _from_basis(numbers) if from_basis else _stored(numbers)
         centres, widths = bands_between(nm)
         needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
         if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
@@ -73,38 +73,38 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         raise InputError(f"{path}: {refused}") from None
 
 
-def _stored(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
+def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
     """Wavelengths, height and width, and the photons of one band after another, as they stand in the file."""
-    if any(key.startswith("scene/") for key in found):
+    if any(key.startswith("scene/") for key in numbers):
         wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
     else:
-        wave, data = "wave" if "wave" in found else "wavelength", ""
-        photons = "photons" if "photons" in found else "data"
-    nm = _numbers(found, wave).ravel().astype(np.float64)
-    cube = _cube(found, photons, nm.size)
-    scale, offset = _quantised(cube.dtype, found, data)
+        wave, data = "wave" if "wave" in numbers else "wavelength", ""
+        photons = "photons" if "photons" in numbers else "data"
+    nm = _numbers(numbers, wave).ravel().astype(np.float64)
+    cube = _cube(numbers, photons, nm.size)
+    scale, offset = _quantised(cube.dtype, numbers, data)
     return nm, cube.shape[:2], (cube[:, :, k].astype(np.float64) * scale + offset for k in range(nm.size))
 
 
-def _quantised(dtype: np.dtype[Any], found: Numbers, data: str) -> tuple[float, float]:
+def _quantised(dtype: np.dtype[Any], numbers: Numbers, data: str) -> tuple[float, float]:
     """Scale and offset of photons: old files hold 16 or 32 bit integers that span least to most (ieCompressData)."""
     if dtype.kind == "f":
         return 1.0, 0.0
     for least, most in (("dmin", "dmax"), ("min", "max")):
-        if dtype in (np.uint16, np.uint32) and {data + least, data + most} <= found.keys():
-            low, high = (float(_numbers(found, data + name).ravel()[0]) for name in (least, most))
+        if dtype in (np.uint16, np.uint32) and {data + least, data + most} <= numbers.keys():
+            low, high = (float(_numbers(numbers, data + name).ravel()[0]) for name in (least, most))
             return (high - low) / float(np.iinfo(dtype).max), low
     raise InputError(f"photons are {dtype}; allowed: floating, or uint16 or uint32 with dmin and dmax; save them so")
 
 
-def _from_basis(found: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
+def _from_basis(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
     """Photons from coefficients: coefficients times basis, and the mean where it was taken out."""
-    nm = _numbers(found, "basis/wave").ravel().astype(np.float64)
-    functions = np.atleast_2d(_numbers(found, "basis/basis").astype(np.float64))
+    nm = _numbers(numbers, "basis/wave").ravel().astype(np.float64)
+    functions = np.atleast_2d(_numbers(numbers, "basis/basis").astype(np.float64))
     if functions.shape[0] != nm.size:
         raise InputError(f"basis.basis: shape {functions.shape} has not one row for each of {nm.size} wavelengths")
-    coefficients = _cube(found, "mcCOEF", functions.shape[1]).astype(np.float64)
-    mean = _numbers(found, "imgMean").ravel().astype(np.float64) if "imgMean" in found else np.zeros(nm.size)
+    coefficients = _cube(numbers, "mcCOEF", functions.shape[1]).astype(np.float64)
+    mean = _numbers(numbers, "imgMean").ravel().astype(np.float64) if "imgMean" in numbers else np.zeros(nm.size)
     if mean.size != nm.size:
         raise InputError(f"imgMean: {mean.size} values don't fit {nm.size} wavelengths; give one each")
     bands = (coefficients @ weights + offset for weights, offset in zip(functions, mean, strict=True))
@@ -121,16 +121,16 @@ def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
         )
 
 
-def _numbers(found: Numbers, name: str) -> NDArray[Any]:
-    if name not in found or not found[name].size:
+def _numbers(numbers: Numbers, name: str) -> NDArray[Any]:
+    if name not in numbers or not numbers[name].size:
         stated = name.replace("/", ".")
         raise InputError(f"it has no numbers {stated!r}; allowed: an ISETCam scene; save it with sceneToFile")
-    return found[name]
+    return numbers[name]
 
 
-def _cube(found: Numbers, name: str, depth: int) -> NDArray[Any]:
+def _cube(numbers: Numbers, name: str, depth: int) -> NDArray[Any]:
     """Array of (h, w, depth); MATLAB drops a last axis of 1."""
-    value = _numbers(found, name)
+    value = _numbers(numbers, name)
     cube = value[:, :, None] if value.ndim == 2 and depth == 1 else value
     if cube.ndim != 3 or cube.shape[2] != depth:
         raise InputError(f"{name.replace('/', '.')}: shape {value.shape} is not (h, w, {depth}); correct it")

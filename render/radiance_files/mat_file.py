@@ -49,14 +49,14 @@ def read_numbers(path: Path, keys: Collection[str]) -> Mapping[str, NDArray[Any]
         raise InputError(f"{path}: it is no level 5 .mat file; allowed: MATLAB's -v6 or -v7; save it with save -v7")
     most = min(MOST_BYTES, max(SMALL_BYTES, MOST_EXPANSION * size))
     with tempfile.TemporaryDirectory() as folder:
-        found = Path(folder) / "numbers.npz"
-        _run_reader(path, found, most, keys, _SECONDS + size / _BYTES_PER_SECOND)
-        with np.load(found) as numbers:
+        output = Path(folder) / "numbers.npz"
+        _run_reader(path, output, most, keys, _SECONDS + size / _BYTES_PER_SECOND)
+        with np.load(output) as numbers:
             return dict(numbers)
 
 
-def _run_reader(path: Path, found: Path, most_bytes: int, keys: Collection[str], seconds: float) -> None:
-    command = [sys.executable, mat_reader.__file__, str(path.resolve()), str(found), str(most_bytes), *keys]
+def _run_reader(path: Path, output: Path, most_bytes: int, keys: Collection[str], seconds: float) -> None:
+    command = [sys.executable, mat_reader.__file__, str(path.resolve()), str(output), str(most_bytes), *keys]
     environment = safe_environment(OPENBLAS_NUM_THREADS="1")
     try:
         done = subprocess.run(command, env=environment, capture_output=True, timeout=seconds, check=False)

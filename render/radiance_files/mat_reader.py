@@ -12,7 +12,7 @@ READER_BYTES = 1 << 28  # beside the file's values: SciPy's buffers
 COPIES = 4  # of the values on their way: inflated, stored type, MATLAB's type, written
 
 
-def main(path: str, found: str, most_bytes: str, *keys: str) -> None:
+def main(path: str, output: str, most_bytes: str, *keys: str) -> None:
     """Write the numbers that stand under some keys as one .npz file."""
     from scipy.io import loadmat
 
@@ -21,7 +21,7 @@ def main(path: str, found: str, most_bytes: str, *keys: str) -> None:
     names = {key.split("/")[0] for key in keys}
     content = loadmat(path, variable_names=names, mat_dtype=True, struct_as_record=False)
     numbers: dict[str, Any] = {key: value for key in keys if (value := _numbers(content, key)) is not None}
-    np.savez(found, **numbers)
+    np.savez(output, **numbers)
 
 
 def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:
@@ -39,8 +39,8 @@ def _limit(most_bytes: int) -> None:
     _lower(resource.RLIMIT_FSIZE, most_bytes)
     statm = Path("/proc/self/statm")
     if statm.is_file():
-        held = int(statm.read_text().split()[0]) * resource.getpagesize()
-        _lower(resource.RLIMIT_AS, held + READER_BYTES + COPIES * most_bytes)
+        address_bytes = int(statm.read_text().split()[0]) * resource.getpagesize()
+        _lower(resource.RLIMIT_AS, address_bytes + READER_BYTES + COPIES * most_bytes)
 
 
 def _lower(limit: int, most: int) -> None:

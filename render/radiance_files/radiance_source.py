@@ -61,7 +61,7 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
     if Path(path).suffix.lower() in photo.EXTENSIONS:
         height, width = photo.photo_size(path)
         return height * width, DEFAULT_WAVELENGTH_NM.size, 1
-    pixels, bands, groups = zip(*(file_extent(each) for each in files_of(path)), strict=True)
+    pixels, bands, groups = zip(*(file_extent(file) for file in files_of(path)), strict=True)
     return sum(pixels), bands[0], groups[0]
 
 

@@ -73,8 +73,8 @@ def convert(copy: Path, folder: Path) -> Path:
 def _camera(path: Path) -> dict[str, Any]:
     """One camera, its curves as whole numbers."""
     try:
-        held = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
-        header, data = held["header"], held["spectral_data"]
+        content = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
+        header, data = content["header"], content["spectral_data"]
         channels, rows = list(data["index"]["main"]), data["data"]["main"]
         nm = np.array(sorted(float(key) for key in rows))
         table = np.array([rows[key] for key in sorted(rows, key=float)], dtype=np.float64)
@@ -105,5 +105,5 @@ def _camera(path: Path) -> dict[str, Any]:
 def _compact(content: dict[str, Any]) -> str:
     """JSON with a camera a line, so that changes can be read."""
     head = {key: value for key, value in content.items() if key != "cameras"}
-    lines = ",\n".join(json.dumps(each, separators=(",", ":"), ensure_ascii=False) for each in content["cameras"])
+    lines = ",\n".join(json.dumps(camera, separators=(",", ":"), ensure_ascii=False) for camera in content["cameras"])
     return f'{json.dumps(head)[:-1]}, "cameras": [\n{lines}\n]}}\n'

@@ -110,7 +110,7 @@ def measured_camera(name: str) -> MeasuredCamera:
         For an unknown name.
     """
     cameras = measured_cameras()
-    names = {" ".join(each.lower().split()): each for each in cameras}
+    names = {" ".join(camera.lower().split()): camera for camera in cameras}
     key = " ".join(name.lower().split())
     if key in names:
         return cameras[names[key]]

@@ -180,9 +180,9 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
         lines.append('cfa = "bayer"  # RG over GB: a choice; another phase of it, or another mosaic, is yours to set')
     else:
         lines.append('cfa = ["W"]  # one channel without a filter, named W: numbers of a monochrome chip')
-    lines += [_line(key, each) for key, each in numbers.settings.items()]
+    lines += [_line(key, number) for key, number in numbers.settings.items()]
     lines += ["", *_responses(numbers, shape, curves), "", "[pixel]"]
-    names = [each.name for each in fields(PixelConfig)]
+    names = [field.name for field in fields(PixelConfig)]
     lines += [_line(key, numbers.pixel[key]) for key in names if key in numbers.pixel]
     words = dict.fromkeys(missing(numbers), "not told: needed, so give a number")
     words |= {key: f"not told: {off}" for key, off in _OFF.items()} | dict(numbers.left_out)
@@ -266,11 +266,11 @@ def _anchor(numbers: PixelNumbers) -> str:
     return f"{value:g} at {at_nm:g} nm, {_plain(numbers.source)}"
 
 
-def _line(key: str, each: Sourced) -> str:
+def _line(key: str, number: Sourced) -> str:
     whole = key in ("bits", "black_level_dn")
-    return f"{key} = {int(each.value) if whole else repr(float(each.value))}  # {_plain(each.source)}"
+    return f"{key} = {int(number.value) if whole else repr(float(number.value))}  # {_plain(number.source)}"
 
 
 def _plain(text: str) -> str:
     """Words of a text on one line, without what TOML forbids in a comment."""
-    return " ".join("".join(each if each.isprintable() else " " for each in text).split())
+    return " ".join("".join(x if x.isprintable() else " " for x in text).split())

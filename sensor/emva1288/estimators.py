@@ -36,9 +36,9 @@ def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
     power = float(np.sum(signal**2))
     slope = float(np.sum(signal * excess)) / power if power > 0 else 0.0
     pixels = dark.mean_dn.size
-    own = np.sum((signal * transfer.variance_dn2[used]) ** 2) * 2 / pixels
-    common = (signal.sum() * dark.variance_dn2) ** 2 * 2 / (pixels * (dark.frames - 1))
-    error = sqrt(float(own + common)) / power if power > 0 else inf
+    of_points = np.sum((signal * transfer.variance_dn2[used]) ** 2) * 2 / pixels
+    of_dark = (signal.sum() * dark.variance_dn2) ** 2 * 2 / (pixels * (dark.frames - 1))
+    error = sqrt(float(of_points + of_dark)) / power if power > 0 else inf
     if not slope > 4 * error:  # 4 standard errors: no slope at all would be taken for one once in 3e4 chips
         raise InputError(
             f"gain: {slope:.3g} +- {error:.3g} DN/e- can't be told from 0, the light shows no shot noise; allowed: "
@@ -125,8 +125,8 @@ def dark_current(slopes: NDArray[np.float64], gain_dn_per_e: Estimate) -> tuple[
 def _electrons(variance_dn2: float, error_dn2: float, gain_dn_per_e: Estimate) -> Estimate:
     """Standard deviation in electrons from a variance in DN^2; the gain's error comes on top."""
     slope, error = gain_dn_per_e
-    value, own = _root(variance_dn2 / slope**2, error_dn2 / slope**2)
-    return value, hypot(own, value * error / slope)
+    value, error_e = _root(variance_dn2 / slope**2, error_dn2 / slope**2)
+    return value, hypot(error_e, value * error / slope)
 
 
 def _root(variance: float, error: float) -> Estimate:

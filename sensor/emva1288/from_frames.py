@@ -144,7 +144,7 @@ def _stacks(flats: Sequence[NDArray[np.uint16]]) -> list[list[NDArray[np.uint16]
 def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
     """Mean and temporal variance by position, each frame's own brightness taken off: lamps flicker (eqs. 18, 44)."""
     height, width = len(tile), len(tile[0])
-    found = []
+    sites = []
     for row in range(height):
         for column in range(width):
             stack = np.array([frame[row::height, column::width] for frame in frames], dtype=np.float64)
@@ -154,26 +154,26 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
             freedom = (len(frames) - 1) * (mean.size - 1)
             variance = float(np.sum(rest**2)) / freedom
             error = max(variance, QUANTISATION_DN2) * sqrt(2 / freedom)  # the same file twice varies in nothing
-            found.append(_Site(mean, variance, error, len(frames)))
-    return found
+            sites.append(_Site(mean, variance, error, len(frames)))
+    return sites
 
 
 def _gain(stacks: list[list[_Site]], dark: list[_Site], levels: Floats, most_dn: float) -> Estimate:
     """Slope of the variance that light adds over the signal (eq. 50), in DN per electron; least squares by error."""
-    power, slope, own, shared = 0.0, 0.0, 0.0, np.zeros(len(dark))
+    power, slope, of_flats, of_darks = 0.0, 0.0, 0.0, np.zeros(len(dark))
     for stack, level in zip(stacks, levels, strict=True):
         for index, (site, signal) in enumerate(zip(stack, level, strict=True)):
             if signal <= most_dn and signal > 0:
                 weight = signal / site.error_dn2**2
                 slope += weight * (site.variance_dn2 - dark[index].variance_dn2)
                 power += weight * signal
-                own += (weight * site.error_dn2) ** 2
-                shared[index] += weight * dark[index].error_dn2
+                of_flats += (weight * site.error_dn2) ** 2
+                of_darks[index] += weight * dark[index].error_dn2
     if not power:
         raise InputError(
             f"flat frames: each is over {FIT_SHARE:.0%} of white; allowed: two or more below that; expose them less"
         )
-    error = sqrt(own + float(np.sum(shared**2))) / power
+    error = sqrt(of_flats + float(np.sum(of_darks**2))) / power
     slope /= power
     if not slope > 4 * error:  # 4 standard errors: no slope at all would be taken for one once in 3e4 cameras
         raise InputError(
@@ -185,7 +185,7 @@ def _gain(stacks: list[list[_Site]], dark: list[_Site], levels: Floats, most_dn:
 
 def _relative(stack: list[_Site], dark: list[_Site], level: Floats) -> list[tuple[NDArray[np.float64], float]]:
     """Response of each pixel over the mean, less a smooth surface of second order, with its temporal variance."""
-    found = []
+    responses = []
     for site, shade, signal in zip(stack, dark, level, strict=True):
         added = (site.mean_dn - shade.mean_dn) / signal
         y, x = (np.linspace(-1, 1, size) for size in added.shape)
@@ -194,8 +194,8 @@ def _relative(stack: list[_Site], dark: list[_Site], level: Floats) -> list[tupl
         smooth = surface @ np.linalg.lstsq(surface, added.ravel(), rcond=None)[0]
         rest = added.ravel() - smooth
         freedom = sqrt(rest.size / (rest.size - len(terms)))
-        found.append(((rest * freedom).reshape(added.shape), (site.temporal_dn2 + shade.temporal_dn2) / signal**2))
-    return found
+        responses.append(((rest * freedom).reshape(added.shape), (site.temporal_dn2 + shade.temporal_dn2) / signal**2))
+    return responses
 
 
 def _spread(images: list[tuple[NDArray[np.float64], float]]) -> Estimate:

@@ -111,8 +111,8 @@ def column_variance(image: NDArray[np.float64]) -> tuple[float, float]:
     """
     height, width = image.shape
     of_means = float(image.mean(axis=0).var(ddof=1))
-    own = float(image.var(axis=0, ddof=1).mean()) / height
-    return of_means - own, of_means * float(np.sqrt(2 / (width - 1)))
+    of_pixels = float(image.var(axis=0, ddof=1).mean()) / height
+    return of_means - of_pixels, of_means * float(np.sqrt(2 / (width - 1)))
 
 
 def dark_slopes(expose: Expose, exposures_s: Sequence[float]) -> NDArray[np.float64]:

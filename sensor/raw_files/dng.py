@@ -78,11 +78,11 @@ def read_dng(path: Path) -> RawImage:
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
-        held, meant = (some[code][1] if code in some else None for some in (tags, expected))
-        if held != meant:
-            found, right = ("missing" if values is None else tuple(values[:8]) for values in (held, meant))
+        of_file, of_calibration = (directory[code][1] if code in directory else None for directory in (tags, expected))
+        if of_file != of_calibration:
+            stated, right = ("missing" if x is None else tuple(x[:8]) for x in (of_file, of_calibration))
             raise InputError(
-                f"{path}: {name} is {found}, the calibration says {right}; allowed: an unchanged file; write it anew"
+                f"{path}: {name} is {stated}, the calibration says {right}; allowed: an unchanged file; write it anew"
             )
     return raw
 

@@ -59,21 +59,27 @@ def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, 
     if len(text) > MOST_BYTES:
         raise InputError(f"{name}: its calibration is over {MOST_BYTES} bytes; allowed: what rodcone wrote")
     try:
-        held = json.loads(text.decode())
+        calibration = json.loads(text.decode())
     except (ValueError, RecursionError):  # no UTF-8, no JSON, or brackets nested too deep
-        held = None
-    if not isinstance(held, dict) or held.get("format") != FORMAT or held.get("version") != VERSION:
+        calibration = None
+    if (
+        not isinstance(calibration, dict)
+        or calibration.get("format") != FORMAT
+        or calibration.get("version") != VERSION
+    ):
         raise InputError(
             f"{name}: its calibration is not that of a raw image; allowed: {FORMAT!r}, version {VERSION}; write it anew"
         )
-    require_keys(f"{name}: calibration", (key[:_LONGEST_KEY] for key in held), ("format", "version", *KEYS, *more))
-    missing = [key for key in (*KEYS, *more) if key not in held and key not in _OPTIONAL]
+    require_keys(
+        f"{name}: calibration", (key[:_LONGEST_KEY] for key in calibration), ("format", "version", *KEYS, *more)
+    )
+    missing = [key for key in (*KEYS, *more) if key not in calibration and key not in _OPTIONAL]
     if missing:
         raise InputError(f"{name}: its calibration lacks {', '.join(missing)}; write the file anew")
-    return held
+    return calibration
 
 
-def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawImage:
+def raw_image(calibration: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawImage:
     """Raw image from its pixels and its calibration as `parse_json` gives it.
 
     Raises
@@ -83,9 +89,9 @@ def raw_image(held: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawIma
     """
     try:
         structured = {
-            "colour": None if held["colour"] is None else ColourCalibration(**held["colour"]),
-            "noise_steps": tuple(NoiseStep(**step) for step in held.get("noise_steps", ())),
+            "colour": None if calibration["colour"] is None else ColourCalibration(**calibration["colour"]),
+            "noise_steps": tuple(NoiseStep(**step) for step in calibration.get("noise_steps", ())),
         }
-        return RawImage(dn, **{key: held[key] for key in KEYS if key in held} | structured)
+        return RawImage(dn, **{key: calibration[key] for key in KEYS if key in calibration} | structured)
     except (InputError, TypeError) as error:  # TypeError: keys of a part that it lacks or doesn't know
         raise InputError(f"{name}: {error}; give what rodcone wrote") from None

@@ -48,10 +48,10 @@ def read_tiff(path: Path) -> RawImage:
     """
     dn, _ = read_mosaic(path, MIN_IS_BLACK)
     sidecar = path.with_suffix(".json")
-    held = parse_json(_text(sidecar, path), str(sidecar), (DIGEST,))
-    if held[DIGEST] != _digest(dn):
+    calibration = parse_json(_text(sidecar, path), str(sidecar), (DIGEST,))
+    if calibration[DIGEST] != _digest(dn):
         raise InputError(f"{sidecar}: it describes other pixels than {path.name}; keep the two files of one exposure")
-    return raw_image(held, dn, str(sidecar))
+    return raw_image(calibration, dn, str(sidecar))
 
 
 def _text(sidecar: Path, picture: Path) -> bytes:

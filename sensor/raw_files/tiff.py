@@ -183,8 +183,8 @@ def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDA
         )
     fixed = {COMPRESSION: 1, PHOTOMETRIC: photometric, SAMPLES_PER_PIXEL: 1}
     for code, allowed in fixed.items():
-        if (found := whole(tags, code, name)) != (allowed,):
-            raise InputError(f"{name}: tag {code} is {found[:4]}; allowed: {allowed}; use a rodcone file")
+        if (values := whole(tags, code, name)) != (allowed,):
+            raise InputError(f"{name}: tag {code} is {values[:4]}; allowed: {allowed}; use a rodcone file")
     width, height = (whole(tags, code, name)[0] for code in (WIDTH, HEIGHT))
     offsets, counts = whole(tags, STRIP_OFFSETS, name), whole(tags, STRIP_BYTE_COUNTS, name)
     if not (1 <= width <= _LONGEST_SIDE and 1 <= height <= _LONGEST_SIDE):

@@ -86,7 +86,7 @@ def system(root: Path, **files: str) -> Path:
 
 
 def bounds(root: Path) -> dict[str, float]:
-    return {limit.name: limit.free for limit in memory_limits(root) if not limit.each}
+    return {limit.name: limit.free for limit in memory_limits(root) if not limit.per_process}
 
 
 def test_what_is_available_is_the_kernel_s_own_estimate(tmp_path: Path) -> None:

@@ -101,11 +101,10 @@ def test_sources_of_noise_sum_to_the_noise() -> None:
             assert sum(value**2 for value in sources.values()) == pytest.approx(expected, rel=1e-12)
 
 
-def test_values_show_their_curves_and_facts_in_a_notebook() -> None:
-    assert "<img" in Spectrum(np.array([400.0, 700.0]), np.ones(2))._repr_html_()
-    scene = load("flat_field")._repr_html_()
-    for words in ("Scene flat_field", "<img", "<td>sky</td>", "<td>1</td>", "<td>wall</td>"):
-        assert words in scene
+def test_values_show_their_curves_in_a_notebook() -> None:
+    for value in (Spectrum(np.array([400.0, 700.0]), np.ones(2)), load("flat_field")):
+        with Image.open(BytesIO(value._repr_png_())) as picture:
+            assert picture.size == (600, 300)
     assert not pyplot.get_fignums()
 
 
