@@ -104,7 +104,7 @@ def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
 def read_exr(path: str | Path) -> SpectralRadiance:
     """Read radiance from a spectral OpenEXR file, rodcone's own or another program's.
 
-    Any S0 channels in any order, in wavelengths or frequencies, in half or float, with or without a preview. What has
+    Any S0 channels in any order, in half or float, with or without a preview. What has
     to be assumed is named by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
     that is smaller than its frame the part that is there is read.
 

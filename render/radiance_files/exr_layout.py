@@ -23,13 +23,7 @@ LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values a
 TRUE_UNITS = "W.m^-2.sr^-1.nm^-1"
 UNITS, OWN_UNITS, BANDS = "emissiveUnits", "rodconeUnits", "rodconeBands_nm"
 _MEASUREMENT = ("lensTransmission", "cameraResponse")  # of the camera that took the picture, which rodcone doesn't undo
-
-_LIGHT_M_S = 299792458.0
-_PREFIX = {"Y": 1e24, "Z": 1e21, "E": 1e18, "P": 1e15, "T": 1e12, "G": 1e9, "M": 1e6, "k": 1e3, "h": 1e2, "da": 1e1}
-_PREFIX |= {"": 1.0, "d": 1e-1, "c": 1e-2, "m": 1e-3, "u": 1e-6, "n": 1e-9, "p": 1e-12}
-_SPECTRAL = re.compile(
-    r"(S[0-3]|T)\.([0-9]*,?[0-9]*(?:[Ee][+-]?[0-9]+)?)(Y|Z|E|P|T|G|M|k|h|da|d|c|m|u|n|p)?(m|Hz)(\..*)?"
-)
+_SPECTRAL = re.compile(r"(S[0-3]|T)\.([0-9]*,?[0-9]*(?:[Ee][+-]?[0-9]+)?)(\w{,2}(?:m|Hz)(?:\..*)?)")
 
 
 def channel_name(wavelength_nm: float) -> str:
@@ -66,15 +60,14 @@ def radiance_channels(names: Iterable[str]) -> dict[str, float]:
 
 
 def _to_nm(name: str, match: re.Match[str]) -> float:
-    """Wavelength of a channel from its number, prefix and unit."""
-    _, number, prefix, unit, rest = match.groups()
+    """Wavelength of a channel from its number; the layout's other units are refused."""
+    _, number, unit = match.groups()
     try:
-        value = float(number.replace(",", ".")) * (1.0 if (prefix, unit) == ("n", "m") else _PREFIX[prefix or ""])
-        nm = value if (prefix, unit) == ("n", "m") else (value if unit == "m" else _LIGHT_M_S / value) * 1e9
-    except (ValueError, ZeroDivisionError, OverflowError):
+        nm = float(number.replace(",", "."))
+    except ValueError:
         nm = np.nan
-    if rest or not 0 < nm < np.inf:
-        raise InputError(f"channel {name!r} has no wavelength; allowed: names such as S0.550,0nm; rename it")
+    if unit != "nm" or not 0 < nm < np.inf:
+        raise InputError(f"channel {name!r} has no wavelength in nm; allowed: names such as S0.550,0nm; rename it")
     return nm
 
 

@@ -208,28 +208,17 @@ def test_reflectances_of_the_authors_and_colour_science_are_refused(samples: Pat
     refusal(read_exr, samples / name, match="reflectances")
 
 
-def test_channels_in_any_order_and_unit_are_put_in_the_order_of_wavelength(tmp_path: Path) -> None:
-    """Light of 499 654.0966... GHz has c / f = 600 nm."""
-    channels = {"S0.0,7um": plane(7), "S0.499654,0966666667GHz": plane(6), "S0.5e-7m": plane(5), "Z": plane(99)}
+def test_channels_in_any_order_are_put_in_the_order_of_wavelength(tmp_path: Path) -> None:
+    channels = {"S0.700nm": plane(7), "S0.600,0nm": plane(6), "S0.5e2nm": plane(5), "Z": plane(99)}
     path = write_by_hand(tmp_path / "a.exr", channels)
     read = read_exr(path)
-    assert read.wavelength_nm == pytest.approx([500.0, 600.0, 700.0], rel=1e-12)
+    assert read.wavelength_nm.tolist() == [500.0, 600.0, 700.0]
     assert read.values[0, 0].tolist() == [5, 6, 7]
     assert read.widths_nm == pytest.approx([100.0] * 3)
     assert read.relative_mc_error == 0
 
 
-@loop(
-    ("name", "nm"),
-    [
-        ("S0.550,25nm", 550.25),
-        ("S0.5,5E2nm", 550.0),
-        ("S0.55e-8m", 550.0),
-        ("S0.299792,458GHz", 1000.0),
-        ("S0.600THz", 499.6540966666667),
-        ("S0.0,6PHz", 499.6540966666667),
-    ],
-)
+@loop(("name", "nm"), [("S0.550nm", 550.0), ("S0.550,25nm", 550.25), ("S0.5,5E2nm", 550.0)])
 def test_wavelength_of_a_channel_name(name: str, nm: float) -> None:
     assert list(radiance_channels([name]).values()) == [pytest.approx(nm, rel=1e-12)]
 
@@ -322,6 +311,7 @@ def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
         ({"beauty.S0.500nm": 1}, {}, "beauty"),
         ({"S0.500nm": 1, "S0.5e2nm": 1}, {}, "one wavelength"),
         ({"S0.nm": 1, "S0.500nm": 1}, {}, "no wavelength"),
+        ({"S0.600THz": 1, "S0.500nm": 1}, {}, "no wavelength in nm"),
         ({"S0.1e999nm": 1, "S0.500nm": 1}, {}, "no wavelength"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"emissiveUnits": "cd.m^-2"}, "cd.m"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"rodconeUnits": "lux"}, "lux"),
