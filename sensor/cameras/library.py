@@ -1,4 +1,8 @@
-"""Measured responses of cameras by name: one of colour-science, and those of `sensor.cameras.convert`'s file."""
+"""Measured responses of cameras by name: one of colour-science, and those of a copy of rawtoaces-data.
+
+That collection (Academy Software Foundation, Apache License 2.0) holds a JSON file a camera: relative response of R, G
+and B at 380-780 nm, 5 nm apart, with the name of its laboratory.
+"""
 
 import json
 import os
@@ -6,7 +10,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -16,13 +19,13 @@ from rodcone.errors import InputError, one_line, unknown
 from rodcone.files import read_bounded
 from sensor.curves import Responses
 
-FILE = "cameras.json"
-VARIABLE = "RODCONE_CAMERAS"  # environment variable: folder of the file
-MOST_BYTES = 1 << 23  # 52 cameras take 68 kB
-STEPS = 100_000  # whole numbers in the file are this many to 1: half a step is under the sources' own last digits
-_SHIPPED = Path(__file__).parent / "measured"  # a distribution may ship what `convert` writes
+VARIABLE = "RODCONE_CAMERAS"  # environment variable: folder of a copy of rawtoaces-data
+SOURCE = "rawtoaces-data, Academy Software Foundation, https://github.com/AcademySoftwareFoundation/rawtoaces-data"
+LICENCE = "Apache-2.0"
+RANGE_NM = (380.0, 780.0, 5.0)
+_MOST_BYTES = 1 << 20  # of one camera's file: some 20 kB
+_MOST_CAMERAS = 10_000
 _NPL = "Nikon D5100"
-_TEXTS = ("maker", "model", "creator", "laboratory", "equipment", "date")
 
 
 @dataclass(frozen=True)
@@ -77,27 +80,16 @@ class MeasuredCamera:
         )
 
 
-def library_file() -> Path | None:
-    """File of the measured responses: below `VARIABLE`'s folder, else the one shipped; None where there is none."""
-    folder = os.environ.get(VARIABLE)
-    path = (Path(folder) if folder else _SHIPPED) / FILE
-    if folder and not path.is_file():
-        raise InputError(
-            f"{VARIABLE}: {folder!r} holds no {FILE}; allowed: a folder of rodcone new cameras; correct it"
-        )
-    return path if path.is_file() else None
-
-
 def measured_cameras() -> dict[str, MeasuredCamera]:
-    """Cameras by name, such as ``Nikon D850``: those of the file, and one that every installation has.
+    """Cameras by name, such as ``Nikon D850``: those of the copy, and one that every installation has.
 
     Raises
     ------
     InputError
-        For a file that is damaged.
+        For a folder that is no copy, or a damaged file in it.
     """
-    path = library_file()
-    cameras = {} if path is None else read_library(path, path.stat().st_mtime_ns)
+    copy = os.environ.get(VARIABLE)
+    cameras = read_library(Path(copy)) if copy else {}
     return cameras if _NPL in cameras else {_NPL: _npl_camera(), **cameras}
 
 
@@ -114,10 +106,10 @@ def measured_camera(name: str) -> MeasuredCamera:
     key = " ".join(name.lower().split())
     if key in names:
         return cameras[names[key]]
-    if library_file() is None:
+    if not os.environ.get(VARIABLE):
         raise InputError(
-            f"camera: {name!r} is unknown; allowed: {', '.join(cameras)}, and the names of a copy of rawtoaces-data, "
-            f"which isn't at hand: rodcone new cameras COPY -o FOLDER, then {VARIABLE}=FOLDER"
+            f"camera: {name!r} is unknown; allowed: {', '.join(cameras)}, and the names of a copy of rawtoaces-data; "
+            f"name its folder by {VARIABLE}=FOLDER"
         )
     raise unknown("camera", name, cameras)
 
@@ -145,38 +137,53 @@ def _npl_camera() -> MeasuredCamera:
 
 
 @cache
-def read_library(path: Path, _changed: int) -> dict[str, MeasuredCamera]:
-    """Cameras of a file as `sensor.cameras.convert` writes it; one that changed is read anew.
+def read_library(copy: Path) -> dict[str, MeasuredCamera]:
+    """Cameras of a copy of rawtoaces-data, by maker and model.
 
     Raises
     ------
     InputError
-        For a file that is damaged.
+        For a folder that is no copy, or a damaged file in it.
     """
+    camera_files = sorted((copy / "data" / "camera").glob("*.json"))[: _MOST_CAMERAS + 1]
+    if not 0 < len(camera_files) <= _MOST_CAMERAS:
+        raise InputError(
+            f"{VARIABLE}: {str(copy)!r} holds no data/camera/*.json; allowed: a copy of rawtoaces-data; give its folder"
+        )
+    cameras = map(read_camera, camera_files)
+    return {f"{camera.maker} {camera.model}": camera for camera in cameras}
+
+
+def read_camera(path: Path) -> MeasuredCamera:
+    """One camera of rawtoaces-data; `InputError` for a file that is damaged or under another licence."""
     try:
-        return _cameras(json.loads(read_bounded(path, MOST_BYTES).decode("utf-8")))
+        content = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
+        header, data = content["header"], content["spectral_data"]
+        channels, rows = list(data["index"]["main"]), data["data"]["main"]
+        nm = np.array(sorted(float(key) for key in rows))
+        table = np.array([rows[key] for key in sorted(rows, key=float)], dtype=np.float64)
+        if header["license"] != LICENCE:
+            raise ValueError(f"licence {header['license']!r} is not {LICENCE}")
+        if data["units"] != "relative" or channels != ["R", "G", "B"] or table.shape != (nm.size, 3):
+            raise ValueError("it holds no relative R, G and B")
+        if not np.array_equal(nm, np.arange(RANGE_NM[0], RANGE_NM[1] + 1, RANGE_NM[2])):
+            raise ValueError("its wavelengths are not 380 to 780 nm, 5 nm apart")
+        if not np.all(np.isfinite(table) & (table >= 0)) or not 0 < table.max() < 2:
+            raise ValueError("its responses are not 0 to 1")
+        return MeasuredCamera(
+            maker=str(header["manufacturer"]),
+            model=str(header["model"]),
+            creator=str(header["document_creator"]),
+            laboratory=str(header.get("laboratory") or ""),
+            equipment=str(header.get("measurement_equipment") or ""),
+            date=header["document_creation_date"][:10],
+            source=SOURCE,
+            licence=LICENCE,
+            wavelength_nm=nm,
+            per_power=dict(zip(channels, table.T, strict=True)),
+        )
     except (OSError, ValueError, TypeError, LookupError, AttributeError, RecursionError, OverflowError) as error:
         raise InputError(
-            f"measured responses: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); "
-            "allowed: what rodcone new cameras wrote; write it anew"
+            f"camera: {str(path)!r} can't be read ({type(error).__name__}: {one_line(error)}); allowed: a camera of "
+            "rawtoaces-data; copy it again"
         ) from error
-
-
-def _cameras(content: Mapping[str, Any]) -> dict[str, MeasuredCamera]:
-    first, last, step = (float(value) for value in content["range_nm"])
-    if not (100 <= first < last <= 20_000 and (last - first) / 1e4 < step < last - first):
-        raise ValueError(f"range_nm {[first, last, step]} is no range")
-    nm = np.arange(first, last + step / 2, step)
-    cameras = {}
-    for entry in content["cameras"]:
-        curves = {channel: np.array(values, dtype=np.float64) / STEPS for channel, values in entry["curves"].items()}
-        if not curves or any(curve.shape != nm.shape or not np.all(curve >= 0) for curve in curves.values()):
-            raise ValueError(f"curves of {entry['model']!r} are not {nm.size} numbers of 0 or more")
-        if not max(curve.max() for curve in curves.values()) <= 2:
-            raise ValueError(f"curves of {entry['model']!r} are not relative to their greatest value")
-        texts = {name: str(entry.get(name, "")) for name in _TEXTS}
-        camera = MeasuredCamera(
-            **texts, source=str(content["source"]), licence=str(content["licence"]), wavelength_nm=nm, per_power=curves
-        )
-        cameras[f"{camera.maker} {camera.model}"] = camera
-    return cameras

@@ -10,7 +10,6 @@ from cyclopts import App
 from rodcone.errors import InputError, require_absent, require_keys, require_range
 from rodcone.files import check_place, replacing
 from rodcone.toml_file import read_toml
-from sensor.cameras.convert import convert
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import measured_camera
 from sensor.cameras.noise_files import dng_numbers
@@ -56,7 +55,7 @@ def preset(
         File to write, ending in .toml; one that exists is left alone. Its path can replace any preset name. Responses
         go into NAME_curves.csv beside it.
     camera
-        Measured response of a camera by name, such as "Nikon D850": see rodcone list sensors, rodcone new cameras.
+        Measured response of a camera by name, such as "Nikon D850": see rodcone list sensors.
     noise
         Where its noise stands: an EMVA 1288 report as .toml, or a .dng with a NoiseProfile. For raw frames of
         your own: rodcone characterise --from.
@@ -107,21 +106,6 @@ def preset(
             "which lends them"
         )
     print(out)
-
-
-@app.command
-def cameras(copy: Path, /, *, out: Path) -> None:
-    """Convert a copy of rawtoaces-data (Academy Software Foundation, Apache-2.0) for --camera and rodcone list sensors.
-
-    Parameters
-    ----------
-    copy
-        Folder of the repository, as cloned.
-    out
-        Folder to write cameras.json into, its licence beside it. The environment variable RODCONE_CAMERAS names it
-        afterwards.
-    """
-    print(convert(copy, out))
 
 
 @app.command

@@ -29,7 +29,7 @@ from scenes.catalog import load
 from scenes.reflectances import read_reflectances
 from sensor.calibration import ColourCalibration
 from sensor.cameras.emva_report import numbers_of, read_report
-from sensor.cameras.library import read_library
+from sensor.cameras.library import read_camera
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, read_curve
 from sensor.raw import RawImage
@@ -415,15 +415,12 @@ mu_e_sat = 9500
 """
 
 
-def _library_samples() -> list[Sample]:
-    curves = {channel: [index * 100 for index in range(9)] for channel in "RGB"}
-    camera = {"maker": "A", "model": "B", "creator": "lab", "date": "2025-01-01", "curves": curves}
-    content = {"source": "s", "licence": "l", "range_nm": [380, 780, 50], "cameras": [camera, {**camera, "model": "C"}]}
-    return [{"cameras.json": json.dumps(content).encode()}]
-
-
-def _read_library(path: Path) -> object:
-    return [camera.responses for camera in read_library(path, path.stat().st_mtime_ns).values()]
+def _camera_json_samples() -> list[Sample]:
+    header = {"manufacturer": "A", "model": "B", "document_creator": "lab", "document_creation_date": "2025-01-01"}
+    rows = {str(nm): [nm / 780, 1.0, 0.5] for nm in range(380, 785, 5)}
+    data = {"units": "relative", "index": {"main": ["R", "G", "B"]}, "data": {"main": rows}}
+    content = {"header": {**header, "license": "Apache-2.0"}, "spectral_data": data}
+    return [{"camera.json": json.dumps(content).encode()}]
 
 
 TARGETS: dict[str, Target] = {
@@ -438,7 +435,7 @@ TARGETS: dict[str, Target] = {
     "report": Target(
         lambda: [{"report.toml": _REPORT}], {".toml": any_text}, lambda path: numbers_of(read_report(path))
     ),
-    "library": Target(_library_samples, {".json": json_values}, _read_library),
+    "library": Target(_camera_json_samples, {".json": json_values}, lambda path: read_camera(path).responses),
     "cube": Target(
         _cube_samples,
         {".npy": any_bytes, ".toml": any_text, ".hdr": any_text, ".img": any_bytes, ".mat": mat_elements},

@@ -1,4 +1,4 @@
-"""`rodcone new cameras`, `rodcone new preset --camera --noise`, `rodcone list sensors`: cameras that exist."""
+"""`rodcone new preset --camera --noise`, `rodcone list sensors`: cameras that exist."""
 
 import json
 import tomllib
@@ -28,8 +28,7 @@ REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "framos_
 @pytest.fixture
 def cameras(tmp_path, monkeypatch):
     copy = sample.copy_of(tmp_path / "copy", sample.camera_json())
-    assert call(["new", "cameras", copy, "-o", tmp_path / "made"])[:2] == (0, f"{tmp_path / 'made/cameras.json'}\n")
-    monkeypatch.setenv(VARIABLE, str(tmp_path / "made"))
+    monkeypatch.setenv(VARIABLE, str(copy))
 
 
 @pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
@@ -53,7 +52,6 @@ def test_a_measured_camera_is_listed_and_becomes_a_preset(tmp_path):
 @pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
 def test_a_fresh_installation_has_a_measured_camera(tmp_path, monkeypatch):
     monkeypatch.delenv(VARIABLE, raising=False)
-    monkeypatch.setattr("sensor.cameras.library._SHIPPED", tmp_path)
     listed = json.loads(call(["list", "sensors", "--json"])[1])["sensors"]
     assert "each channel by itself: Darrodi" in listed["Nikon D5100"]
     path = tmp_path / "mine.toml"
