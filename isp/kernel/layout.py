@@ -200,11 +200,11 @@ def lay_out(
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)
     # The part of the strip that counts, and where the arrays begin in it.
     part = _surroundings(strip.shape, spans, pattern, settings)
-    window = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
+    box = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
     half, block = settings.patch // 2, pattern.block[1]
     channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
-    samples = _window(strip.samples[window], start, (size[0], size[1] + block), 0, 0.0)
+    samples = _window(strip.samples[box], start, (size[0], size[1] + block), 0, 0.0)
 
     # Packets: one or two rows of a plane under the patches of a block, then as many of the block's samples.
     down, across = packet_step(pattern, guide)
@@ -212,7 +212,7 @@ def lay_out(
     planes = aligned((len(channels), *size), np.float32)
     packets = aligned((len(channels), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
     for number, plane, target in zip(channels, planes, packets, strict=True):
-        filled = fill(strip.guide[window], pattern.cfa, pattern.channels[number])
+        filled = fill(strip.guide[box], pattern.cfa, pattern.channels[number])
         wide = _window(filled, (start[0] - half, start[1] - half), (size[0], size[1] + under), half, OUTSIDE)
         plane[:] = wide[:, : size[1]]
         for k in range(down):
@@ -222,9 +222,7 @@ def lay_out(
     alpha = None
     if guide != "W" and strip.alpha is not None:
         alpha = aligned((size[0], row_packets, packet_width(block)), np.float32)
-        _put_packets(
-            alpha[..., :block], _window(strip.alpha[window], start, (size[0], size[1] + block), 0, 0.0), across
-        )
+        _put_packets(alpha[..., :block], _window(strip.alpha[box], start, (size[0], size[1] + block), 0, 0.0), across)
 
     offsets, counts = list_offsets(pattern, settings, guide)
     entries = np.zeros((*offsets.shape[:2], packet_width(offsets.shape[2] - 1)), np.float32)
@@ -233,9 +231,9 @@ def lay_out(
     entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
     brightest = aligned((len(pattern.cells), *size), np.float32)
     for phase, target in zip(np.ndindex(pattern.tile), brightest, strict=True):
-        _window(strip.brightest[phase][window], start, size, 0, 0.0, target)
+        _window(strip.brightest[phase][box], start, size, 0, 0.0, target)
     read = {"planes": planes, "packets": packets, "brightest": brightest, "entries": entries, "counts": counts}
-    read |= {"inverse_variance": _window(strip.inverse_variance[window], start, size, 0, 0.0)}
+    read |= {"inverse_variance": _window(strip.inverse_variance[box], start, size, 0, 0.0)}
     read |= {} if alpha is None else {"alpha": alpha}
     numbers = {
         "length": entries.shape[1],
