@@ -9,11 +9,13 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rodcone.errors import InputError
+from rodcone.files import replacing
 from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
-from studies.commands.console import print_table, require_ending, write_text
+from studies.commands.console import print_table
 from studies.pages.report_sweep import environment
+from studies.pages.speed_page import bench_page
 from studies.photograph.clock import processor_facts
 from studies.speed.points import stage_json
 from studies.speed.stages import STAGES, Bench, stages
@@ -24,22 +26,21 @@ HEAD = (" choice", "seconds", "ratio", "processor", "ratio", "error, e-", "share
 
 
 def bench(
-    task: Annotated[Bench, Parameter(name="*")] = DEFAULT, *, out: Path = Path("out/bench.json"), json: bool = False
+    task: Annotated[Bench, Parameter(name="*")] = DEFAULT, *, out: Path = Path("out/bench"), json: bool = False
 ) -> None:
-    """Measure each stage's choices as time and error, print them as tables, and write them as JSON.
+    """Measure each stage's choices as time and error, and write bench.html and bench.json.
 
     Parameters
     ----------
     out
-        File to write, .json.
+        Folder for the two files.
     json
         Print the JSON instead of the tables.
     """
-    require_ending(out, ".json")
     if parse_level(task.level)[1] != "cd/m2":
         raise InputError(f"level: {task.level!r} is not allowed; give a mean luminance such as 25cd/m2")
     work = stages(task, load(task.scene), preset(task.sensor))
-    out.parent.mkdir(parents=True, exist_ok=True)
+    out.mkdir(parents=True, exist_ok=True)
     results: dict[str, Any] = {
         "rodcone": metadata.version("rodcone"),
         "settings": vars(task),
@@ -56,8 +57,10 @@ def bench(
             if not json:
                 _print_stage(stage)
     content = notation.dumps(results, indent=1, allow_nan=False) + "\n"
-    write_text(out, content)
-    print(content if json else out, end="" if json else "\n")
+    with replacing(out / "bench.json", out / "bench.html") as (data, page):
+        data.write_text(content, "utf-8")
+        page.write_text(bench_page(results), "utf-8")
+    print(content if json else out / "bench.html", end="" if json else "\n")
 
 
 def _print_stage(stage: dict[str, Any]) -> None:

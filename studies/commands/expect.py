@@ -9,12 +9,15 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from scenes.levels import AVERAGE_REFLECTANCE
+from rodcone.errors import InputError
+from rodcone.files import check_place
+from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
-from studies.commands.console import print_json, print_table, require_place, write_text
+from studies.commands.console import print_json, print_table, require_ending, write_text
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
+from studies.pages.expect_chart import gain_svg
 from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
 
 
@@ -24,6 +27,7 @@ def expect(
     *,
     mosaic: list[str] | None = None,
     level: list[str] | None = None,
+    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}",
     light: str = "D65",
     exposure: str = AUTO_INFORMATION,
     prior: str = "drawn",
@@ -42,7 +46,9 @@ def expect(
     mosaic
         Mosaics by name, or rows such as RG/BW; the sensor's own by default.
     level
-        Levels of light, such as 25cd/m2, 500lux or moonlight; all that have a name by default.
+        Levels of light, such as 25cd/m2, 500lux or moonlight.
+    over
+        Named levels from one to another, where no level is given.
     light
         Illuminant; the camera knows it.
     exposure
@@ -50,12 +56,15 @@ def expect(
     prior
         Prior over patches: drawn (shapes and photographs) or photographs (alone).
     out
-        Table with every figure (.csv).
+        Table with every figure (.csv), or plot of the gain over the first camera (.svg).
     json
         Print one JSON object: a list of errors by level for each camera.
     """
-    require_place(out, ".csv")
-    levels = {text: _luminance(text) for text in level or NAMED}
+    if out is not None and out.suffix.lower() != ".svg":
+        require_ending(out, ".csv")
+    if out is not None:
+        check_place(out)
+    levels = {text: _luminance(text) for text in level} if level else _levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
         f"{name} {tile}".strip(): expect_errors(
@@ -69,7 +78,7 @@ def expect(
         for tile in mosaic or [""]
     }
     if out is not None:
-        write_text(out, _csv(by_camera))
+        write_text(out, _csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera))
     if json:
         print_json({name: [asdict(row) for row in rows] for name, rows in by_camera.items()})
         return
@@ -91,6 +100,16 @@ def expect(
 def _luminance(text: str) -> float:
     value, unit = parse_level(text)
     return value if unit == UNITS[0] else value * AVERAGE_REFLECTANCE / pi
+
+
+def _levels_between(over: str) -> dict[str, float]:
+    """Named levels from one to another, such as street:classroom."""
+    names = list(NAMED)
+    first, colon, last = over.partition(":")
+    if not colon or first not in names or last not in names or names.index(first) > names.index(last):
+        raise InputError(f"over: {over!r} is not a range of levels; allowed: two of {', '.join(names)}, the darker "
+                         f"first; write {names[0]}:{names[-1]}")  # fmt: skip
+    return {name: NAMED[name].luminance_cd_m2 for name in names[names.index(first) : names.index(last) + 1]}
 
 
 def _csv(by_camera: dict[str, list[ExpectedError]]) -> str:

@@ -62,7 +62,7 @@ def fit_prior(
     Parameters
     ----------
     patches : (patch, number) float32
-        Of `draw_patches`, or of coefficients of reflectance (`benchmarks/train_spectral_prior.py`).
+        Of `draw_patches`, or of coefficients of reflectance (`studies.training.spectral`).
     neutrals_e, source
         As `isp.ple.prior.Prior`.
     """

@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chart_colours import daylight_delta_e
 
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
@@ -23,6 +22,7 @@ from sensor.response import expected_electrons
 from studies.budget.bands import counts, fine_bands, groups_of
 from studies.budget.ledger import as_stated
 from studies.commands import new as new_command
+from studies.metrics.chart_colours import daylight_delta_e
 from studies.metrics.target_figures import patch_masks
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import mean_electrons

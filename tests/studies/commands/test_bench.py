@@ -1,6 +1,7 @@
-"""Speed against error: the front, what is measured, and the command."""
+"""Speed against error: the front, what is measured, and the page."""
 
 import json
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 from scenes.catalog import load
 from sensor.presets import preset
+from studies.pages.speed_page import LEAST_SHARE, bench_page, plane
 from studies.speed.points import Measured, Stage, Times, front, stage_json, timed
 from studies.speed.stages import STAGES, Bench, stages
 
@@ -67,6 +69,18 @@ def test_a_share_by_the_pixel_goes_before_the_mean_errors() -> None:
     assert [each["on_front"] for each in made["points"]] == [True, False]
 
 
+def test_a_chart_places_choices_by_their_logarithms() -> None:
+    drawn = plane(stage_json(stage(point(0.1, 5.0, "a"), point(1.0, 10.0, "b"), point(10.0, 20.0, "c"))))
+    (axes,) = drawn.axes
+    assert (axes.get_xscale(), axes.get_yscale()) == ("log", "log")
+    marks = [line for line in axes.lines if line.get_marker() != "None"]
+    assert [(*mark.get_xdata(), *mark.get_ydata()) for mark in marks] == [(0.1, 0.25), (1.0, 1.0), (10.0, 4.0)]
+    assert [mark.get_marker() for mark in marks] == ["o", "s", "s"]  # the first alone is on the front
+    assert [text.get_text() for text in axes.texts] == ["the sensor's own noise", "a", "b", "c"]
+    noise = next(line for line in axes.lines if line.get_linestyle() == "--")
+    assert list(noise.get_ydata()) == [1.0, 1.0]
+
+
 def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path) -> None:
     rows = (
         ("--scene still_live", "did you mean 'still_life'?"),
@@ -74,7 +88,7 @@ def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path) -> Non
         ("--level 500lux", "level"),
         ("--size 8", "size: 8"),
     )
-    check_refusals(f"bench -o {tmp_path / 'out' / 'bench.json'}", rows, tmp_path)
+    check_refusals(f"bench -o {tmp_path / 'out'}", rows, tmp_path)
 
 
 @pytest.fixture(scope="module")
@@ -98,18 +112,40 @@ def test_every_stage_is_measured(measured: list[Stage]) -> None:
 
 
 @pytest.mark.thorough
-def test_the_command_prints_tables_and_writes_json(
+def test_the_page_fetches_nothing_runs_nothing_and_escapes_everything(measured: list[Stage]) -> None:
+    results = {
+        "rodcone": "0.1.0",
+        "settings": {"scene": "<script>alert(1)</script>", "sensor": "low_noise"},
+        "machine": {"processor": "P", "cores": 2},
+        "environment": {"python": "3"},
+        "stages": [stage_json(made) for made in measured],
+    }
+    page = bench_page(results)
+    assert "<script" not in page
+    assert re.findall(r"""(?:src|href)=["'](?!data:|#)[^"']+""", page) == []
+    policy = re.search(r'Content-Security-Policy" content="([^"]*)"', page)
+    assert policy is not None
+    assert "default-src 'none'" in policy[1]
+    assert "script-src" not in policy[1]
+    assert page.count("<table") == STAGES
+    shares = [[each["share_of_noise_variance"] for each in made["points"]] for made in results["stages"]]
+    assert page.count("<img") == sum(max(of_stage) >= LEAST_SHARE for of_stage in shares) >= 4
+
+
+@pytest.mark.thorough
+def test_the_command_writes_page_and_json(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: list[Stage]
 ) -> None:
     asked = []
     monkeypatch.setattr(
         "studies.commands.bench.stages", lambda task, scene, sensor: asked.append(task.samples) or iter(measured)
     )
-    written = tmp_path / "new" / "bench.json"
+    written = tmp_path / "new"
     options = ["--scene", "flat_field", "--samples", "16", "--samples", "64"]
     code, out, _ = call(["bench", "-o", written, *options])
     assert (code, asked) == (0, [(16, 64)])
-    assert all(word in out for word in ("processor:", "cores:", "drjit:", "ratio", "*40 bands", str(written)))
-    facts = json.loads(written.read_text())
+    assert all(word in out for word in ("processor:", "cores:", "drjit:", "ratio", "*40 bands", "bench.html"))
+    facts = json.loads((written / "bench.json").read_text())
     assert len(facts["stages"]) == STAGES
     assert facts["machine"]["cores"] >= 1
+    assert (written / "bench.html").read_text().lstrip().lower().startswith("<!doctype html>")

@@ -1,4 +1,4 @@
-"""The command `rodcone expect`: table, CSV, JSON, and each wrong option in one line."""
+"""The command `rodcone expect`: table, CSV, plot, JSON, and each wrong option in one line."""
 
 import csv
 import json
@@ -24,18 +24,22 @@ def test_the_table_has_the_first_camera_and_gains_over_it() -> None:
 
 
 @pytest.mark.thorough
-def test_csv_and_json_hold_the_same(tmp_path: Path) -> None:
-    _, out, _ = call(["expect", *FEW, "--json", "-o", tmp_path / "gain.csv"])
+def test_csv_json_and_plot_hold_the_same(tmp_path: Path) -> None:
+    for ending in (".csv", ".svg"):
+        _, out, _ = call(["expect", *FEW, "--json", "-o", tmp_path / f"gain{ending}"])
     printed = json.loads(out.splitlines()[-1])
     rows = list(csv.DictReader((tmp_path / "gain.csv").read_text("utf-8").splitlines()))
     assert [row["camera"] for row in rows] == ["low_noise bayer"] * 2 + ["low_noise RG/BW"] * 2
     assert [float(row["psnr_db"]) for row in rows] == [x["psnr_db"] for one in printed.values() for x in one]
+    assert "low_noise RG/BW" in (tmp_path / "gain.svg").read_text("utf-8")
 
 
 def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
     rows = (
         ("--mosaic bayr", "did you mean 'bayer'"),
         ("--mosaic RG/B", "differ in length"),
+        ("--over street:moon", "over: 'street:moon' is not a range of levels"),
+        ("--over 'sunlit day:moonlight'", "the darker first"),
         ("--level 25", "has no unit"),
         ("--light D66", "did you mean 'D65'"),
         ("--prior draw", "did you mean 'drawn'"),

@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import train_spectral_prior as spectral
 
 from isp.design import spectral_prior
 from isp.ple.prior import mixture, own_prior
@@ -18,7 +17,7 @@ from sensor.capture import capture
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import channel_electrons
-from studies.training import pictures, train
+from studies.training import pictures, spectral, train
 from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
 from studies.training.train import draw_patches, fit_prior, train_prior
 
@@ -113,7 +112,7 @@ def test_a_spectral_prior_trained_on_little_is_read_back_and_says_from_what(tmp_
     source = spectral.train_spectral_prior("drawn", 3, tmp_path / "a.npz")
     prior = spectral_prior.load_prior.__wrapped__("drawn")
     assert json.loads(prior.source) == json.loads(source)
-    assert json.loads(source)["command"] == "python benchmarks/train_spectral_prior.py drawn --seed 3"
+    assert json.loads(source)["command"] == "rodcone train --spectral drawn --seed 3"
     # Patches were divided by their mean luminous reflectance: the mixture's is 1.
     luminous = luminous_efficiency((prior.edges_nm[1:] + prior.edges_nm[:-1]) / 2, np.diff(prior.edges_nm))
     mean = np.einsum("k,kpc->c", prior.patches.weights, prior.patches.means) / prior.patches.means.shape[1]

@@ -1,9 +1,5 @@
-"""A sweep's figures as a Markdown table: means over the seeds, a line for each combination of axes.
+"""A sweep's figures as a Markdown table: means over the seeds, a line for each combination of axes."""
 
-python docs/make/sweep_table.py out/spectra --by spectrum,processor --show chart_delta_e_mean --where level=1lux
-"""
-
-import argparse
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -13,7 +9,6 @@ from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from chart_colours import daylight_delta_e, pair_delta_e, true_pair_delta_e
 from PIL import Image
 
 from render.illuminants import is_light_file
@@ -21,10 +16,10 @@ from rodcone.colour_spaces import decode_srgb
 from rodcone.errors import InputError, unknown
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
+from studies.metrics.chart_colours import daylight_delta_e, pair_delta_e, true_pair_delta_e
 from studies.metrics.confidence import half_width
 from studies.metrics.target_figures import patch_masks
 from studies.study.study import OWN
-from studies.sweep.export import read_rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import AXES, Row
@@ -154,20 +149,3 @@ def _mean_text(mean: float | None, half: float | None) -> str:
         return "0"
     places = max(0, 2 - int(np.floor(np.log10(max(abs(mean), 1e-3)))))
     return f"{mean:.{places}f}" if half is None or half < SAME * abs(mean) else f"{mean:.{places}f} ± {half:.{places}f}"
-
-
-def main() -> None:
-    """Print figures of a sweep: means over the seeds, with the half width of their 95 % interval."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("folder", type=Path, help="folder of the sweep")
-    parser.add_argument("--by", default="spectrum,level,processor", help="axes, joined by commas: a line each")
-    parser.add_argument("--show", default="psnr_db,delta_e_median", help="figures of `lines`, joined by commas")
-    parser.add_argument("--where", action="append", default=[], metavar="AXIS=VALUE", help="such as level=10lux")
-    given = parser.parse_args()
-    by, show = given.by.split(","), given.show.split(",")
-    where = dict(text.split("=", 1) for text in given.where)
-    print(markdown(lines(read_rows(given.folder), given.folder, by, show, where), by, show))
-
-
-if __name__ == "__main__":
-    main()

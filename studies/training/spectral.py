@@ -1,11 +1,8 @@
 """Train the prior over patches of reflectance (`isp.design.spectral_prior`) on the pictures that `ple`'s is trained on.
 
 Pictures are drawn in bands of reflectance, and projected on the reflectances' first principal directions.
-
-    python benchmarks/train_spectral_prior.py drawn isp/design/drawn.npz      # or: photographs
 """
 
-import argparse
 from functools import partial
 from hashlib import sha256
 from pathlib import Path
@@ -70,9 +67,7 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
         rows.append((relative @ spectra / BANDS).reshape(bright.sum(), -1).astype(np.float32))
     patches = np.concatenate(rows)
     rng.shuffle(patches)
-    source = provenance(
-        f"python benchmarks/train_spectral_prior.py {kind} --seed {seed}", seed, digest.hexdigest(), len(patches)
-    )
+    source = provenance(f"rodcone train --spectral {kind} --seed {seed}", seed, digest.hexdigest(), len(patches))
     fit = fit_prior(patches, np.ones((1, 4)), rng, source, DIRECTIONS)
     _save(fit, edges_nm, spectra, path)
     return source
@@ -116,17 +111,3 @@ def _save(fit: Prior, edges_nm: NDArray[np.float64], spectra: NDArray[np.float64
             basis=fit.basis.astype(np.float16), weights=fit.weights, centres=fit.centres, rest=fit.rest,
             reflectances=photographs_reflectances(), allow_pickle=False,
         )  # fmt: skip
-
-
-def main() -> None:
-    """Train a prior over reflectances, and print what it was trained from."""
-    parser = argparse.ArgumentParser(description=main.__doc__)
-    parser.add_argument("kind", choices=KINDS_OF, help="drawn pictures and photographs, or photographs alone")
-    parser.add_argument("out", type=Path, help="file to write (.npz)")
-    parser.add_argument("--seed", type=int, default=1, help="of the training pictures and of the fit")
-    given = parser.parse_args()
-    print(train_spectral_prior(given.kind, given.seed, given.out))
-
-
-if __name__ == "__main__":
-    main()

@@ -6,19 +6,19 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from chart_colours import daylight_srgb
 from sweep_sample import row
-from sweep_table import FIGURES, lines, markdown
 
 from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
+from studies.metrics.chart_colours import daylight_srgb
 from studies.metrics.target_figures import patch_masks
 from studies.photograph.picture_file import to_png
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import keep
+from studies.sweep.table import FIGURES, lines, markdown
 
 HERE = Path()
 
