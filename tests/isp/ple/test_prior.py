@@ -43,14 +43,6 @@ def test_a_prior_is_read_as_it_was_written_but_for_half_precision(tmp_path):
         assert first == second if field.name == "source" else np.array_equal(first, second), field.name
 
 
-@pytest.mark.parametrize("content", [b"", b"no zip", b"PK\x03\x04"])
-def test_a_file_that_is_no_prior_is_refused_in_one_line(tmp_path, content):
-    (tmp_path / "prior.npz").write_bytes(content)
-    with pytest.raises(InputError, match=r"^prior: .*prior.npz.* can't be read: .*rodcone train") as error:
-        load_prior(tmp_path / "prior.npz")
-    assert "\n" not in str(error.value)
-
-
 def arrays(**changes):
     with np.load(OWN) as file:
         return {**file, **changes}
@@ -83,9 +75,13 @@ def shape_alone(path, shape):
         np.lib.format.write_array_header_1_0(entry, {"descr": "<f4", "fortran_order": False, "shape": shape})
 
 
-@pytest.mark.parametrize("write", HOSTILE.values(), ids=HOSTILE)
-def test_a_hostile_prior_is_refused_in_one_line(tmp_path, write):
-    write(tmp_path / "prior.npz")
-    with pytest.raises(InputError, match=r"^prior: .*prior.npz") as error:
-        load_prior(tmp_path / "prior.npz")
-    assert "\n" not in str(error.value)
+def test_a_hostile_prior_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "prior.npz"
+    for content in (b"", b"no zip", b"PK\x03\x04"):
+        path.write_bytes(content)
+        with pytest.raises(InputError, match=r"\Aprior: .*prior.npz.* can't be read: .*rodcone train.*\Z"):
+            load_prior(path)
+    for write in HOSTILE.values():
+        write(path)
+        with pytest.raises(InputError, match=r"\Aprior: .*prior.npz.*\Z"):
+            load_prior(path)

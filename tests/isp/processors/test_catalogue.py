@@ -9,7 +9,7 @@ import pytest
 from builders import raw_image
 
 from isp.colour.colour_fit import ColourFit
-from isp.processors.catalogue import NAMED, PROCESSORS
+from isp.processors.catalogue import NAMED, PROCESSORS, libraries
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
@@ -25,6 +25,7 @@ ENDS_IN_W = ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami")  # whose luminance i
 SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that library takes seconds: test_bm3d
 # ple leans on a prior, by up to 1 % where there is no noise: a file of its own
 QUICK = [name for name in PROCESSORS if name not in SLOW and not name.startswith("ple")]
+AVAILABLE = [name for name in QUICK if not libraries(name)]
 
 
 def neutral_of(name: str) -> Mapping[str, float]:
@@ -76,95 +77,85 @@ def test_a_flat_grey_field_stays_flat_and_grey_to_the_border_in_every_phase(name
         assert picture.balance == dict.fromkeys(channels(tile), "gray world")
 
 
-@pytest.mark.sample(11)
-@pytest.mark.parametrize("name", QUICK)
-def test_a_grey_ramp_into_saturation_takes_no_colour(name: str) -> None:
-    # Colours clip one after the other: G at its full well, R and B (balanced) at twice and 2.5 times it. What doesn't
-    # hold highlights shows G 15 000 e- beside R and B of up to 37 500. Interpolating across the kink where the ramp
-    # ends, or at the frame's border, may miss by one step of the ramp: 500 e-.
-    require_library(name)
-    ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
-    tile = tile_of(name)
-    balance = [neutral_of(name)[channel] for channel in channels(tile)]
-    rgb = PROCESSORS[name].develop(grey(name, tile, ramp), IDENTITY, balance=balance).rgb
-    assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6)
-    bright = rgb[:, -20:]
-    assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5)
+def test_a_grey_ramp_into_saturation_takes_no_colour() -> None:
+    for name in AVAILABLE:
+        # Colours clip one after the other: G at its full well, R and B (balanced) at twice and 2.5 times it. What
+        # doesn't hold highlights shows G 15 000 e- beside R and B of up to 37 500. Interpolating across the kink where
+        # the ramp ends, or at the frame's border, may miss by one step of the ramp: 500 e-.
+        ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
+        tile = tile_of(name)
+        balance = [neutral_of(name)[channel] for channel in channels(tile)]
+        rgb = PROCESSORS[name].develop(grey(name, tile, ramp), IDENTITY, balance=balance).rgb
+        assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6), name
+        bright = rgb[:, -20:]
+        assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5), name
 
 
-@pytest.mark.sample(17)
-@pytest.mark.parametrize("name", QUICK)
-def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s(name: str) -> None:
-    require_library(name)
-    tile = tile_of(name)
-    balance = [neutral_of(name)[channel] for channel in channels(tile)]
-    rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
-    ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
-    assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5)
+def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s() -> None:
+    for name in AVAILABLE:
+        tile = tile_of(name)
+        balance = [neutral_of(name)[channel] for channel in channels(tile)]
+        rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
+        ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
+        assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5), name
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_nothing_beside_a_highlight_is_brighter_than_it(name: str) -> None:
-    # filters with negative weights overshoot at the edge of a square of saturated grey
-    require_library(name)
-    rows, columns = np.indices((32, 34))
-    square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
-    tile = tile_of(name)
-    balance = [neutral_of(name)[channel] for channel in channels(tile)]
-    rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
-    if name in ENDS_IN_W:  # differences of colours from a luminance of their own
-        assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6)
-    else:
-        assert rgb.max() <= FULL_E * (1 + 1e-6)
+def test_nothing_beside_a_highlight_is_brighter_than_it() -> None:
+    for name in AVAILABLE:
+        # filters with negative weights overshoot at the edge of a square of saturated grey
+        rows, columns = np.indices((32, 34))
+        square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
+        tile = tile_of(name)
+        balance = [neutral_of(name)[channel] for channel in channels(tile)]
+        rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
+        if name in ENDS_IN_W:  # differences of colours from a luminance of their own
+            assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6), name
+        else:
+            assert rgb.max() <= FULL_E * (1 + 1e-6), name
 
 
-@pytest.mark.parametrize("name", QUICK)
-def test_a_given_balance_takes_the_place_of_gray_world(name: str) -> None:
-    require_library(name)
-    tile, unit = tile_of(name), unit_of(name)
-    names = channels(tile)
-    other = [neutral_of(name)[channel] * (2.0 if channel == "W" != unit else 1.0) for channel in names]
-    level = PROCESSORS[name].develop(grey(name, tile, np.full((20, 20), 800.0)), IDENTITY, balance=other)
-    assert level.balance == dict.fromkeys(names, "given")
-    assert unit in names
-    # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
-    expected = 400.0 if name in ENDS_IN_W else 800.0
-    assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5)
+def test_a_given_balance_takes_the_place_of_gray_world() -> None:
+    for name in AVAILABLE:
+        tile, unit = tile_of(name), unit_of(name)
+        names = channels(tile)
+        other = [neutral_of(name)[channel] * (2.0 if channel == "W" != unit else 1.0) for channel in names]
+        level = PROCESSORS[name].develop(grey(name, tile, np.full((20, 20), 800.0)), IDENTITY, balance=other)
+        assert level.balance == dict.fromkeys(names, "given"), name
+        assert unit in names, name
+        # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
+        expected = 400.0 if name in ENDS_IN_W else 800.0
+        assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5), name
 
 
-@pytest.mark.sample(16)
-@pytest.mark.parametrize("name", QUICK)
-def test_listed_defects_are_mended_before_any_processor_sees_them(name: str) -> None:
-    require_library(name)
-    raw = grey(name, tile_of(name), np.full((20, 20), 800.0))
-    places = np.array([(0, 0), (7, 8), (7, 9), (19, 19)])
-    raw.dn[tuple(places.T)] = 15_100
-    listed = replace(raw, defects=places)
-    rgb = PROCESSORS[name].develop(listed, IDENTITY).rgb
-    assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5)
-    assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0
+def test_listed_defects_are_mended_before_any_processor_sees_them() -> None:
+    for name in AVAILABLE:
+        raw = grey(name, tile_of(name), np.full((20, 20), 800.0))
+        places = np.array([(0, 0), (7, 8), (7, 9), (19, 19)])
+        raw.dn[tuple(places.T)] = 15_100
+        listed = replace(raw, defects=places)
+        rgb = PROCESSORS[name].develop(listed, IDENTITY).rgb
+        assert rgb == pytest.approx(np.full((20, 20, 3), 800.0), rel=1e-5), name
+        assert np.abs(PROCESSORS[name].develop(raw, IDENTITY).rgb - 800.0).max() > 200.0, name
 
 
-@pytest.mark.parametrize("matrix", [IDENTITY, ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))])
-@pytest.mark.parametrize("name", [name for name in PROCESSORS if PROCESSORS[name].mosaic != OWN])
-def test_another_mosaic_is_refused_in_one_line(name: str, matrix: np.ndarray | ColourFit) -> None:
-    other = MOSAICS["rccc"] if "bayer" in name else BAYER
-    raw = raw_image(np.full((16, 16), 500), other)
-    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: ") as error:
-        PROCESSORS[name].develop(raw, matrix)
-    assert "\n" not in str(error.value)
+def test_another_mosaic_is_refused_in_one_line() -> None:
+    fit = ColourFit(("R", "G", "B"), np.ones(3), np.eye(3), np.eye(3))
+    for name in (name for name in PROCESSORS if PROCESSORS[name].mosaic != OWN):
+        raw = raw_image(np.full((16, 16), 500), MOSAICS["rccc"] if "bayer" in name else BAYER)
+        for matrix in (IDENTITY, fit):
+            with pytest.raises(InputError, match=r"\Araw: mosaic .* allowed here: .*\Z"):
+                PROCESSORS[name].develop(raw, matrix)
 
 
-@pytest.mark.parametrize("name", ["rgbw_sato", "rgbw_gindele", "cmyw_yamagami", "bayer_malvar"])
-def test_a_wrong_matrix_neutral_or_balance_is_refused(name: str) -> None:
-    require_library(name)
-    raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
-    with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
-        PROCESSORS[name].develop(raw, np.ones((2, 3)))
-    with pytest.raises(InputError, match=r"^neutral: \[1.0, 2.0\]"):
-        PROCESSORS[name].develop(raw, IDENTITY, neutral=[1, 2])
-    with pytest.raises(InputError, match=r"^balance: \[1.0, 2.0\]"):
-        PROCESSORS[name].develop(raw, IDENTITY, balance=[1, 2])
+def test_a_wrong_matrix_neutral_or_balance_is_refused() -> None:
+    for name in {"rgbw_sato", "rgbw_gindele", "cmyw_yamagami", "bayer_malvar"}.intersection(AVAILABLE):
+        raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
+        with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
+            PROCESSORS[name].develop(raw, np.ones((2, 3)))
+        with pytest.raises(InputError, match=r"^neutral: \[1.0, 2.0\]"):
+            PROCESSORS[name].develop(raw, IDENTITY, neutral=[1, 2])
+        with pytest.raises(InputError, match=r"^balance: \[1.0, 2.0\]"):
+            PROCESSORS[name].develop(raw, IDENTITY, balance=[1, 2])
 
 
 def test_a_missing_library_names_its_extra() -> None:

@@ -66,9 +66,8 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
     assert (tmp_path / trace).exists()
 
 
-@pytest.mark.parametrize(
-    ("text", "words"),
-    [
+def test_a_file_that_fails_says_where_in_one_line(tmp_path: Path) -> None:
+    for text, words in (
         ("def other(): pass", "has no function 'develop'"),
         ("develop = 3", "has no function 'develop'"),
         ("class develop: pass", "has no function 'develop'"),
@@ -87,10 +86,8 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
             "import numpy as np\ndef develop(raw, matrix, **options): return np.full((*raw.shape, 3), np.nan)",
             "allowed: a Picture, or finite linear sRGB of shape (8, 10, 3)",
         ),
-    ],
-)
-def test_a_file_that_fails_says_where_in_one_line(text: str, words: str, tmp_path: Path) -> None:
-    assert words in told(written(tmp_path, text))
+    ):
+        assert words in told(written(tmp_path, text)), text
 
 
 def test_what_is_no_plain_file_is_refused(tmp_path: Path) -> None:

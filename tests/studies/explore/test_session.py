@@ -54,6 +54,11 @@ class Page:
             assert self.came.wait_for(found, 30), self.headers
             return found()[-1]
 
+    def ask(self, session: Session, kind: str, number: int, **more: Any) -> dict[str, Any]:
+        """The answer to a question."""
+        session.take(message(kind, number, **more), self.send)
+        return self.wait(kind, number)
+
 
 def connected(session: Session) -> Page:
     """A page that asks a session."""
@@ -71,19 +76,16 @@ def test_another_scene_is_shown_and_one_that_is_not_offered_is_refused():
     page, other = Page(), public.render("color_checker", (16, 24), spp=4, **BANDS)
     session = Session(of_transport(small_transport()), {"chart": lambda: replace(of_transport(other), title="chart")})
     session.connect(page.send)
-    session.take(message("show", 1), page.send)
-    assert page.wait("show", 1)["size"] == [40, 48]
+    assert page.ask(session, "show", 1)["size"] == [40, 48]
     session.take(message("scene", 2, name="charts"), page.send)
     assert "did you mean 'chart'?" in page.wait("error", 2)["message"]
-    session.take(message("scene", 3, name="chart"), page.send)
-    header = page.wait("scene", 3)
+    header = page.ask(session, "scene", 3, name="chart")
     assert (header["title"], header["scenes"], header["groups"]) == (
         "chart",
         ["chart"],
         dict.fromkeys(other.groups, False),
     )
-    session.take(message("show", 4), page.send)
-    assert page.wait("show", 4)["size"] == [16, 24]
+    assert page.ask(session, "show", 4)["size"] == [16, 24]
     session.close()
 
 
@@ -95,12 +97,10 @@ def test_a_sensor_that_was_dropped_makes_the_pictures_of_its_file(tmp_path, monk
         (tmp_path / name).write_text(content, "utf-8")
     page, session = Page(), Session(of_transport(small_transport()))
     session.connect(page.send)
-    session.take(message("sensor", 1, files=files), page.send)
-    header = page.wait("sensor", 1)
+    header = page.ask(session, "sensor", 1, files=files)
     camera = {"sensor": header["sensor"]}
     assert header["terms"]["pixel"]["full_well_e"] == 3000
-    session.take(message("show", 2, cameras=[camera]), page.send)
-    python = page.wait("show", 2)["python"][0]
+    python = page.ask(session, "show", 2, cameras=[camera])["python"][0]
     session.close()
     assert not Path(header["sensor"]).exists()
     monkeypatch.chdir(tmp_path)
@@ -133,8 +133,7 @@ def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_o
     session.connect(page.send)
     for number, level in enumerate((100.0, 50.0, 1e-4), 1):
         camera = {"level_cd_m2": level}
-        session.take(message("histogram", number, cameras=[camera]), page.send)
-        page.wait("histogram", number)
+        page.ask(session, "histogram", number, cameras=[camera])
     session.close()
     notes = [header["noise_note"] for header in page.headers]
     assert [note.startswith("the render's noise has ") for note in notes] == [True, True, False]
@@ -161,8 +160,7 @@ def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
     page = Page()
     session = Session(replace(of_transport(small_transport()), states=Failing))
     session.connect(page.send)
-    session.take(message("hello", 1), page.send)
-    page.wait("hello", 1)
+    page.ask(session, "hello", 1)
     assert once.wait(20)
     for number in (2, 3):
         session.take(message("show", number), page.send)
@@ -225,8 +223,7 @@ def test_a_burst_ends_where_its_page_is_closed(session, interrupted):
     time.sleep(0.5)  # enough for the other 61
     assert len(frames) == 3
     session.connect(later.send)
-    session.take(message("hello", 2), later.send)
-    later.wait("hello", 2)
+    later.ask(session, "hello", 2)
     assert page.headers == [{"kind": "taken over"}]
 
 
@@ -235,8 +232,7 @@ def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
     page = connected(session)
     interrupted(lambda: session.take(message("show", 3, cameras=[{"seed": 3}]), page.send))
     for number in (1, 2):
-        session.take(message("show", number, cameras=[{"seed": number}]), page.send)
-        page.wait("show", number)
+        page.ask(session, "show", number, cameras=[{"seed": number}])
     session.take(message(kind, 4, cameras=[{"seed": 9}]), page.send)
     page.wait(kind, 4)
     assert [each["kind"] for each in page.headers] == ["show", "show", "show", kind]
@@ -262,12 +258,9 @@ def test_a_render_lets_pictures_go_first_and_ends_for_another_scene(endless):
     """And with the session: without it the fixture would never end."""
     page = connected(endless)
     for number in (1, 2, 3):
-        endless.take(message("show", number), page.send)
-        assert page.wait("show", number)["last"] is False
-    endless.take(message("scene", 4, name="chart"), page.send)
-    page.wait("scene", 4)
-    endless.take(message("show", 5), page.send)
-    assert page.wait("show", 5)["last"] is True
+        assert page.ask(endless, "show", number)["last"] is False
+    page.ask(endless, "scene", 4, name="chart")
+    assert page.ask(endless, "show", 5)["last"] is True
 
 
 @pytest.mark.thorough
@@ -292,8 +285,7 @@ def test_notes_of_an_answer_are_few_and_short(session, monkeypatch):
 
     monkeypatch.setattr(SESSION, "written", warned)
     page = connected(session)
-    session.take(message("histogram", 1, cameras=[{}]), page.send)
-    notes = page.wait("histogram", 1)["notes"]
+    notes = page.ask(session, "histogram", 1, cameras=[{}])["notes"]
     assert len(notes) == MOST_NOTES
     assert max(map(len, notes)) <= MOST_TOLD
 
@@ -315,14 +307,12 @@ def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_e
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):
     old, new = Page(), Page()
     session.connect(old.send)
-    session.take(message("show", 1), old.send)
-    old.wait("show", 1)
+    old.ask(session, "show", 1)
     session.connect(new.send)
     old.wait("taken over", None)
     session.take(message("show", 2), old.send)
     session.take(message("hello", 3), old.send)
-    session.take(message("show", 1), new.send)
-    new.wait("show", 1)
+    new.ask(session, "show", 1)
     assert [each["number"] for each in new.headers] == [1]
     assert [each.get("number") for each in old.headers] == [1, None]
 
@@ -334,8 +324,7 @@ def test_a_picture_that_stays_as_it_is_is_sent_to_a_page_once(session):
     for page in (first, second):
         session.connect(page.send)
         for number in (1, 2):
-            session.take(message("show", number, cameras=[{"exposure_number": number}], views=views), page.send)
-            page.wait("show", number)
+            page.ask(session, "show", number, cameras=[{"exposure_number": number}], views=views)
         lengths = [[len(each) for each in buffers] for buffers in page.buffers if buffers]
         assert lengths == [[40 * 48 * 3] * 2, [40 * 48 * 3, 0]]
     session.take(message("show", 3, cameras=[{"exposure_number": 2}], views=views[::-1]), page.send)
@@ -349,13 +338,11 @@ def test_another_view_of_one_connection_takes_over(session):
     page = connected(session)
     for view in ("first", "second"):
         session.take(message("hello", 1, page=view), page.send)
-        session.take(message("show", 2, page=view), page.send)
-        assert page.wait("show", 2)["page"] == view
+        assert page.ask(session, "show", 2, page=view)["page"] == view
         page.headers = [each for each in page.headers if each["kind"] != "show"]
     assert [each["page"] for each in page.headers if each["kind"] == "taken over"] == ["first", "second"]
     session.take(message("show", 3, page="first"), page.send)
-    session.take(message("show", 3, page="second"), page.send)
-    assert page.wait("show", 3)["page"] == "second"
+    assert page.ask(session, "show", 3, page="second")["page"] == "second"
     assert [each["page"] for each in page.headers if each["kind"] == "show"] == ["second"]
 
 
@@ -375,7 +362,6 @@ def test_what_another_page_asked_is_not_answered_to_the_new_one():
     session.connect(new.send)
     for event in go:
         event.set()
-    session.take(message("histogram", 2, cameras=[{}]), new.send)
-    new.wait("histogram", 2)
+    new.ask(session, "histogram", 2, cameras=[{}])
     session.close()
     assert [each["kind"] for each in new.headers] == ["histogram"]
