@@ -51,19 +51,12 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="counts the wavefronts of Dr.Jit")
-def test_the_results_state_the_render_and_the_exposures_that_were_made(
-    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
-) -> None:
+def test_the_results_state_the_render_that_was_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     paths, made = count_paths(monkeypatch), []
     monkeypatch.setattr(render_noise, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
-    size, longest_s = 16, 0.05
-    study = Study(
-        (SceneChoice("slanted_edge"),),
-        ("0.001cd/m2", "1000cd/m2"),
-        exposures=("auto",),
-        longest_exposure_s=longest_s,
-        render=RenderLimits(size=size, spp=33, noise_share=1e-6),
-    )
+    size = 16
+    limits = RenderLimits(size=size, spp=33, noise_share=1e-6)
+    study = Study((SceneChoice("slanted_edge"),), ("0.001cd/m2", "1000cd/m2"), render=limits)
     swept(study, tmp_path)
     found = json.loads(results_json(tmp_path))["rows"]
     (transport,), told = made, found[0]["render"]
@@ -79,13 +72,3 @@ def test_the_results_state_the_render_and_the_exposures_that_were_made(
     halves = transport.light.difference.sum(axis=(0, 1))
     error = halves.std() / halves.size**0.5 / transport.radiance.sum(axis=(0, 1)).mean()
     assert told["relative_level_error"] == pytest.approx(error, rel=0.3)
-    well = low_noise().pixel.full_well_e
-    for row in found:
-        fullest = max(row["mean_electrons"].values())
-        if row["level"] == "0.001cd/m2":
-            assert row["exposure_s"] == longest_s
-            assert fullest < 0.01 * well
-        else:
-            assert row["exposure_s"] < longest_s
-            assert 0.2 * well < row["mean_electrons"]["G"] < 0.8 * well  # the brightest greens have 80 %
-        assert row["saturated"] <= 0.3

@@ -115,17 +115,3 @@ def test_white_is_the_percentile_of_the_area_that_shows_no_light() -> None:
     planes = (np.moveaxis(unit.values, -1, 0) * np.arange(1, 101).reshape(10, 10)).astype(np.float32)[None]
     lit = transport_of(planes, {"sky": LightGroup(("sky",), flat())}, NM, unit.widths_nm)
     assert shown_white_cd_m2(lit, None) == pytest.approx(99 / 0.9, rel=1e-5)
-
-
-def test_the_shown_white_needs_no_weights_where_no_light_is_seen():
-    """The quick way, without weights, gives the same value as weights that are all 1."""
-    for pixels in [1, 2, 99, 100, 101, 1000, 4096]:
-        from rodcone.colour_spaces import WHITE_AT
-        from studies.metrics.truth import white_of
-
-        luminance = np.random.default_rng(pixels).random((1, pixels))
-        weighted = np.percentile(luminance, 99.0, weights=np.ones((1, pixels)), method="inverted_cdf") / WHITE_AT
-        assert white_of(luminance, np.zeros((1, pixels))) == weighted, pixels
-        covered = np.zeros((1, pixels))
-        covered[0, np.argmax(luminance)] = 1.0
-        assert pixels == 1 or white_of(luminance, covered) <= weighted, pixels

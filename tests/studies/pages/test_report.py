@@ -15,7 +15,6 @@ import report_sample as SAMPLE
 from studies.metrics import metric as figures
 from studies.pages import report_text as text
 from studies.pages.report import render_report
-from studies.pages.report_compare import CAMERA
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.report_pictures import SHOWN_BYTES, ReportPictures
 from studies.study.study_file import read_study
@@ -247,37 +246,6 @@ def test_one_seed_calls_nothing_ahead_and_says_so() -> None:
     page = page_of(SAMPLE.sample_report())
     assert "±" not in page.split("<main>")[1].split("<script")[0]
     assert "One seed (0)" in page
-
-
-@pytest.mark.thorough
-def test_every_metric_is_compared_by_light_lost_ones_too() -> None:
-    """PSNR is won in the dark and lost in the light by 2 dB, FLIP lost everywhere, SSIM level: seeds scatter a bit."""
-    dark = ("moonlight", "street light", "living room")
-
-    def led(row: Row) -> Row:
-        ours, scatter = row.processor == "interleaved", 0.001 * (row.seed - 1)
-        ahead = (2.0 if row.level in dark else -2.0) if ours else 0.0
-        return replace(
-            row,
-            psnr_db=20.0 + ahead + scatter * ours,
-            ssim=0.5 + scatter * ours,
-            flip_mean=0.2 + (0.1 + scatter) * ours,
-            **dict.fromkeys(("delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "pu21_psnr_db"), 30.0),
-        )
-
-    of = SAMPLE.sample_report(led, seeds=(0, 1, 2))
-    page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
-    found = json.loads(scripts(page_of(of))[0])["comparisons"][CAMERA]["leads"]["0 1"]
-    assert set(found) == {metric.key for metric in figures.METRICS[:8]}
-    assert {key: found[key][0] for key in ("psnr_db", "ssim", "flip_mean")} == {
-        "psnr_db": 2 * "aaabbbb",
-        "ssim": 2 * "lllllll",
-        "flip_mean": 2 * "bbbbbbb",
-    }
-    assert found["flip_mean"][1] == pytest.approx([-0.1] * 14)
-    head = page[page.index("<header>") : page.index("</header>")]
-    assert "Moonlight to living room: better in part (PSNR +2.0 dB), worse in part (FLIP higher by 0.100)." in head
-    assert "From paper's figure 6 on: clearly worse (PSNR −2.0 dB, FLIP higher by 0.100)." in head
 
 
 def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_title() -> None:

@@ -11,7 +11,6 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from datetime import datetime
 from functools import partial
-from multiprocessing import active_children
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -35,7 +34,7 @@ from studies.sweep.cells import Cell
 from studies.sweep.database import last_run, open_results, rows
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import at_work
-from studies.sweep.workers import run, run_in_processes
+from studies.sweep.workers import run
 
 content, half_pictures, here, parts_left, small_study, swept = (
     getattr(SAMPLE, name) for name in ("content", "half_pictures", "here", "parts_left", "small_study", "swept")
@@ -334,23 +333,3 @@ def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_ane
     share = monte_carlo_share((even - odd) / 2, whole, sensor, fine.exposure_s)
     assert fine.mc_share == pytest.approx(share, rel=1e-4)  # float32 halves
     assert 0 < fine.mc_share < coarse.mc_share
-
-
-@pytest.mark.thorough
-def test_two_processes_one_of_them_killed_give_what_one_gives(tmp_path: Path) -> None:
-    study = small_study(tmp_path, seeds=tuple(range(6)))
-    swept(study, tmp_path / "serial")
-    killed: list[int] = []
-
-    def with_a_death(cells: Sequence[Cell]) -> Iterator[Row]:
-        for row in run_in_processes(cells, 2):
-            if not killed:
-                victim = active_children()[0]
-                killed.append(victim.pid or 0)
-                victim.kill()
-            yield row
-
-    assert swept(study, tmp_path / "two", with_a_death).made == 12
-    assert killed
-    assert content(tmp_path / "serial") == content(tmp_path / "two")
-    assert active_children() == []
