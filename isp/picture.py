@@ -91,10 +91,10 @@ class Picture:
         require_range("white", level, 1e-12, 1e12, "give electrons of green")
         return encode(self.rgb / level, encoding)
 
-    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
-        """Draw R, G and B along a row (the middle one by default) or a column into Matplotlib's axes."""
+    def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw R, G and B along a row, the middle one by default, into Matplotlib's axes."""
         planes = dict(zip("RGB", np.moveaxis(self.rgb, -1, 0), strict=True))
-        return draw_line(planes, row, column, axes, "linear sRGB, electrons of green")
+        return draw_line(planes, row, axes, "linear sRGB, electrons of green")
 
     def _repr_png_(self) -> bytes:
         return preview_png(self.rgb)

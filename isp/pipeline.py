@@ -121,8 +121,3 @@ def picture_bayer(
     """Develop a Bayer raw image: bilinear demosaicking, Gray World, matrix; parameters as `picture_interleaved`."""
     require_letters(raw, ("R", "G", "B"))
     return finish(raw, bilinear(raw), matrix, neutral=neutral, balance=balance)
-
-
-# The same by the names that written code has for them: NumPy takes a picture as its linear RGB.
-develop_interleaved = picture_interleaved
-develop_bayer = picture_bayer

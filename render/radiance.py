@@ -81,9 +81,9 @@ class SpectralRadiance:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm)
 
-    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
-        """Draw the luminance along a row (the middle one by default) or a column into Matplotlib's axes."""
-        return draw_line({"": self.luminance()}, row, column, axes, "luminance, cd/m²")
+    def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw the luminance along a row, the middle one by default, into Matplotlib's axes."""
+        return draw_line({"": self.luminance()}, row, axes, "luminance, cd/m²")
 
     def _repr_png_(self) -> bytes:
         return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB_ROUNDED.T)

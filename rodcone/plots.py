@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import require_whole
 
 if TYPE_CHECKING:  # Matplotlib takes half a second to import: only who plots waits for it
     from matplotlib.axes import Axes as Axes  # noqa: PLC0414  (values import it from here)
@@ -57,28 +57,17 @@ def draw_curves(
     return axes
 
 
-def draw_line(
-    planes: Mapping[str, NDArray[np.floating]], row: int | None, column: int | None, axes: Axes | None, y: str
-) -> Axes:
-    """Draw a row or a column of planes (h, w); the middle row where none is asked for, samples that are NaN left out.
+def draw_line(planes: Mapping[str, NDArray[np.floating]], row: int | None, axes: Axes | None, y: str) -> Axes:
+    """Draw a row of planes (h, w); the middle one where none is asked for, samples that are NaN left out.
 
     Raises
     ------
     InputError
-        For a row and a column at once, or one outside the picture.
+        For a row outside the picture.
     """
     height, width = next(iter(planes.values())).shape
-    if row is not None and column is not None:
-        raise InputError(f"row {row!r} and column {column!r}: both given; allowed: one of them; leave one out")
-    if column is not None:
-        require_whole("column", column, 0, width - 1, "give one of the picture's columns")
-        what, along = f"row, in column {column}", np.arange(height)
-        cut = {name: plane[:, column] for name, plane in planes.items()}
-    else:
-        row = height // 2 if row is None else row
-        require_whole("row", row, 0, height - 1, "give one of the picture's rows")
-        what, along = f"column, in row {row}", np.arange(width)
-        cut = {name: plane[row] for name, plane in planes.items()}
-    known = {name: np.isfinite(values) for name, values in cut.items()}
-    curves = {name: (along[known[name]], values[known[name]]) for name, values in cut.items() if known[name].any()}
-    return draw_curves(curves, axes, x=what, y=y, marker="." if len(along) <= 128 else "")
+    row = height // 2 if row is None else row
+    require_whole("row", row, 0, height - 1, "give one of the picture's rows")
+    known = {name: np.isfinite(plane[row]) for name, plane in planes.items()}
+    curves = {name: (np.flatnonzero(at), planes[name][row, at]) for name, at in known.items() if at.any()}
+    return draw_curves(curves, axes, x=f"column, in row {row}", y=y, marker="." if width <= 128 else "")

@@ -133,10 +133,10 @@ class RawImage:
                 "calibrate this camera"
             )
 
-    def plot_line(self, row: int | None = None, column: int | None = None, axes: Axes | None = None) -> Axes:
-        """Draw the electrons along a row (the middle one by default) or a column into Matplotlib's axes, by channel."""
+    def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
+        """Draw the electrons along a row, the middle one by default, into Matplotlib's axes, by channel."""
         planes = {x: np.where(mask(self.cfa, x, self.shape), self.electrons, np.nan) for x in channels(self.cfa)}
-        return draw_line(planes, row, column, axes, "electrons")
+        return draw_line(planes, row, axes, "electrons")
 
     def _repr_png_(self) -> bytes:
         return preview_png(np.maximum(self.electrons, 0.0))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, raw_image
 
-from isp.pipeline import develop_bayer, develop_interleaved, picture_bayer, picture_interleaved
+from isp.pipeline import picture_bayer, picture_interleaved
 from isp.settings import DEFAULTS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
@@ -28,7 +28,7 @@ def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32)
 
 def test_a_flat_field_stays_flat_to_the_border_in_every_phase() -> None:
     levels, shape = {"R": 500, "G": 1000, "B": 400, "W": 5000}, (30, 33)
-    for tiles, develop, rel in ((RGBW_PHASES, develop_interleaved, 1e-5), (BAYER_PHASES, develop_bayer, 1e-9)):
+    for tiles, develop, rel in ((RGBW_PHASES, picture_interleaved, 1e-5), (BAYER_PHASES, picture_bayer, 1e-9)):
         for cfa in tiles:
             picture = develop(raw(cfa, levels, shape), IDENTITY)
             assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=rel), cfa
@@ -37,8 +37,8 @@ def test_a_flat_field_stays_flat_to_the_border_in_every_phase() -> None:
 def test_both_pipelines_agree_on_a_flat_field() -> None:
     levels = {"R": 300, "G": 800, "B": 250, "W": 4000}
     matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
-    ours = develop_interleaved(raw(RGBW, levels), matrix)
-    theirs = develop_bayer(raw(BAYER, levels), matrix)
+    ours = picture_interleaved(raw(RGBW, levels), matrix)
+    theirs = picture_bayer(raw(BAYER, levels), matrix)
     assert ours.rgb.mean(axis=(0, 1)) == pytest.approx(theirs.rgb.mean(axis=(0, 1)), rel=1e-5)
 
 
@@ -75,7 +75,7 @@ def test_dark_frame_is_balanced_by_calibration_and_says_so() -> None:
 def test_clipped_highlight_stays_neutral() -> None:
     image = raw(BAYER, {"R": 500, "G": 1000, "B": 400})
     image.dn[8:16, 8:16] = 15_100
-    patch = develop_bayer(image, IDENTITY).rgb[10:14, 10:14]
+    patch = picture_bayer(image, IDENTITY).rgb[10:14, 10:14]
     assert patch == pytest.approx(np.full((4, 4, 3), 15_000.0), rel=1e-9)
 
 
@@ -88,11 +88,10 @@ def test_saturated_w_does_not_shift_the_colours_balance() -> None:
 
 
 def test_wrong_mosaic_is_refused() -> None:
-    for develop in [develop_interleaved, picture_interleaved]:
-        with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: .*; use the other camera's pipeline"):
-            develop(raw(BAYER, {"R": 1, "G": 1, "B": 1}), IDENTITY)  # type: ignore[operator]
-        with pytest.raises(InputError, match=r"^raw: mosaic"):
-            picture_bayer(raw(RGBW, dict.fromkeys("RGBW", 1.0)), IDENTITY)
+    with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: .*; use the other camera's pipeline"):
+        picture_interleaved(raw(BAYER, {"R": 1, "G": 1, "B": 1}), IDENTITY)
+    with pytest.raises(InputError, match=r"^raw: mosaic"):
+        picture_bayer(raw(RGBW, dict.fromkeys("RGBW", 1.0)), IDENTITY)
 
 
 def test_a_given_balance_takes_the_place_of_gray_world() -> None:
@@ -110,7 +109,7 @@ def test_a_given_balance_takes_the_place_of_gray_world() -> None:
 
 
 def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
-    linear = develop_bayer(raw(BAYER, {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
+    linear = picture_bayer(raw(BAYER, {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
     assert linear.shape == (16, 18, 3)
     assert np.asarray(linear) is linear.rgb
     assert np.asarray(linear, dtype=np.float32).dtype == np.float32
@@ -122,11 +121,11 @@ def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
 def test_wrong_matrix_or_neutral_is_refused() -> None:
     image = raw(BAYER, {"R": 1, "G": 1, "B": 1})
     with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
-        develop_bayer(image, np.ones((2, 3)))
+        picture_bayer(image, np.ones((2, 3)))
     with pytest.raises(InputError, match=r"^neutral: \[1.0, 0.0, 1.0\]"):
-        develop_bayer(image, IDENTITY, neutral=[1, 0, 1])
+        picture_bayer(image, IDENTITY, neutral=[1, 0, 1])
     with pytest.raises(InputError, match=r"^balance: \[1.0, inf, 1.0\]"):
-        develop_bayer(image, IDENTITY, balance=[1, np.inf, 1])
+        picture_bayer(image, IDENTITY, balance=[1, np.inf, 1])
 
 
 def test_gray_world_leaves_saturated_pixels_out() -> None:
