@@ -18,7 +18,6 @@ from render.geometry import look_at, to_world
 from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from scenes import still_life_outdoor
 from scenes.catalog import load
 from scenes.materials import disk, floor, matte, panel
 from scenes.reflectances import grey
@@ -128,19 +127,6 @@ def test_a_constant_environment_gives_pi_within_the_derived_error():
     assert error < 6e-4
 
 
-def hidden_by(wall, point):
-    """Share of the sky's illuminance that a wall facing +z takes from level ground: cos cos / (pi d^2), midpoint rule.
-
-    `wall` is (left, right, bottom, top, z) [m].
-    """
-    left, right, bottom, top, z = wall
-    x = left + (np.arange(4000) + 0.5) / 4000 * (right - left)
-    y = bottom + (np.arange(2000) + 0.5)[:, None] / 2000 * (top - bottom)
-    far = point[2] - z
-    squared = (x - point[0]) ** 2 + (y - point[1]) ** 2 + far**2
-    return np.mean((y - point[1]) * far / squared**2) / np.pi * (right - left) * (top - bottom)
-
-
 def lit_plate(**options):
     scene = load("flat_field")
     return render(scene, (2, 3), wavelength_nm=BANDS_NM, spp=1, **options)
@@ -195,28 +181,6 @@ def test_the_error_told_is_the_scatter_over_seeds():
     told = np.mean([(level.relative_error * level.value) ** 2 for level in levels])
     low, high = (chi2.ppf(tail, count - 1) / (count - 1) for tail in (FALSE_ALARM / 2, 1 - FALSE_ALARM / 2))
     assert low < values.var(ddof=1) / told < high
-
-
-@pytest.mark.slow
-def test_sun_and_sky_light_the_garden_table_as_the_scene_states():
-    scene = load("still_life_outdoor")
-    kept = {key: scene.geometry[key] for key in ("type", "sensor", "meter_card", "wall", "sun", "sky")}
-    black = {key: kept[key] | {"bsdf": matte(grey(0.0))} for key in ("meter_card", "wall")}  # no light but from above
-    scene = Scene("garden", kept | black, scene.groups, reference_plane="meter_card")
-    made = render(scene, (1, 1), wavelength_nm=BANDS_NM, spp=1)
-    card, height, bearing = np.array([-0.22, 0.0002, 0.50]), *np.radians([41.8, 62.0])
-    towards = np.array([-np.sin(bearing) * np.cos(height), np.sin(height), np.cos(bearing) * np.cos(height)])
-    # The sun is aimed at the middle of the table, half a metre off: 3 per mille in distance and angle.
-    way = 100.0 * towards - card
-    distance = np.linalg.norm(way)
-    share = (100.0 / distance) ** 2 * (way @ towards) / distance * way[1] / distance
-    lux = {name: made.irradiance[i] * made.groups[name].power for i, name in enumerate(("sun", "sky"))}
-    # From seeds: the sun is sure to 1e-5 in the test above, the sky to 4e-4.
-    assert lux["sun"] == pytest.approx(np.full(4, still_life_outdoor.SUN_BEAM_LUX * share), rel=1e-3)
-    assert share == pytest.approx(np.sin(height), rel=0.01)
-    open_sky = 1 - hidden_by((-6.0, 6.0, 0.0002, 2.46, -0.52), card)
-    assert 0.6 < open_sky < 0.8
-    assert lux["sky"] == pytest.approx(np.full(4, still_life_outdoor.SKY_LUX * open_sky), rel=3e-3)
 
 
 def test_light_is_metered_in_this_programs_variant_and_the_users_own_stays():

@@ -9,7 +9,6 @@ from loop import loop
 from refusal import refusal
 
 from render.radiance import SpectralRadiance
-from sensor import burst as module
 from sensor.burst import merge, merged_raw, merged_sensor
 from sensor.capture import capture
 from sensor.chip import PixelConfig
@@ -47,15 +46,6 @@ def test_a_burst_of_equal_frames_merges_to_their_mean_and_an_nth_of_the_variance
     expected = (mean + 400 + sensor.gain_e_per_dn**2 / 12) / (5 * 0.01**2)
     np.testing.assert_allclose(merged.temporal_variance, expected, rtol=1e-12)
     assert not merged.saturated.any()
-
-
-def test_a_few_rounds_settle_the_weights(monkeypatch):
-    frames = shoot(camera(read_noise_e=15.0), np.geomspace(10, 3e6, 256), [0.001, 0.004, 0.016])
-    settled = merge(frames)
-    monkeypatch.setattr(module, "_ROUNDS", 40)
-    exact = merge(frames)
-    off = np.abs(settled.rate_e_per_s - exact.rate_e_per_s) / np.sqrt(exact.temporal_variance)
-    assert off.max() < 1e-3
 
 
 # Levels from the dark to beyond the shortest frame's well: read noise rules, shot noise rules, the longest frame
