@@ -16,6 +16,26 @@ from sensor.raw import RawImage
 BAYER_PHASES: list[Tile] = [BAYER, ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
 RGBW_PHASES: list[Tile] = [RGBW, ("GR", "WB"), ("BW", "RG"), ("WB", "GR")]
 RGBW_4X4: Tile = ("RWGW", "WBWG", "GWBW", "WGWR")  # W on a checkerboard, each colour on diagonals
+# A pixel of a real chip, and one with every term there is, none of them large.
+REAL_PIXEL = {
+    "dark_current_e_per_s": 100.0,
+    "column_gain_spread": 0.01,
+    "column_offset_e": 3.0,
+    "hot_pixel_share": 0.01,
+    "hot_pixel_dark_current_e_per_s": 1e4,
+    "crosstalk": 0.05,
+}
+EVERY_TERM = {
+    "read_noise_e": 3.0,
+    "dsnu_e": 4.0,
+    "prnu": 0.02,
+    "dark_current_e_per_s": 200.0,
+    "column_gain_spread": 0.01,
+    "column_offset_e": 2.0,
+    "hot_pixel_share": 0.05,
+    "hot_pixel_dark_current_e_per_s": 500.0,
+    "crosstalk": 0.05,
+}
 
 
 def any_order(terms: int) -> float:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import REAL_PIXEL
 from loop import loop
 
 from render.radiance import SpectralRadiance
@@ -22,14 +23,6 @@ from sensor.readout import noise_variance
 from sensor.response import expected_electrons
 
 NM = np.arange(390.0, 780.0, 20.0)
-REAL = {
-    "dark_current_e_per_s": 100.0,
-    "column_gain_spread": 0.01,
-    "column_offset_e": 3.0,
-    "hot_pixel_share": 0.01,
-    "hot_pixel_dark_current_e_per_s": 1e4,
-    "crosstalk": 0.05,
-}
 EXACT = loop("exact", [False, True])
 
 
@@ -40,7 +33,7 @@ def scene(value, shape):
 
 
 def real(sensor):
-    return replace(sensor, pixel=replace(sensor.pixel, **REAL))
+    return replace(sensor, pixel=replace(sensor.pixel, **REAL_PIXEL))
 
 
 def shoot(sensor, value, shape, exact, exposure_s=0.01, seed=0):
@@ -117,7 +110,7 @@ def test_1_bit_and_16_bits_use_their_whole_range_and_no_more(bits, exact):
 
 @EXACT
 def test_a_well_under_the_read_noise_still_gives_numbers(exact):
-    pixel = PixelConfig(2.2, 0.9, full_well_e=5.0, read_noise_e=50.0, dsnu_e=20.0, prnu=0.5, **REAL)
+    pixel = PixelConfig(2.2, 0.9, full_well_e=5.0, read_noise_e=50.0, dsnu_e=20.0, prnu=0.5, **REAL_PIXEL)
     sensor = SensorConfig(pixel, LensConfig(2.8))
     dark, bright = (shoot(sensor, value, (64, 64), exact) for value in (0.0, 1e3))
     assert dark.dn.std() > 0
@@ -137,7 +130,7 @@ def test_a_response_of_zero_everywhere_reads_as_darkness_under_any_light(exact):
 
 
 @EXACT
-@loop("term", [*REAL, "read_noise_e", "dsnu_e", "prnu"])
+@loop("term", [*REAL_PIXEL, "read_noise_e", "dsnu_e", "prnu"])
 def test_each_term_at_the_top_of_its_range_reads_in_range(term, exact):
     tops = {"column_gain_spread": 1.0, "hot_pixel_share": 1.0, "crosstalk": 0.25, "prnu": 1.0, "column_offset_e": 1e9}
     top = tops.get(term, 1e9)

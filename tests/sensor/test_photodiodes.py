@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import EVERY_TERM
 from loop import loop
 from refusal import refusal
 
@@ -180,19 +181,6 @@ def test_each_term_alone_in_closed_form(pixel, charge, digital):
         assert sum(x**2 for x in noise_sources(400.0, sensor, 0.1).values()) == pytest.approx(found[0, 0], rel=1e-12)
 
 
-REAL = {
-    "read_noise_e": 3.0,
-    "dsnu_e": 4.0,
-    "prnu": 0.02,
-    "dark_current_e_per_s": 200.0,
-    "column_gain_spread": 0.01,
-    "column_offset_e": 2.0,
-    "hot_pixel_share": 0.05,
-    "hot_pixel_dark_current_e_per_s": 500.0,
-    "crosstalk": 0.05,
-}
-
-
 @pytest.mark.sample(1)
 @BOTH
 @pytest.mark.parametrize("exact", [True, False])
@@ -200,7 +188,7 @@ REAL = {
 def test_chips_drawn_at_random_have_the_stated_snr(binning, exact, photo_e):
     if not exact and backend() == "numpy":
         pytest.skip("Dr.Jit has no backend here")
-    sensor = camera(binning, black_level_dn=None, **REAL)
+    sensor = camera(binning, black_level_dn=None, **EVERY_TERM)
     raw = even_frame(sensor, photo_e, (128, 8192), exact=exact)
     stated = noise_variance(np.full((1, 1), 4 * photo_e), sensor, 0.1)[0, 0]
     # Standard error of the mean over columns of (value - mean)^2, as of `test_readout_variance`; raw columns share no
@@ -223,14 +211,14 @@ def test_the_raw_image_states_its_own_dark_noise(binning, bits):
 
 @BOTH
 def test_light_for_an_snr_is_of_the_sum(binning):
-    sensor = camera(binning, **{name: REAL[name] for name in ("read_noise_e", "dsnu_e", "prnu")})
+    sensor = camera(binning, **{name: EVERY_TERM[name] for name in ("read_noise_e", "dsnu_e", "prnu")})
     electrons = electrons_at_snr(10.0, sensor, 0.1)
     assert electrons / np.sqrt(noise_variance(np.full((1, 1), electrons), sensor, 0.1)[0, 0]) == pytest.approx(10.0)
 
 
 @BOTH
 def test_photodiodes_by_themselves_are_what_was_binned(binning):
-    one = camera("", **REAL)
+    one = camera("", **EVERY_TERM)
     assert binned(one, binning).photosites == one
 
 

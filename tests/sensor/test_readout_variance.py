@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import EVERY_TERM
 from loop import loop
 
 from sensor.chip import PixelConfig
@@ -67,17 +68,7 @@ def test_crosstalk_spreads_the_shot_noise_as_it_spreads_the_charge():
 
 @loop("light_e", [0.0, 400.0, 20_000.0])
 def test_pixels_of_chips_drawn_at_random_have_the_stated_variance(light_e):
-    sensor = camera(
-        read_noise_e=3.0,
-        dsnu_e=4.0,
-        prnu=0.02,
-        dark_current_e_per_s=200.0,
-        column_gain_spread=0.01,
-        column_offset_e=2.0,
-        hot_pixel_share=0.05,
-        hot_pixel_dark_current_e_per_s=500.0,
-        crosstalk=0.05,
-    )
+    sensor = camera(**EVERY_TERM)
     shape = (64, 4096)
     device = draw_device(sensor, shape, np.random.default_rng(3))
     frame = read_out(np.full(shape, light_e), sensor, device, 0.1, np.random.default_rng(4)).electrons

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import REAL_PIXEL
 from loop import loop
 
 from sensor.burst import merged_raw, merged_sensor
@@ -26,13 +27,6 @@ from sensor.readout import electrons_at_snr, noise_sources, noise_variance
 from studies.photograph.snr import snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
-REAL = {
-    "dark_current_e_per_s": 100.0,
-    "column_gain_spread": 0.01,
-    "column_offset_e": 3.0,
-    "hot_pixel_share": 0.01,
-    "hot_pixel_dark_current_e_per_s": 1e4,
-}
 
 
 def sensor_of(*readings, **pixel):
@@ -54,7 +48,7 @@ def dual(high=2.0, low=6.0, **pixel):
 @loop("name", HDR)
 def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
     sensor = preset(name)
-    sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL))
+    sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL_PIXEL | {"crosstalk": 0.0}))
     light = np.array([0.0, 0.3, 40.0, 5000.0])
     total = sum(covariances(light, sensor, 0.02).values())
     for index, reading in enumerate(sensor.chip.readings):
