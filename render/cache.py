@@ -39,7 +39,7 @@ def load_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoise
     Renders with `denoised` light are files of their own.
     The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
     """
-    arrays = _read(_path(folder, scene, film, seed, _kind(denoised)))
+    arrays = read_arrays(_path(folder, scene, film, seed, _kind(denoised)))
     if arrays is None:
         return None
     values, lights = json.loads(str(arrays["values"])), emission(scene.groups, film.wavelength_nm, film.width_nm)
@@ -75,7 +75,7 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
         values |= {"fold_points": denoised.fold_points}
     arrays |= {f"{name}_{part}": x for name, both in halves.items() for part, x in vars(both).items()}
     path = _path(folder, scene, film, seed, _kind(transport.denoised is not None))
-    _write(path, arrays | {"values": np.array(json.dumps(values))})
+    write_arrays(path, arrays | {"values": np.array(json.dumps(values))})
 
 
 def _kind(denoised: bool) -> str:
@@ -93,16 +93,16 @@ def _halves(arrays: Mapping[str, Any], name: str) -> Halves:
 
 def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:
     """Stored irradiance of the reference plane, or None where there is no intact file."""
-    arrays = _read(_path(folder, scene, film, seed, "meter"))
+    arrays = read_arrays(_path(folder, scene, film, seed, "meter"))
     return None if arrays is None else Irradiance(**arrays)
 
 
 def save_irradiance(folder: Path, scene: Scene, film: Film, seed: int, irradiance: Irradiance) -> None:
     """Store an irradiance beside the renders."""
-    _write(_path(folder, scene, film, seed, "meter"), vars(irradiance))
+    write_arrays(_path(folder, scene, film, seed, "meter"), vars(irradiance))
 
 
-def _read(path: Path) -> dict[str, Any] | None:
+def read_arrays(path: Path) -> dict[str, Any] | None:
     """Arrays of a file, None where it is missing or isn't what was written."""
     try:
         with path.open("rb") as file:
@@ -116,12 +116,12 @@ def _read(path: Path) -> dict[str, Any] | None:
         return None
 
 
-def _write(path: Path, arrays: Mapping[str, Any]) -> None:
-    """Write arrays behind their digest; readers see the whole file or none."""
+def write_arrays(path: Path, arrays: Mapping[str, Any], *, packed: bool = False) -> None:
+    """Write arrays behind their digest, compressed where asked for; readers see the whole file or none."""
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as (place,), place.open("w+b") as file:
         file.write(bytes(_DIGEST_BYTES))
-        np.savez(file, **arrays)
+        (np.savez_compressed if packed else np.savez)(file, **arrays)
         file.seek(_DIGEST_BYTES)
         content = hashlib.file_digest(file, "sha256").digest()
         file.seek(0)
@@ -133,12 +133,16 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render
         [
             *(ENGINE_VERSION, kind, INTEGRATOR, variant(), compiler_version()),
             *map(metadata.version, ("mitsuba", "drjit")),
-            *(scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry)),
-            [[name, group.emitters, group.coloured] for name, group in scene.groups.items()],
-            *(film, seed),
+            *(*scene_terms(scene, film), seed),
         ]
     )
     return folder / f"{_NOT_IN_NAMES.sub('_', scene.name)}-{key}.npz"
+
+
+def scene_terms(scene: Scene, film: Film) -> list[Any]:
+    """What decides a scene's light transport on a film: neither lamps' spectra and powers nor the engine."""
+    groups = [[name, group.emitters, group.coloured] for name, group in scene.groups.items()]
+    return [scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry), groups, film]
 
 
 def file_digests(geometry: Node) -> list[str]:

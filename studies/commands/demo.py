@@ -30,6 +30,7 @@ def demo(
     seed: int = 0,
     light: str | None = None,
     denoise: bool = False,
+    render: bool = False,
     force: bool = False,
 ) -> None:
     """Photograph one scene from moonlight to daylight with RGBW and Bayer and write a report; prints its path.
@@ -67,6 +68,9 @@ def demo(
         Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
     denoise
         Photograph denoised light; the report's Monte Carlo share is then its measured error. Needs rodcone[denoise].
+    render
+        Render here in full what is photographed, also where the project ships the light of the scene, size and bands
+        and a short render only tests it; --spp, --max-seconds and --denoise do too.
     force
         Run even where more memory is needed than is free.
     """
@@ -74,6 +78,7 @@ def demo(
     changes: dict[str, Any] = {"sensors": sensor, "levels": level, "processors": processor}
     changes["longest_exposure_s"] = longest_exposure
     limits: dict[str, Any] = {"size": size, "spp": spp, "max_seconds": max_seconds, "seed": seed, "denoise": denoise}
+    limits["reference"] = not (render or spp or max_seconds or denoise)
     study = replace(
         study,
         scenes=(SceneChoice(scene or study.scenes[0].source, light),),

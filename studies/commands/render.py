@@ -20,7 +20,8 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
 from studies.commands.console import INTERRUPTED, Seconds, print_result, require_ending, say
-from studies.study.lit_scene import asked_spectra, render_facts
+from studies.study.lit_scene import asked_spectra
+from studies.study.render_facts import render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
 MOST_BANDS = 1000

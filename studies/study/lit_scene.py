@@ -12,15 +12,18 @@ from render.cache import file_digests
 from render.denoised.relight import relight_denoised
 from render.engine import render
 from render.illuminants import illuminant
+from render.loader import Film
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import files_of, is_radiance_file
+from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys
+from rodcone.jit import backend
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
@@ -30,6 +33,7 @@ from studies.study.scene_source import LIGHT, asked_level, check_radiance_file, 
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]
+LIVE_SPP = 64  # of a render that is compared with a reference
 
 
 @dataclass(frozen=True)
@@ -122,7 +126,7 @@ def make_transport(
     Raises
     ------
     InputError
-        As `render.engine.render` and `open_radiance_file`.
+        As `render.engine.render` and `open_radiance_file`; where a render made here disagrees with the reference light.
     KeyboardInterrupt
         Where Ctrl-C ended the render; what was rendered is in `cache`.
     """
@@ -141,6 +145,11 @@ def make_transport(
         "progress": progress,
         "denoise": model.denoise,
     }
+    if limits.reference and (reference := find_reference(opened.scene, film_of(opened, model))):
+        if backend() == "numpy":
+            return reference.transport, (f"light: the reference {reference.path.name}; nothing here can test it",)
+        live = render(opened.scene, opened.size, **terms | {"max_spp": LIVE_SPP, "max_seconds": None})
+        return replace(reference.transport, meter=live.meter), (require_agreement(live, reference),)
     if limits.noise_share is None or share is None:
         transport = render(opened.scene, opened.size, **terms)
     else:
@@ -150,50 +159,16 @@ def make_transport(
     return transport, ()
 
 
-@dataclass(frozen=True)
-class RenderFacts:
-    """How a render was made, as `render.transport.Transport` has it, and the error that it reached.
-
-    Attributes
-    ----------
-    integrator, variant, stopped_by : str
-    seconds : float
-    spp : float
-        Samples a pixel, in the mean.
-    bands : int
-    relative_mc_error, relative_level_error : float or None
-        Of the lit scene, as `render.radiance.SpectralRadiance`.
-    first_nm, last_nm, width_nm : float
-        Centres of the first and the last band, and the width of the first.
-    """
-
-    integrator: str
-    variant: str
-    seconds: float
-    spp: float
-    stopped_by: str
-    relative_mc_error: float | None
-    relative_level_error: float | None
-    bands: int
-    first_nm: float
-    last_nm: float
-    width_nm: float
-
-
-def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFacts:
-    """Return the facts of a render; `radiance` is the scene that it lights."""
-    return RenderFacts(
-        integrator=transport.integrator,
-        variant=transport.variant,
-        seconds=transport.seconds,
-        spp=transport.spp,
-        stopped_by=transport.stopped_by,
-        relative_mc_error=radiance.relative_mc_error,
-        relative_level_error=radiance.relative_level_error,
-        bands=transport.wavelength_nm.size,
-        first_nm=float(transport.wavelength_nm[0]),
-        last_nm=float(transport.wavelength_nm[-1]),
-        width_nm=float(transport.width_nm[0]),
+def film_of(opened: OpenedScene, model: RenderModel) -> Film:
+    """Film on which a scene is rendered."""
+    if opened.scene is None:
+        raise InputError(f"scene: {opened.choice.source!r} is a picture; allowed: a scene; it needs no render")
+    return Film(
+        size=opened.size,
+        wavelength_nm=np.array(model.wavelength_nm),
+        width_nm=np.array(model.width_nm),
+        max_depth=opened.scene.max_depth,
+        rr_depth=opened.scene.rr_depth,
     )
 
 

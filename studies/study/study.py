@@ -83,6 +83,9 @@ class RenderLimits:
         the brightest light that the study asks for; of the unbiased light, denoised or not.
     denoise : bool
         Photograph the denoised light (`render.denoised`): its measured error is then the pictures' Monte Carlo share.
+    reference : bool
+        Photograph the reference light (`render.reference`) where there is one of the scene, size and bands: a render of
+        few samples is then made only to compare with it.
     """
 
     size: Annotated[int | None, (16, 8192, "give the picture's longer side in pixels")] = None
@@ -93,6 +96,7 @@ class RenderLimits:
     range_nm: tuple[float, float] = VISIBLE_NM
     noise_share: Annotated[float | None, (1e-6, 1e3, "give a share of the noise variance: 0.03")] = None
     denoise: bool = False
+    reference: bool = False
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from rodcone.digests import digest, digest_inputs
 from sensor.config import SensorConfig
 from studies.metrics.truth import Light
 from studies.study.levels import parse_exposure, parse_level
-from studies.study.lit_scene import RenderFacts
+from studies.study.render_facts import RenderFacts
 from studies.study.study import Condition, label
 from studies.sweep.provenance import Provenance
 

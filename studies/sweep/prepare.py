@@ -28,10 +28,10 @@ from studies.study.lit_scene import (
     lux_per_cd_m2,
     make_transport,
     photographed,
-    render_facts,
     under,
     white_spectrum,
 )
+from studies.study.render_facts import render_facts
 from studies.study.render_noise import render_share
 from studies.study.study import Study, conditions, label, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key

@@ -11,7 +11,7 @@ import pytest
 from sweep_sample import ROW
 
 from rodcone.errors import InputError
-from studies.study.lit_scene import RenderFacts
+from studies.study.render_facts import RenderFacts
 from studies.sweep.cells import RenderRecord
 from studies.sweep.database import (
     FILE,

@@ -1,0 +1,214 @@
+"""Reference light: a long render of a scene in one small file, and whether a short render made here agrees with it.
+
+Transport depends on no lamp's power, level, sensor or exposure, so it is computed once. The file holds light in half
+floats and one plane of its error, and a certificate of how it was made. It is found by the scene and the film; whether
+the engine still gives that light is tested, not read from a version.
+"""
+
+import json
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from scipy.special import gammaincc
+
+from render.cache import ENGINE_VERSION, read_arrays, scene_terms, write_arrays
+from render.combine import emission
+from render.error_estimates import Halves
+from render.level import SceneMeans
+from render.loader import Film
+from render.runs import Means, errors_of
+from render.scene import Scene
+from render.transport import Transport
+from rodcone.digests import digest_inputs
+from rodcone.errors import InputError
+from rodcone.types import Floats, Planes
+
+SHIPPED = Path(__file__).parent / "data" / "references"
+FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
+BLOCK = 16  # pixels a side, within which errors are pooled: a variance from 256 differences is right to 9 %
+FALSE_ALARM = 1e-3  # chance, at most, that an agreeing render is called another
+_LEVELS = ("radiance", "uncovered", "covariance")
+
+
+@dataclass(frozen=True)
+class Reference:
+    """Light of a long render, and its certificate: samples, shares, test between its halves, command, versions."""
+
+    path: Path
+    transport: Transport
+    certificate: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Chi-square of two renders' difference over blocks, in the band where it is least likely.
+
+    Attributes
+    ----------
+    wavelength_nm : float
+    chi_square : float
+    blocks : int
+        Degrees of freedom.
+    chance : float
+        That agreeing renders differ by as much in a band or more, times the number of bands.
+    """
+
+    wavelength_nm: float
+    chi_square: float
+    blocks: int
+    chance: float
+
+
+def reference_folders() -> Iterator[Path]:
+    """Folders of references: the user's own, then what comes with the program."""
+    yield Path(os.environ.get(FOLDER) or Path.home() / ".local" / "share" / "rodcone" / "references")
+    yield SHIPPED
+
+
+def reference_path(folder: Path, scene: Scene, film: Film) -> Path:
+    """File of a scene and film in a folder."""
+    key = digest_inputs(scene_terms(scene, film))[:12]
+    return folder / f"{Path(scene.name).stem}-{film.size[0]}x{film.size[1]}x{film.wavelength_nm.size}-{key}.npz"
+
+
+def find_reference(scene: Scene, film: Film) -> Reference | None:
+    """Reference of a scene and film, the user's own first; None where there is no intact one."""
+    for folder in reference_folders():
+        path = reference_path(folder, scene, film)
+        if (arrays := read_arrays(path)) is not None:
+            return Reference(path, _unpacked(arrays, scene, film), json.loads(str(arrays["certificate"])))
+    return None
+
+
+def save_reference(path: Path, transport: Transport, certificate: Mapping[str, Any]) -> None:
+    """Write a reference. What half floats round off is part of the error that the file states."""
+    stored, scale = _half(transport.light.mean)
+    rounding = stored * scale - transport.light.mean
+    arrays = {
+        "light": stored,
+        "scale": scale,
+        "error": _error_plane(transport.light, transport.light.difference + rounding),
+        "rates": transport.counts // transport.counts.min(),
+        "points": transport.counts.min() // 2,
+        "coverage": np.stack([transport.coverage.mean, transport.coverage.difference]),
+        "shared": np.array(transport.shared.groups if transport.shared else (), np.int64),
+        **{f"mean_{name}": getattr(transport.scene_means, name) for name in _LEVELS},
+        **{f"seen_{group}": np.stack([seen.mean, seen.difference]) for group, seen in enumerate(transport.seen)},
+    }
+    made_by = {name: getattr(transport, name) for name in ("seconds", "integrator", "variant")}
+    facts = {**made_by, "engine": ENGINE_VERSION, **certificate}
+    write_arrays(path, arrays | {"certificate": np.array(json.dumps(facts))}, packed=True)
+
+
+def _half(planes: Planes) -> tuple[Any, Planes]:
+    """Planes in half floats, each over its largest value, and that value: (group, band, 1, 1)."""
+    largest = planes.max(axis=(2, 3), keepdims=True)
+    scale = np.where(largest > 0, largest, np.float32(1))
+    return (planes / scale).astype(np.float16), scale
+
+
+def _error_plane(light: Halves, error: Planes) -> Planes:
+    """Relative error of each group's light, summed over bands: (group, h, w) float32; bands share their paths.
+
+    A plane has less of an error than its bands apart: it is scaled so that the variance over the picture is theirs.
+    """
+    total = light.mean.sum(axis=1)
+    plane = np.divide(error.sum(axis=1), total, out=np.zeros_like(total), where=total > 0)
+    spread = (plane[:, None] * light.mean).astype(np.float64)
+    lost = (error.astype(np.float64) ** 2).sum(axis=(1, 2, 3)) / np.maximum((spread**2).sum(axis=(1, 2, 3)), 1e-300)
+    return np.asarray(plane * np.sqrt(np.maximum(lost, 1.0))[:, None, None], np.float32)
+
+
+def _unpacked(arrays: Mapping[str, Any], scene: Scene, film: Film) -> Transport:
+    """Transport of a file; variances are pooled from the error plane as a render's from its difference."""
+    light = arrays["light"] * arrays["scale"]
+    rates, facts = arrays["rates"], json.loads(str(arrays["certificate"]))
+    means = Means(
+        count=int(arrays["points"]),
+        rates=rates,
+        light=Halves(light, arrays["error"][:, None] * light),
+        seen=[Halves(*arrays[f"seen_{group}"]) for group in range(len(scene.groups))],
+        coverage=Halves(*arrays["coverage"]),
+        shared=tuple(arrays["shared"].tolist()) or None,
+    )
+    return Transport(
+        light=means.light,
+        coverage=means.coverage,
+        seen=tuple(means.seen),
+        **errors_of(emission(scene.groups, film.wavelength_nm, film.width_nm), means),
+        scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _LEVELS}),
+        groups=dict(scene.groups),
+        wavelength_nm=film.wavelength_nm,
+        width_nm=film.width_nm,
+        counts=2 * means.count * rates,
+        stopped_by="samples",
+        seconds=facts["seconds"],
+        integrator=f"reference light: {facts['integrator']}",
+        variant=facts["variant"],
+    )
+
+
+def agreement(live: Transport, reference: Transport) -> Agreement:
+    """Compare a short render with a reference of other paths, band by band, by chi-square over blocks of pixels.
+
+    A block's variance is the sum of its squared half differences. A short render may not have met a rare path yet
+    that brings a part of the light; then its halves don't tell, and the reference's variance, at as many samples,
+    does: the larger of the two counts. So the rate of false alarms is at most `FALSE_ALARM`.
+    """
+    ratio = (reference.counts / live.counts).astype(np.float32)
+    found: list[Agreement] = []
+    tests = live.light.mean.shape[0] * live.light.mean.shape[1]
+    for group, nm in np.ndindex(live.light.mean.shape[:2]):
+        planes = [x.light[group][nm] for x in (live, reference)]
+        gap = _block_sums(planes[0].mean.astype(np.float64) - planes[1].mean)
+        own, known = (np.square(x.difference.astype(np.float64)) for x in planes)
+        variance = np.maximum(_block_sums(own), _block_sums(known * ratio)) + _block_sums(known)
+        lit = variance > 0
+        chi_square, blocks = float((gap[lit] ** 2 / variance[lit]).sum()), int(lit.sum())
+        chance = min(1.0, tests * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
+        found.append(Agreement(float(live.wavelength_nm[nm]), chi_square, blocks, chance))
+    return min(found, key=lambda each: each.chance)
+
+
+def require_agreement(live: Transport, reference: Reference) -> str:
+    """Sentence that says how far a render made here agrees with a reference.
+
+    Raises
+    ------
+    InputError
+        Where it disagrees: the engine, its libraries or the file are not what they were.
+    """
+    test = agreement(live, reference.transport)
+    words = (
+        f"chi-square {test.chi_square:.0f} over {test.blocks} blocks at {test.wavelength_nm:g} nm, "
+        f"false alarms at most 1 in {1 / FALSE_ALARM:.0f}"
+    )
+    if test.chance < FALSE_ALARM:
+        raise InputError(
+            f"light: this machine's render of {live.spp:.0f} samples disagrees with {reference.path.name} ({words}); "
+            "report this line with what rodcone doctor prints; rodcone demo --render goes on without the file"
+        )
+    return (
+        f"light: the reference {reference.path.name}, {reference.transport.spp:.0f} samples a pixel; a render of "
+        f"{live.spp:.0f} made here agrees with it within its noise ({words})"
+    )
+
+
+def _block_sums(plane: Floats) -> Floats:
+    """Sums over blocks of `BLOCK` pixels each way; what is left at the ends is a block of its own."""
+    rows, columns = (np.arange(0, side, BLOCK) for side in plane.shape)
+    return np.asarray(np.add.reduceat(np.add.reduceat(plane, rows, axis=0), columns, axis=1))
+
+
+def halves_agree(transport: Transport) -> Agreement:
+    """Chi-square between a render's halves: whether errors of neighbouring pixels are independent of each other."""
+    half = np.sqrt(2).astype(np.float32)
+    even, odd = (
+        replace(transport, light=Halves(transport.light.mean + sign * transport.light.difference, half * spread))
+        for sign, spread in ((1, transport.light.difference), (-1, transport.light.difference))
+    )
+    return agreement(even, odd)
