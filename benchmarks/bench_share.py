@@ -43,8 +43,7 @@ from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS
 from sensor.presets import low_noise
 from studies.pages.plots import CHART, COLOURS, SOFT, STYLE, blank, plain_ticks, svg_text
-from studies.speed.points import front
-from studies.speed.share import Image, Yardstick, electrons, pooled_share, share_map, yardstick
+from studies.speed.points import Image, Yardstick, electrons, front, pooled_share, share_map, yardstick
 
 ROOT = Path(__file__).resolve().parents[1]
 THIS = "this checkout"

@@ -51,7 +51,7 @@ _PUBLIC = {
     "channel_electrons": ("sensor.response", "channel_electrons"),
     "expected_electrons": ("sensor.response", "expected_electrons"),
     "auto_exposure_s": ("sensor.exposure", "auto_exposure_s"),
-    "capture": ("studies.photograph.capture", "capture"),
+    "capture": ("studies.photograph.camera", "capture"),
     "expose": ("sensor.capture", "expose"),
     "RawImage": ("sensor.raw", "RawImage"),
     "merged_raw": ("sensor.burst", "merged_raw"),

@@ -1,5 +1,6 @@
-"""A camera's colours: calibrated on the ColorChecker as in a laboratory; raw images developed to the truth's scale."""
+"""A camera's colours, calibrated on the ColorChecker; its notes beside a frame; development to the truth's scale."""
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -13,14 +14,19 @@ from isp.planes import bilinear
 from isp.processors.catalogue import Processor
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule, tristimulus
+from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
 from sensor.calibration import ColourCalibration
+from sensor.capture import capture as frame_of
 from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
-from sensor.optics import camera_equation, falloff
+from sensor.device import Device
+from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
+from sensor.optics import camera_equation, falloff, form_image
+from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
 from studies.metrics.truth import GREY, Light, green_scale, light_in_bands, neutral_electrons
@@ -209,3 +215,50 @@ def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dic
     electrons = sensor.pixel_sums(expected_e)
     shape = (electrons.shape[0], electrons.shape[1])
     return {name: float(electrons[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
+
+
+def capture(
+    radiance: SpectralRadiance,
+    sensor: SensorConfig | None = None,
+    exposure_s: float | None = None,
+    device: Device | None = None,
+    rng: np.random.Generator | None = None,
+    *,
+    light: Spectrum | None = None,
+    exact: bool = False,
+    samples_per_pixel: int = 1,
+) -> RawImage:
+    """Take one exposure; the raw image holds what `develop` needs.
+
+    Parameters
+    ----------
+    radiance : SpectralRadiance
+    sensor : SensorConfig, optional
+        Left out, the preset ``low_noise``.
+    exposure_s : float, optional
+        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposure_by_rule_s`.
+    device, rng, exact, samples_per_pixel
+        As `sensor.capture.capture` takes them.
+    light : Spectrum, optional
+        That the camera's neutral and colour matrix are set to; left out, D65. Where the mosaic tells no colours under
+        it the raw image holds none, and `calibrate` says why.
+
+    Raises
+    ------
+    InputError
+        As `sensor.capture.capture`.
+
+    Warns
+    -----
+    UserWarning
+        For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
+    """
+    sensor = preset("low_noise") if sensor is None else sensor
+    if exposure_s is None:
+        exposure_s = exposure_by_rule_s(AUTO_INFORMATION, form_image(radiance, sensor, samples_per_pixel), sensor)
+    raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
+    try:
+        colour = calibrate(sensor, light or illuminant("D65"))
+    except InputError:
+        colour = None
+    return replace(raw, colour=colour, f_number=sensor.lens.f_number, iso=iso_speed(sensor))

@@ -27,8 +27,7 @@ from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import fine_bands, groups_of
 from studies.budget.terms import horizontal_view_deg
-from studies.speed.points import Measured, Stage, Times, timed
-from studies.speed.share import electrons, mean_error, yardstick
+from studies.speed.points import Measured, Stage, Times, electrons, mean_error, timed, yardstick
 from studies.study.levels import parse_level
 
 MOST_BANDS = 40

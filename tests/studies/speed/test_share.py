@@ -9,7 +9,7 @@ import pytest
 
 from render.radiance import SpectralRadiance
 from sensor.presets import low_noise
-from studies.speed.share import Yardstick, electrons, mean_error, share_map, yardstick
+from studies.speed.points import Yardstick, electrons, mean_error, share_map, yardstick
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "benchmarks"))
 
