@@ -78,6 +78,7 @@ def test_a_lamps_rim_is_what_it_is_brighter_by_than_what_it_hides():
     assert variance_of(0.5 * 0.75 + lamp, 0.5 * rim, lamp, rim)[0] == pytest.approx(0.25 * rim**2, rel=1e-5)
 
 
+@settings(deadline=None)
 @given(st.integers(0, 2**32 - 1))
 def test_a_variance_is_never_negative(seed):
     rng = np.random.default_rng(seed)

@@ -208,6 +208,7 @@ def test_a_piece_of_under_a_nanometre_beside_a_line_joins_its_neighbour():
     assert edges == pytest.approx([560.0, 570.0, 578.6, 579.6, 590.0, 600.0])
 
 
+@settings(deadline=None)
 @given(lines=st.lists(st.floats(381.0, 779.0), min_size=1, max_size=12), width=st.sampled_from([2.0, 5.0, 10.0, 33.0]))
 def test_every_line_has_a_band_whose_edges_are_half_a_nanometre_from_a_line(lines, width):
     centres, widths = line_bands(lines, width_nm=width)

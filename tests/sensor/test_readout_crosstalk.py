@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop import loop
 
@@ -27,6 +27,7 @@ def test_at_the_border_the_charge_that_has_no_neighbour_stays():
     np.testing.assert_allclose(spread_charge(light, 0.1), expected, rtol=1e-15)
 
 
+@settings(deadline=None)
 @given(st.integers(1, 9), st.integers(1, 9), st.floats(0.0, 0.25), st.integers(0, 2**32))
 def test_the_total_is_kept_and_nothing_becomes_negative(height, width, crosstalk, seed):
     light = np.random.default_rng(seed).exponential(1e3, (height, width))

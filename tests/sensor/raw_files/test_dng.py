@@ -196,6 +196,7 @@ def test_the_response_counts_as_linear_up_to_where_pixels_count_as_saturated() -
     assert numerator / denominator == pytest.approx((2000 - 4 * np.sqrt(25 + 1 / 3) - 1) / 2000, rel=1e-9)
 
 
+@settings(deadline=None)
 @given(st.floats(-1e9, 1e9))
 def test_rationals_are_the_nearest_that_fit(value: float) -> None:
     numerator, denominator = (int(part) for part in rational(value))

@@ -234,4 +234,6 @@ def test_directories_without_end_are_left_at_once(tmp_path: Path) -> None:
     assert read_noise_profile(tmp_path / "a.dng", 1000.0) is None
     (tmp_path / "b.dng").write_bytes(b"II*\0" + struct.pack("<IHI", 8, 0, 8))
     assert read_noise_profile(tmp_path / "b.dng", 1000.0) is None
+    (tmp_path / "c.raf").write_bytes(b"FUJIFILMCCD-RAW ")  # a format of its own
+    assert read_noise_profile(tmp_path / "c.raf", 1000.0) is None
     assert time.process_time() - start < 0.5

@@ -141,6 +141,7 @@ COLOUR = r"shot\.json: .* is not allowed; give"
         ({"noise_steps": [STEP | {"prnu": "1"}]}, {}, "noise_steps: prnu: '1'"),
         ({"noise_steps": [STEP, STEP | {"from_e": 5.0}]}, {}, r"noise_steps: from_e \[10.0, 5.0\] doesn't rise"),
         ({}, {"neutral": [1.0, 1.0]}, COLOUR),
+        ({}, {"neutral": [1.0, -1.0, 1.0]}, COLOUR),
         ({}, {"neutral": [1.0, float("nan"), 1.0]}, COLOUR),
         ({}, {"neutral": [10**400, 1, 1]}, COLOUR),
         ({}, {"to_srgb": [[1, 2, 3], [1, 2], [1]]}, COLOUR),
