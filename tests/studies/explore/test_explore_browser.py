@@ -72,13 +72,6 @@ def test_each_picture_is_that_of_the_copied_python(browser, address, one_render)
     assert check_changes(page, 12, seed=1) >= 8
 
 
-@pytest.mark.slow
-def test_each_of_200_pictures_is_that_of_the_copied_python(browser, address, one_render):
-    page = CHROME.open_page(browser, address)
-    EXPLORE.settle(page)
-    assert check_changes(page, 200, seed=2) >= 150
-
-
 def test_the_page_asks_no_other_host(browser, address):
     page = CHROME.open_page(browser, address)
     EXPLORE.settle(page, figures=True)

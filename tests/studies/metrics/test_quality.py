@@ -42,13 +42,6 @@ def test_ssim_of_even_pictures_is_the_luminance_term_alone() -> None:
     assert measure(first, second).ssim == pytest.approx(closed, rel=1e-9)
 
 
-def test_noise_of_a_hundredth_has_40_db() -> None:
-    # The mean of n squares of normal numbers has the relative standard error sqrt(2 / n): 4.4 of them, 1 in 100 000.
-    noise = np.random.default_rng(1).normal(0, 0.01, (100, 100, 3))
-    bound_db = 10 / np.log(10) * 4.4 * np.sqrt(2 / noise.size)
-    assert psnr_db(0.5 + noise, np.full_like(noise, 0.5)) == pytest.approx(40.0, abs=bound_db)
-
-
 def test_the_95th_percentile_sees_what_the_median_does_not() -> None:
     truth = np.full((20, 20, 3), 0.5)
     picture = truth.copy()

@@ -47,23 +47,6 @@ def test_the_mean_is_the_known_noise_and_bias_whatever_the_references_noise() ->
     assert own.mean() == pytest.approx(s**2 / NOISE_E2, abs=BOUND * np.sqrt(2 / own.size) * s**2 / NOISE_E2)
 
 
-def test_quantiles_are_those_of_squares_pooled_over_nine() -> None:
-    """References without noise: nine squares of normal errors have a chi-squared distribution of 9 degrees over 9.
-
-    Its median is 8.343 / 9 and its 95 % value 16.919 / 9 (any printed table). Neighbours share pixels: a 96x96 picture
-    of four channels holds 4096 that share none. A quantile's standard error is sqrt(q (1 - q) / n) over the density
-    there, 0.0983 and 0.0160 for 9 degrees.
-    """
-    yard, truth = flat(0.0)
-    image = truth + np.random.default_rng(2).normal(0.0, 10.0, truth.shape)
-    found = shares(share_map(image, yard)[:, 1:-1, 1:-1], yard.inside[:, 1:-1, 1:-1])
-    independent = CHANNELS * SIDE**2 / 9
-    for value, quantile, level, density in ((found.median, 8.343, 0.5, 0.0983), (found.p95, 16.919, 0.95, 0.0160)):
-        standard_error = np.sqrt(level * (1 - level) / independent) / density / 9
-        assert value == pytest.approx(quantile / 9, abs=BOUND * standard_error)
-    assert found.mean == found.mean_of_kept
-
-
 def test_each_pixel_s_error_counts_against_its_own_noise() -> None:
     """A bright half whose error is a hundredth of its noise variance, and a dark half without error."""
     yard, truth = flat(0.0)
