@@ -14,7 +14,7 @@ from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import MOST_EXPANSION, read_exr, write_exr
 from render.radiance_files.exr_layout import LAYOUT_UNITS, channel_name, radiance_channels, read_bands
-from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, require_extent
+from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads
 
@@ -417,6 +417,11 @@ def test_a_black_picture_is_not_taken_for_a_hostile_one(tmp_path: Path) -> None:
         path = write_by_hand(tmp_path / "a.exr", channels, compression=kind)
         assert MOST_EXPANSION * path.stat().st_size > 4 * 4 * 512 * 2048
         assert not read_exr(path).values.any()
+
+
+def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:
+    for nm in ([500.0], [510.0, 500.0], [500.0, np.nan]):
+        refusal(bands_between, np.array(nm), match="wavelength_nm")
 
 
 def test_extent_is_allowed_up_to_its_limits() -> None:
