@@ -169,6 +169,7 @@ def capture(
     light: _Light | None = None,
     exact: bool = False,
     samples_per_pixel: int = 1,
+    shake: str | None = None,
 ) -> RawImage: ...
 def channel_electrons(irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
 def characterise(

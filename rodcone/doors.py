@@ -179,6 +179,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
             ("name", "encoding", "channel", "isp", "readout", "way", "white_balance", "extend", "engine", "processor"),
             _TEXT,
         ),
+        "shake": _TEXT,
         **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything"), _FLAG),
         **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
         **dict.fromkeys(("progress", "step", "runner"), _CALL),

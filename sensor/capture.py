@@ -12,7 +12,8 @@ from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
 from sensor.readout import read_out
-from sensor.response import electrons_per_irradiance, expected_electrons
+from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, expected_electrons
+from sensor.shake import shaken
 
 
 def capture(
@@ -27,7 +28,8 @@ def capture(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    What is left out is as `rodcone capture` has it by default; the same frame at every call then.
+    What is left out is as `rodcone capture` has it by default; the same frame at every call then. A camera that shakes
+    (`LensConfig.shake_um`) takes a path of its own in each exposure.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
@@ -67,13 +69,16 @@ def capture(
     rng = np.random.default_rng([0, 1]) if rng is None else rng
     numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
     light: SpectralRadiance | SpectralIrradiance = radiance
-    if numpy_runs or not scaled:
+    if numpy_runs or not scaled or sensor.lens.shake_um:
         light = form_image(radiance, sensor, samples_per_pixel)
     if exposure_s is None:
         image = light if isinstance(light, SpectralIrradiance) else form_image(radiance, sensor)
         exposure_s = auto_exposure_s(image, sensor)
     expected_e: NDArray[np.floating]
-    if isinstance(light, SpectralIrradiance) and numpy_runs:
+    if isinstance(light, SpectralIrradiance) and sensor.lens.shake_um:
+        moved = shaken(channel_electrons(light, sensor, exposure_s), sensor, exposure_s, rng)
+        expected_e = behind_filters(moved, sensor)
+    elif isinstance(light, SpectralIrradiance) and numpy_runs:
         expected_e = expected_electrons(light, sensor, exposure_s)
     else:
         # A lens that only scales light forms no image: its factors go to the weights and to the electrons.

@@ -36,6 +36,8 @@ class LensConfig:
         Diameter of the disc on the sensor that a point out of focus becomes.
     veiling_glare : float
         Share of the light that scatters evenly over the picture, about the index of ISO 9358.
+    shake_um : float
+        Standard deviation of the image's place on the sensor along each axis, by the hand (`sensor.shake`).
     """
 
     f_number: Annotated[float, (0.1, 1e4, "give focal length over aperture")]
@@ -45,6 +47,7 @@ class LensConfig:
     diffraction: Annotated[float, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = 0.0
     defocus_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for none")] = 0.0
     veiling_glare: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
+    shake_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for a camera that stands still")] = 0.0
 
     __repr__ = brief
 

@@ -21,10 +21,12 @@ from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
+from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
 WAVELENGTH_NM = 550.0
 VIEW_DEG = 40.0  # angle of view for the falloff
+LONGEST_S = 0.066  # exposure time, for camera shake
 DIAGONAL = 1.25  # over the width of a picture of 4:3
 APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
 AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
@@ -204,6 +206,12 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
         lines.append(f"defocus: a disc as wide as a pixel: {_at_nyquist(disc)}")
     elif lens.diffraction and lens.defocus_um < AIRY_DIAMETER / limit_per_um(WAVELENGTH_NM, lens):
         lines.append("defocus: its disc is within the Airy disc, where the product of both transfers is a rough guess")
+    if not lens.shake_um:
+        moved_um = SHAKES["hand"] * blur_variance(LONGEST_S) ** 0.5
+        lines.append(
+            f"camera shake: in the hand the image would move by {moved_um:.1f} um in {LONGEST_S * 1e3:g} ms (standard "
+            "deviation along each axis)"
+        )
     return (*lines, "aberrations, distortion, flare, polarisation: not modelled, their cost isn't estimated")
 
 

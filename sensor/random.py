@@ -26,6 +26,7 @@ class NoiseTerm(IntEnum):
     COLUMN_OFFSET = 6
     HOT = 7
     EXPOSURE = 8  # shot and read noise of one pixel together, in `sensor.kernel.kernel`
+    SHAKE = 9  # the path of the image in one exposure: axes and time steps stand for rows and columns
 
 
 def draw_key(rng: np.random.Generator) -> int:

@@ -15,7 +15,8 @@ FIRST_SPP = 128  # fewer are less even than the pilot's, which says how noisy th
 # 4410 ns a pixel and sample in 8, 16 and 40 bands: 85 ns a band, and as much as 12 bands for tracing a path.
 TRACING_BANDS = 12
 SAMPLE_BAND_NS = 85.0
-LENS_BAND_NS = {"diffraction": 55.0, "veiling glare": 4.5, "cos^4": 0.7}  # a pixel, on the same picture
+# A pixel, on the same picture.
+LENS_BAND_NS = {"diffraction": 55.0, "veiling glare": 4.5, "cos^4": 0.7, "camera shake": 10.0}
 EXACT_NS = 40.0  # a pixel
 
 

@@ -19,7 +19,7 @@ from sensor.variations import vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
 from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, weigh
-from studies.budget.terms import LENS_TERMS, effects, horizontal_view_deg
+from studies.budget.terms import LENS_TERMS, SHAKE, effects, horizontal_view_deg, shake_effect
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
@@ -168,13 +168,18 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
             auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name).undivided)
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
-                sensor_effects = effects(lit, sensor, full_lens(study, sensor.lens, pilot.opened), pilot.groups, rng)
+                lens = full_lens(study, sensor.lens, pilot.opened)
+                of_any_time = effects(lit, sensor, lens, pilot.groups, rng)
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):
                         level = level_luminance(condition.level, lux)
                         exposure_s = parse_exposure(condition.exposure)
                         if exposure_s is None:
                             exposure_s = min(study.longest_exposure_s, auto_s / level)
+                        sensor_effects = of_any_time
+                        if lens.shake_um:
+                            shake = shake_effect(lit, sensor, lens, exposure_s, rng)
+                            sensor_effects = replace(of_any_time, lens={**of_any_time.lens, SHAKE: shake})
                         together = merged_sensor(sensor, condition.frames), exposure_s * condition.frames
                         yield weigh(condition, mosaic, together[0], sensor_effects, level, together[1], noise)
 

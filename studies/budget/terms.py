@@ -18,14 +18,18 @@ from rodcone.errors import InputError, unknown
 from sensor.config import LensConfig, SensorConfig
 from sensor.kernel.poisson import LARGEST_ERROR
 from sensor.optics import form_image
-from sensor.response import expected_electrons
+from sensor.response import behind_filters, channel_electrons, expected_electrons
+from sensor.shake import shaken
 from studies.budget.bands import merge_radiance, merge_transport
 
 Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e- per cd/m^2 and s]
 
 DIFFRACTION = "diffraction"
-LENS_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
+IMAGING_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
+SHAKE = "camera shake"  # it alone depends on the exposure time
+LENS_TERMS = IMAGING_TERMS | {SHAKE: "shake_um"}
 DRAWS = 2  # of Monte Carlo noise
+PATHS = 8  # of a shaking camera
 SINGLE_EPSILON = 2.0**-24  # largest relative rounding error of one operation in single precision
 NORMAL_REACH = 6.7  # standard deviations at which `sensor.kernel.kernel.normal_pair` ends
 
@@ -95,11 +99,11 @@ def effects(
         For the draws of Monte Carlo noise.
     """
     halves = transport.relight_halves(luminance_cd_m2=1.0)
-    bare = replace(sensor, lens=replace(lens, **dict.fromkeys(LENS_TERMS.values(), 0.0)))
+    bare = replace(sensor, lens=replace(lens, **dict.fromkeys(IMAGING_TERMS.values(), 0.0)))
     full, plain = _electrons(halves, replace(sensor, lens=lens)), _electrons(halves, bare)
     without = {
         name: _electrons(halves, replace(sensor, lens=replace(lens, **{field: 0.0}))) - full
-        for name, field in LENS_TERMS.items()
+        for name, field in IMAGING_TERMS.items()
         if getattr(lens, field)
     }
     return Effects(
@@ -109,6 +113,19 @@ def effects(
         lens=without,
         bands={factor: _band_errors(transport, halves, plain, bare, chosen) for factor, chosen in groups.items()},
     )
+
+
+def shake_effect(
+    transport: Transport, sensor: SensorConfig, lens: LensConfig, exposure_s: float, rng: np.random.Generator
+) -> Pair:
+    """What a still camera changes, as `Effects.lens`: of the path that costs most of `PATHS`."""
+    halves, held = transport.relight_halves(luminance_cd_m2=1.0), replace(sensor, lens=lens)
+    still = [channel_electrons(form_image(half, held), held, 1.0) for half in halves]
+    effects = []
+    for key in rng.integers(0, 2**63, PATHS):
+        moved = [shaken(half, held, exposure_s, np.random.default_rng(key)) for half in still]
+        effects.append(np.stack([behind_filters(a - b, held) for a, b in zip(still, moved, strict=True)]))
+    return max(effects, key=lambda pair: float((pair[0] * pair[1]).mean()))
 
 
 def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.float64]:

@@ -27,6 +27,7 @@ from sensor.optics import SpectralIrradiance, form_image
 from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
+from sensor.shake import shaken
 from studies.explore.controls import TIME, Controls, Lamp, options_of
 from studies.explore.equipment import alone, camera_of, lit_transport, own_camera
 from studies.explore.memo import Memo
@@ -213,8 +214,10 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     exposures = []
     for number in numbers:
         memo.check()
-        rng = _rng(controls.seed, _FRAME, number)
-        exposures.append(take(expected_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
+        rng, frame_e = _rng(controls.seed, _FRAME, number), expected_e
+        if sensor.lens.shake_um:
+            frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
+        exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
     raw = merged_raw(exposures)
     return Exposed(
         *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)

@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import LogLocator
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from render.spectrum import Spectrum
 from rodcone.plots import BLUE as BLUE  # noqa: PLC0414  (pages and figures import the colours from here)
@@ -127,6 +127,27 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     wanted = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
     for (name, _, colour), height in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
         axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)
+
+
+@rc_context(STYLE)
+def light_charts(
+    levels_cd_m2: Sequence[float] | NDArray[np.float64], charts: Mapping[str, Mapping[str, ArrayLike]]
+) -> Figure:
+    """Charts side by side over luminance: lines (level,) by the chart's title and their names.
+
+    Lines that stay above 0 and span more than 20 times have a logarithmic scale.
+    """
+    figure = blank(len(charts) * CHART[0], CHART[1])
+    for axes, (title, lines) in zip(figure.subplots(1, len(charts)), charts.items(), strict=True):
+        for values, colour in zip(lines.values(), COLOURS, strict=False):
+            axes.semilogx(levels_cd_m2, values, color=colour)
+        axes.set(title=title, xlabel="luminance, cd/m²", xlim=(levels_cd_m2[0], levels_cd_m2[-1]))
+        together = np.array(list(lines.values()))
+        if 0 < 20 * together.min() < together.max():
+            axes.set_yscale("log")
+        plain_ticks(axes)
+        name_at_ends(axes, [(name, together[i, -1], COLOURS[i]) for i, name in enumerate(lines)])
+    return figure
 
 
 def tick_text(value: float) -> str:

@@ -8,8 +8,11 @@ from dataclasses import dataclass, replace
 from math import inf, isfinite
 from typing import Literal, get_args
 
+import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
+from studies.metrics.confidence import half_width
 from studies.pages import report_text as text
 
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
@@ -35,6 +38,8 @@ class ClaimCheck:
     default : float or None
         What the default camera, `interleaved`, gives where the paper's own method, `interleaved_paper`, gives `value`.
         It has no part in the verdict.
+    margin : float
+        Half of the value's 95 % interval over exposures; 0 where it doesn't scatter.
     """
 
     condition: str
@@ -43,11 +48,14 @@ class ClaimCheck:
     high: float
     unit: str = ""
     default: float | None = None
+    margin: float = 0.0
 
     @property
     def holds(self) -> bool:
-        """Whether the value lies in the range; NaN and infinities don't."""
-        return isfinite(self.value) and self.low <= self.value <= self.high
+        """Whether the whole interval lies in the range; NaN and infinities don't."""
+        return bool(
+            isfinite(self.value) and self.low <= self.value - self.margin and self.value + self.margin <= self.high
+        )
 
 
 @dataclass(frozen=True)
@@ -98,6 +106,13 @@ def at_most(condition: str, value: float, high: float, unit: str = "") -> ClaimC
     return ClaimCheck(condition, value, -inf, high, unit)
 
 
+def over_seeds(
+    condition: str, values: NDArray[np.float64], low: float = -inf, high: float = inf, unit: str = ""
+) -> ClaimCheck:
+    """Check the mean of what exposures gave, shape (seed,), with its interval."""
+    return ClaimCheck(condition, float(values.mean()), low, high, unit, margin=float(half_width(values)))
+
+
 def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, ...]:
     """Claims computed by the paper's own method, with the values of the same claims computed by the default."""
     return tuple(
@@ -138,9 +153,10 @@ def value_text(check: ClaimCheck) -> str:
         ends = [text.significant(end, digits=digits) for end in (check.low, check.high) if isfinite(end)]
         if shown not in ends or check.value in (check.low, check.high):
             break
+    shown += f" ± {text.significant(check.margin, digits=2)}" if check.margin else ""
     return f"{shown}\N{NO-BREAK SPACE}{check.unit}" if check.unit else shown
 
 
 def default_text(check: ClaimCheck) -> str:
     """What the default camera gives: ``default: 3.1 dB``."""
-    return "" if check.default is None else f"default: {value_text(replace(check, value=check.default))}"
+    return "" if check.default is None else f"default: {value_text(replace(check, value=check.default, margin=0.0))}"

@@ -1,9 +1,11 @@
 """The paper's figures and claims, all of them: computed, written as files, and as one page."""
 
+import csv
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +14,13 @@ from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
 from studies.pages.report_sweep import environment
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
+from studies.paper.early import section_2
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
 from studies.paper.figure6 import figure_6
 from studies.paper.figures_3_5 import figure_3, figure_5
+from studies.paper.held import figure_b
+from studies.paper.levels import figure_a
 from studies.paper.numbers import number_claims
 from studies.paper.patches import figure_4, section_3_1
 from studies.paper.setup import Setup, view
@@ -49,6 +54,8 @@ def make(setup: Setup) -> Paper:
         "Figure 4": figure_4,
         "Figure 5": figure_5,
         "Figure 6": figure_6,
+        "Figure A": figure_a,
+        "Figure B": figure_b,
     }
     made = []
     for index, (name, maker) in enumerate(makers.items()):
@@ -59,16 +66,17 @@ def make(setup: Setup) -> Paper:
         step("begins", 0.0)
         made.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
-    claims = (*numbers, *(claim for _, own in made for claim in own), *section_3_1())
+    claims = (*numbers, *(claim for _, own in made for claim in own), *section_2(setup), *section_3_1())
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
 
 
 def write(paper: Paper, folder: Path) -> Path:
-    """Write ``paper.html``, ``paper.json`` and each figure as SVG and PNG; all appear or none."""
+    """Write ``paper.html``, ``.json``, ``.csv`` and each figure as SVG and PNG; all appear or none."""
     files = {f"figure_{figure.name}.svg": svg_text(figure.drawing).encode() for figure in paper.figures}
     files |= {f"figure_{figure.name}.png": png_bytes(figure.drawing) for figure in paper.figures}
     files["paper.json"] = (json.dumps(as_json(paper), indent=1, allow_nan=False) + "\n").encode()
+    files["paper.csv"] = as_csv(paper).encode()
     page = write_out(
         "paper.html.j2",
         figures=[(one, address("svg+xml", files[f"figure_{one.name}.svg"])) for one in paper.figures],
@@ -101,3 +109,15 @@ def as_json(paper: Paper) -> dict[str, Any]:
     ]
     count = {verdict: sum(claim.verdict == verdict for claim in paper.claims) for verdict in VERDICTS}
     return {**paper.facts, "verdicts": count, "claims": claims}
+
+
+def as_csv(paper: Paper) -> str:
+    """A row for each check, under its claim's number."""
+    table = StringIO()
+    writer = csv.writer(table, lineterminator="\n")
+    writer.writerow(["number", "where", "claim", "verdict", "condition", "computed", "claimed", "check", "default"])
+    for number, claim in enumerate(paper.claims, 1):
+        for check in claim.checks:
+            computed = value_text(check), range_text(check), "holds" if check.holds else "fails", default_text(check)
+            writer.writerow([number, claim.where, claim.text, claim.verdict, check.condition, *computed])
+    return table.getvalue()

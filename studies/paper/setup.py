@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import NAMED
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
@@ -22,7 +24,8 @@ from sensor.device import draw_device
 from sensor.optics import camera_equation, form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
-from sensor.response import expected_electrons
+from sensor.response import behind_filters, channel_electrons
+from sensor.shake import held, shaken
 from sensor.variations import vary
 from studies.budget.ledger import as_stated
 from studies.metrics.quality import psnr_db
@@ -31,7 +34,7 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import make_transport, open_choice
 from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
-from studies.sweep.cells import device_stream, exposure_stream
+from studies.sweep.cells import device_stream, exposure_stream, shake_stream
 
 Image = NDArray[np.float64]
 RENDERS = "renders"  # folder of them, below the command's own
@@ -83,9 +86,9 @@ class Setup:
         require_whole("seeds", self.seeds, 2, 1000, "give 2 exposures or more: noise is their scatter")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class View:
-    """What the cameras look at.
+    """What the cameras look at; one of its kind, so that what follows from it is computed once.
 
     Attributes
     ----------
@@ -104,12 +107,13 @@ class View:
     light: Light
     white_cd_m2: float
 
-    @property
+    @cached_property
     def truth(self) -> Image:
         """Linear sRGB of the noise-free scene, white 1, shape (h, w, 3)."""
         return true_srgb(self.radiance, self.light, self.white_cd_m2)
 
 
+@cache
 def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
     """Table 1's camera under one reading, or the figures' variation of it with pixels of 2, 3 or 6 um."""
     own = preset(reading)
@@ -129,16 +133,20 @@ class Camera:
     reading, processor : str
     pitch_um : int, optional
         As `sensor_of` takes it.
+    shake : str, optional
+        As `sensor.shake.held` takes it.
     """
 
     reading: str
     processor: str = PAPER
     pitch_um: int | None = None
+    shake: str | None = None
 
     @property
     def sensor(self) -> SensorConfig:
         """Its sensor, with the processor's mosaic."""
-        return sensor_of(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
+        sensor = sensor_of(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
+        return replace(sensor, lens=held(sensor.lens, self.shake))
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
@@ -170,19 +178,45 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     )
 
 
+def close_up(seen: View) -> View:
+    """Middle of a view, a quarter of its pixels, for what takes hundreds of pictures."""
+    rows, columns = (slice((size - side) // 2, (size + side) // 2) for size, side in _sides(seen.radiance.shape))
+    return replace(seen, radiance=replace(seen.radiance, values=seen.radiance.values[rows, columns]))
+
+
+def _sides(shape: tuple[int, int]) -> list[tuple[int, int]]:
+    return [(size, min(size, max(size // 4 * 2, 24))) for size in shape]
+
+
+def at_level(seen: View, luminance_cd_m2: float) -> View:
+    """What a view at 1 cd/m^2 is at another mean luminance."""
+    radiance = replace(seen.radiance, values=seen.radiance.values * luminance_cd_m2)
+    white_cd_m2 = seen.white_cd_m2 * luminance_cd_m2
+    return replace(seen, level=f"{luminance_cd_m2:.6g}cd/m2", radiance=radiance, white_cd_m2=white_cd_m2)
+
+
 def exposures(camera: Camera, seen: View, exposure: str, count: int = 1) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
     sensor, exposure_s = camera.sensor, parse_exposure(exposure) or 0.0
     mosaic = NAMED[camera.processor].mosaic
-    expected_e = expected_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
+    electrons = channel_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
+    expected_e = behind_filters(electrons, sensor)
     name = camera.reading if camera.pitch_um is None else f"{camera.reading}_{camera.pitch_um}um"
     condition = Condition(scene=SceneChoice(seen.scene), spectrum=OWN, level=seen.level, exposure=exposure, sensor=name)
     made = []
     for seed in range(count):
         device = draw_device(sensor, expected_e.shape, device_stream(name, mosaic, seed))
         stream = exposure_stream(condition, mosaic, seed)
+        if sensor.lens.shake_um:
+            expected_e = behind_filters(shaken(electrons, sensor, exposure_s, shake_stream(seed)), sensor)
         made.append(expose(expected_e, sensor, exposure_s, device, stream, exact=True))
     return made
+
+
+@lru_cache(maxsize=4)
+def colours_of(camera: Camera, seen: View) -> ColourFit:
+    """Colours of a camera's processor, fitted under a view's light."""
+    return colour_fit(camera.sensor, NAMED[camera.processor], seen.light)
 
 
 def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float | None = None) -> tuple[Image, Picture]:
@@ -197,8 +231,7 @@ def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float |
     options = {}
     if camera.processor in CAMERAS:
         options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr
-    colours = colour_fit(sensor, processor, seen.light)
-    return develop_to_scale(raw, processor, colours, sensor, seen.light, seen.white_cd_m2, **options)
+    return develop_to_scale(raw, processor, colours_of(camera, seen), sensor, seen.light, seen.white_cd_m2, **options)
 
 
 def noise(pictures: Sequence[Image]) -> float:
@@ -215,9 +248,9 @@ def noise(pictures: Sequence[Image]) -> float:
     return float(np.sqrt(shown.var(axis=0, ddof=1).mean()))
 
 
-def quality_db(pictures: Sequence[Image], truth: Image) -> float:
-    """Mean PSNR of pictures against the truth [dB], both linear and encoded for it."""
-    return float(np.mean([psnr_db(encode_srgb(picture), encode_srgb(truth)) for picture in pictures]))
+def quality_db(pictures: Sequence[Image], truth: Image) -> Image:
+    """PSNR of each picture against the truth [dB], both linear and encoded for it, shape (picture,)."""
+    return np.array([psnr_db(encode_srgb(picture), encode_srgb(truth)) for picture in pictures])
 
 
 def photons(light: Light, luminance_cd_m2: float, sensor: SensorConfig) -> float:

@@ -29,6 +29,7 @@ from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
+from sensor.shake import held
 from studies.metrics.truth import GREY, Light, green_scale, light_in_bands, neutral_electrons
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
@@ -227,6 +228,7 @@ def capture(
     light: Spectrum | None = None,
     exact: bool = False,
     samples_per_pixel: int = 1,
+    shake: str | None = None,
 ) -> RawImage:
     """Take one exposure; the raw image holds what `develop` needs.
 
@@ -242,6 +244,8 @@ def capture(
     light : Spectrum, optional
         That the camera's neutral and colour matrix are set to; left out, D65. Where the mosaic tells no colours under
         it the raw image holds none, and `calibrate` says why.
+    shake : str, optional
+        ``hand`` for a camera held in the hand (`sensor.shake`); left out, what the sensor's lens states.
 
     Raises
     ------
@@ -254,6 +258,7 @@ def capture(
         For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
     """
     sensor = preset("low_noise") if sensor is None else sensor
+    sensor = replace(sensor, lens=held(sensor.lens, shake))
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(AUTO_INFORMATION, form_image(radiance, sensor, samples_per_pixel), sensor)
     raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)

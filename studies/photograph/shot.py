@@ -29,6 +29,7 @@ from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from sensor.response import expected_electrons
+from sensor.shake import held
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
@@ -87,6 +88,8 @@ class Order:
         Samples a pixel of the render.
     frames : int
         Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
+    shake : str, optional
+        hand: the camera is held in the hand, whose tremor moves the image during each exposure; none by default.
     seed : int
         Seed of the render, the chip and the exposure.
     trust_scene : bool
@@ -111,6 +114,7 @@ class Order:
     width: int | None = None
     spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 64
     frames: Annotated[int, (1, MOST_FRAMES, "give exposures of a burst")] = 1
+    shake: str | None = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     extend: str | None = None
@@ -235,6 +239,7 @@ def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
+    sensor = replace(sensor, lens=held(sensor.lens, order.shake))
     check_ending(Path(order.out), sensor.cfa)
     if order.size is not None:
         require_absent("beside --size", height=order.height, width=order.width)

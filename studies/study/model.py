@@ -7,6 +7,7 @@ from render.radiance import SpectralRadiance
 from sensor.config import LensConfig, SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
+from sensor.shake import held
 
 _DARK_S = 1e7  # longer than any exposure
 
@@ -33,15 +34,19 @@ class LensTerms:
         Share of the light.
     horizontal_view_deg : float, optional
         Angle of view for cos^4.
+    shake : str, optional
+        ``hand``: cameras are held in the hand (`sensor.shake`).
     """
 
     diffraction: Annotated[float | None, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = None
     veiling_glare: Annotated[float | None, (0.0, 1.0, "give a fraction, 0 for none")] = None
     horizontal_view_deg: Annotated[float | None, (0.0, 175.0, "give degrees, 0 for none")] = None
+    shake: str | None = None
 
     def on(self, lens: LensConfig) -> LensConfig:
         """Return a lens with the terms that are stated."""
-        return replace(lens, **{name: value for name, value in vars(self).items() if value is not None})
+        terms = {name: value for name, value in vars(self).items() if value is not None and name != "shake"}
+        return held(replace(lens, **terms), self.shake)
 
 
 @dataclass(frozen=True)

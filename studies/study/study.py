@@ -14,6 +14,7 @@ from rodcone.brief import brief
 from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
 from sensor.exposure import AUTO_INFORMATION, LONGEST_S
 from sensor.presets import preset
+from sensor.shake import SHAKES
 from sensor.variations import vary
 from studies.study.equal_area import EqualArea
 from studies.study.levels import check_known, check_range, parse_exposure, parse_level
@@ -273,6 +274,8 @@ def _check_cameras(study: Study) -> None:
 
 def _check_shares_and_sizes(study: Study) -> None:
     budget, side_um = study.budget, study.sensor_side_um
+    if study.lens.shake is not None and study.lens.shake not in SHAKES:
+        raise unknown("lens.shake", study.lens.shake, SHAKES)
     require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
     if side_um is None:
         return

@@ -139,5 +139,10 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
     return _stream("exposure", names["scene"], names["spectrum"], value, unit, exposure, names["sensor"], mosaic, seed)
 
 
+def shake_stream(seed: int) -> np.random.Generator:
+    """Stream of the hand's paths: one hand holds every camera of a seed, in every light and for every time."""
+    return _stream("shake", seed)
+
+
 def _stream(*parts: object) -> np.random.Generator:
     return np.random.default_rng(int(digest(list(parts)), 16))

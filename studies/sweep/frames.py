@@ -26,7 +26,7 @@ from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, most_informative_s
 from sensor.optics import form_image
-from sensor.response import expected_electrons
+from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.equal_area import grid
@@ -60,7 +60,7 @@ class UnitFrame:
         Linear sRGB of the noise-free scene, not clipped, `white_cd_m2` reads 1, (h, w, 3) float64; the same at every
         level and for every sensor.
     electrons : Path
-        Expected electrons, (h, w) float64.
+        Expected electrons, (h, w) float64; of a camera that shakes behind every filter, (h, w, channel).
     errors : Path
         One draw of the unbiased light's Monte Carlo error, half the difference of its halves, (1, h, w) float32; or
         what the denoised light's electrons differ by from two folds, (2, h, w).
@@ -142,12 +142,13 @@ def make_frames(
         radiances: tuple[SpectralRadiance, ...] = views
         if area is not None:
             radiances = tuple(area.view(view, *grid(sensor)) for view in views)
-        whole, one, other = (expected_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
+        unmoved, *halves = (channel_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
+        whole, one, other = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
             "auto_s": unit_exposure_s(radiances[0], preset),
             "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
-            "electrons": keep(folder, _npy(whole), ".npy"),
+            "electrons": keep(folder, _npy(unmoved if sensor.lens.shake_um else whole), ".npy"),
             "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
         }
         with replacing(folder / f"{key}.json") as (text,):
@@ -165,6 +166,8 @@ def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longe
     if exposure == AUTO_W or for_green_s == for_white_s:
         return for_white_s
     per_second_e = np.load(frame.electrons, allow_pickle=False) * luminance_cd_m2
+    if per_second_e.ndim == 3:
+        per_second_e = behind_filters(per_second_e, frame.sensor)
     return most_informative_s(per_second_e, frame.sensor, (for_green_s, for_white_s))
 
 

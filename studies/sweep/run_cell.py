@@ -21,6 +21,8 @@ from sensor.capture import expose
 from sensor.cfa import block_sums
 from sensor.device import draw_device
 from sensor.raw import RawImage
+from sensor.response import behind_filters
+from sensor.shake import shaken
 from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
@@ -31,7 +33,7 @@ from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
 from studies.study.render_noise import charged_share
 from studies.study.study import AS_SHOT, label
-from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text
+from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text, shake_stream
 from studies.sweep.provenance import in_words, provenance, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
@@ -64,7 +66,8 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
-    expected_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
+    unmoved_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
+    expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
     # of sensors of one size it has the coarsest's pixels already
     truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
     errors_e = sensor.pixel_sums(_array(cell.errors)) * light
@@ -74,8 +77,13 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
 
     def burst() -> RawImage:
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
-        exposure = expected_e, sensor, cell.exposure_s, device, stream
-        return merged_raw([expose(*exposure, exact=engine == "numpy") for _ in range(frames)])
+        hand, taken = shake_stream(cell.seed), []
+        for _ in range(frames):
+            frame_e = expected_e
+            if sensor.lens.shake_um:
+                frame_e = behind_filters(shaken(unmoved_e, sensor, cell.exposure_s, hand), sensor)
+            taken.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
+        return merged_raw(taken)
 
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.

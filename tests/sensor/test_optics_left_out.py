@@ -38,13 +38,14 @@ def test_every_preset_says_in_one_line_each_what_it_leaves_out(name):
         "cos^4 falloff",
         "veiling glare",
         "defocus",
+        "camera shake",
         "aberrations, distortion, flare, polarisation",
     ]
     assert not any("\n" in text for text in lines)
 
 
 def test_a_complete_lens_leaves_out_what_is_not_modelled_alone():
-    whole = camera(diffraction=1.0, horizontal_view_deg=40.0, veiling_glare=0.02, defocus_um=5.0)
+    whole = camera(diffraction=1.0, horizontal_view_deg=40.0, veiling_glare=0.02, defocus_um=5.0, shake_um=5.0)
     assert [text.split(":")[0] for text in left_out(whole, 4)] == ["aberrations, distortion, flare, polarisation"]
 
 

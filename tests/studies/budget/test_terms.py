@@ -21,6 +21,7 @@ from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
+from sensor.shake import held
 from studies.budget.bands import COUNTS, emission_lines_nm, fine_bands, groups_of, merge_radiance, merge_transport
 from studies.budget.choice import choose, image_ns, render_ns
 from studies.budget.ledger import (
@@ -36,7 +37,7 @@ from studies.budget.ledger import (
     ledger,
     weigh,
 )
-from studies.budget.terms import LENS_TERMS, Effects, effects, horizontal_view_deg, kernel_rms_e
+from studies.budget.terms import IMAGING_TERMS, Effects, effects, horizontal_view_deg, kernel_rms_e, shake_effect
 from studies.study.study import BudgetShares, Condition, SceneChoice
 
 NM, WIDTH_NM = np.arange(385.0, 780.0, 10.0), np.full(40, 10.0)
@@ -182,6 +183,20 @@ def test_falloff_costs_what_is_lost_off_the_axis() -> None:
     assert np.allclose(some.lens["cos^4"][0], plain * (1 - falloff(lens, SIZE)), rtol=1e-5, atol=1e-5 * plain.max())
 
 
+def test_shake_costs_what_the_path_takes_over_an_edge() -> None:
+    """Beside an edge that the image crosses by x, a step of height h, the light changes by h times the time beyond."""
+    made, sensor = transport(halved()), low_noise()
+    lens = held(sensor.lens, "hand")
+    short, long = (shake_effect(made, sensor, lens, time_s, np.random.default_rng(0)) for time_s in (0.004, 0.1))
+    full = found(made).full[0]
+    assert rms(short) < 0.3 * rms(long)
+    away = np.abs(np.arange(SIZE[1]) + 0.5 - SIZE[1] / 2) > 8  # 8 pixels of 2.8 um and more: 4 standard deviations
+    assert np.abs(long[0][:, away]).max() < 0.01 * full.max()
+    # the most that an edge can change is its height
+    assert 0.05 * full.max() < np.abs(long[0][:, ~away]).max() < full.max()
+    np.testing.assert_array_equal(shake_effect(made, sensor, lens, 0.0, np.random.default_rng(0)), 0.0)
+
+
 def test_an_effects_rms_is_free_of_monte_carlo_noise() -> None:
     """An even picture with 5 % noise: diffraction changes nothing but the noise; 0 within 5 standard errors."""
     some = found(transport(even(), noise=0.05, seed=1), diffraction=1.0)
@@ -267,7 +282,7 @@ def test_saturated_pixels_are_left_out() -> None:
     margin = EFFECT_MARGIN * square.std() / np.sqrt(square.size)
     assert bright.lens["veiling glare"] ** 2 == pytest.approx(square.mean() + margin, rel=1e-6)
     all_full = weigh(CONDITION, "rgbw", sensor, some, 1e9, 0.01, QUIET)
-    assert ledger(all_full, 40, 128, frozenset(LENS_TERMS)).share == 0.0
+    assert ledger(all_full, 40, 128, frozenset(IMAGING_TERMS)).share == 0.0
 
 
 def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> None:
@@ -321,7 +336,7 @@ def test_choice_is_the_cheapest_of_all_that_fit() -> None:
     other = replace(CONDITION, level="1cd/m2")
     rows = [weighed(), weighed(mosaic="bayer", **{"veiling glare": 0.2}), weighed(other, noise_variance=1e6)]
     choice = choose(rows, SIZES, BudgetShares(), 512)
-    names = (*LENS_TERMS, KERNEL)
+    names = (*IMAGING_TERMS, KERNEL)
     subsets = [frozenset(some) for n in range(5) for some in combinations(names, n)]
     costs = {}
     for count in SIZES:
@@ -347,7 +362,7 @@ def test_a_tiny_budget_models_everything_and_a_huge_one_nothing() -> None:
     tiny = choose([weighed()], SIZES, BudgetShares(1e-9, 1e-10), 512)
     assert (tiny.count, tiny.left_out[CONDITION]) == (40, frozenset())
     huge = choose([weighed()], SIZES, BudgetShares(100.0, 1.0), 512)
-    assert (huge.count, huge.left_out[CONDITION]) == (4, frozenset((*LENS_TERMS, KERNEL)))
+    assert (huge.count, huge.left_out[CONDITION]) == (4, frozenset((*IMAGING_TERMS, KERNEL)))
 
 
 def test_samples_are_those_that_monte_carlos_share_asks_for_up_to_the_studys() -> None:

@@ -1,7 +1,9 @@
 """The paper's command, small: figures as files, one page, claims with verdicts; and in full, where there is time."""
 
+import csv
 import json
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +13,8 @@ import pytest
 from command_line import call, check_refusals
 from PIL import Image
 
-from studies.paper.claims import ClaimCheck, at_least, at_most, range_text, value_text
+from studies.paper import held, levels
+from studies.paper.claims import ClaimCheck, at_least, at_most, over_seeds, range_text, value_text
 from studies.paper.figure1 import gain_db
 from studies.paper.figures_3_5 import likeness
 from studies.paper.numbers import moonlight_photons
@@ -20,7 +23,7 @@ from studies.paper.patches import edge_columns
 from studies.paper.setup import READINGS, Setup, noise, sensor_of
 
 pytestmark = pytest.mark.thorough
-FIGURES = ["1a", "1b", "2", "3", "4", "5", "6"]
+FIGURES = ["1a", "1b", "2", "3", "4", "5", "6", "A", "B"]
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +32,17 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def paper(folder: Path) -> Paper:
+def fewer() -> Iterator[None]:
+    """Six levels of light for Figures A and B in place of 40 and 4, and three times."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(levels, "LEVELS_CD_M2", np.geomspace(1e-3, 1e3, 6))
+        patch.setattr(held, "LEVELS_CD_M2", (4.0, 16.0))
+        patch.setattr(held, "TIMES_S", np.array([0.005, 0.02, 0.08]))
+        yield
+
+
+@pytest.fixture(scope="module")
+def paper(folder: Path, fewer: None) -> Paper:
     made = make(Setup(folder, size=24, spp=4, band_nm=100.0, seeds=2))
     write(made, folder)
     return made
@@ -60,14 +73,23 @@ def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Pa
 
 
 def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> None:
-    assert len(paper.claims) == 26  # and as many rows in test_claims.py: a new claim needs one there
+    assert len(paper.claims) == 35  # and as many rows in test_claims.py: a new claim needs one there
     places = {claim.where for claim in paper.claims}
-    assert places >= {"Table 1", *(f"Figure {name}" for name in FIGURES)}
+    assert places >= {"Table 1", *(f"Figure {name}" for name in FIGURES if name.islower() or name.isdigit())}
     for claim in paper.claims:
         conditions = [check.condition for check in claim.checks]
         assert len(set(conditions)) == len(conditions) > 0, claim.text
     told = " ".join(check.condition for claim in paper.claims for check in claim.checks)
     assert all(reading in told for reading in READINGS)
+
+
+def test_table_has_a_row_for_each_check_under_its_claims_number(paper: Paper, folder: Path) -> None:
+    with (folder / "paper.csv").open(encoding="utf-8", newline="") as file:
+        rows = list(csv.DictReader(file))
+    numbered = [(str(number), claim, check) for number, claim in enumerate(paper.claims, 1) for check in claim.checks]
+    for row, (number, claim, check) in zip(rows, numbered, strict=True):
+        assert (row["number"], row["claim"], row["verdict"]) == (number, claim.text, claim.verdict)
+        assert (row["condition"], row["check"]) == (check.condition, "holds" if check.holds else "fails")
 
 
 def test_json_holds_what_the_page_says(paper: Paper, folder: Path) -> None:
@@ -146,6 +168,7 @@ def test_numbers_and_ranges_in_words() -> None:
     assert value_text(ClaimCheck("", 9.5424, 9.04, 10.04, "dB")) == "9.54\N{NO-BREAK SPACE}dB"
     # 0.9496 would read 0.95 beside "at least 0.95", and fail: another digit tells why
     assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
+    assert value_text(over_seeds("", np.array([1.0, 3.0]), unit="dB")) == "2 ± 13\N{NO-BREAK SPACE}dB"
 
 
 @CHROME.NEEDED

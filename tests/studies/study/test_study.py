@@ -91,6 +91,7 @@ def test_faults_are_told_in_one_line() -> None:
         ({"render": replace(STUDY.render, size=8)}, "render.size"),
         ({"render": replace(STUDY.render, noise_share=0.0)}, "render.noise_share"),
         ({"lens": replace(STUDY.lens, veiling_glare=2.0)}, "lens.veiling_glare"),
+        ({"lens": replace(STUDY.lens, shake="tripod")}, "lens.shake: 'tripod' is unknown; allowed: hand"),
         ({"budget": replace(STUDY.budget, monte_carlo=0.2)}, "within budget.total"),
     ]:
         with pytest.raises(InputError) as told:

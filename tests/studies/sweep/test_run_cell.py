@@ -15,6 +15,7 @@ from PIL import Image
 
 from isp.colour.colour_fit import fit_colours
 from isp.pipeline import picture_bayer
+from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
@@ -31,14 +32,16 @@ from sensor.exposure import auto_exposure_s
 from sensor.optics import falloff, form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
-from sensor.response import expected_electrons
+from sensor.response import behind_filters, expected_electrons
+from sensor.shake import SHAKES, shaken
 from studies.budget.ledger import Plan
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
-from studies.study.model import ImageModel
+from studies.photograph.camera import develop_to_scale
+from studies.study.model import ImageModel, LensTerms
 from studies.study.study import RenderLimits, SceneChoice, conditions
-from studies.sweep.cells import Cell, device_stream, exposure_stream
+from studies.sweep.cells import Cell, device_stream, exposure_stream, shake_stream
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import keep
 
@@ -256,3 +259,28 @@ def test_a_burst_is_merged_and_shows_less_noise_and_its_first_frame_is_the_singl
     assert one.picture == run_cell(alone[0]).picture
     assert (one.exposure_s, many.exposure_s) == (0.005, 0.005)
     assert many.psnr_db > one.psnr_db + 3.0
+
+
+def test_cells_of_a_hand_held_study_are_moved_alike_and_a_dark_frame_is_the_still_one(tmp_path: Path) -> None:
+    by_hand = {"lens": LensTerms(shake="hand"), "seeds": (0,), "levels": ("1cd/m2",)}
+    cells = made(tmp_path, **by_hand, exposures=("66ms",))
+    sensor = cells[0].sensor
+    assert sensor.lens.shake_um == SHAKES["hand"]
+    unmoved = np.load(cells[0].electrons)
+    assert unmoved.ndim == 3
+    frame = behind_filters(shaken(unmoved * 0.066, sensor, 0.066, shake_stream(0)), sensor)
+    device = draw_device(sensor, frame.shape, device_stream(cells[0].condition.sensor, "bayer", 0))
+    raw = read_out(frame, sensor, device, 0.066, exposure_stream(cells[0].condition, "bayer", 0))
+    row = run_cell(cells[0])
+    assert row.saturated == raw.saturated.mean()
+    neutral = neutral_electrons(sensor, cells[0].light, 0.066)
+    linear, _ = develop_to_scale(
+        raw, PROCESSORS["bayer"], cells[0].colours, sensor, cells[0].light, cells[0].white_cd_m2, balance=neutral
+    )
+    shown = np.asarray(Image.open(tmp_path / "pictures" / row.picture), dtype=int)
+    assert (np.abs(shown - np.rint(encode_srgb(linear) * 255)) <= 1).all()
+
+    (still,) = made(tmp_path, seeds=(0,), levels=("1cd/m2",), exposures=("1us",))
+    (dark,) = made(tmp_path, **by_hand, exposures=("1us",))  # no time to move: the noise is the same
+    assert run_cell(dark).picture == run_cell(still).picture
+    assert run_cell(made(tmp_path, seeds=(0,), levels=("1cd/m2",), exposures=("66ms",))[0]).picture != row.picture

@@ -1,0 +1,118 @@
+"""Camera shake: how the image moves on the sensor while a hand holds the camera, and the blur that this leaves.
+
+Muscles push the hand at random and it answers as a damped oscillator: the second-order stochastic process by which
+Timmer, Lauk, Pfleger & Deuschl, "Cross-spectral analysis of physiological tremor and muscle activity I", Biological
+Cybernetics 78 (1998), describe measured hand tremor. An axis of the image, of variance s^2, has the one-sided spectrum
+
+    S(f) = 4 zeta f0^3 s^2 / pi / ((f0^2 - f^2)^2 + (2 zeta f0 f)^2).
+
+f0 is 4 Hz, as accelerometers on hand-held cameras measured (Japanese Journal of Ergonomics 31 (6), 399, 1995). Ours are
+zeta, a broad resonance, and s: at the speed that this gives, the photographers' longest time by hand, 1 s over the
+focal length in mm on film of 35 mm, draws a point out to that film's circle of confusion, 30 um.
+"""
+
+from collections.abc import Mapping
+from dataclasses import replace
+from math import pi, sqrt
+from types import MappingProxyType
+
+import numpy as np
+import scipy
+from numpy.typing import NDArray
+
+from rodcone.errors import unknown
+from sensor.config import LensConfig, SensorConfig
+from sensor.random import NoiseTerm, draw_key, normals
+
+RESONANCE_HZ, DAMPING = 4.0, 0.5
+POLE_PER_S = 2 * pi * RESONANCE_HZ * complex(-DAMPING, sqrt(1 - DAMPING**2))  # of the oscillator
+SPEED_RAD_PER_S = 0.030 / sqrt(2)  # of each axis, root mean square: 30 um in 1/F s behind F mm, both axes together
+FOCAL_LENGTH_MM = 6.0  # of a compact camera with Table 1's pixel
+# Standard deviation of the image along each axis [um], by the name that `shake` options take.
+SHAKES: Mapping[str, float] = MappingProxyType(
+    {"hand": SPEED_RAD_PER_S / (2 * pi * RESONANCE_HZ) * FOCAL_LENGTH_MM * 1e3}
+)
+STEP_S, STEPS = 2e-3, (32, 4096)  # of a path: no longer than that, and fewest and most of them
+
+
+def held(lens: LensConfig, shake: str | None) -> LensConfig:
+    """Lens of a camera that is held as one of `SHAKES` names; None leaves the lens as it is.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    if shake is None:
+        return lens
+    if shake not in SHAKES:
+        raise unknown("shake", shake, SHAKES)
+    return replace(lens, shake_um=SHAKES[shake])
+
+
+def blur_variance(exposure_s: float) -> float:
+    """Expected variance of the image's place within an exposure, over its variance in all time.
+
+    That is the integral of S(f) (1 - sinc^2(f T)) / s^2, in closed form by the autocorrelation
+    Re((1 - i a) exp(p t)), p the oscillator's pole and a = -Re p / Im p.
+    """
+    if exposure_s == 0:
+        return 0.0
+    turn = POLE_PER_S * exposure_s
+    # Short times would cancel: (exp(x) - 1 - x - x^2 / 2) as a series there.
+    rest = turn**3 / 6 * (1 + turn / 4 + turn**2 / 20) if abs(turn) < 1e-2 else np.exp(turn) - 1 - turn - turn**2 / 2
+    return float(-2 * ((1 + 1j * POLE_PER_S.real / POLE_PER_S.imag) * rest / turn**2).real)
+
+
+def path(exposure_s: float, key: int) -> NDArray[np.float64]:
+    """Place of the image at even times within an exposure, about its mean, shape (axis, time); s is 1.
+
+    A draw depends on key, axis and time step alone. The exposure's own mean is the framing, and no blur.
+    """
+    count = int(np.clip(np.ceil(exposure_s / STEP_S), *STEPS))
+    # Place and speed / (2 pi f0), both of variance 1, taken on exactly: z' = A z + B n with B B^T = 1 - A A^T.
+    turn = np.exp(POLE_PER_S * exposure_s / count)
+    advance = turn.real * np.eye(2) + turn.imag / sqrt(1 - DAMPING**2) * np.array([[DAMPING, 1.0], [-1.0, -DAMPING]])
+    values, vectors = np.linalg.eigh(np.eye(2) - advance @ advance.T)
+    push = vectors * np.sqrt(np.maximum(values, 0.0))
+    draws = normals(key, NoiseTerm.SHAKE, (4, count)).reshape(2, 2, count)
+    states = np.empty((count, 2, 2))  # time, axis, place and speed
+    states[0] = draws[..., 0]
+    for step in range(1, count):
+        states[step] = states[step - 1] @ advance.T + draws[..., step] @ push.T
+    places = states[..., 0].T
+    return np.asarray(places - places.mean(axis=1, keepdims=True))
+
+
+def shaken(
+    electrons: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, rng: np.random.Generator
+) -> NDArray[np.float64]:
+    """Electrons behind every filter, shape (h, w, channel), as the moving image leaves them.
+
+    The transfer function of the path multiplies the picture's, which goes on as its mirror image. Undershoot becomes 0,
+    and each channel keeps its sum.
+
+    Parameters
+    ----------
+    electrons : (h, w, channel) float64
+        Of a still camera, as `sensor.response.channel_electrons`.
+    sensor : SensorConfig
+        Its lens's `shake_um` is the standard deviation of the image's place; 0 draws nothing.
+    exposure_s : float
+    rng : numpy.random.Generator
+        Gives one key for the path.
+    """
+    if not sensor.lens.shake_um:
+        return electrons
+    places = path(exposure_s, draw_key(rng)) * (sensor.lens.shake_um / sensor.site_pitch_um)
+    if exposure_s == 0:
+        return electrons
+    (height, width), count = electrons.shape[:2], places.shape[1]
+    frequencies = scipy.fft.fftfreq(2 * height), scipy.fft.rfftfreq(2 * width)
+    down, across = (np.exp(-2j * pi * np.outer(place, f)) for place, f in zip(places, frequencies, strict=True))
+    transfer = down.T @ across / count
+    mirrored = np.pad(np.moveaxis(electrons, -1, 0), ((0, 0), (0, height), (0, width)), "symmetric")
+    light = scipy.fft.irfft2(scipy.fft.rfft2(mirrored) * transfer, s=mirrored.shape[1:])[:, :height, :width]
+    light = np.maximum(light, 0.0)
+    sums, totals = light.sum(axis=(1, 2)), electrons.sum(axis=(0, 1))
+    return np.moveaxis(light * (totals / np.where(sums > 0, sums, 1.0))[:, None, None], 0, -1)

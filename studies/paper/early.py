@@ -1,0 +1,187 @@
+"""The designs that the paper argues against (section 2), each by what it gives away or keeps.
+
+Sato 1983 and Kijima 2007 take W for the luminance, also where it is full; Gindele & Gallagher 2002 fall back on the
+colours there; Yamagami 1994 brings W and the colours to one sensitivity by a neutral density or complementary filters.
+"""
+
+from collections.abc import Mapping
+from itertools import product
+
+import numpy as np
+import scipy
+
+from isp.planes import tent
+from isp.processors.catalogue import NAMED
+from isp.processors.fusion import MATCHED_RADIUS, combine
+from rodcone.colour_spaces import SRGB_TO_XYZ
+from sensor.cfa import MOSAICS, Tile, channels, mask
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.readout import electrons_at_snr, noise_variance, read_out
+from studies.metrics.truth import light_of
+from studies.paper.claims import Claim, about, at_least, at_most
+from studies.paper.figures_3_5 import BRIGHT_CD_M2, GAIN_DB, LOW_CD_M2, PITCH_UM, WHOLE, measure_bright
+from studies.paper.numbers import MOONLIGHT_CD_M2
+from studies.paper.setup import READINGS, Camera, Setup, decibels, develop, exposures, sensor_of, view
+from studies.photograph.camera import colour_fit
+from studies.photograph.snr import channel_e
+
+GINDELE = "rgbw_gindele_published"
+DESIGNS = ("rgbw_sato_published", "rgbw_kijima_published", GINDELE)  # judged where W is full
+MATCHED = ("rgbw_nd", "cmyw")  # Yamagami's mosaics
+CMYW, RGBW = "cmyw_yamagami_published", "rgbw_sato_published"  # whose colours are compared
+HOW = ("closed form", "read out")
+EXPOSURE_S, FLAT_SIDE = 0.020, 256  # of the even fields
+WHITE_E = 1e4  # of a W pixel beside combined colours
+COLOUR_LIGHTS = {"moonlight": MOONLIGHT_CD_M2, "low light": LOW_CD_M2, "25 cd/m²": 25.0}
+
+
+def range_db(sensor: SensorConfig) -> tuple[float, float]:
+    """Light that fills the most sensitive colour over the light in which W's SNR is 1: closed form, and read out [dB].
+
+    Read out, the first is where half of the pixels are full, and the second follows from the SNR that W has there.
+    """
+    light, names = light_of("D65"), channels(sensor.cfa)
+    per_cd_m2 = channel_e(sensor, light, 1.0, EXPOSURE_S)
+    white, colour = per_cd_m2[names.index("W")], per_cd_m2[[name != "W" for name in names]].max()
+    dark_cd_m2 = electrons_at_snr(1.0, sensor, EXPOSURE_S) / white
+    full_cd_m2 = sensor.pixel.full_well_e / colour
+    rng, shape = np.random.default_rng(0), (FLAT_SIDE, FLAT_SIDE)
+    device = draw_device(sensor, shape, rng)
+    # In the dark the SNR goes with the light, so what one is off by is what the other is.
+    dark_e = read_out(np.full(shape, dark_cd_m2 * white), sensor, device, EXPOSURE_S, rng).electrons
+    measured_cd_m2 = dark_cd_m2 * float(dark_e.std() / dark_e.mean())
+    steps = full_cd_m2 * np.linspace(0.9, 1.1, 21)
+    full = [read_out(np.full(shape, step * colour), sensor, device, EXPOSURE_S, rng).saturated.mean() for step in steps]
+    return decibels(full_cd_m2 / dark_cd_m2), decibels(float(np.interp(0.5, full, steps)) / measured_cd_m2)
+
+
+def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
+    """Noise of linear sRGB about its luminance, grey 1, on an even field: closed form, and read out."""
+    sensor = Camera(reading, processor).sensor
+    light, colours = light_of("D65"), NAMED[processor].colours
+    electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[channels(sensor.cfa).index(x) for x in colours]]
+    matrix = colour_fit(sensor, NAMED[processor], light).matrix(colours) / electrons
+    chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB less its luminance
+    variance = noise_variance(electrons, sensor, EXPOSURE_S)
+    rng, shape = np.random.default_rng(0), (FLAT_SIDE, FLAT_SIDE)
+    fields = [
+        read_out(np.full(shape, mean_e), sensor, draw_device(sensor, shape, rng), EXPOSURE_S, rng).electrons
+        for mean_e in electrons
+    ]
+    measured = np.einsum("ij,jhw->ihw", chroma, np.stack(fields)).var(axis=(1, 2)).mean()
+    return float(np.sqrt((chroma**2 @ variance).mean())), float(np.sqrt(measured))
+
+
+def ranges_lost_db(reading: str) -> Mapping[str, float]:
+    """Dynamic range of RGBW less that of each of `MATCHED` [dB], in closed form and read out."""
+    whole = range_db(sensor_of(reading))
+    return {
+        f"{reading}, {mosaic}, {how}": ours - theirs
+        for mosaic in MATCHED
+        for how, ours, theirs in zip(HOW, whole, range_db(sensor_of(reading, mosaic)), strict=True)
+    }
+
+
+def colour_noise_ratios(reading: str) -> Mapping[str, float]:
+    """Colour noise of C, M, Y over that of R, G, B by light, in closed form and read out."""
+    ratios = dict[str, float]()
+    for name, level in COLOUR_LIGHTS.items():
+        theirs, ours = (colour_noise(reading, design, level) for design in (CMYW, RGBW))
+        ratios |= {f"{reading}, {name}, {how}": a / b for how, a, b in zip(HOW, theirs, ours, strict=True)}
+    return ratios
+
+
+def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
+    """Light of Kijima's combined colour sample over that of W's, by colour: closed form, and by read out shot noise."""
+    per_cd_m2 = channel_e(sensor_of("table1_output"), light_of("D65"), 1.0, 1.0)
+    weights = np.outer(tent(MATCHED_RADIUS), tent(MATCHED_RADIUS))
+    shape, rng, lights = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0), dict[str, tuple[float, float]]()
+    for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
+        sites = mask(tile, channel, shape).astype(np.float64)
+        total, squares = (scipy.ndimage.convolve(sites, each, mode="wrap") for each in (weights, weights**2))
+        samples = 1 / float((squares / total**2).mean())  # that a weighted mean is worth
+        combined = combine(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
+        lights[channel] = samples * mean_e / WHITE_E, float(combined.mean() ** 2 / combined.var()) / WHITE_E
+    return lights
+
+
+def claims_early(
+    bright: Mapping[str, Mapping[str, float]],
+    lost_db: Mapping[str, float],
+    noise_ratios: Mapping[str, float],
+    lights: Mapping[str, Mapping[str, tuple[float, float]]],
+) -> tuple[Claim, ...]:
+    """Claims about the earlier designs.
+
+    Parameters
+    ----------
+    bright : mapping
+        Correlation of luminance with the truth's where W is full and no colour is, at Figure 5's light, by design and
+        reading.
+    lost_db, noise_ratios : mapping
+        `ranges_lost_db` and `colour_noise_ratios` of both readings.
+    lights : mapping
+        `gathered` by the tile's name.
+    """
+    note = "Correlation of luminance with the truth where W is full and no colour is, Figure 5's conditions."
+    fused = [(name, values) for name, values in bright.items() if name != GINDELE]
+    # Where W is full.
+    fusion = Claim(
+        "Section 2",
+        "Early fusion gives away the light between the two mosaics",
+        tuple(
+            at_most(f"{name}, {reading}", value, WHOLE) for name, values in fused for reading, value in values.items()
+        ),
+        f"{note} Sato 1983 and Kijima 2007 end at W's full well; whole would be {WHOLE:g} or more.",
+    )
+    recovery = Claim(
+        "Section 2",
+        "Gindele & Gallagher recover RGB where W saturates",
+        tuple(at_least(reading, value, WHOLE) for reading, value in bright[GINDELE].items()),
+        f"{note} On bilinear colours here; they build on Adams' demosaicking.",
+    )
+    # Sensitivities that match.
+    matching = Claim(
+        "Section 2",
+        "Matching sensitivities (a neutral density on W, complementary filters) costs dynamic range",
+        tuple(at_least(name, value, GAIN_DB, "dB") for name, value in lost_db.items()),
+        "Yamagami 1994. From the light that fills the most sensitive colour to that in which W's SNR is 1, even "
+        f"field, D65, {EXPOSURE_S * 1e3:g} ms: RGBW's range less that of W behind a density or of CMYW.",
+    )
+    colours = Claim(
+        "Section 2",
+        "Complementary filters make colour noisier",
+        tuple(at_least(name, value, 1.0, "×") for name, value in noise_ratios.items()),
+        "Noise of linear sRGB about its luminance, of single pixels of C, M, Y over that of R, G, B, each through "
+        "its own matrix. The filters pass more light, and the matrix back to primaries takes differences of it.",
+    )
+    kijima = Claim(
+        "Section 2",
+        "Kijima and Luo match the colours' sensitivity to W's",
+        tuple(
+            about(f"{channel}, {tile}, {how}", value, 1.0, "× W's light")
+            for tile, of_tile in lights.items()
+            for channel, values in of_tile.items()
+            for how, value in zip(HOW, values, strict=True)
+        ),
+        "Light of the combined colour sample over that of one W. Kijima's combination of samples, on the paper's "
+        "tile and Kodak's. Luo (reference 12): the paper says the same of both, and nothing that tells Luo's from "
+        "Kijima's, so there is no processor of its own.",
+    )
+    return fusion, recovery, matching, colours, kijima
+
+
+def section_2(setup: Setup) -> tuple[Claim, ...]:
+    """All of them, computed."""
+    seen = view(setup, "still_life", BRIGHT_CD_M2)
+    bright: dict[str, dict[str, float]] = {name: {} for name in DESIGNS}
+    for name, reading in product(DESIGNS, READINGS):
+        camera = Camera(reading, name, PITCH_UM)
+        raw = exposures(camera, seen, "66ms")[0]
+        bright[name][reading] = measure_bright(raw, develop(camera, raw, seen)[0], seen).result_likeness
+    lost_db, ratios = (
+        {name: value for reading in READINGS for name, value in of(reading).items()}
+        for of in (ranges_lost_db, colour_noise_ratios)
+    )
+    return claims_early(bright, lost_db, ratios, {name: gathered(MOSAICS[name]) for name in ("rgbw", "rgbw_4x4")})

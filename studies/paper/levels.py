@@ -1,0 +1,201 @@
+"""Figure A, the paper's main claim: the camera changes gracefully between light levels, and W's part falls smoothly.
+
+The same scene over 40 levels from starlight to day, exposed for green: W's part in the picture, what it gains over the
+same frame without W, and the largest steps of quality between neighbouring levels.
+"""
+
+from dataclasses import dataclass, replace
+from math import log2
+
+import numpy as np
+
+from isp.similarity.guide import saturated_fraction
+from rodcone.colour_spaces import encode_srgb
+from sensor.cfa import mask
+from sensor.exposure import LONGEST_S, auto_exposure_s
+from sensor.optics import form_image
+from sensor.raw import RawImage
+from studies.metrics.appearance import flip
+from studies.metrics.confidence import half_width
+from studies.metrics.quality import measure, psnr_db
+from studies.pages.plots import light_charts
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, over_seeds
+from studies.paper.figures_3_5 import GAIN_DB
+from studies.paper.setup import (
+    CAMERAS,
+    DEFAULT,
+    PAPER,
+    Camera,
+    Image,
+    Setup,
+    View,
+    at_level,
+    close_up,
+    develop,
+    exposures,
+    view,
+)
+
+LEVELS_CD_M2 = np.geomspace(1e-4, 1e4, 40)  # mean of the scene: a moonless sky to full sun and beyond
+READING = "table1_output"
+SMOOTH = 0.5  # step of a share that two levels, 0.68 octaves apart, may differ by
+LEVEL_DB = 0.1  # PSNR that is no difference
+SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # a difference that is just seen; of FLIP what is taken for it
+
+
+@dataclass(frozen=True)
+class LevelCurves:
+    """What a camera's pictures are over light, each (level, seed).
+
+    Attributes
+    ----------
+    weight, similarity, white_full
+        Substitution's weight, W's share of the similarity (1 - alpha), share of W's pixels that are full.
+    psnr_db, delta_e, flip
+        Quality: median CIEDE2000, mean FLIP.
+    gain_db
+        PSNR over the same frame without W: W as if it were full, and no substitution.
+    """
+
+    weight: Image
+    similarity: Image
+    white_full: Image
+    psnr_db: Image
+    delta_e: Image
+    flip: Image
+    gain_db: Image
+
+
+def without_white(raw: RawImage) -> RawImage:
+    """Frame in which W tells nothing: each of its samples is full."""
+    return replace(raw, dn=np.where(mask(raw.cfa, "W", raw.shape), raw.dn.dtype.type(raw.white_dn), raw.dn))
+
+
+def curves(setup: Setup, seen: View, camera: Camera) -> LevelCurves:
+    """Photograph a view (at 1 cd/m^2) at every level."""
+    unit_s = auto_exposure_s(form_image(seen.radiance, camera.sensor), camera.sensor, LONGEST_S * 1e6)
+    rows: list[list[tuple[float, ...]]] = []
+    for level in LEVELS_CD_M2:
+        # Once the time is under the longest, light and time cancel: brighter levels give the same electrons.
+        if len(rows) > 1 and unit_s / LEVELS_CD_M2[len(rows) - 1] < LONGEST_S:
+            rows.append(rows[-1])
+            continue
+        lit, time = at_level(seen, level), f"{min(unit_s / level, LONGEST_S) * 1e3:.6g}ms"
+        rows.append([_row(camera, raw, lit) for raw in exposures(camera, lit, time, setup.seeds)])
+    return LevelCurves(*np.moveaxis(np.array(rows), -1, 0))
+
+
+def _row(camera: Camera, raw: RawImage, seen: View) -> tuple[float, ...]:
+    """Fields of `LevelCurves` of one exposure."""
+    truth = encode_srgb(seen.truth)
+    linear, picture = develop(camera, raw, seen)
+    encoded, bare = (encode_srgb(x) for x in (linear, develop(camera, without_white(raw), seen, 0.0)[0]))
+    quality = measure(encoded, truth)
+    return (
+        picture.substitution or 0.0,
+        1 - float(saturated_fraction(raw).mean()),
+        float(raw.saturated[mask(raw.cfa, "W", raw.shape)].mean()),
+        quality.psnr_db,
+        quality.delta_e_median,
+        float(flip(encoded, truth).mean()),
+        quality.psnr_db - psnr_db(bare, truth),
+    )
+
+
+def largest_step(values: Image, sign: float) -> tuple[float, Image]:
+    """Level [cd/m^2] up to which values (level, seed) times `sign` grow most from the one below, and that step (seed,).
+
+    A `sign` of 0 asks for the largest step either way. Largest is the one whose interval begins highest: in the dark
+    means of few exposures rise and fall by chance.
+    """
+    steps = np.diff(values, axis=0)
+    sizes = steps * sign if sign else np.abs(steps)
+    moved = (sizes != 0).any(axis=1)  # not between levels that hold the same electrons
+    index = int(np.where(moved, sizes.mean(axis=1) - half_width(sizes), -np.inf).argmax())
+    return float(LEVELS_CD_M2[index + 1]), sizes[index]
+
+
+def where_white_fills(one: LevelCurves) -> float:
+    """Level at which half as many of W's pixels are full as at most [cd/m^2]; the brightest where none ever is."""
+    full = one.white_full.mean(axis=1)
+    return float(LEVELS_CD_M2[int((full >= full.max() / 2).argmax()) if full.any() else -1])
+
+
+def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
+    """Steps of quality, steps of W's part, and what W gains."""
+    (psnr_at, psnr), (delta_at, delta), (flip_at, seen) = (
+        largest_step(*pair) for pair in ((one.psnr_db, -1.0), (one.delta_e, 1.0), (one.flip, 1.0))
+    )
+    any_db = largest_step(one.psnr_db, 0.0)
+    fills_at, log_levels = where_white_fills(one), np.log2(LEVELS_CD_M2)
+    ends = [
+        np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in one.psnr_db.T])
+        for side in (-0.5, 0.5)
+    ]
+    means, margins = one.gain_db.mean(axis=1), half_width(one.gain_db)
+    best, least = one.gain_db[(means - margins).argmax()], one.gain_db[(means + margins).argmin()]
+    note = (
+        f"still_life, {READING}, {len(LEVELS_CD_M2)} levels from {LEVELS_CD_M2[0]:g} to {LEVELS_CD_M2[-1]:g} cd/m², "
+        "exposed for green up to 66 ms."
+    )
+    return (
+        Claim(
+            "Abstract",
+            "The picture's quality changes gracefully with light",
+            (
+                over_seeds("PSNR, largest fall from level to level", psnr, high=GAIN_DB, unit="dB"),
+                over_seeds("CIEDE2000, largest rise", delta, high=SEEN_DELTA_E),
+                over_seeds("FLIP, largest rise", seen, high=SEEN_FLIP),
+                over_seeds("PSNR, fall over the octave in which W fills", ends[0] - ends[1], high=GAIN_DB, unit="dB"),
+            ),
+            f"{note} The largest are up to {psnr_at:.3g}, {delta_at:.3g} and {flip_at:.3g} cd/m²; W fills at "
+            f"{fills_at:.3g} cd/m². With more light PSNR gains up to {any_db[1].mean():.1f} dB from level to level.",
+        ),
+        Claim(
+            "Abstract",
+            "W's part in the picture falls smoothly as light grows",
+            (
+                at_most("share of similarity by W, largest step", _step(one.similarity), SMOOTH),
+                at_most("substitution's weight, largest step", _step(one.weight), SMOOTH),
+                ClaimCheck("share of similarity by W, in starlight", float(one.similarity[0].mean()), 0.95, 1.0),
+                at_most("share of similarity by W, in full sun", float(one.similarity[-1].mean()), 0.5),
+            ),
+            f"{note} Half of a share at once is taken for a jump.",
+        ),
+        Claim(
+            "Section 3",
+            "W makes the picture better, at no level worse",
+            (
+                over_seeds("gain over the frame without W, largest", best, low=GAIN_DB, unit="dB"),
+                over_seeds("gain over the frame without W, least", least, low=-LEVEL_DB, unit="dB"),
+            ),
+            f"{note} Without W: the same frame with W as if full, and no substitution.",
+        ),
+    )
+
+
+def _step(values: Image) -> float:
+    return float(largest_step(values, 0.0)[1].mean())
+
+
+def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+    """LevelCurves of the paper's method and of the default, and the claims about them."""
+    seen = close_up(view(setup, "still_life", 1.0))
+    found = {name: curves(setup, seen, Camera(READING, name)) for name in CAMERAS}
+    caption = (
+        f"{len(LEVELS_CD_M2)} levels of light on still_life, {READING}: W's part (the paper's method), PSNR with W and "
+        "of the same frame without it, and FLIP."
+    )
+    paper, default = found[PAPER], found[DEFAULT]
+    charts = {
+        "W's part, share": {"similarity": paper.similarity, "luminance": paper.weight, "W full": paper.white_full},
+        "PSNR, dB": {
+            "interleaved": paper.psnr_db,
+            "without W": paper.psnr_db - paper.gain_db,
+            "the default": default.psnr_db,
+        },
+        "FLIP": {"interleaved": paper.flip, "the default": default.flip},
+    }
+    means = {title: {name: x.mean(axis=1) for name, x in lines.items()} for title, lines in charts.items()}
+    claims = beside(claims_levels(paper), claims_levels(default))
+    return PaperFigure("A", caption, light_charts(LEVELS_CD_M2, means)), claims
