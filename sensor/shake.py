@@ -35,7 +35,7 @@ SHAKES: Mapping[str, float] = MappingProxyType(
 STEP_S, STEPS = 2e-3, (32, 4096)  # of a path: no longer than that, and fewest and most of them
 
 
-def held(lens: LensConfig, shake: str | None) -> LensConfig:
+def held_lens(lens: LensConfig, shake: str | None) -> LensConfig:
     """Lens of a camera that is held as one of `SHAKES` names; None leaves the lens as it is.
 
     Raises

@@ -25,7 +25,7 @@ from sensor.optics import camera_equation, form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
-from sensor.shake import held, shaken
+from sensor.shake import held_lens, shaken
 from sensor.variations import vary
 from studies.budget.ledger import as_stated
 from studies.metrics.quality import psnr_db
@@ -134,7 +134,7 @@ class Camera:
     pitch_um : int, optional
         As `sensor_of` takes it.
     shake : str, optional
-        As `sensor.shake.held` takes it.
+        As `sensor.shake.held_lens` takes it.
     """
 
     reading: str
@@ -146,7 +146,7 @@ class Camera:
     def sensor(self) -> SensorConfig:
         """Its sensor, with the processor's mosaic."""
         sensor = sensor_of(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
-        return replace(sensor, lens=held(sensor.lens, self.shake))
+        return replace(sensor, lens=held_lens(sensor.lens, self.shake))
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:

@@ -29,7 +29,7 @@ from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
-from sensor.shake import held
+from sensor.shake import held_lens
 from studies.metrics.truth import GREY, Light, green_scale, light_in_bands, neutral_electrons
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
@@ -258,7 +258,7 @@ def capture(
         For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
     """
     sensor = preset("low_noise") if sensor is None else sensor
-    sensor = replace(sensor, lens=held(sensor.lens, shake))
+    sensor = replace(sensor, lens=held_lens(sensor.lens, shake))
     if exposure_s is None:
         exposure_s = exposure_by_rule_s(AUTO_INFORMATION, form_image(radiance, sensor, samples_per_pixel), sensor)
     raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)

@@ -29,7 +29,7 @@ from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from sensor.response import expected_electrons
-from sensor.shake import held
+from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
@@ -239,7 +239,7 @@ def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
     sensor = preset(order.sensor, order.cfa)
-    sensor = replace(sensor, lens=held(sensor.lens, order.shake))
+    sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
     check_ending(Path(order.out), sensor.cfa)
     if order.size is not None:
         require_absent("beside --size", height=order.height, width=order.width)

@@ -7,7 +7,7 @@ from render.radiance import SpectralRadiance
 from sensor.config import LensConfig, SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
-from sensor.shake import held
+from sensor.shake import held_lens
 
 _DARK_S = 1e7  # longer than any exposure
 
@@ -46,7 +46,7 @@ class LensTerms:
     def on(self, lens: LensConfig) -> LensConfig:
         """Return a lens with the terms that are stated."""
         terms = {name: value for name, value in vars(self).items() if value is not None and name != "shake"}
-        return held(replace(lens, **terms), self.shake)
+        return held_lens(replace(lens, **terms), self.shake)
 
 
 @dataclass(frozen=True)

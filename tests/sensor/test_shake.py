@@ -13,7 +13,7 @@ from sensor.capture import capture
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.presets import preset
-from sensor.shake import DAMPING, RESONANCE_HZ, SHAKES, SPEED_RAD_PER_S, blur_variance, held, path, shaken
+from sensor.shake import DAMPING, RESONANCE_HZ, SHAKES, SPEED_RAD_PER_S, blur_variance, held_lens, path, shaken
 
 NM = np.arange(400.0, 781.0, 40.0)
 TIMES_S = (1e-5, 0.001, 0.02, 0.1, 0.3)
@@ -21,7 +21,7 @@ TIMES_S = (1e-5, 0.001, 0.02, 0.1, 0.3)
 
 def by_hand() -> SensorConfig:
     sensor = preset("table1_output")
-    return replace(sensor, lens=held(sensor.lens, "hand"))
+    return replace(sensor, lens=held_lens(sensor.lens, "hand"))
 
 
 def spectrum(frequency_hz):
@@ -109,7 +109,7 @@ def test_energy_of_every_channel_is_kept_and_nothing_is_negative(time_s):
 
 def test_unknown_way_to_hold_a_camera_is_refused():
     with pytest.raises(InputError, match="shake: 'tripod' is unknown; allowed: hand"):
-        held(LensConfig(2.8), "tripod")
+        held_lens(LensConfig(2.8), "tripod")
 
 
 def test_frames_of_a_held_camera_differ_by_their_paths_and_repeat_with_the_seed():

@@ -21,7 +21,7 @@ from sensor.optics import camera_equation, falloff, form_image
 from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
-from sensor.shake import held
+from sensor.shake import held_lens
 from studies.budget.bands import COUNTS, emission_lines_nm, fine_bands, groups_of, merge_radiance, merge_transport
 from studies.budget.choice import choose, image_ns, render_ns
 from studies.budget.ledger import (
@@ -186,7 +186,7 @@ def test_falloff_costs_what_is_lost_off_the_axis() -> None:
 def test_shake_costs_what_the_path_takes_over_an_edge() -> None:
     """Beside an edge that the image crosses by x, a step of height h, the light changes by h times the time beyond."""
     made, sensor = transport(halved()), low_noise()
-    lens = held(sensor.lens, "hand")
+    lens = held_lens(sensor.lens, "hand")
     short, long = (shake_effect(made, sensor, lens, time_s, np.random.default_rng(0)) for time_s in (0.004, 0.1))
     full = found(made).full[0]
     assert rms(short) < 0.3 * rms(long)

@@ -8,7 +8,7 @@ import pytest
 
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from sensor.shake import RESONANCE_HZ, SHAKES, blur_variance, held, shaken
+from sensor.shake import RESONANCE_HZ, SHAKES, blur_variance, held_lens, shaken
 from studies.paper.held import best_time_s, blur_px
 
 PATHS = 300
@@ -16,7 +16,7 @@ PATHS = 300
 
 def by_hand() -> SensorConfig:
     sensor = preset("table1_output")
-    return replace(sensor, lens=held(sensor.lens, "hand"))
+    return replace(sensor, lens=held_lens(sensor.lens, "hand"))
 
 
 @pytest.mark.thorough
