@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from render.engine import render
 from render.error_estimates import Halves
-from render.reference import FOLDER, find_reference, save_reference
+from render.reference import FOLDER, SHIPPED, find_reference, require_agreement, save_reference
 from scenes.catalog import load
 from studies.budget.ledger import as_stated
 from studies.commands.cli import main
@@ -27,10 +28,10 @@ def call(*arguments: str) -> int:
     return int(stopped.value.code or 0)
 
 
-def stored(folder: Path):  # type: ignore[no-untyped-def]
-    """Reference of the demo's scene at 32 pixels."""
+def stored(size: int = 32):  # type: ignore[no-untyped-def]
+    """Reference of the demo's scene."""
     study = read_study(STUDY)
-    study = replace(study, render=replace(study.render, size=32))
+    study = replace(study, render=replace(study.render, size=size))
     opened, model = open_choice(study.scenes[0], study), as_stated(study).renders[study.scenes[0]]
     return find_reference(load("still_life"), film_of(opened, model))
 
@@ -47,7 +48,7 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(
     folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(FOLDER, str(folder))
-    first = stored(folder).certificate
+    first = stored().certificate
     assert first["samples"] == pytest.approx(512, rel=0.15)
     assert list(first["shares"]["low_noise"]) == list(read_study(STUDY).levels)
     assert first["share"] == max(first["shares"]["low_noise"].values())
@@ -57,7 +58,7 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(
     assert call("reference", "--size", "32", "--until", until, "--out", str(folder)) == 0
     printed = capsys.readouterr()
     assert "of the sensor's variance in 95 % of pixels; about" in printed.err
-    second = stored(folder).certificate
+    second = stored().certificate
     assert second["share"] <= float(until)
     assert second["samples"] > first["samples"]
     assert second["seconds"] > first["seconds"]
@@ -72,7 +73,7 @@ def test_the_demo_tests_the_reference_photographs_it_and_says_so(
     results = json.loads((tmp_path / "with" / "results.json").read_text("utf-8"))
     assert "light: the reference still_life-32x32x20" in json.dumps(results)
     assert "light: the reference still_life-32x32x20" in (tmp_path / "with" / "report.html").read_text("utf-8")
-    assert {row["spp"] for row in results["rows"]} == {stored(folder).transport.spp}
+    assert {row["spp"] for row in results["rows"]} == {stored().transport.spp}
     assert call(*DEMO, "--render", "--spp", "16", "-o", str(tmp_path / "without")) == 0
     assert "light: the reference" not in (tmp_path / "without" / "results.json").read_text("utf-8")
 
@@ -84,14 +85,14 @@ def test_the_share_of_a_demo_is_the_certificates(folder: Path, tmp_path: Path, m
     results = json.loads((tmp_path / "results.json").read_text("utf-8"))
     shares = [row["mc_share"] for row in results["rows"]]
     assert min(shares) > 0
-    assert max(shares) < stored(folder).certificate["share"]
+    assert max(shares) < stored().certificate["share"]
 
 
 def test_a_reference_of_other_light_is_refused_in_one_line(
     folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv(FOLDER, str(folder))
-    made = stored(folder)
+    made = stored()
     light = Halves(np.float32(1.05) * made.transport.light.mean, made.transport.light.difference)
     other = tmp_path / "others" / made.path.name
     save_reference(other, replace(made.transport, light=light), made.certificate)
@@ -101,3 +102,22 @@ def test_a_reference_of_other_light_is_refused_in_one_line(
     assert "disagrees with still_life-32x32x20" in words
     assert "rodcone doctor" in words
     assert "--render" in words
+
+
+def test_the_light_of_the_demo_comes_with_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    shipped = stored(size=256)
+    assert shipped.path.parent == SHIPPED
+    assert shipped.path.stat().st_size < 3e6
+    assert shipped.certificate["samples"] == pytest.approx(shipped.transport.spp)
+    # of the sensor's variance in 95 % of the pixels: the 288 samples that the demo rendered before left about 3
+    assert shipped.certificate["share"] < 0.25
+    assert shipped.certificate["halves"]["chance"] > 1e-3
+    assert shipped.certificate["command"] == "rodcone reference still_life --size 256"
+
+
+@pytest.mark.slow
+def test_the_light_of_the_demo_is_what_is_rendered_here() -> None:
+    shipped = stored(size=256)
+    film = {"wavelength_nm": shipped.transport.wavelength_nm, "width_nm": shipped.transport.width_nm}
+    assert "agrees" in require_agreement(render(load("still_life"), (256, 256), spp=64, seed=1, **film), shipped)
