@@ -14,7 +14,20 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.kernel.edges import EVEN, FULL, NOISE, OFF, REACH, RELATIVE, SIGMAS, TINY_E, TOGETHER, even_strips
+from isp.kernel.edges import (
+    EVEN,
+    FILLS,
+    FULL,
+    NOISE,
+    OFF,
+    OVER_SIGMAS,
+    REACH,
+    RELATIVE,
+    SIGMAS,
+    TINY_E,
+    TOGETHER,
+    even_strips,
+)
 from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.cfa import channels, mask
@@ -45,9 +58,11 @@ def even_edges(raw: RawImage, planes: NDArray[np.floating], gains: Floats, alpha
     and where samples around lie off their planes: where they don't, no edge was missed.
 
     In rims, 0 < alpha < 1, W is full nearby. With q the most that all pixels of some 2 x 2 in the window hold, a lamp
-    fills 2 x 2 pixels as far as (q - l) / (h - l), the least of the colours', is 1. As far as it doesn't, its pixels'
-    samples say little of each other: the share is the mean of the colours' (f - l) / (h - l), by c^2; and over the dark
-    around its colour isn't known: it gets the mean of its balanced colours. A colour that is full isn't lowered.
+    fills 2 x 2 pixels as far as (q - l) / (h - l), the least of the colours', goes from 0.25 to 0.5. So far it has an
+    edge, of the pixel's share where no colour is full, else of the colours' mean (f - l) / (h - l), by c^2. As far as
+    it doesn't, its pixels stay where they are and have no colour, but the mean of the balanced ones, over the dark
+    around: by v^2, the largest v = (f - l - 2 sqrt(f + s^2)) / (f + l), where s is the dark noise. A colour that is
+    full isn't lowered by an edge.
 
     Parameters
     ----------
@@ -79,9 +94,9 @@ def _even_edges(raw: RawImage, planes: Floats, gains: Floats, alpha: Floats) -> 
     rims = (alpha > 0.0) & (alpha < 1.0)
     evened = window.least + share[..., None] * window.step
     _hold(evened, planes, window)
-    evened[rims] = _evened_rims(planes, window, share, known, gains)[rims]
-    weight = np.where(rims, 1.0, known) * together
-    return np.asarray(planes + weight[..., None] * _ramp(window.sigmas, SIGMAS) * (evened - planes))
+    result = planes + (known * together)[..., None] * _ramp(window.sigmas, SIGMAS) * (evened - planes)
+    result[rims] = _rims(raw, planes, window, share, known, gains, together)[rims]
+    return np.asarray(result)
 
 
 def _ramp(values: Floats, limits: tuple[float, float]) -> Floats:
@@ -146,25 +161,31 @@ def _moved(combine: np.ufunc, values: Floats, size: int) -> Floats:
     )
 
 
-def _evened_rims(planes: Floats, window: Window, share: Floats, known: Floats, gains: Floats) -> Floats:
+def _rims(
+    raw: RawImage, planes: Floats, window: Window, share: Floats, known: Floats, gains: Floats, together: Floats
+) -> Floats:
     """Channels of `even_edges` in rims, (h, w, channel), computed everywhere."""
     least, step, colours, full = window.least[..., :3], window.step[..., :3], planes[..., :3], window.full[..., :3]
     padded = np.pad(colours, ((REACH, REACH), (REACH, REACH), (0, 0)), mode="reflect")
     filled = _moved(np.maximum, _moved(np.minimum, padded, 2), 2 * REACH)
-    fills = ((filled - least) / step).min(axis=2)
+    fills = _ramp(((filled - least) / step).min(axis=2), FILLS)
 
-    # Its own share where the lamp is large, else the colours' mean.
+    # An edge where the lamp is large.
     contrast = window.contrast[..., :3] ** 2
     mean = (contrast * (colours - least) / step).sum(axis=2) / np.maximum(contrast.sum(axis=2), TINY_E)
     large = np.where(full.any(axis=2), 0.0, fills * known)
     evened = window.least + (large * share + (1.0 - large) * mean)[..., None] * window.step
     _hold(evened, planes, window)
 
+    moved = planes + (fills * together)[..., None] * _ramp(window.sigmas, SIGMAS) * (evened - planes)
+
     # No colour where it is smaller than 2 x 2 pixels.
-    light = evened[..., :3]
-    over = ((light - least) / np.maximum(light + least, TINY_E)).max(axis=2)
+    light = moved[..., :3]
+    noise = OVER_SIGMAS * np.sqrt(np.maximum(light, 0.0) + raw.dark_noise_e**2)
+    over = ((light - least - noise) / np.maximum(light + least, TINY_E)).max(axis=2)
     grey = (light @ gains[:3] / 3.0)[..., None] / gains
-    return np.asarray(evened + ((1.0 - fills) * np.clip(over, 0.0, 1.0) ** 2)[..., None] * (grey - evened))
+    colourless = (1.0 - fills) * together * np.clip(over, 0.0, 1.0) ** 2
+    return np.asarray(moved + colourless[..., None] * (grey - moved))
 
 
 def _hold(evened: Floats, planes: Floats, window: Window) -> None:

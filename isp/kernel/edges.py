@@ -28,6 +28,8 @@ TOGETHER = 0.5, 0.8  # rise of the light over the colours' together: 1 where the
 RELATIVE = 0.4, 0.7  # contrast of a pixel's own channel, over the largest
 NOISE = 2.0, 4.0  # distance of a sample from its plane, in its noise
 OFF = 0.05, 0.15  # distance of the samples around from their planes, over the channel's contrast
+FILLS = 0.25, 0.5  # what all pixels of 2 x 2 hold over the dark, of the most: a tent shares one pixel's light to 0.25
+OVER_SIGMAS = 2.0  # noise of a lamp, which is no light over the dark around
 FULL = 0.9  # of saturation, from which on there may be more light than was read
 EVEN = 1e-3  # squared difference of shares that is none
 TINY_E = 1e-9  # where nothing differs
@@ -116,12 +118,12 @@ def even_strips(
         windows = _windows(jit, frame, first, (count + 2) * width)
         pixels = _pixels(jit, frame, windows, first, dr.arange(jit.UInt, count * width))
         evened = _held(frame, pixels, pixels.least + pixels.share * pixels.step)
-        _store(frame, pixels, evened, pixels.known * pixels.together, result)
+        _store(pixels, pixels.plane + pixels.known * _moves(frame, pixels) * (evened - pixels.plane), result)
         mixed = alpha[start : start + count]
         rims = np.flatnonzero((mixed > 0.0) & (mixed < 1.0)).astype(np.uint32)
         if rims.size:
             pixels = _pixels(jit, frame, windows, first, upload(rims))
-            _store(frame, pixels, _evened_rims(jit, frame, pixels), pixels.together, result)
+            _store(pixels, _rims(jit, frame, pixels), result)
     return np.asarray(result.numpy().reshape(planes.shape))
 
 
@@ -194,7 +196,7 @@ def _pixels(jit: Any, frame: Frame, windows: tuple[Any, Any, Any], first: Any, p
     )
 
 
-def _evened_rims(jit: Any, frame: Frame, pixels: Pixels) -> Any:
+def _rims(jit: Any, frame: Frame, pixels: Pixels) -> Any:
     """Channels in rims."""
     plane, least, most, step = pixels.plane, pixels.least, pixels.most, pixels.step
     row, column = divide(pixels.target, frame.width)
@@ -203,19 +205,23 @@ def _evened_rims(jit: Any, frame: Frame, pixels: Pixels) -> Any:
     values = [[dr.gather(jit.Array4f, frame.planes, row + column) for column in columns] for row in rows]
     pairs = [[_smaller(a, b) for a, b in pairwise(line)] for line in values]
     squares = [_smaller(a, b) for both in pairwise(pairs) for a, b in zip(*both, strict=True)]
-    fills = reduce(_smaller, [*((reduce(larger, squares) - least) / step)][:3])
+    fills = _ramp(reduce(_smaller, [*((reduce(larger, squares) - least) / step)][:3]), FILLS)
 
-    # Its own share where the lamp is large, else the colours' mean.
+    # An edge where the lamp is large.
     colours = jit.Array4f(1.0, 1.0, 1.0, 0.0)
     contrast = colours * dr.square(step / larger(most + least, TINY_E))
     mean = dr.sum(contrast * (plane - least) / step) / larger(dr.sum(contrast), TINY_E)
     large = dr.select(dr.any(_full_colours(frame, pixels)), 0.0, fills * pixels.known)
     evened = _held(frame, pixels, least + (large * pixels.share + (1.0 - large) * mean) * step)
 
+    moved = plane + fills * _moves(frame, pixels) * (evened - plane)
+
     # No colour where it is smaller than 2 x 2 pixels.
-    over = reduce(larger, [*((evened - least) / larger(evened + least, TINY_E))][:3])
-    grey = dr.sum(frame.gains * evened) / 3.0 / (frame.gains + (1.0 - colours) * frame.white_gain)
-    return evened + (1.0 - fills) * dr.square(_smaller(larger(over, 0.0), 1.0)) * (grey - evened)
+    noise = OVER_SIGMAS * dr.sqrt(larger(moved, 0.0) + frame.dark_variance)
+    over = reduce(larger, [*((moved - least - noise) / larger(moved + least, TINY_E))][:3])
+    grey = dr.sum(frame.gains * moved) / 3.0 / (frame.gains + (1.0 - colours) * frame.white_gain)
+    colourless = (1.0 - fills) * pixels.together * dr.square(_smaller(larger(over, 0.0), 1.0))
+    return moved + colourless * (grey - moved)
 
 
 def _full_colours(frame: Frame, pixels: Pixels) -> Any:
@@ -228,10 +234,13 @@ def _held(frame: Frame, pixels: Pixels, evened: Any) -> Any:
     return dr.select(_full_colours(frame, pixels), larger(evened, pixels.plane), evened)
 
 
-def _store(frame: Frame, pixels: Pixels, evened: Any, weight: Any, result: Any) -> None:
-    """Store the channels, moved as far as their step is over the noise of a sample."""
+def _moves(frame: Frame, pixels: Pixels) -> Any:
+    """How far channels move to an edge: as their step is over the noise of a sample, and colours rise together."""
     sigmas = pixels.step / dr.sqrt(larger(pixels.most, 0.0) + frame.dark_variance)
-    values = pixels.plane + _ramp(sigmas, SIGMAS) * weight * (evened - pixels.plane)
+    return _ramp(sigmas, SIGMAS) * pixels.together
+
+
+def _store(pixels: Pixels, values: Any, result: Any) -> None:
     dr.scatter(result, values, pixels.target, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
 

@@ -111,14 +111,15 @@ def test_a_sample_s_own_noise_beside_a_lamp_is_not_drawn():
     assert even[:, :9] == pytest.approx(planes[:, :9], rel=1e-5)
 
 
-def test_in_rims_all_channels_get_the_colours_mean_share_where_samples_tell_nothing():
-    planes = edge(MISPLACED)
+def test_in_rims_light_of_fewer_than_2_x_2_pixels_stays_where_it_is():
+    """A lamp of 5 x 1 on sites of B and W; in rims that took the colours' mean share it was a block of 11 x 7."""
+    planes = np.random.default_rng(0).uniform(0.0, 3.0, (16, 16, 4))
+    planes[5:10, 7] = [3.0, 3.0, 4000.0, 15_000.0]
     even = even_edges(frame(planes), planes, np.ones(4), MIXED)
-    contrast = ((LIGHT_E - DARK_E) / (LIGHT_E + DARK_E))[:3] ** 2
-    share = contrast @ MISPLACED[:3] / contrast.sum()
-    assert even[3:13, 8] == pytest.approx(np.broadcast_to(DARK_E + share * (LIGHT_E - DARK_E), (10, 4)), rel=1e-5)
-    # beyond the edge nothing changes
-    assert even[:, [2, 14]] == pytest.approx(planes[:, [2, 14]], rel=1e-6)
+    lamp = np.zeros((16, 16), bool)
+    lamp[5:10, 7] = True
+    assert even[~lamp] == pytest.approx(planes[~lamp], abs=1e-3)
+    assert (even[lamp] > 1000.0).all()
 
 
 def test_a_colour_that_is_full_nearby_is_not_lowered():
@@ -138,14 +139,15 @@ def test_colours_that_do_not_rise_together_keep_their_own_edges():
 
 
 def test_a_lamp_smaller_than_2_x_2_has_no_colour_in_rims():
-    """Its colours, balanced, are their mean; over the dark by c^2, here 1."""
-    for width, grey in [(1, True), (2, False)]:
-        gains = np.array([2.0, 1.0, 3.0, 0.2])
+    """Channels become the colours' balanced mean M by v^2 = (1 - 2 sqrt(f + s^2) / f)^2 of the largest v."""
+    gains, lamp_e = np.array([2.0, 1.0, 3.0, 0.2]), np.array([4000.0, 2000.0, 1000.0, 15_000.0])
+    for width in (1, 2):
         planes = np.zeros((16, 16, 4))
-        planes[5 : 5 + width, 5 : 5 + width] = [4000.0, 2000.0, 1000.0, 15_000.0]
-        balanced = even_edges(frame(planes), planes, gains, MIXED)[5, 5] * gains
-        expected = np.full(4, (8000.0 + 2000.0 + 3000.0) / 3) if grey else [8000.0, 2000.0, 3000.0, 3000.0]
-        assert balanced == pytest.approx(expected, rel=1e-5), (width, grey)
+        planes[5 : 5 + width, 5 : 5 + width] = lamp_e
+        raw = frame(planes)
+        balanced = even_edges(raw, planes, gains, MIXED)[5, 5] * gains
+        over = (width == 1) * (1.0 - 2.0 * np.sqrt(4000.0 + raw.dark_noise_e**2) / 4000.0) ** 2
+        assert balanced == pytest.approx(gains * lamp_e + over * (13_000.0 / 3 - gains * lamp_e), rel=1e-5), width
 
 
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
