@@ -6,9 +6,9 @@ import warnings
 from collections.abc import Sequence
 from functools import cache
 from importlib import metadata
-from typing import Any
+from typing import Any, get_args
 
-from cyclopts import App, CycloptsError, Parameter
+from cyclopts import App, CycloptsError, Parameter, Token, convert
 
 from rodcone.errors import InputError
 from studies.commands.console import INTERRUPTED, say
@@ -18,14 +18,26 @@ from studies.commands.console import INTERRUPTED, say
 BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
+_FRACTION = re.compile(r"^[-+]?\d*\.\d+$")
 _UNITS = {"us", "ms", "s", "lux", "cd/m2", "cd/m²", "K"}
+
+
+def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
+    """Cyclopts' value of the type, but no whole number of a fraction, which it would round."""
+    if kind is int or int in get_args(kind):
+        for token in tokens:
+            if _FRACTION.match(token.value) and float(token.value) % 1:
+                raise ValueError(f"{token.value!r} is not a whole number")
+    return convert(kind, tokens)
+
 
 app = App(
     name="rodcone",
     help="Camera simulation from spectral scene to developed picture: interleaved RGBW beside Bayer.",
     help_epilogue="-o is short for --out.",
     version=lambda: metadata.version("rodcone"),
-    default_parameter=Parameter(negative=()),  # a flag has no --no-flag, a list no --empty-list
+    # A flag has no --no-flag, a list no --empty-list.
+    default_parameter=Parameter(negative=(), converter=_converted),
 )
 
 

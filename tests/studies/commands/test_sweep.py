@@ -139,6 +139,7 @@ def test_faults_are_one_line_and_nothing_is_begun(study: Path, monkeypatch: pyte
         ("--reference --as-stated", "as-stated: True beside --reference"),
         ("--cluster 127.0.0.1", "is not an address"),
         ("--cluster tcp://127.0.0.1:x", "is not an address"),
+        ("--workers 1.5", "'1.5' is not a whole number"),
     )
     check_refusals("sweep study.toml", rows, study.parent)
     bad_place = [("-o study.toml/out --as-stated", "choose another place with --out")]
