@@ -173,3 +173,8 @@ def test_matrix_takes_bands_of_uneven_widths() -> None:
     assert fit_matrix(split[0], halves, split[2], split[1], widths) == pytest.approx(even, abs=2e-3)
     with pytest.raises(InputError, match="width_nm"):
         fit_matrix(merged[0], nm, np.ones(nm.size), merged[1])
+
+
+def test_fit_takes_transposed_tables_alike() -> None:
+    table = RESPONSES[:3]
+    assert np.array_equal(fit_matrix(table, NM, LIGHT, SURFACES), fit_matrix(table.T, NM, LIGHT, SURFACES.T))
