@@ -51,7 +51,7 @@ def test_every_module_before_the_studies_decides(copy: Path, package: str) -> No
 @pytest.mark.thorough
 def test_a_byte_of_any_deciding_module_changes_the_version(copy: Path) -> None:
     deciding = deciding_modules(copy)
-    assert {"quality", "truth", "camera", "png", "lit_scene", "run_cell"} <= {path.stem for path in deciding}
+    assert {"quality", "truth", "camera", "picture_file", "lit_scene", "run_cell"} <= {path.stem for path in deciding}
     assert [path for path in deciding if not changed(copy, path)] == []
 
 
