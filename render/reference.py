@@ -80,7 +80,8 @@ def find_reference(scene: Scene, film: Film) -> Reference | None:
     for folder in reference_folders():
         path = reference_path(folder, scene, film)
         if (arrays := read_arrays(path)) is not None:
-            return Reference(path, _unpacked(arrays, scene, film), json.loads(str(arrays["certificate"])))
+            certificate = json.loads(str(arrays["certificate"]))
+            return Reference(path, _unpacked(arrays, certificate, scene, film), certificate)
     return None
 
 
@@ -123,10 +124,10 @@ def _error_plane(light: Halves, error: Planes) -> Planes:
     return np.asarray(plane * np.sqrt(np.maximum(lost, 1.0))[:, None, None], np.float32)
 
 
-def _unpacked(arrays: Mapping[str, Any], scene: Scene, film: Film) -> Transport:
+def _unpacked(arrays: Mapping[str, Any], certificate: Mapping[str, Any], scene: Scene, film: Film) -> Transport:
     """Transport of a file; variances are pooled from the error plane as a render's from its difference."""
     light = arrays["light"] * arrays["scale"]
-    rates, facts = arrays["rates"], json.loads(str(arrays["certificate"]))
+    rates = arrays["rates"]
     means = Means(
         count=int(arrays["points"]),
         rates=rates,
@@ -146,9 +147,9 @@ def _unpacked(arrays: Mapping[str, Any], scene: Scene, film: Film) -> Transport:
         width_nm=film.width_nm,
         counts=2 * means.count * rates,
         stopped_by="samples",
-        seconds=facts["seconds"],
-        integrator=f"reference light: {facts['integrator']}",
-        variant=facts["variant"],
+        seconds=certificate["seconds"],
+        integrator=f"reference light: {certificate['integrator']}",
+        variant=certificate["variant"],
     )
 
 
@@ -160,18 +161,18 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
     does: the larger of the two counts. So the rate of false alarms is at most `FALSE_ALARM`.
     """
     ratio = (reference.counts / live.counts).astype(np.float32)
-    found: list[Agreement] = []
-    tests = live.light.mean.shape[0] * live.light.mean.shape[1]
-    for group, nm in np.ndindex(live.light.mean.shape[:2]):
-        planes = [x.light[group][nm] for x in (live, reference)]
+    tests: list[Agreement] = []
+    count = live.light.mean.shape[0] * live.light.mean.shape[1]
+    for group, band in np.ndindex(live.light.mean.shape[:2]):
+        planes = [x.light[group][band] for x in (live, reference)]
         gap = _block_sums(planes[0].mean.astype(np.float64) - planes[1].mean)
-        own, known = (np.square(x.difference.astype(np.float64)) for x in planes)
-        variance = np.maximum(_block_sums(own), _block_sums(known * ratio)) + _block_sums(known)
+        short, long = (np.square(x.difference.astype(np.float64)) for x in planes)
+        variance = np.maximum(_block_sums(short), _block_sums(long * ratio)) + _block_sums(long)
         lit = variance > 0
         chi_square, blocks = float((gap[lit] ** 2 / variance[lit]).sum()), int(lit.sum())
-        chance = min(1.0, tests * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
-        found.append(Agreement(float(live.wavelength_nm[nm]), chi_square, blocks, chance))
-    return min(found, key=lambda each: each.chance)
+        chance = min(1.0, count * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
+        tests.append(Agreement(float(live.wavelength_nm[band]), chi_square, blocks, chance))
+    return min(tests, key=lambda test: test.chance)
 
 
 def require_agreement(live: Transport, reference: Reference) -> str:
@@ -206,9 +207,10 @@ def _block_sums(plane: Floats) -> Floats:
 
 def halves_agree(transport: Transport) -> Agreement:
     """Chi-square between a render's halves: whether errors of neighbouring pixels are independent of each other."""
-    half = np.sqrt(2).astype(np.float32)
+    # A half's error is sqrt(2) times that of the mean, which the halves' difference estimates.
+    light, root = transport.light, np.float32(np.sqrt(2))
     even, odd = (
-        replace(transport, light=Halves(transport.light.mean + sign * transport.light.difference, half * spread))
-        for sign, spread in ((1, transport.light.difference), (-1, transport.light.difference))
+        replace(transport, light=Halves(light.mean + sign * light.difference, root * light.difference))
+        for sign in (1, -1)
     )
     return agreement(even, odd)

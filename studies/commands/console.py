@@ -78,14 +78,17 @@ def require_new(out: Path, ending: str) -> None:
         raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
 
 
-def require_ending(out: Path, ending: str) -> None:
+def require_ending(out: Path, *endings: str) -> None:
     """Raise `InputError` where a file to write has another ending."""
-    if out.suffix.lower() != ending:
-        raise InputError(f"out: {str(out)!r} doesn't end in {ending}; allowed: {ending}; write {out.stem}{ending}")
+    if out.suffix.lower() not in endings:
+        raise InputError(
+            f"out: {str(out)!r} doesn't end in {' or '.join(endings)}; allowed: {', '.join(endings)}; "
+            f"write {out.stem}{endings[0]}"
+        )
 
 
-def require_place(out: Path | None, ending: str) -> None:
+def require_place(out: Path | None, *endings: str) -> None:
     """Raise `InputError` or `OSError` where a file, if one is asked for, can't be written under its name."""
     if out is not None:
-        require_ending(out, ending)
+        require_ending(out, *endings)
         check_place(out)

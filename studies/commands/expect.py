@@ -10,11 +10,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.errors import InputError
-from rodcone.files import check_place
 from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
-from studies.commands.console import print_json, print_table, require_ending, write_text
+from studies.commands.console import print_json, print_table, require_place, write_text
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.expect_chart import gain_svg
@@ -60,10 +59,7 @@ def expect(
     json
         Print one JSON object: a list of errors by level for each camera.
     """
-    if out is not None and out.suffix.lower() != ".svg":
-        require_ending(out, ".csv")
-    if out is not None:
-        check_place(out)
+    require_place(out, ".csv", ".svg")
     levels = {text: _luminance(text) for text in level} if level else _levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {

@@ -2,7 +2,6 @@
 
 import sys
 from dataclasses import asdict, replace
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -98,11 +97,14 @@ def reference(
 def _shares(transport: Transport, study: Study) -> dict[str, dict[str, float]]:
     """Noise variance over the sensor's own in 95 % of the pixels, by sensor and level."""
     lux = lux_per_cd_m2(transport, study.levels)
-    shares: dict[str, dict[str, float]] = {name: {} for name in study.sensors}
-    for name, level in product(study.sensors, study.levels):
-        sensor = replace(preset(name), lens=study.lens.on(preset(name).lens))
-        luminance = level_luminance(level, lux)
-        shares[name][level] = render_share(transport, sensor, luminance, study.longest_exposure_s)
+    shares: dict[str, dict[str, float]] = {}
+    for name in study.sensors:
+        sensor = preset(name)
+        sensor = replace(sensor, lens=study.lens.on(sensor.lens))
+        shares[name] = {
+            level: render_share(transport, sensor, level_luminance(level, lux), study.longest_exposure_s)
+            for level in study.levels
+        }
     return shares
 
 

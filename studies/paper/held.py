@@ -74,7 +74,7 @@ def blur_px(sensor: SensorConfig, exposure_s: float) -> float:
 
 def measure_best(setup: Setup, seen: View, camera: Camera) -> Mapping[float, Best]:
     """Best exposure of a camera by level; `seen` at 1 cd/m^2."""
-    found = {}
+    best = {}
     for level in LEVELS_CD_M2:
         lit = at_level(seen, level)
         quality = np.stack(
@@ -87,8 +87,8 @@ def measure_best(setup: Setup, seen: View, camera: Camera) -> Mapping[float, Bes
             ]
         )
         time_s, psnr_db = np.array([best_time_s(TIMES_S, of_seed) for of_seed in quality.T]).T
-        found[level] = Best(time_s, psnr_db, blur_px(camera.sensor, float(time_s.mean())))
-    return found
+        best[level] = Best(time_s, psnr_db, blur_px(camera.sensor, float(time_s.mean())))
+    return best
 
 
 def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], more_light: float) -> tuple[Claim, ...]:

@@ -179,14 +179,14 @@ def _step(values: Image) -> float:
 
 
 def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """LevelCurves of the paper's method and of the default, and the claims about them."""
+    """Curves of the paper's method and of the default, and the claims about them."""
     seen = close_up(view(setup, "still_life", 1.0))
-    found = {name: curves(setup, seen, Camera(READING, name)) for name in CAMERAS}
+    by_camera = {name: curves(setup, seen, Camera(READING, name)) for name in CAMERAS}
     caption = (
         f"{len(LEVELS_CD_M2)} levels of light on still_life, {READING}: W's part (the paper's method), PSNR with W and "
         "of the same frame without it, and FLIP."
     )
-    paper, default = found[PAPER], found[DEFAULT]
+    paper, default = by_camera[PAPER], by_camera[DEFAULT]
     charts = {
         "W's part, share": {"similarity": paper.similarity, "luminance": paper.weight, "W full": paper.white_full},
         "PSNR, dB": {

@@ -44,6 +44,6 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
         ("--light D66", "did you mean 'D65'"),
         ("--prior draw", "did you mean 'drawn'"),
         ("--exposure autoo", "did you mean 'auto'"),
-        ("-o gain.pdf", "doesn't end in .csv"),
+        ("-o gain.pdf", "doesn't end in .csv or .svg"),
     )
     check_refusals("expect low_noise", rows, tmp_path)
