@@ -18,6 +18,7 @@ from sensor.curves import Responses, rgbw
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
 METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
 METERED_PERCENTILE = 99.0
+LONGEST_S = 0.066  # exposure time that a rule chooses at most: Parmar & Wandell 2009, Figure 5, 66 ms
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rodcone.errors import require_range, unknown
 from sensor.cfa import channels, unit_channel
-from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
+from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
@@ -17,7 +17,6 @@ from sensor.response import behind_filters, channel_electrons
 
 MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
 DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3  # noise alone takes 3e-5 of the dark pixels so far above their mean
-LONGEST_S = 0.066  # Parmar & Wandell 2009, Figure 5: 66 ms
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
 # What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
 RULES: Mapping[str, str] = MappingProxyType(

@@ -19,14 +19,13 @@ from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole
-from sensor.config import LensConfig, SensorConfig
+from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
 from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
 WAVELENGTH_NM = 550.0
 VIEW_DEG = 40.0  # angle of view for the falloff
-LONGEST_S = 0.066  # exposure time, for camera shake
 DIAGONAL = 1.25  # over the width of a picture of 4:3
 APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
 AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number

@@ -13,7 +13,8 @@ from rodcone.errors import InputError, require_fields, require_keys, require_ran
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
-from sensor.exposure import AUTO_INFORMATION, LONGEST_S, RULES
+from sensor.config import LONGEST_S
+from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.presets import names
 from sensor.variations import VARIATIONS
 from studies.study.scene_source import LIGHT

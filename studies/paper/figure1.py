@@ -8,7 +8,7 @@ import numpy as np
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb
 from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
-from sensor.exposure import LONGEST_S
+from sensor.config import LONGEST_S
 from sensor.optics import form_image
 from sensor.response import channel_electrons
 from studies.metrics.truth import light_of

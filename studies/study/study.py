@@ -12,7 +12,8 @@ from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
-from sensor.exposure import AUTO_INFORMATION, LONGEST_S
+from sensor.config import LONGEST_S
+from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
 from sensor.shake import SHAKES
 from sensor.variations import vary

@@ -68,7 +68,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     light = cell.luminance_cd_m2 * cell.exposure_s
     unmoved_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
-    # of sensors of one size it has the coarsest's pixels already
+    # In a study with `sensor_side_um` the truth was already averaged to the coarsest sensor's pixels.
     truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
     errors_e = sensor.pixel_sums(_array(cell.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])

@@ -13,10 +13,10 @@ from sensor.burst import merge
 from sensor.capture import capture
 from sensor.cfa import MOSAICS
 from sensor.chip import PixelConfig
-from sensor.config import LensConfig, SensorConfig
+from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
-from sensor.exposure import LONGEST_S, auto_exposure_s
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import names, preset
 from sensor.readout import noise_variance
