@@ -16,7 +16,7 @@ from PIL import Image
 
 from scenes import catalog
 from sensor import cfa, presets
-from studies.commands.list import first_line, lights, sensors
+from studies.commands.list import first_line, lights
 
 FOLDER = Path(__file__).resolve().parent / "gallery"
 QUALITY = 80  # of the pictures, as WebP counts it
@@ -35,7 +35,8 @@ SHOWN = {
     "still_life": "--level 500lux",
     "still_life_outdoor": "",
 }
-MADE = "Made by `python docs/gallery.py`: each picture by the commands beneath it."
+MADE = """Made by `python docs/gallery.py`: each picture by the command beneath
+it and `rodcone develop NAME.dng --width 320`."""
 
 
 def commands(scene: str) -> list[str]:
@@ -66,7 +67,6 @@ def scene_section(name: str) -> str:
     options = inspect.signature(getattr(module, name)).parameters.values()
     facts = {
         "lights": ", ".join(f"`{group}`" for group in scene.groups),
-        "width over height": f"{scene.size[1] / scene.size[0]:.2g}",
         "levels": "cd/m² and lux" if scene.reference_plane else "cd/m²",
         "options in Python": ", ".join(f"`{option}`" for option in options) or "none",
     }
@@ -80,7 +80,7 @@ def scene_section(name: str) -> str:
 {told[0].upper()}{told[1:]}.
 
 ```sh
-{chr(10).join(commands(name))}
+{commands(name)[0]}
 ```
 
 """
@@ -122,7 +122,6 @@ def sensors_page() -> str:
                 ",", "\N{NARROW NO-BREAK SPACE}"
             )
         )
-    texts = "\n".join(f"- `{name}`: {text}" for name, text in sensors().items() if name in presets.names())
     mosaics = "\n".join(
         f"| `{name}` | {'<br>'.join(f'`{row}`' for row in cfa.tile_of(name))} |" for name in cfa.mosaics()
     )
@@ -139,9 +138,7 @@ exists](../how_to/real_camera.md).
 {table}
 
 Of a pixel that is [read more than once](../how_to/hdr.md): the deepest well and the least noise, over that reading's
-share of the light and of the time.
-
-{texts}
+share of the light and of the time. `rodcone list sensors` says what each stands for, and its source.
 
 ## Responses
 

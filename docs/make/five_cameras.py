@@ -267,7 +267,6 @@ def results(
         f"{percent(worst)} of the sensor's variance.",
         "sensors": sensors_table(entries, area),
         "summary": summary_table(beside, own.words),
-        "paper's pixel": table([f"lead in {_with_unit(PSNR)} over", *levels], paper[PSNR]),
         "white pixel": table([f"lead in {_with_unit(PSNR)}", *levels], white_pixel[PSNR]),
     }
     rows = [[name, *cells] for name, of_table in tables.items() for cells in of_table]
