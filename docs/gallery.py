@@ -16,7 +16,7 @@ from PIL import Image
 
 from scenes import catalog
 from sensor import cfa, presets
-from studies.commands.list import first_line, lights
+from studies.commands.list import texts
 
 FOLDER = Path(__file__).resolve().parent / "gallery"
 QUALITY = 80  # of the pictures, as WebP counts it
@@ -73,7 +73,7 @@ def scene_section(name: str) -> str:
     told = "; ".join(f"{fact}: {value}" for fact, value in facts.items())
     return f"""## {name}
 
-{first_line(module.__doc__)}
+{texts("scenes")[name].partition(" Lights: ")[0]}
 
 ![{name}]({name}.webp)
 
@@ -88,7 +88,7 @@ def scene_section(name: str) -> str:
 
 def lights_page() -> str:
     """Page of the lights."""
-    rows = "\n".join(f"| `{name}` | {text} |" for name, text in lights().items())
+    rows = "\n".join(f"| `{name}` | {text} |" for name, text in texts("lights").items())
     return f"""# Lights
 
 Illuminants by name: `--light A`, `--light sky=D65` and `--white-balance D65` on the command line, `spectra = ["D65",

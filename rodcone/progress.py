@@ -15,6 +15,7 @@ from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TextColumn, 
 Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 LINE_EVERY_S = 5.0
 SHOW_EVERY_S = 0.2  # in a notebook
+START = "start"  # what a task says before its first step
 PACE_OVER_S = 300.0  # of the latest work, by which the time left is told: its parts differ
 
 
@@ -39,7 +40,7 @@ def progress(file: TextIO) -> Iterator[Step]:
     bar = Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=math.inf
     )
-    number = bar.add_task("start", total=None)
+    number = bar.add_task(START, total=None)
     ended, most = Event(), 0.0
     printer = Thread(target=_print_lines, args=(bar.tasks[number], file, ended), daemon=True)
 
@@ -97,8 +98,11 @@ def _notebook_display() -> Callable[..., Any] | None:
 
 
 def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
-    """Print a line now and then where it says something new; by a thread, since a call of Mitsuba may take long."""
-    printed = None
+    """Print a line now and then where it says something new; by a thread, since a call of Mitsuba may take long.
+
+    Before the first step nothing has begun: what is refused until then gets its own line alone, however long it took.
+    """
+    printed = f"0%, {START}"
     while not ended.wait(LINE_EVERY_S):
         state = f"{task.completed:.0%}, {task.description}"
         if state == printed:

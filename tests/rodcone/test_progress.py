@@ -11,6 +11,7 @@ from io import StringIO
 import pytest
 
 from rodcone import progress as module
+from rodcone.errors import InputError
 from rodcone.progress import duration, progress, render_words
 
 
@@ -62,6 +63,18 @@ def test_the_time_left_is_by_the_pace_since_the_first_share(often: None) -> None
     assert re.fullmatch(
         "rodcone: 20%, render, [123] s left", file.getvalue().splitlines()[-1]
     )  # a busy machine's 0.1 s
+
+
+def test_what_is_refused_before_its_first_step_gets_no_line(often: None) -> None:
+    file = StringIO()
+
+    def refuse_late() -> None:
+        time.sleep(0.3)  # as a loaded machine, which takes its time to check the arguments
+        raise InputError("size: 0 is not allowed")
+
+    with pytest.raises(InputError), progress(file):
+        refuse_late()
+    assert file.getvalue() == ""
 
 
 def test_what_fails_ends_the_lines_too(often: None) -> None:

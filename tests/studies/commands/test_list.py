@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
 
 import colour
@@ -18,7 +19,7 @@ from render.photometry import tristimulus
 from scenes import catalog
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
-from studies.commands.list import LIGHTS
+from studies.commands.list import texts
 
 
 def printed(*arguments: object) -> str:
@@ -30,7 +31,7 @@ def printed(*arguments: object) -> str:
 def test_every_name_of_every_catalogue_is_listed() -> None:
     found = json.loads(printed("--json"))
     assert tuple(found["scenes"]) == catalog.names()
-    assert set(illuminants.names()) < set(found["lights"])
+    assert tuple(found["lights"]) == (*illuminants.names(), "3000K", "D7000K")
     assert tuple(found["sensors"]) == (*presets.names(), *measured_cameras())
     assert tuple(found["mosaics"]) == cfa.mosaics()
     assert tuple(found["processors"]) == tuple(PROCESSORS)
@@ -38,6 +39,16 @@ def test_every_name_of_every_catalogue_is_listed() -> None:
     assert all(text.strip() for lines in found.values() for text in lines.values())
     for name in found["lights"]:
         illuminant(name)
+
+
+def test_texts_of_scenes_and_processors_are_those_of_their_modules() -> None:
+    for name, text in texts("scenes").items():
+        sentence = str(import_module(f"scenes.{name}").__doc__).strip().split("\n", 1)[0]
+        assert text == f"{sentence} Lights: {', '.join(catalog.load(name).groups)}."
+    for name, text in texts("processors").items():
+        processor = PROCESSORS[name]
+        extra = f"; pip install rodcone[{processor.extra}]" if processor.extra else ""
+        assert text == f"{processor.mosaic}: {processor.source}{extra}"
 
 
 def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
@@ -48,7 +59,9 @@ def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
 
 def test_the_temperatures_are_those_of_the_spectra() -> None:
     nm = np.arange(380.0, 781.0, 1.0)
-    stated_k = {name: float(found[1]) for name, text in LIGHTS.items() if (found := re.search(r"(\d+) K$", text))}
+    stated_k = {
+        name: float(found[1]) for name, text in texts("lights").items() if (found := re.search(r"(\d+) K$", text))
+    }
     assert len(stated_k) > 10
     for name, temperature_k in stated_k.items():
         xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
@@ -70,17 +83,12 @@ def test_what_has_no_curves_or_no_place_is_refused(tmp_path: Path, monkeypatch: 
     check_refusals("list", rows, tmp_path)
 
 
-@pytest.mark.parametrize(
-    ("kind", "absent"), [("", ""), *((kind, " drjit") for kind in ("lights", "sensors", "mosaics", "metrics"))]
-)
-def test_lists_import_no_renderer(kind: str, absent: str) -> None:
-    """Nor what takes long to load: 0.2 to 0.6 s of processor time a command, where a list of mosaics took 1.7 s.
-
-    Scenes and processors hold values of Dr.Jit.
-    """
+@pytest.mark.parametrize("kind", ["", "scenes", "lights", "sensors", "mosaics", "processors", "metrics"])
+def test_lists_import_no_renderer(kind: str) -> None:
+    """Nor what takes long to load: 0.2 to 0.6 s of processor time a command, where a list of mosaics took 1.7 s."""
     program = (
         f"import sys; from studies.commands.cli import app; app('list {kind}', result_action='return_value'); "
-        f"print([name for name in 'mitsuba matplotlib colour scipy.ndimage{absent}'.split() if name in sys.modules])"
+        f"print([name for name in 'mitsuba drjit matplotlib colour scipy.ndimage'.split() if name in sys.modules])"
     )
     done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "[]"
