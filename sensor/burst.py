@@ -22,7 +22,7 @@ _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of t
 # Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
 _CALIBRATION = (
     *("cfa", "shape", "black_dn", "white_dn", "gain_e_per_dn"),
-    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread", "noise_steps"),
+    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread", "noise_steps", "channel_noise"),
 )
 
 

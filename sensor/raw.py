@@ -46,6 +46,37 @@ class NoiseStep:
 
 
 @dataclass(frozen=True)
+class ChannelNoise:
+    """Noise and well of a channel whose sites are read apart, in the raw image's electrons: `NoiseStep`'s form.
+
+    Attributes
+    ----------
+    channel : str
+    full_well_e : float
+        Electrons at which its samples are full.
+    shot, read_noise_e, dsnu_e, prnu : float
+        As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
+    """
+
+    channel: str
+    full_well_e: Annotated[float, (1e-18, 1e20, "give electrons")]
+    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    read_noise_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        require_fields(self, "channel_noise: ")
+
+    @property
+    def dark_noise_e(self) -> float:
+        """Standard deviation of a dark sample [e-]."""
+        return hypot(self.read_noise_e, self.dsnu_e)
+
+
+@dataclass(frozen=True)
 class RawImage:
     """One exposure as read out, with the calibration that a DNG's tags and noise profile would hold.
 
@@ -81,6 +112,9 @@ class RawImage:
     noise_steps : tuple of NoiseStep
         Of a pixel read several times, the noise from each level on at which one reading is full; up to
         the first one read_noise_e, dsnu_e and prnu hold.
+    channel_noise : tuple of ChannelNoise
+        Of channels that are read apart; what the others say of noise and well doesn't hold there. Their samples may
+        read more than `white_dn`.
 
     Raises
     ------
@@ -106,6 +140,7 @@ class RawImage:
     column_gain_spread: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
     defects: NDArray[np.intp] | None = None
     noise_steps: tuple[NoiseStep, ...] = ()
+    channel_noise: tuple[ChannelNoise, ...] = ()
 
     __repr__ = brief
 
@@ -124,6 +159,11 @@ class RawImage:
         levels = [step.from_e for step in self.noise_steps]
         if levels != sorted(levels):
             raise InputError(f"noise_steps: from_e {levels} doesn't rise; put the darkest step first")
+        apart = [noise.channel for noise in self.channel_noise]
+        if len(set(apart)) < len(apart) or not set(apart) <= set(channels(self.cfa)):
+            raise InputError(
+                f"channel_noise: {apart}; allowed: channels of {channels(self.cfa)}, each once; list those"
+            )
         for name, text in (("camera", self.camera), ("engine", self.engine)):
             if not (isinstance(text, str) and text.isascii() and text.isprintable() and (text or name == "engine")):
                 raise InputError(f"{name}: {text!r} is not allowed; give a name in printable ASCII")
@@ -166,19 +206,60 @@ class RawImage:
         """Electrons of a pixel that reads the white level."""
         return float((self.white_dn - self.black_dn) * self.gain_e_per_dn)
 
-    @property
-    def saturation_e(self) -> float:
-        """Level from which a pixel counts as saturated [e-]: noise comes after the well clips (design, section 4)."""
-        dark_e = self.dark_noise_e
+    def noise_of(self, channel: str) -> ChannelNoise:
+        """Noise and well of a channel's samples; of pixels read several times up to the first of `noise_steps`."""
+        plain = ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
+        return next((noise for noise in self.channel_noise if noise.channel == channel), plain)
+
+    def noise_at_sites(self, electrons: NDArray[Any]) -> NDArray[Any]:
+        """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
+
+        Parameters
+        ----------
+        electrons : (h, w) float32 or float64
+            Of the mosaic, or of a part of it that begins with a whole tile.
+        """
+        light = np.maximum(electrons, 0.0)
+        variance = light * self.prnu
+        variance *= variance
+        variance += light
+        variance += self.dark_noise_e**2
+        parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise]]
+        parts = [(light >= step.from_e, step) for step in self.noise_steps]
+        parts += [(mask(self.cfa, noise.channel, light.shape), noise) for noise in self.channel_noise]
+        for where, noise in parts:
+            bright_e = light[where]
+            variance[where] = (
+                noise.shot * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
+            )
+        return np.asarray(variance)
+
+    def saturation_of(self, channel: str) -> float:
+        """Level from which a channel's sample counts as saturated [e-]: noise comes after the well clips."""
+        noise = self.noise_of(channel)
+        dark_e = noise.dark_noise_e
         if self.noise_steps:
             dark_e = hypot(self.noise_steps[-1].read_noise_e, self.noise_steps[-1].dsnu_e)
-        spread_e = hypot(dark_e, self.column_gain_spread * self.full_well_e)
-        return self.full_well_e - SATURATION_SIGMAS * spread_e - self.gain_e_per_dn / 2
+        spread_e = hypot(dark_e, self.column_gain_spread * noise.full_well_e)
+        return noise.full_well_e - SATURATION_SIGMAS * spread_e - noise.shot * self.gain_e_per_dn / 2
+
+    @property
+    def saturation_e(self) -> float:
+        """`saturation_of` the channels that aren't read apart."""
+        return self.saturation_of("")
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Where the pixel counts as saturated, shape (h, w)."""
-        return self.electrons >= self.saturation_e
+        return self.full_at_sites(self.dn)
+
+    def full_at_sites(self, dn: NDArray[Any]) -> NDArray[np.bool_]:
+        """Where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
+        full = np.asarray(dn >= self.saturation_e / self.gain_e_per_dn + self.black_dn)
+        for noise in self.channel_noise:
+            at = mask(self.cfa, noise.channel, full.shape)
+            full[at] = dn[at] >= self.saturation_of(noise.channel) / self.gain_e_per_dn + self.black_dn
+        return full
 
 
 def _as_array(values: ArrayLike) -> NDArray[Any]:

@@ -38,7 +38,7 @@ from isp.kernel.schedule import Guide, Pattern, list_offsets
 from isp.planes import fill, guide_mosaic
 from isp.settings import WINDOW, Settings
 from isp.similarity.brightest import brightest_allowed
-from isp.similarity.guide import fraction_of_full, reliability, saturation_dn
+from isp.similarity.guide import fraction_of_full, reliability
 from isp.similarity.interpolation import certainty
 from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
@@ -155,7 +155,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
-    full = dn >= saturation_dn(raw)
+    full = raw.full_at_sites(dn)
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain

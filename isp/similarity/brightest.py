@@ -29,7 +29,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
     z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
-    does who takes the paper's distance. Of pixels read several times, the noise is that of `raw.noise_steps`.
+    does who takes the paper's distance. The noise is `RawImage.noise_at_sites`.
 
     Parameters
     ----------
@@ -47,17 +47,10 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         return np.full((*tile, *shape), np.inf, electrons.dtype)
     ends = 2 * tile[0] - 1, 2 * tile[1] - 1
     allowed = np.full((shape[0] + 2 * ends[0], shape[1] + 2 * ends[1]), -np.inf, electrons.dtype)
-    for first in range(0, shape[0], BLOCK_ROWS):
-        part = electrons[first : first + BLOCK_ROWS]
-        light = np.maximum(part, 0.0)
-        bound = light * raw.prnu
-        bound *= bound
-        bound += light
-        bound += raw.dark_noise_e**2
-        for step in raw.noise_steps:
-            beyond = light >= step.from_e
-            bright_e = light[beyond]
-            bound[beyond] = step.shot * bright_e + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * bright_e) ** 2
+    block = max(BLOCK_ROWS // tile[0], 1) * tile[0]
+    for first in range(0, shape[0], block):
+        part = electrons[first : first + block]
+        bound = raw.noise_at_sites(part)
         np.sqrt(bound, out=bound)
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2

@@ -26,7 +26,7 @@ def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
     (h, w) float64
         0 where W alone guides, 1 where the channel alone does.
     """
-    return fraction_of_full(raw.dn >= saturation_dn(raw), raw.cfa, window)
+    return fraction_of_full(raw.saturated, raw.cfa, window)
 
 
 def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int = WINDOW) -> Plane:
@@ -48,11 +48,6 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int = WINDOW) 
     rows, columns = (np.minimum(line + half, line[-1]) - np.maximum(line - half, 0) + 1 for line in pixels)
     alpha[box[0], box[1]] = count / np.outer(rows, columns)
     return alpha
-
-
-def saturation_dn(raw: RawImage) -> float:
-    """Digital number from which a pixel counts as saturated."""
-    return raw.saturation_e / raw.gain_e_per_dn + raw.black_dn
 
 
 def reliability(light_e: NDArray[Any], dark_noise_e: float, window: int) -> NDArray[Any]:

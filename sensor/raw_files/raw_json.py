@@ -9,12 +9,12 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_keys
 from sensor.calibration import ColourCalibration
-from sensor.raw import NoiseStep, RawImage
+from sensor.raw import ChannelNoise, NoiseStep, RawImage
 
 FORMAT = "rodcone raw image"
 VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
-_OPTIONAL = ("defects", "noise_steps")  # left out where there are none
+_OPTIONAL = ("defects", "noise_steps", "channel_noise")  # left out where there are none
 _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file may hold a mebibyte there
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 
@@ -22,8 +22,8 @@ MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 
 def to_json(raw: RawImage, **more: Any) -> str:
     """Everything of a raw image but its pixels, and the keys of `more`.
 
-    Python writes the shortest decimals that read back as the same float64. The keys ``defects`` and ``noise_steps`` are
-    left out where there are none.
+    Python writes the shortest decimals that read back as the same float64. The keys ``defects``, ``noise_steps`` and
+    ``channel_noise`` are left out where there are none.
 
     Raises
     ------
@@ -33,11 +33,12 @@ def to_json(raw: RawImage, **more: Any) -> str:
     calibration: dict[str, Any] = {key: getattr(raw, key) for key in KEYS}
     if raw.colour is not None:
         calibration["colour"] = {key: value.tolist() for key, value in asdict(raw.colour).items()}
-    defects, steps = (calibration.pop(key) for key in _OPTIONAL)
+    defects, *lists = (calibration.pop(key) for key in _OPTIONAL)
     if defects is not None:
         calibration["defects"] = defects.tolist()
-    if steps:
-        calibration["noise_steps"] = [asdict(step) for step in steps]
+    calibration |= {
+        key: [asdict(x) for x in values] for key, values in zip(_OPTIONAL[1:], lists, strict=True) if values
+    }
     content = {"format": FORMAT, "version": VERSION, **more, **calibration}
     text = json.dumps(content, allow_nan=False, default=float)
     if len(text) > MOST_BYTES:
@@ -91,6 +92,7 @@ def raw_image(calibration: dict[str, Any], dn: NDArray[np.uint16], name: str) ->
         structured = {
             "colour": None if calibration["colour"] is None else ColourCalibration(**calibration["colour"]),
             "noise_steps": tuple(NoiseStep(**step) for step in calibration.get("noise_steps", ())),
+            "channel_noise": tuple(ChannelNoise(**noise) for noise in calibration.get("channel_noise", ())),
         }
         return RawImage(dn, **{key: calibration[key] for key in KEYS if key in calibration} | structured)
     except (InputError, TypeError) as error:  # TypeError: keys of a part that it lacks or doesn't know

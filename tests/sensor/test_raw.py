@@ -11,7 +11,7 @@ from scipy import stats
 from sensor.cfa import RGBW
 from sensor.device import draw_device
 from sensor.presets import low_noise, table1_output, table1_pixel
-from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.raw import SATURATION_SIGMAS, ChannelNoise, RawImage
 from sensor.readout import read_out
 
 RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)
@@ -32,6 +32,19 @@ def test_saturation_begins_four_sigmas_of_the_dark_and_half_a_dn_under_the_well(
     assert RAW.saturation_e == pytest.approx(2000.0 - 4 * np.sqrt(25 + 1 / 3) - 1.0, rel=1e-12)
     dn = np.array([[1089, 1090], [1091, 1100]], np.uint16)  # 1978.87 e- is DN 1089.43
     np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
+
+
+def test_a_channel_read_apart_has_its_own_noise_and_saturation():
+    """Four times the shot noise, read noise 6, DSNU 8 and a well of 6000: 3000 DN over black."""
+    white = ChannelNoise("W", full_well_e=6000.0, shot=4.0, read_noise_e=6.0, dsnu_e=8.0, prnu=0.01)
+    raw = replace(RAW, dn=np.full((4, 4), 1100, np.float32), channel_noise=(white,))
+    got = raw.noise_at_sites(np.full((4, 4), 500.0))
+    assert got[0, 0] == got[0, 1] == pytest.approx(500 + 3**2 + 4**2 + 5**2, rel=1e-12)
+    assert got[1, 1] == got[3, 3] == pytest.approx(4 * 500 + 6**2 + 8**2 + 5**2, rel=1e-12)
+    np.testing.assert_array_equal(raw.saturated[:2, :2], [[True, True], [True, False]])
+    full_dn = 100 + (6000 - 4 * 10 - 4) / 2
+    for dn, full in ((full_dn - 0.01, False), (full_dn + 0.01, True)):
+        assert replace(raw, dn=np.full((4, 4), dn)).saturated[1, 1] == full, dn
 
 
 @loop("sigma_dn", np.geomspace(0.05, 200, 60))
@@ -88,6 +101,13 @@ def test_whole_numbers_and_finite_floats_are_taken_as_they_are(dtype):
         ({"dn": np.ones((2, 2), complex)}, r"dn: samples of type complex128 are not allowed; give whole numbers or"),
         ({"dn": [[1, 2], [3]]}, r"dn: samples of type object"),
         ({"camera": "Käfer"}, r"camera: 'Käfer' is not allowed"),
+        *(
+            (
+                {"channel_noise": tuple(ChannelNoise(x, 1e3, 1.0, 1.0, 1.0, 0.0) for x in names)},
+                r"channel_noise: .* each once",
+            )
+            for names in ("X", "WW")
+        ),
         ({"cfa": ("RG", "B")}, r"cfa: rows of .* differ in length"),
     ],
 )
