@@ -222,16 +222,3 @@ def mat_elements(random: Random, content: bytes) -> bytes:
             new = any_bytes(random, body)
         changed += struct.pack("<II", kind, len(new)) + new
     return changed
-
-
-def pages(random: Random, content: bytes) -> bytes:
-    """Bytes of an SQLite file: of its header, of the pages' own headers, or anywhere."""
-    changed = bytearray(content)
-    for _ in range(random.choice((1, 1, 2, 8))):
-        page = 4096 * random.randrange(max(len(changed) // 4096, 1))
-        at = random.choice((random.randrange(100), page + random.randrange(64), random.randrange(max(len(changed), 1))))
-        if at < len(changed):
-            random.choice(_CHANGES[:6])(random, changed, at)
-    if random.random() < 0.05:
-        _cut(random, changed, random.randrange(len(changed) + 1))
-    return bytes(changed)

@@ -10,17 +10,17 @@ import multiprocessing
 import os
 import sys
 import tempfile
-import time
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from targets import TARGETS
-from worker import ACCEPTED, COLUMNS, FINDINGS, NOW, REFUSED, TRIED, input_files, keep, work
+from worker import input_files, keep, work
 
 START = "spawn"  # a forked process would share locks of Dr.Jit's threads
 HANGS_S = 60.0  # after which a child is ended
 START_S = 120.0  # that a child may take to load its libraries and read the samples
-NAMES = {"tried": TRIED, "refused": REFUSED, "accepted": ACCEPTED, "findings": FINDINGS}
+NAMES = ("tried", "refused", "accepted", "findings")
 
 
 def main() -> int:
@@ -48,62 +48,45 @@ def main() -> int:
 def _child(plan: list[tuple[str, float]], seed: int, counts: dict[str, Any], out: Path) -> tuple[int, list[Any]]:
     """Run one child to its end; gives the number of findings, and what it left to be done."""
     shared = Path("/dev/shm")
-    first = {
-        name: counts.setdefault(f"{name} {seed}", {**dict.fromkeys(NAMES, 0), "next": 0})["next"] for name, _ in plan
-    }
+    entries = {name: counts.setdefault(f"{name} {seed}", {**dict.fromkeys(NAMES, 0), "next": 0}) for name, _ in plan}
     with tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None, prefix="rodcone-fuzz-") as place:
         context = multiprocessing.get_context(START)
-        state = context.Array("q", COLUMNS * len(plan), lock=False)
-        state[:] = [-1] * len(state)
-        for row in range(len(plan)):
-            state[COLUMNS * row + TRIED : COLUMNS * row + COLUMNS] = [0] * (COLUMNS - 1)
-        steps = [(name, first[name], seconds) for name, seconds in plan]
-        child = context.Process(target=work, args=(steps, seed, state, out, Path(place)))
+        messages, end = context.Pipe(duplex=False)
+        steps = [(name, entries[name]["next"], seconds) for name, seconds in plan]
+        child = context.Process(target=work, args=(steps, seed, end, out, Path(place)))
         child.start()
-        hung = _wait(child, state)
-    found = _note(plan, seed, counts, state)
-    rows = [row for row in range(len(plan)) if state[COLUMNS * row + NOW] >= 0]
+        end.close()
+        name, found, hangs = "", 0, False
+        with suppress(EOFError):  # the child's end
+            while not hangs:
+                hangs = not messages.poll(HANGS_S if name else START_S)
+                if not hangs:
+                    name, told = messages.recv()
+                    found += _note(entries[name], told) if told else 0
+        if hangs:
+            child.kill()
+        child.join()
     if child.exitcode == 0:
         return found, []
-    if not rows:
+    if not name:
         sys.exit("the child ended before its first input; see above")
-    name, seconds = plan[rows[-1]]  # which it died of
-    number = state[COLUMNS * rows[-1] + NOW]
+    number = entries[name]["next"]  # which it died of
+    words = "hangs" if hangs else f"died-{-(child.exitcode or 0)}"
     made = input_files(TARGETS[name], TARGETS[name].samples(), name, seed, number)
-    words = "hangs" if hung else f"died-{-(child.exitcode or 0)}"
     keep(out / "findings" / f"{name}-{words}-{seed}-{number}", made, words)
-    entry = counts[f"{name} {seed}"]
-    entry.update(tried=entry["tried"] + 1, findings=entry["findings"] + 1, next=number + 1)
-    left = (
-        [(name, seconds / 2)] if seconds > 2.0 else []
-    )  # half of it, so that a target that always dies comes to an end
-    return found + 1, [*left, *plan[rows[-1] + 1 :]]
+    _note(entries[name], words)
+    index = [step for step, _ in plan].index(name)
+    seconds = plan[index][1]
+    # half of its time, so that a target that always dies comes to an end
+    return found + 1, [*([(name, seconds / 2)] if seconds > 2.0 else []), *plan[index + 1 :]]
 
 
-def _wait(child: Any, state: Any) -> bool:
-    """Wait for a child's end; end it where it stays with one input, which is told."""
-    seen, since, limit = list(state), time.monotonic(), START_S
-    while child.is_alive():
-        child.join(0.2)
-        if list(state) != seen:
-            seen, since, limit = list(state), time.monotonic(), HANGS_S
-        elif time.monotonic() - since > limit:
-            child.kill()
-            child.join()
-            return True
-    return False
-
-
-def _note(plan: list[tuple[str, float]], seed: int, counts: dict[str, Any], state: Any) -> int:
-    found = 0
-    for row, (name, _) in enumerate(plan):
-        entry, place = counts[f"{name} {seed}"], COLUMNS * row
-        for key, column in NAMES.items():
-            entry[key] += state[place + column]
-        if state[place + NOW] < -1:
-            entry["next"] = -state[place + NOW] - 1
-        found += state[place + FINDINGS]
-    return found
+def _note(entry: dict[str, int], told: str) -> bool:
+    """Count an input; whether it is a finding."""
+    kind = told if told in ("refused", "accepted") else "findings"
+    for name in ("tried", kind, "next"):
+        entry[name] += 1
+    return kind == "findings"
 
 
 def _print(counts: dict[str, Any]) -> None:

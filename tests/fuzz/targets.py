@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
-from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, pages, tiff_tags
+from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, tiff_tags
 
 from isp.ple.prior import OWN, load_prior
 from render.cache import load_transport, save_transport
@@ -448,5 +448,5 @@ TARGETS: dict[str, Target] = {
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
     "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),
     "prior": Target(lambda: [{"prior.npz": OWN.read_bytes()}], {".npz": any_bytes}, load_prior),
-    "ledger": Target(_ledger_samples, {".sqlite": pages}, lambda path: read_rows(path.parent, everything=True)),
+    "ledger": Target(_ledger_samples, {".sqlite": any_bytes}, lambda path: read_rows(path.parent, everything=True)),
 }

@@ -21,7 +21,6 @@ from rodcone.errors import MOST_TOLD, InputError
 MOST_MIB = 256  # of memory over what the process held before
 MOST_CPU_S = 5.0  # of processor time
 MORE_ADDRESSES = 8 << 30  # that all inputs together may map: a single huge claim fails at once
-NOW, TRIED, REFUSED, ACCEPTED, FINDINGS, COLUMNS = 0, 1, 2, 3, 4, 5  # columns of the state, one row a target
 _WRITING = os.O_WRONLY | os.O_RDWR | os.O_CREAT | os.O_TRUNC | os.O_APPEND
 _FORBIDDEN = ("pickle.find_class", "os.system", "os.exec", "os.posix_spawn", "subprocess.Popen", "socket.connect")
 _CHANGING = ("os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.link", "os.symlink", "os.chmod", "os.truncate")
@@ -122,15 +121,15 @@ def _memory_mib(name: str) -> float:
         return next(int(line.split()[1]) for line in file if line.startswith(name)) / 1024
 
 
-def work(plan: Sequence[tuple[str, int, float]], seed: int, state: Any, out: Path, place: Path) -> None:
-    """Feed targets one after the other; `state` tells the parent how far it came, also where this process dies.
+def work(plan: Sequence[tuple[str, int, float]], seed: int, messages: Any, out: Path, place: Path) -> None:
+    """Feed targets one after the other, and tell the parent of each input, so that it knows of which one this died.
 
     Parameters
     ----------
     plan : sequence of (str, int, float)
         Target, number of its first input, seconds.
-    state : shared array of int
-        `COLUMNS` for each target of the plan.
+    messages : end of a pipe
+        Takes the target and what became of an input; nothing became of it where the target begins.
     out, place : Path
         Where findings are kept, and where files are put to be read.
     """
@@ -141,20 +140,18 @@ def work(plan: Sequence[tuple[str, int, float]], seed: int, state: Any, out: Pat
     for name, *_ in plan:
         for sample in samples[name]:  # loads what is loaded at first use
             judge(TARGETS[name], sample, folder)
-    for place_in_plan, (name, first, seconds) in enumerate(plan):
-        row, end, number = COLUMNS * place_in_plan, time.monotonic() + seconds, first
+    for name, first, seconds in plan:
+        end, number = time.monotonic() + seconds, first
+        messages.send((name, ""))
         while time.monotonic() < end:
-            state[row + NOW] = number
             if number % 1000 == 0:
                 _reset_peak()
             made = input_files(TARGETS[name], samples[name], name, seed, number)
             told, words = judge(TARGETS[name], made, folder)
-            state[row + TRIED] += 1
-            state[row + {"refused": REFUSED, "accepted": ACCEPTED}.get(told, FINDINGS)] += 1
             if told not in ("refused", "accepted"):
                 keep(out / "findings" / f"{name}-{told}-{seed}-{number}", made, words)
+            messages.send((name, told))
             number += 1
-        state[row + NOW] = -number - 1  # done: the next to be tried
 
 
 def quiet() -> None:

@@ -5,11 +5,8 @@ from collections.abc import Sequence
 from csv import writer
 from pathlib import Path
 
-import numpy as np
 from hard.case import Margin
 from hard.catalogue import CASES, INVARIANTS, LIMITS, OWN, Result, run_case, unexpected
-from hard.precision import Worst, search
-from hard.stages import STAGES
 
 from rodcone.jit import backend
 
@@ -42,13 +39,6 @@ What isn't kept, by how much, and why. `tests/hard` holds this list to be exact.
 ## Tables
 
 Every case with its margins, empty where an invariant says nothing about it: [hard_cases.csv](results/hard_cases.csv).
-
-Where stages run in single precision, the same arithmetic in double precision stands beside it:
-[hard_cases_precision.csv](results/hard_cases_precision.csv). A search of {tried} sets of parameters a stage, first at
-random, then by steps from the worst, looks for the largest error beside the least noise that a sensor can have. Bounds
-are counted roundings, u = 2⁻²⁴ of the number that is rounded.
-
-The largest error is {worst} of the noise, in stage *{stage}*.
 """
 
 
@@ -60,27 +50,21 @@ def main() -> int:
     for case in CASES:
         results.append(run_case(case))
         print(case.name, *unexpected(results[-1]), sep="\n    ", flush=True)
-    stages = [search(stage, np.random.default_rng([8, number])) for number, stage in enumerate(STAGES)]
-    PAGE.write_text(page(results, stages), encoding="utf-8")
-    for name, rows in (("hard_cases", catalogue(results)), ("hard_cases_precision", precision(stages))):
-        with (PAGE.parent / "results" / f"{name}.csv").open("w", encoding="utf-8", newline="") as file:
-            writer(file, lineterminator="\n").writerows(rows)
+    PAGE.write_text(page(results), encoding="utf-8")
+    with (PAGE.parent / "results" / "hard_cases.csv").open("w", encoding="utf-8", newline="") as file:
+        writer(file, lineterminator="\n").writerows(catalogue(results))
     print(f"\n{summary(results)}\n{PAGE}")
     return int(any(unexpected(result) for result in results))
 
 
-def page(results: Sequence[Result], stages: Sequence[Worst]) -> str:
+def page(results: Sequence[Result]) -> str:
     """The whole page."""
-    worst = max(stages, key=lambda stage: stage.found.share_of_noise)
     return TEXT.format(
         summary=summary(results),
         invariants="\n".join(
             f"- **{name}**: {(measure.__doc__ or '').splitlines()[0]}" for name, measure in INVARIANTS.items()
         ),
         limits=limits(results),
-        tried=stages[0].tried,
-        worst=f"{worst.found.share_of_noise:.1g}",
-        stage=worst.stage.name,
     )
 
 
@@ -121,17 +105,6 @@ def catalogue(results: Sequence[Result]) -> list[list[str]]:
         rows.append(
             [result.case.name, result.case.setup, *shares, kept, result.case.promise if result.case.own else ""]
         )
-    return rows
-
-
-def precision(stages: Sequence[Worst]) -> list[list[str]]:
-    """Table of the worst that each stage's search found."""
-    rows = [["stage", "worst parameters", "error [e⁻]", "noise [e⁻]", "share", "bound", "share of it"]]
-    for worst in stages:
-        parameters = ", ".join(f"{name} {value:.3g}" for name, value in worst.parameters.items() if name != "seed")
-        error, noise = f"{worst.found.error_e:.2g}", f"{worst.found.noise_e:.3g}"
-        share = f"{worst.found.share_of_noise:.1g}"
-        rows.append([worst.stage.name, parameters, error, noise, share, worst.stage.bound, share_text(worst.bound)])
     return rows
 
 

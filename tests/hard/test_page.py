@@ -6,8 +6,7 @@ from csv import DictReader
 import numpy as np
 from hard.case import Margin
 from hard.catalogue import CASES, INVARIANTS, LIMITS, OWN, Result
-from hard.page import PAGE, catalogue, limits, page, precision, summary
-from hard.precision import Found, Stage, Worst
+from hard.page import PAGE, catalogue, limits, summary
 
 
 def result(**margins):
@@ -34,18 +33,3 @@ def test_the_page_in_the_docs_is_of_this_catalogue_and_its_limits():
     part = text.partition("## Limits")[2].partition("##")[0]
     assert sorted(re.findall(r"^\| `([\w.]+)`", part, re.MULTILINE)) == sorted(name for name, _ in LIMITS)
     assert all(reason in part for reason in LIMITS.values())
-
-
-def test_the_page_in_the_docs_has_the_text_that_is_written_today():
-    stage = Stage("a stage", "u e", {"level_e": (1.0, 2.0)}, measure=lambda parameters: found)
-    found = Found(1e-3, 2.0, Margin(1.0, 4.0, "e⁻"))
-    worst = Worst(stage, {"level_e": 1.5, "seed": 3.0}, found, found.bound, 64)
-    made = page([result()], [worst])
-    assert "is 0.0005 of the noise, in stage *a stage*" in made
-    assert precision([worst])[1] == ["a stage", "level_e 1.5", "0.001", "2", "0.0005", "u e", "0.25"]
-    assert prose(made) == prose(PAGE.read_text(encoding="utf-8"))
-
-
-def prose(text):
-    """All but the tables and the counts."""
-    return [line for line in text.splitlines() if not re.match(r"\||\d+ cases|.*The largest error is", line)]

@@ -83,28 +83,6 @@ def found_error(relit, direct):
     return np.divide((found, slack), seen, out=np.zeros((2, len(found))), where=seen > 0)
 
 
-def finer(name):
-    """Bands in which a lamp misses next to nothing: a line's own ones, or 0.5 nm where its table is smooth."""
-    if lines := lines_nm(name):
-        return line_bands(lines, RANGE_NM)
-    return line_bands((), (587.0, 592.0), width_nm=0.5)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize(("name", "spp"), [("sodium_low", 1024), ("sodium_high", 512), ("LED-B3", 512)])
-def test_on_fine_bands_relit_is_directly_rendered_within_the_monte_carlo_error(name, spp):
-    draws = 12
-    relit, direct, _ = drawn(name, *finer(name), draws, spp, apart=1000)
-    lit = direct.mean(axis=(0, 2)) > 0
-    assert not relit[:, ~lit].any()  # bands without a line
-    difference, mean = (relit - direct)[:, lit], direct.mean(axis=0)[lit]
-    error = difference.std(axis=0, ddof=1) / np.sqrt(draws)
-    bound = student.isf(FALSE_ALARM / 2 / error.size, draws - 1)
-    print(f"{name}: least bias caught in a block: median {np.median(bound * error / mean):.2%}")
-    assert np.abs(difference.mean(axis=0) / error).max() < bound
-    assert np.median(bound * error / mean) < 0.03
-
-
 # Found over reported, from the next term of the expansion, the third derivative D of the transport T with slope s. The
 # parabola through bands of width w takes for the slope s + (1/6 + 1/24) D w^2, where light that rises evenly sees
 # s + D w^2 / 40. In the middle of the scene's steepest edge (logistic, 8 nm) D = -s / (2 x 8^2): the report is 0.84 s

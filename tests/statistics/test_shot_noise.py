@@ -59,21 +59,6 @@ def frame(mean_e, sensor, seed):
     return read_out(np.full(SHAPE, mean_e), sensor, device, 0.01, np.random.default_rng(seed)).dn
 
 
-def test_the_exact_probabilities_are_themselves_right_where_they_can_be_worked_out():
-    fine = camera(0.01, 0.0, bits=16)  # a lattice this fine keeps Poisson's own moments
-    p = exact_probabilities(10.0, fine)
-    levels = (np.arange(p.size) - fine.black_dn) * 0.01
-    assert p.sum() == pytest.approx(1.0, rel=1e-12)
-    assert p @ levels == pytest.approx(10.0, abs=0.005)
-    assert p @ (levels - 10.0) ** 2 == pytest.approx(10.0, abs=0.001)
-    noisy = camera(1.7, 5.0)  # rounding of a smooth density adds 1/12 (Sheppard)
-    p = exact_probabilities(26.0, noisy)
-    levels = (np.arange(p.size) - noisy.black_dn) * 1.7
-    assert p.sum() == pytest.approx(1.0, rel=1e-9)
-    assert p @ levels == pytest.approx(26.0, abs=1e-6)
-    assert p @ (levels - 26.0) ** 2 == pytest.approx(26.0 + 25.0 + 1.7**2 / 12, abs=1e-5)
-
-
 @pytest.mark.sample(10)
 @pytest.mark.parametrize("read_noise_e", [0.0, 0.4, 3.0])
 @pytest.mark.parametrize("gain_e_per_dn", GAINS)
