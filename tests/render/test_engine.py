@@ -7,7 +7,6 @@ Monte Carlo values are compared in units of their own stated standard error. By 
 import gc
 import os
 import signal
-import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from operator import attrgetter
@@ -25,18 +24,16 @@ from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant
 from render.limits import LEAST_POINTS
-from render.loader import Film, load_groups, mitsuba_module
+from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from scenes.catalog import load
 from scenes.materials import floor, glossy, matte, panel
-from scenes.reflectances import color_checker as patches
 from scenes.reflectances import edge, grey
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)  # eight bands fill 380-780 nm
-NARROWER_NM = np.linspace(410.0, 750.0, 8)
 WIDTH_NM = np.full(8, 50.0)
 SIZE = (24, 32)
 BLOCK = 8  # pixels each side: the mean of 64 pixels is close to normal
@@ -186,28 +183,6 @@ def test_a_lamp_of_half_angle_30_degrees_gives_a_quarter_of_pi_and_hides_that_mu
     assert sky == pytest.approx(np.full(8, 0.75), rel=5e-3)
 
 
-def test_color_checker_patches_are_reflectance_times_sky_in_every_band():
-    h, w, pixels_of_patch = 72, 108, 6
-    made = render(load("color_checker", light="E"), (h, w), wavelength_nm=BANDS_NM, spp=128, seed=3)
-    pixel_m = 2 * 0.72 * np.tan(np.radians(10.0)) / h
-    z = []
-    for index, (_, reflectance) in enumerate(patches()):
-        row, column = divmod(index, 6)
-        x, y = (column - 2.5) * 0.045, (1.5 - row) * 0.045
-        left, top = round(w / 2 + x / pixel_m) - 1, round(h / 2 - y / pixel_m) - 1
-        here = np.s_[:, top : top + pixels_of_patch, left : left + pixels_of_patch]
-        seen, half = made.radiance[0][here].astype(np.float64), made.light.difference[0][here].astype(np.float64)
-        truth = reflectance.band_average(BANDS_NM, WIDTH_NM)
-        # Under a constant environment only the jitter within a band scatters, much alike in all pixels, since they
-        # share the offsets of a half: the halves' means tell it. On a grey patch, float32's rounding.
-        error = np.hypot(half.mean(axis=(1, 2)), 2e-6 * truth)
-        z.append((seen.mean(axis=(1, 2)) - truth) / error)
-    # One difference of two halves: Student's law of one degree of freedom, whose median is 1 and whose tails are long.
-    # Bands share their offsets, so 24 patches count.
-    assert 0.25 < np.median(np.square(z)) < 4.0
-    assert np.quantile(np.abs(z), 0.9) < 25.0
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("max_depth", [2, 16, 1 << 16])
 def test_a_glowing_cavity_is_the_geometric_series_of_its_reflectance(max_depth):
@@ -296,13 +271,6 @@ def test_a_lamp_in_view_is_taken_out_of_the_light_and_what_it_covers_out_of_the_
     assert lit.luminance() == pytest.approx(dark * 10.0 / level.value, rel=1e-5)
 
 
-def test_a_black_wall_is_black():
-    made = render(load("flat_field", reflectance=0.0), (2, 2), wavelength_nm=BANDS_NM, spp=8)
-    assert not made.radiance.any()
-    assert made.relight().relative_mc_error == 0.0
-    assert made.irradiance == pytest.approx(np.full((1, 8), np.pi), rel=1e-5)
-
-
 def small(seed=0, **options):
     return render(noisy_wall(), (3, 4), **({"wavelength_nm": BANDS_NM, "spp": 8, "seed": seed} | options))
 
@@ -312,17 +280,6 @@ def test_the_same_seed_gives_the_same_bits_and_another_seed_others():
     for name in ("radiance", "variance", "light.difference", "irradiance", "coverage.mean"):
         assert np.array_equal(attrgetter(name)(one), attrgetter(name)(again)), name
     assert not (one.radiance == other.radiance).any()
-
-
-@pytest.mark.thorough
-def test_lamps_of_one_group_keep_their_order():
-    """Paths choose a lamp by its number: in another order of the lamps the same seed gives other bits."""
-    scene = load("lit_and_shadowed")
-    film = Film((4, 4), BANDS_NM, WIDTH_NM, 8)
-    for _ in range(3):
-        for loaded, side in zip(load_groups(scene, film), ("left", "right"), strict=True):
-            lamps = [emitter.get_shape().id() for emitter in loaded.mi_scene.emitters()]
-            assert lamps == [f"{side}_upper_lamp", f"{side}_lower_lamp"]
 
 
 def apart(scene):
@@ -425,13 +382,6 @@ def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrup
     assert part.spp == stops[-1], "what was gone on from is untouched"
 
 
-def test_a_result_of_another_render_is_not_gone_on_from():
-    part = small(spp=4)
-    for options in ({"width_nm": 40.0}, {"wavelength_nm": NARROWER_NM}):
-        assert refusal(small, spp=16, resume=part, **options).startswith("resume: (group, band, h, w) (1, 8, 3, 4)")
-    assert refusal(render, load("flat_field"), (4, 4), wavelength_nm=BANDS_NM, resume=part).startswith("resume: ")
-
-
 def test_control_c_keeps_what_was_made_so_far(tmp_path):
     def press(share, error):
         os.kill(os.getpid(), signal.SIGINT)
@@ -443,17 +393,6 @@ def test_control_c_keeps_what_was_made_so_far(tmp_path):
     on = small(spp=None, max_spp=128, cache=tmp_path)
     assert (on.spp, on.stopped_by) == (128, "samples")
     assert np.array_equal(on.radiance, small(spp=None, max_spp=128).radiance)
-
-
-def test_a_second_control_c_gives_up(tmp_path):
-    def press(share, error):
-        for _ in range(2):
-            os.kill(os.getpid(), signal.SIGINT)
-            time.sleep(0.01)
-
-    with pytest.raises(KeyboardInterrupt):
-        small(spp=None, max_spp=4096, cache=tmp_path, progress=press)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_render_in_another_thread_leaves_control_c_alone():
@@ -557,13 +496,6 @@ def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     text = refusal(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
     assert text.startswith("scene: a material chooses where light goes by wavelength")
     assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
-
-
-@loop("bsdf", [{"type": "dielectric", "int_ior": 1.5}, {"type": "dielectric", "int_ior": "bk7"}])
-def test_clear_glass_is_as_bright_as_the_constant_environment_around_it(bsdf):
-    made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=64, max_depth=32)
-    assert made.radiance == pytest.approx(np.ones((1, 8, 6, 6)), abs=0.02)  # paths end after 32 segments
-    assert made.radiance.mean() == pytest.approx(1.0, abs=2e-3)
 
 
 @loop(

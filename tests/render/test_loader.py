@@ -68,33 +68,6 @@ def test_tables_anywhere_in_memory_are_read_by_one_kernel() -> None:
     assert len(kernels) == 1
 
 
-ENVIRONMENT = """
-import sys
-import numpy as np
-import OpenEXR
-from rodcone.jit import dr
-dr.set_thread_count(1)
-from render.engine import render
-from render.user_scene.scene_file import load_scene_file
-OpenEXR.File({"compression": OpenEXR.ZIP_COMPRESSION, "type": OpenEXR.scanlineimage},
-             {"RGB": np.full((32, 64, 3), 0.5, np.float32)}).write("sky.exr")
-open("sky.xml", "w").write('''<scene version="3.0.0"><sensor type="perspective"/>
-<shape type="sphere"><point name="center" value="0,0,9"/></shape>
-<emitter type="envmap"><string name="filename" value="sky.exr"/></emitter></scene>''')
-made = render(load_scene_file("sky.xml").scene, (2, 2), wavelength_nm=np.array([550.0, 650.0]), spp=4)
-print(made.radiance.any(), dr.thread_count())
-"""
-
-
-@pytest.mark.thorough
-def test_a_machine_of_one_core_reads_an_environment_map(tmp_path: Path) -> None:
-    """Mitsuba reads OpenEXR in Dr.Jit's threads, without the one that asks: with one thread alone it never ended."""
-    command = [sys.executable, "-c", ENVIRONMENT]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=60, check=False)
-    assert done.returncode == 0, done.stderr
-    assert done.stdout == "True 1\n"
-
-
 GUEST = """
 import numpy as np
 import rodcone

@@ -6,12 +6,12 @@ from loop import loop
 from refusal import refusal
 
 from render.engine import render
-from render.scene import Scene, film_size
+from render.scene import Scene
 from rodcone.digests import digest
 from scenes.catalog import load, names
 from scenes.levels import DEMO_LEVELS
 from scenes.materials import metal
-from scenes.reflectances import band, color_checker, edge, grey
+from scenes.reflectances import color_checker
 from studies.metrics.target_figures import patch_masks
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
@@ -75,15 +75,6 @@ def test_a_generated_scene_is_its_seed_s_and_no_other():
     assert "'generated-c0ffeeh'" in refusal(load, "generated-c0ffeeh")
 
 
-def test_options_reach_the_builder():
-    values = load("flat_field", reflectance=0.25).geometry["wall"]["bsdf"]["bsdf"]["reflectance"]["values"]
-    assert set(values.split(",")) == {"0.25"}
-    values = load("slanted_edge", contrast=3.0).geometry["dark"]["bsdf"]["bsdf"]["reflectance"]["values"]
-    assert [float(value) for value in set(values.split(","))] == pytest.approx([0.2])
-    values = load("color_checker", surround=0.5).geometry["card"]["bsdf"]["bsdf"]["reflectance"]["values"]
-    assert set(values.split(",")) == {"0.5"}
-
-
 @loop(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
 def test_an_unknown_scene_is_refused_and_the_nearest_named(name, nearest):
     text = refusal(load, name)
@@ -131,18 +122,6 @@ def test_the_chart_has_24_reflectances_that_rise_along_its_grey_row():
     assert greys == pytest.approx([0.90, 0.59, 0.36, 0.20, 0.09, 0.03], abs=0.03)  # densities 0.05 to 1.50
 
 
-def test_reflectance_curves_stay_between_their_ends():
-    assert np.ptp(grey(0.3).values) == 0
-    for low, high in ((0.1, 0.7), (0.7, 0.1)):
-        curve = edge(580.0, 10.0, low, high)
-        assert curve.values[[0, -1]] == pytest.approx([low, high], abs=1e-6)
-        assert curve.band_average(580.0, 20.0) == pytest.approx(0.4, abs=1e-3)
-    bump = band(550.0, 20.0, 0.1, 0.6)
-    assert bump.values.max() == pytest.approx(0.6)
-    assert bump.wavelength_nm[bump.values.argmax()] == 550.0
-    assert bump.values.min() == pytest.approx(0.1, abs=1e-6)
-
-
 def test_demo_levels_rise_from_moonlight_to_daylight_and_name_their_sources():
     levels = [level.luminance_cd_m2 for level in DEMO_LEVELS]
     assert len(levels) == 7
@@ -185,12 +164,6 @@ def test_a_metal_reflects_as_its_handbook_says(material, nm, reflectance):
     at = [float(bsdf[part]["values"].split(",")[round((nm - 380) / 5)]) for part in ("eta", "k")]
     index = complex(*at)
     assert abs((index - 1) / (index + 1)) ** 2 == pytest.approx(reflectance, abs=0.05)  # Fresnel; samples differ
-
-
-@loop("name", names())
-def test_a_scene_knows_its_proportions(name: str) -> None:
-    assert load(name).size == ((170, 256) if name in ("color_checker", "metamers") else (256, 256))
-    assert film_size(load(name).size, 64) == ((42, 64) if name in ("color_checker", "metamers") else (64, 64))
 
 
 @pytest.mark.thorough

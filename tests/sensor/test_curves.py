@@ -11,7 +11,7 @@ from render.illuminants import illuminant
 from render.spectrum import Spectrum
 from rodcone.csv_file import MOST_BYTES
 from rodcone.errors import InputError
-from sensor.curves import Responses, read_csv, read_curve, rgbw
+from sensor.curves import read_csv, read_curve, rgbw
 
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
@@ -44,13 +44,6 @@ def test_w_collects_the_published_multiple_of_r_g_and_b(light, first_nm, last_nm
     white = electrons("W", light, first_nm, last_nm)
     for channel, ratio in zip("RGB", ratios, strict=True):
         assert white / electrons(channel, light, first_nm, last_nm) == pytest.approx(ratio, rel=0.03)
-
-
-def test_the_band_average_is_the_mean_of_the_linear_pieces():
-    ramp = Responses({"R": Spectrum([500.0, 600.0], [0.0, 1.0]), "G": Spectrum([400.0, 700.0], [0.25, 0.25])})
-    average = ramp.band_average(("G", "R"), [550.0, 600.0], [20.0, 20.0])
-    # R over 590-610 nm: a trapezoid 0.9 to 1 over half of the band, nothing over the other half
-    np.testing.assert_allclose(average, [[0.25, 0.25], [0.5, 0.475]], rtol=1e-13)
 
 
 def test_a_letter_without_a_curve_is_refused_by_name():
@@ -154,11 +147,6 @@ def test_a_quantum_efficiency_multiplies_filters_without_a_word(tmp_path):
 @loop("efficiency", [-0.1, 1.1, np.nan])
 def test_a_quantum_efficiency_out_of_range_is_refused(tmp_path, efficiency):
     refusal(read_csv, write(tmp_path, FILTERS), quantum_efficiency=efficiency, match="quantum_efficiency")
-
-
-def test_filters_in_per_cent_are_told_so_although_the_product_would_fit(tmp_path):
-    with pytest.raises(InputError, match="divide per cent by 100"):
-        read_csv(write(tmp_path, "wavelength_nm,G\n400,20\n500,80\n"), quantum_efficiency=0.005)
 
 
 def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path):

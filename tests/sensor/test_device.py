@@ -4,9 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 from loop import loop
-from refusal import refusal
 
-from sensor.cfa import RGBW
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
@@ -59,13 +57,6 @@ def test_a_smaller_chip_of_the_same_seed_is_the_larger_one_s_corner():
     np.testing.assert_array_equal(small.photo_response, large.photo_response[:6, :11])
     np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])
     assert small.shape == (6, 11)
-
-
-@loop("shape", [(1, 8), (8,), (8, 8, 3)])
-def test_a_chip_that_does_not_hold_a_tile_is_refused(shape):
-    assert str(RGBW) in refusal(
-        draw_device, camera(), shape, np.random.default_rng(0), match=r"mosaic: shape .*at least 2x2"
-    )
 
 
 # Columns and hot pixels

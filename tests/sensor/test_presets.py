@@ -74,14 +74,6 @@ def test_a_copy_that_was_changed_reads_as_it_was_changed(tmp_path):
     assert preset(path, ["GR", "BG"]).cfa == ("GR", "BG")
 
 
-def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
-    expected = SensorConfig(PixelConfig(2.2, 0.9, 15_000, 3, 4, 0.01), LensConfig(2.8))
-    assert read_sensor(write(tmp_path, LEAST + LENS)) == expected
-    more = 'cfa = ["RG", "GB"]\nbits = 12\nblack_level_dn = 64\nwindow_nm = [400, 700]\n'
-    changed = replace(expected, cfa=BAYER, bits=12, black_level_dn=64, window_nm=(400.0, 700.0))
-    assert read_sensor(write(tmp_path, more + LEAST + LENS)) == changed
-
-
 @loop(
     ("text", "parts"),
     [
@@ -106,14 +98,6 @@ def test_the_least_file_leaves_the_rest_at_its_defaults(tmp_path):
 )
 def test_a_file_that_describes_no_camera_is_refused_in_one_line_with_its_name(tmp_path, text, parts):
     refusal(read_sensor, write(tmp_path, text), words=("camera.toml", *parts))
-
-
-def test_a_missing_or_a_binary_file_is_refused(tmp_path):
-    refusal(read_sensor, tmp_path / "absent.toml", match=r"absent\.toml.* can't be read.*rodcone new preset NAME")
-    binary = tmp_path / "binary.toml"
-    binary.write_bytes(b"\xff\xfe\x00\x01")
-    refusal(read_sensor, binary, match=r"binary\.toml.* can't be read")
-    refusal(read_sensor, tmp_path, match="can't be read")
 
 
 # Measured responses

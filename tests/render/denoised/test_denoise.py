@@ -66,19 +66,6 @@ def test_what_the_denoiser_gets_knows_no_texture_and_no_unit(idle) -> None:
         assert (options["albedo"] == 0.5).all()
 
 
-@pytest.mark.thorough
-def test_dark_surfaces_keep_their_light(idle) -> None:
-    """Light over an albedo of 0 would have no bound."""
-    light = np.full((20, *SIZE), 0.1, np.float32)
-    assert denoised(light, 0 * light, 0 * light, np.zeros((3, *SIZE), np.float32)) == pytest.approx(light, rel=1e-4)
-
-
-def test_no_light_stays_none(idle) -> None:
-    dark = np.zeros((20, *SIZE), np.float32)
-    assert not denoised(dark, dark, dark, np.zeros((3, *SIZE), np.float32)).any()
-    assert not idle
-
-
 def halves_of(noise, seed=4):
     """A flat grey surface under light of 1, bands of common paths: mean of two halves and half their difference."""
     rng = np.random.default_rng(seed)

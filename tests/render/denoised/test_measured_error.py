@@ -41,10 +41,6 @@ def test_a_negative_estimate_charges_no_negative_limit() -> None:
     assert found.upper == 0.0
 
 
-def test_a_single_pixel_has_no_limit() -> None:
-    assert measured_error(*np.ones((3, 1, 1))).upper == np.inf
-
-
 @loop("bias", [0.0, 0.3])
 def test_known_bias_and_noise_are_recovered(bias: float) -> None:
     """A picture with a smooth bias and its own noise, folds of four times its variance; 400 frames.

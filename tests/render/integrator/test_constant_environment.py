@@ -14,7 +14,6 @@ from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from scenes.materials import ball, checks, floor, glass, matte, panel
 from scenes.reflectances import edge, grey
-from studies.budget.bands import merge_transport
 
 BANDS_NM, WIDTH_NM, SIZE, BLOCK = np.array([430.0, 500.0, 570.0, 640.0]), 30.0, (32, 40), 8
 FALSE_ALARM = 1e-5
@@ -131,14 +130,6 @@ def test_a_render_gone_on_from_and_a_cached_one_keep_the_correlation(tmp_path):
     assert again.shared.groups == on.shared.groups
     assert np.array_equal(again.shared.correlation, on.shared.correlation)
     assert again.relative_mc_error == on.relative_mc_error
-
-
-def test_wider_bands_keep_the_correlation(both):
-    merged = merge_transport(both, [np.array([0, 1]), np.array([2, 3])])
-    assert merged.shared.correlation == pytest.approx(
-        both.shared.correlation.reshape(2, 2, *SIZE).mean(axis=1), abs=1e-6
-    )
-    assert 0 < merged.relight().relative_mc_error < 1.2 * both.relative_mc_error
 
 
 def test_a_sky_of_its_own_colour_or_with_another_light_is_rendered_by_itself():

@@ -7,7 +7,6 @@ import pytest
 from loop import loop
 from scipy.stats import norm
 
-from render import loader
 from render.engine import render
 from render.integrator.reflectance_table import STEPS, band_offsets, reflectance_table, with_rows
 from render.scene import spectrum_node, uniform_node
@@ -80,15 +79,6 @@ def test_other_textures_are_left_as_they_are(reflectance):
     made, curves = with_rows({"a": matte(reflectance), "b": {"type": "roughplastic", "reflectance": RED}})
     assert made == {"a": matte(reflectance), "b": {"type": "roughplastic", "reflectance": RED}}
     assert curves == ()
-
-
-def test_a_picture_is_the_same_with_and_without_the_table(monkeypatch):
-    options = {"wavelength_nm": np.arange(420.0, 700.0, 40.0), "width_nm": 12.0, "spp": 16, "max_depth": 3, "seed": 4}
-    tabulated = render(load("color_checker"), (12, 16), **options)
-    monkeypatch.setattr(loader, "with_rows", lambda node: (node, with_rows(node)[1]))  # curves that no surface reads
-    plain = render(load("color_checker"), (12, 16), **options)
-    assert np.ptp(plain.radiance) > 0.5
-    assert tabulated.radiance == pytest.approx(plain.radiance, rel=1e-4)
 
 
 def test_a_line_in_a_light_of_its_own_colour_is_met_anew_by_each_path():

@@ -132,18 +132,6 @@ def test_what_does_not_agree_is_refused_in_one_line(cube: np.ndarray, text: str,
         assert read_cube(path).shape == (6, 7)
 
 
-def test_files_that_are_none_are_refused_in_one_line(tmp_path: Path) -> None:
-    assert "there is no such file" in refusal(load_radiance, tmp_path / "absent.npy")
-    path = npy(tmp_path)
-    for content in (b"", b"\x93NUMPY", path.read_bytes()[:-1], b"\x93NUMPY\x01\x00\x08\x00{'descr'"):
-        path.write_bytes(content)
-        assert "NumPy can't read it" in refusal(read_cube, path)
-    np.save(path, np.array([{"a": 1}], dtype=object), allow_pickle=True)
-    assert "NumPy can't read it" in refusal(read_cube, path)
-    (tmp_path / "desk.toml").unlink()
-    assert "nothing says what it holds; allowed: desk.toml beside it" in refusal(load_radiance, path)
-
-
 @loop(
     ("changes", "words"),
     [
@@ -162,10 +150,3 @@ def test_files_that_are_none_are_refused_in_one_line(tmp_path: Path) -> None:
 def test_a_damaged_envi_header_is_refused_in_one_line(changes: dict[str, object], words: str, tmp_path: Path) -> None:
     (tmp_path / "desk.img").write_bytes(CUBE.transpose(2, 0, 1).astype("<f4").tobytes())
     assert words in refusal(read_cube, envi(tmp_path, **changes))  # type: ignore[arg-type]
-
-
-def test_an_envi_header_alone_or_another_file_is_refused(tmp_path: Path) -> None:
-    path = envi(tmp_path)
-    assert "there are no numbers beside it" in refusal(read_cube, path)
-    path.write_text("#?RADIANCE\n", "utf-8")  # Radiance's pictures end in .hdr too
-    assert "doesn't begin with ENVI" in refusal(read_cube, path)

@@ -12,7 +12,7 @@ from refusal import refusal
 
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
-from render.radiance_files.exr import MOST_EXPANSION, read_exr, write_exr
+from render.radiance_files.exr import read_exr, write_exr
 from render.radiance_files.exr_layout import LAYOUT_UNITS, channel_name, radiance_channels, read_bands
 from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
 from rodcone.errors import InputError
@@ -73,13 +73,6 @@ def test_float64_is_rounded_once_to_float32(tmp_path: Path) -> None:
     assert np.array_equal(read_exr(tmp_path / "a.exr").values, values.astype(np.float32))
 
 
-def test_channel_names_are_of_one_width_and_in_the_order_of_wavelength(tmp_path: Path) -> None:
-    radiance = SpectralRadiance(np.ones((1, 1, 3)), np.array([105.5, 550.0, 1050.25]), width_nm=np.ones(3))
-    write_exr(radiance, tmp_path / "a.exr")
-    names, _, _ = layout_of(tmp_path / "a.exr")
-    assert names == ["B", "G", "R", "S0.0105,500000nm", "S0.0550,000000nm", "S0.1050,250000nm"]
-
-
 def test_header_states_layout_units_and_lossless_compression(tmp_path: Path) -> None:
     write_exr(picture(), tmp_path / "a.exr", scene="still_life")
     _, header, pixels = layout_of(tmp_path / "a.exr")
@@ -102,16 +95,6 @@ def test_preview_is_linear_srgb_over_the_luminance_that_the_header_states(tmp_pa
     assert rgb == pytest.approx([0.9 * 1.2048, 0.9 * 0.9484, 0.9 * 0.9087], rel=1e-3)
 
 
-@loop("value", [0.0, 1e-44, 1e34])
-def test_preview_stays_finite_at_both_ends_of_float32(tmp_path: Path, value: float) -> None:
-    values = np.full((20, 20, 40), value)
-    values[0, :2] = [[0.0], [1e36]]
-    write_exr(SpectralRadiance(values, 385.0 + 10 * np.arange(40)), tmp_path / "a.exr")
-    _, header, pixels = layout_of(tmp_path / "a.exr")
-    assert np.isfinite(header["whiteLuminance"])
-    assert all(np.isfinite(pixels[name]).all() and (pixels[name] >= 0).all() for name in "RGB")
-
-
 @loop(
     ("values", "nm", "told"),
     [
@@ -128,33 +111,6 @@ def test_what_the_layout_cannot_hold_is_refused_and_nothing_is_written(
     assert not list(tmp_path.iterdir())
 
 
-def test_failed_write_keeps_the_older_file_and_leaves_nothing_else(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    path = tmp_path / "a.exr"
-    path.write_text("older")
-
-    class FullDisk:
-        def __init__(self, *_: Any) -> None: ...
-
-        def write(self, name: str) -> None:
-            Path(name).write_text("half")
-            raise RuntimeError("No space left")
-
-    monkeypatch.setattr(OpenEXR, "File", FullDisk)
-    with pytest.raises(OSError, match="No space left"):
-        write_exr(picture(), path)
-    assert [p.name for p in tmp_path.iterdir()] == ["a.exr"]
-    assert path.read_text() == "older"
-
-
-def test_missing_folder_is_made_and_files_get_usual_rights(tmp_path: Path) -> None:
-    path = tmp_path / "new" / "a.exr"
-    write_exr(picture(), path)
-    (tmp_path / "usual").touch()
-    assert path.stat().st_mode == (tmp_path / "usual").stat().st_mode
-
-
 def test_mitsuba_opens_it(tmp_path: Path) -> None:
     radiance = picture()
     write_exr(radiance, tmp_path / "a.exr")
@@ -165,20 +121,6 @@ def test_mitsuba_opens_it(tmp_path: Path) -> None:
     assert pixels.dtype == np.float32
     for band, nm in enumerate(radiance.wavelength_nm):
         assert np.array_equal(pixels[:, :, names.index(channel_name(nm))], radiance.values[:, :, band])
-
-
-@pytest.mark.thorough
-def test_colour_science_opens_it_through_openimageio(tmp_path: Path) -> None:
-    pytest.importorskip("OpenImageIO", reason="OpenImageIO isn't installed")
-    from outside_truth import colour_science
-
-    radiance = picture()
-    write_exr(radiance, tmp_path / "a.exr")
-    components = colour_science().read_spectral_image_Fichet2021(str(tmp_path / "a.exr"))
-    nm, values = components["S0"]
-    assert set(components) == {"S0"}
-    assert nm == pytest.approx(radiance.wavelength_nm)
-    assert np.array_equal(values.astype(np.float32), radiance.values)
 
 
 # Files of other programs.
@@ -281,12 +223,6 @@ def test_missing_units_are_assumed_and_told(tmp_path: Path) -> None:
         read_exr(path)
 
 
-def test_a_camera_that_the_file_describes_is_told_to_be_left_in(tmp_path: Path) -> None:
-    channels = {f"S0.{nm}nm": plane(1) for nm in (400, 410)}
-    with pytest.warns(UserWarning, match="lensTransmission"):
-        read_exr(write_by_hand(tmp_path / "a.exr", channels, lensTransmission="400nm:0.9;700nm:0.9"))
-
-
 @loop("bands", ["400.0:10.0", "400.0:10.0;410.0:-1", "400:10;411:10", "nonsense", ""])
 def test_band_attribute_that_does_not_fit_is_left_aside_and_told(tmp_path: Path, bands: str) -> None:
     channels = {channel_name(nm): plane(1) for nm in (400, 410)}
@@ -338,17 +274,6 @@ def test_what_is_no_openexr_file_is_refused(tmp_path: Path, content: bytes) -> N
         refusal(read_exr, tmp_path / name, match="no such file")
 
 
-def test_whole_numbers_are_refused(tmp_path: Path) -> None:
-    path = write_by_hand(tmp_path / "a.exr", {"S0.500nm": plane(1, dtype=np.uint32), "S0.510nm": plane(1)})
-    refusal(read_exr, path, match="uint32")
-
-
-def test_several_parts_are_refused(tmp_path: Path) -> None:
-    parts = [OpenEXR.Part({}, {f"S0.{nm}nm": plane(1) for nm in (500, 510)}, name) for name in "ab"]
-    OpenEXR.File(parts).write(str(tmp_path / "a.exr"))
-    refusal(read_exr, tmp_path / "a.exr", match="2 parts")
-
-
 def test_subsampled_channels_are_refused(tmp_path: Path) -> None:
     path = write_by_hand(tmp_path / "a.exr", {name: plane(1, (8, 8)) for name in ("BY", "S0.500nm", "S0.510nm")})
     content = path.read_bytes()
@@ -376,13 +301,6 @@ def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, bytes]:
     return path, path.read_bytes()
 
 
-def test_a_file_cut_anywhere_is_refused(whole: tuple[Path, bytes]) -> None:
-    path, content = whole
-    for length in range(0, len(content), 97):
-        path.write_bytes(content[:length])
-        assert "Warning" not in refusal(read_exr, path)
-
-
 def with_window(content: bytes, right: int, bottom: int) -> bytes:
     """The same file that declares another size."""
     for name in (b"dataWindow\0box2i\0", b"displayWindow\0box2i\0"):
@@ -408,15 +326,6 @@ def test_declared_size_is_bounded_before_memory_is_taken(
     message = refusal(read_exr, path, match=told)
     assert message.startswith(f"{path}: ")
     assert message.count(str(path)) == 1
-
-
-def test_a_black_picture_is_not_taken_for_a_hostile_one(tmp_path: Path) -> None:
-    """The expansion that is allowed is over what lossless compressions reach on zeros."""
-    channels = {f"S0.{400 + 10 * k}nm": plane(0, (512, 2048)) for k in range(4)}
-    for kind in (OpenEXR.PXR24_COMPRESSION, OpenEXR.ZIP_COMPRESSION, OpenEXR.PIZ_COMPRESSION):
-        path = write_by_hand(tmp_path / "a.exr", channels, compression=kind)
-        assert MOST_EXPANSION * path.stat().st_size > 4 * 4 * 512 * 2048
-        assert not read_exr(path).values.any()
 
 
 def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:

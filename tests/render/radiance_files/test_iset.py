@@ -85,23 +85,6 @@ def test_the_mean_that_was_taken_out_is_added(tmp_path: Path) -> None:
     assert read_iset_scene(path).values == pytest.approx((photons + mean) * JOULE, rel=1e-6)
 
 
-def test_one_basis_function_whose_axis_matlab_dropped_is_read(tmp_path: Path) -> None:
-    shape = NM / 500
-    path = save(tmp_path, mcCOEF=PHOTONS[:, :, 0], basis={"basis": shape[:, None], "wave": NM})
-    assert read_iset_scene(path).values == pytest.approx(PHOTONS[:, :, :1] * shape * JOULE, rel=1e-6)
-
-
-def test_photons_that_a_basis_makes_negative_become_zero_and_are_told(tmp_path: Path) -> None:
-    """One band of 31 has its mean under zero: 1/31 is 3.23 %."""
-    mean = np.full(NM.size, 1e14)
-    mean[4] = -1e18
-    path, photons = basis_file(tmp_path, imgMean=mean)
-    with pytest.warns(UserWarning, match=r"3\.23% of its photons"):
-        read = read_iset_scene(path)
-    assert not read.values[:, :, 4].any()
-    assert read.values == pytest.approx(np.maximum(photons + mean, 0) * JOULE, rel=1e-6)
-
-
 def in_form(form: str, photons: np.ndarray, tmp_path: Path) -> Path:
     """The same photons in one of the three forms that ISETCam writes."""
     if form == "basis":  # one function a wavelength: coefficients are photons

@@ -60,20 +60,6 @@ def test_numbers_are_read_as_they_were_written_and_nothing_else(tmp_path: Path, 
     assert read["scene/spectrum/wave"].ravel().tolist() == [0, 1, 2]
 
 
-@loop(
-    ("order", "content", "numbers"),
-    [
-        ("<", matrix(6, (2, 2), 2, bytes([1, 2, 3, 4])), [[1.0, 3.0], [2.0, 4.0]]),  # columns first
-        (">", matrix(6, (1, 2), 9, np.array([1.5, -2.0], ">f8").tobytes(), ">"), [[1.5, -2.0]]),
-    ],
-)
-def test_every_form_of_a_double_is_read(tmp_path: Path, order: str, content: bytes, numbers: list[Any]) -> None:
-    """MATLAB stores whole doubles in the smallest type that holds them."""
-    read = read_numbers(file_of(tmp_path / "a.mat", content, order=order), ["x"])["x"]
-    assert read.dtype.kind == "f"
-    assert read.tolist() == numbers
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     "content",

@@ -167,15 +167,6 @@ def test_a_file_is_checked_where_mitsuba_opens_it(tmp_path: Path) -> None:
         )
 
 
-def test_textured_light_keeps_its_picture(tmp_path: Path) -> None:
-    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "p.png")
-    picture = '<texture type="bitmap" name="radiance"><string name="filename" value="p.png"/></texture>'
-    path = write(tmp_path, CAMERA, f'<shape type="disk" id="tv"><emitter type="area">{picture}</emitter></shape>')
-    scene = load_scene_file(path).scene
-    assert scene.groups["tv"].coloured
-    assert scene.geometry["tv"]["_arg_0"]["radiance"]["filename"] == str((tmp_path / "p.png").resolve())
-
-
 def test_includes_defaults_aliases_and_spectrum_files_are_followed(tmp_path: Path) -> None:
     write(
         tmp_path,
@@ -325,22 +316,6 @@ def test_the_first_camera_that_can_be_rendered_is_taken(kind: str, tmp_path: Pat
     opened = load_scene_file(write(tmp_path, other, CAMERA.replace("perspective", "orthographic"), SUN))
     assert (opened.size, opened.scene.geometry["sensor"]["type"]) == ((6, 8), "orthographic")
     assert "1 of 2 cameras are left out: 'orthographic', the first that can be" in opened.notes[0]
-
-
-def test_an_orthographic_camera_sees_things_in_one_size(tmp_path: Path) -> None:
-    """Two squares of one size, one three times as far: the same pixels in parallel projection."""
-    square = (
-        '<shape type="rectangle"><transform name="to_world"><scale value="0.25"/><translate x="{}" z="{}"/></transform>'
-        '<emitter type="area"><spectrum name="radiance" value="1"/></emitter></shape>'
-    )
-    camera = CAMERA.replace("perspective", "orthographic").replace('<float name="fov" value="20"/>', "")
-    camera = camera.replace('value="8"', 'value="16"').replace('value="6"', 'value="16"')
-    path = write(tmp_path, camera, square.format(-0.5, 2), square.format(0.5, -4))
-    opened = load_scene_file(path)
-    made = render(opened.scene, opened.size, wavelength_nm=np.arange(420.0, 700.0, 80.0), spp=16).relight().values
-    lit = made[:, :, 0] > 0.5
-    assert lit.sum() == 2 * 4 * 4  # of 2 m in 16 pixels
-    np.testing.assert_array_equal(lit, lit[:, ::-1])
 
 
 def test_lights_that_are_dark_in_the_first_bands_shine_in_the_others(tmp_path: Path) -> None:
@@ -556,15 +531,6 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
     assert scene.geometry["quad"]["filename"] == str((tmp_path / "quad.obj").resolve())
     mitsuba_module().load_dict(scene.description)
     assert str(tmp_path / "mine") in loaded_libraries()
-
-
-def test_what_is_not_simulated_is_refused_in_a_trusted_scene_too(tmp_path: Path) -> None:
-    refusal(
-        load_scene_file,
-        write(tmp_path, CAMERA, SUN, MEDIUM),
-        trust=True,
-        words=("medium 'interior' of type 'homogeneous' is refused",),
-    )
 
 
 def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:

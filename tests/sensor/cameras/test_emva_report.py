@@ -129,16 +129,3 @@ def test_a_shipped_report_reads_has_source_and_date_and_gives_a_pixel(path):
 )
 def test_a_hostile_report_is_refused_in_one_line_that_names_it(tmp_path, text, words):
     refusal(read_report, write(tmp_path, text), words=(words, "report.toml"))
-
-
-def test_a_report_that_is_a_folder_or_absent_is_refused(tmp_path):
-    for path in (tmp_path, tmp_path / "absent.toml"):
-        refusal(read_report, path, match="can't be read")
-
-
-def test_a_source_of_many_lines_stays_a_comment(tmp_path):
-    report = (
-        HEAD.replace('"report 7"', '"""a\n[pixel]\nprnu = 0.5\u2028x\\u0007\\u0000"""') + "[report]\nsigma_d = 2.5\n"
-    )
-    text = preset_text("X1", numbers_of(read_report(write(tmp_path, report))), None, "")
-    assert tomllib.loads(text)["pixel"] == {"fill_factor": 1.0, "read_noise_e": 2.5}

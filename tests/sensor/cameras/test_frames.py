@@ -52,12 +52,6 @@ def test_the_preset_holds_what_was_configured_every_number_with_its_interval(fil
         assert f"# {key} =   # not told by" in text
 
 
-def test_the_middle_alone_begins_with_the_tiles_first_position(files):
-    found = measure_files(*files, 50)
-    assert found.gain_dn_per_e.low < 1 / SENSOR.gain_e_per_dn < found.gain_dn_per_e.high
-    refusal(measure_files, *files, 97, match="window: 97 pixels don't fit a frame of 96 x 128")
-
-
 def test_files_that_do_not_belong_together_are_refused_by_name(files, tmp_path):
     flats, darks = files
     refusal(measure_files, [flats[0], flats[0]], darks, None, match="a file is given twice")

@@ -19,7 +19,6 @@ from sensor.cameras.numbers import (
     measured_curves,
     preset_text,
 )
-from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
 from sensor.curves import RelativeResponsesWarning
 from sensor.presets import low_noise
@@ -110,13 +109,6 @@ def test_lent_curves_have_a_monochrome_sources_quantum_efficiency_in_w(tmp_path)
     text = path.read_text("utf-8")
     assert "shape of low_noise's curves, not of this camera" in text
     assert "so that W has the quantum efficiency 0.64 at 528 nm, sheet 7" in text
-
-
-def test_lent_curves_of_a_bayer_source_have_it_in_the_channel_that_responds_most():
-    numbers = PixelNumbers("own frames", efficiency=(0.5, 540.0), cfa=BAYER)
-    shape = lent_curves(low_noise(), "low_noise", numbers)
-    assert set(shape.curves) == set("RGB")
-    assert np.interp(540.0, shape.curves["G"].wavelength_nm, shape.curves["G"].values) == pytest.approx(0.5)
 
 
 def test_lent_curves_stop_at_one_electron_a_photon_and_say_so():

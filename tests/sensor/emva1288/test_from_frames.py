@@ -109,11 +109,3 @@ def bad_frames():
 def test_frames_that_are_not_flat_or_not_frames_of_a_bench_are_refused_in_one_line(name):
     flats, darks, words = bad_frames()[name]
     assert words in refusal(figures_of_frames, flats, darks, BAYER, chip().white_dn)
-
-
-@pytest.mark.thorough
-def test_even_frames_are_not_refused():
-    """Noise alone is, once in a thousand frames: once in 25 runs of this test, were its seeds not fixed."""
-    sensor = chip()
-    for seed in range(40):
-        measure(sensor, bench(sensor, 1000 + seed, (64, 64)), bright=2)

@@ -20,7 +20,7 @@ from sensor.calibration import ColourCalibration
 from sensor.cfa import MOSAICS, Tile, channels
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.raw_files.raw_json import KEYS, MOST_BYTES, VERSION
+from sensor.raw_files.raw_json import MOST_BYTES, VERSION
 
 
 def colour(count: int) -> ColourCalibration:
@@ -74,16 +74,6 @@ def test_any_calibration_comes_back_exactly(
     assert (back.black_dn, back.white_dn, back.gain_e_per_dn, back.iso) == (black, white, gain, iso)
 
 
-def test_numbers_of_numpy_are_kept_as_numbers(tmp_path: Path) -> None:
-    raw = replace(exposure(("RC", "CC")), gain_e_per_dn=np.float32(1 / 7), white_dn=np.int64(1000))
-    back = read_raw(write_raw(raw, tmp_path / "shot.tif")[0])
-    assert (back.gain_e_per_dn, back.white_dn) == (float(np.float32(1 / 7)), 1000)
-
-
-def test_a_sidecar_without_every_field_of_a_raw_image_cannot_be_written() -> None:
-    assert {*KEYS, "dn"} == {field.name for field in fields(RawImage)}
-
-
 @loop(
     ("name", "cfa", "message"),
     [
@@ -113,13 +103,6 @@ def test_a_file_from_before_there_were_lists_is_read(tmp_path: Path) -> None:
     write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
     assert "defects" not in json.loads((tmp_path / "shot.json").read_text())
     assert read_raw(tmp_path / "shot.tif").defects is None
-
-
-def test_a_list_too_long_for_a_file_is_refused(tmp_path: Path) -> None:
-    shape = (300, 400)
-    raw = replace(exposure(("RC", "CC"), shape), defects=np.argwhere(np.ones(shape, dtype=bool)))
-    refusal(write_raw, raw, tmp_path / "shot.tif", match=r"defects: 120000 pixels don't fit a raw file; .*list fewer")
-    assert list(tmp_path.iterdir()) == []
 
 
 STEP = {"from_e": 10.0, "shot": 2.0, "read_noise_e": 1.0, "dsnu_e": 0.0, "prnu": 0.01}
@@ -216,12 +199,6 @@ def test_a_part_of_a_calibration_keeps_rows_and_columns_of_its_channels() -> Non
         np.testing.assert_array_equal(getattr(part, back), getattr(whole, back)[:, :3])
 
 
-def test_a_missing_sidecar_is_named(tmp_path: Path) -> None:
-    write_raw(exposure(("RC", "CC")), tmp_path / "shot.tif")
-    (tmp_path / "shot.json").unlink()
-    refusal(read_raw, tmp_path / "shot.tif", match=r"shot\.json: can't be read .*; keep the sidecar beside shot\.tif")
-
-
 def test_files_are_replaced_together_or_not_at_all(tmp_path: Path) -> None:
     one, two = tmp_path / "one", tmp_path / "two"
     one.write_text("old")
@@ -234,13 +211,6 @@ def test_files_are_replaced_together_or_not_at_all(tmp_path: Path) -> None:
         second.write_text("beside")
     assert (one.read_text(), two.read_text()) == ("new", "beside")
     assert sorted(tmp_path.iterdir()) == [one, two]
-
-
-def test_another_programs_json_of_the_same_name_is_left_alone(tmp_path: Path) -> None:
-    (tmp_path / "shot.json").write_text("{}")
-    with pytest.raises(InputError, match=r"shot\.json beside it is another program's"):
-        write_raw(exposure(("RG", "BW")), tmp_path / "shot.tif")
-    assert [path.read_text() for path in tmp_path.iterdir()] == ["{}"]
 
 
 @pytest.mark.timeout(10)
