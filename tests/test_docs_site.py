@@ -22,36 +22,6 @@ PAGES = sorted([DOCS / "index.md", DOCS / "model.md", *DOCS.glob("tutorial/*.md"
 RUN = [page for page in PAGES if page.parent != DOCS]
 NAME = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
 SMALL = ["DEMO=--size 32 --spp 16 --level 0.05cd/m2 --level 25cd/m2", "PAPER=--size 48 --spp 16 --seeds 2"]
-# What people search for, and the page that has to come first.
-SEARCHED = {
-    "reflectance csv": "how_to/own_scene.html",
-    "measured lamp": "how_to/own_scene.html",
-    "dng": "how_to/dng_from_numpy.html",
-    "isetcam": "how_to/coming_from.html",
-    "pyxel": "how_to/coming_from.html",
-    "read noise": "how_to/",
-    "night_street": "gallery/scenes.html",
-    "sodium": "gallery/lights.html",
-    "demosaicking function": "how_to/own_processor.html",
-    "exposure time": "how_to/",
-    "mitsuba xml": "how_to/own_scene.html",
-    "cluster": "how_to/cluster.html",
-    "burst": "how_to/burst.html",
-    "noise_variance": "api/sensor/readout.html",
-}
-SEARCH = """(async words => {
-  const field = document.querySelector("[data-md-component=search-query]");
-  field.focus();
-  for (let tries = 0; tries < 100; tries++) {
-    field.value = words;
-    field.dispatchEvent(new Event("input", {bubbles: true}));
-    field.dispatchEvent(new KeyboardEvent("keyup", {bubbles: true}));
-    await new Promise(done => setTimeout(done, 200));
-    const found = [...document.querySelectorAll(".md-search-result__link")].map(link => link.href);
-    if (found.length) return found;
-  }
-  return [];
-})"""
 VIEWS = [(360, False), (360, True), (1280, False), (1280, True)]
 
 
@@ -196,19 +166,6 @@ def test_the_finished_pages_ask_no_host_for_anything(site: Path) -> None:
         if (found := [tag for tag in fetched.findall(page.read_text("utf-8")) if 'rel="canonical"' not in tag])
     }
     assert not wrong
-
-
-@pytest.mark.slow
-@pytest.mark.timeout(1800)
-@CHROME.NEEDED
-def test_the_search_finds_how_tos_first_where_the_site_was_opened_as_a_file(site: Path, browser: Any) -> None:
-    first = {}
-    for words in SEARCHED:
-        page = CHROME.open_page(browser, site / "index.html")
-        found = page.evaluate(f"{SEARCH}({words!r})")
-        assert CHROME.complaints(page) == []
-        first[words] = found[0].removeprefix(site.as_uri()).partition("?")[0] if found else ""
-    assert {words: place for words, place in first.items() if SEARCHED[words] not in place} == {}
 
 
 @pytest.mark.slow

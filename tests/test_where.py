@@ -5,8 +5,6 @@ from collections import Counter
 from pathlib import Path
 from pkgutil import resolve_name
 
-import pytest
-
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "where.md"
 NAME = re.compile(r"`([\w.]+)`")
 TERMS = (
@@ -70,15 +68,3 @@ def test_a_terms_names_exist():
 def test_a_term_has_one_row_with_a_meaning():
     counts = Counter(term for term, meaning, _ in ROWS if meaning)
     assert {term: counts[term] for term in TERMS if counts[term] != 1} == {}, "give each one row"
-
-
-def test_a_name_that_is_gone_is_seen():
-    function, module, field = "readout.no_such_function", "no_such_module.read_out", "chip.PixelConfig.pitch_nm"
-    for name in (function, module, field):
-        with pytest.raises(AttributeError):
-            resolve(f"sensor.{name}")
-
-
-def test_rows_are_read_from_the_tables_alone():
-    text = "| term | meaning | held by |\n|---|---|---|\n| a, b | c | `x.y`, or `x.z` |\nno row `x.q`\n"
-    assert rows(text) == [("a, b", "c", ("x.y", "x.z"))]

@@ -1,19 +1,17 @@
 """Sensors of one size beside each other: presets made from the reports, places and leads by hand, studies refused."""
 
 import csv
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import sweep_sample as SAMPLE
-from five_cameras import _entry, main, sensors_table, write_page
+from five_cameras import _entry, sensors_table, write_page
 from real_cameras import REPORTS
 
-from rodcone.errors import InputError
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.numbers import completed, curves_csv, lent_curves, missing, preset_text
-from sensor.presets import low_noise, preset_file
+from sensor.presets import low_noise
 from studies.study.equal_area import EqualArea
 from studies.study.study_file import read_study
 from studies.sweep.database import LastRun
@@ -77,10 +75,6 @@ def test_each_camera_of_the_study_is_what_its_report_makes(path: Path) -> None:
     assert (path.parent / name).read_text("utf-8") == curves_csv(whole, curves)
 
 
-def test_five_makers_are_there() -> None:
-    assert len({read_report(REPORTS / path.name).maker for path in FILES}) == 5
-
-
 @pytest.fixture
 def places(tmp_path: Path) -> tuple[Path, Path]:
     """A copy of the page in docs, and where its table goes."""
@@ -123,35 +117,6 @@ def test_the_quantum_efficiency_is_the_simulated_one_and_the_published_stands_be
         assert cell.startswith(f"{simulated:.1f} % at {told['lambda_nm']:g} nm")
         assert ("published" in cell) == entry.name.startswith("framos")  # whose curve ends at 1 electron a photon
     assert "86.5 % at 536 nm; published: 91.25 %" in rows[-1]
-
-
-def test_another_study_is_refused_and_nothing_is_written(tmp_path: Path, places: tuple[Path, Path]) -> None:
-    slow = tmp_path / "slow.toml"
-    slow.write_text(preset_file("low_noise").read_text("utf-8").replace("f_number = 2.8", "f_number = 4.0"), "utf-8")
-    bayer = run()
-    bayer.rows[:] = [row for row in bayer.rows if row.processor == "ple_bayer"]
-    other = run(sensors=[str(slow), "table1_output"])
-    other.rows[:] = [replace(row, sensor="slow.toml") if row.sensor == FILES[0].name else row for row in other.rows]
-    alone = run(sensors=["table1_output"])
-    cases = {"sensor_side_um": run(sensor_side_um=None), "ple_rgbw": bayer, "f_number": other, "and a preset": alone}
-    for words, wrong in cases.items():
-        with pytest.raises(InputError, match=words):
-            write_page(wrong, tmp_path, *places)
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["five.md", "slow.toml"]
-    assert places[0].read_text("utf-8") == PAGE.read_text("utf-8")
-
-
-def test_the_command_tells_faults_in_one_line(tmp_path: Path) -> None:
-    for arguments, words in (
-        ([], "give the sweep's folder"),
-        ([str(tmp_path), "page.md"], "give the sweep's folder"),
-        ([str(tmp_path)], "it holds no ledger.sqlite"),
-    ):
-        with pytest.raises(SystemExit) as told:
-            main(arguments)
-        assert words in str(told.value)
-        assert "\n" not in str(told.value)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_page_in_docs_is_of_the_committed_study() -> None:

@@ -1,16 +1,13 @@
 """Margins, transformed raw images and bias: closed forms."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from builders import raw_image
 from hard.case import Margin, worse, worst_of
 from hard.invariants_raw import allowed_errors, bias
-from hard.invariants_symmetry import cut, mirrored
+from hard.invariants_symmetry import mirrored
 from loop import loop
 
-from isp.planes import bilinear
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map
 
 
@@ -41,17 +38,6 @@ def test_a_mirrored_frame_holds_each_sample_under_its_own_letter_and_each_defect
     here, there = np.zeros(shape, bool), np.zeros(shape, bool)
     here[tuple(raw.defects.T)] = there[tuple(turned.defects.T)] = True
     assert np.array_equal(there, np.flip(here, axis))
-
-
-def test_a_cut_frame_begins_at_the_next_phase_of_the_mosaic():
-    raw = exposure((6, 7))
-    part = cut(raw)
-    assert np.array_equal(channel_map(part.cfa, (5, 6)), channel_map(raw.cfa, (6, 7))[1:, 1:])
-    assert np.array_equal(part.dn, raw.dn[1:, 1:])
-    assert part.defects is None
-    bayer = replace(raw, cfa=BAYER, defects=None)
-    order = [("R", "G", "B").index(channel) for channel in ("R", "G", "B")]
-    assert bilinear(cut(bayer))[2:-2, 2:-2] == pytest.approx(bilinear(bayer)[3:-2, 3:-2][..., order], rel=1e-12)
 
 
 def test_bias_is_a_mean_in_its_own_standard_errors():

@@ -55,11 +55,6 @@ def test_a_letter_without_a_sound_sample_reads_black() -> None:
     np.testing.assert_array_equal(mended.dn, [[500, 500], [500, 10]])
 
 
-def test_a_frame_without_a_list_stays_the_same_object() -> None:
-    raw = frame(np.zeros((4, 4)), RGBW, [])
-    assert mend(raw) is raw
-
-
 def test_a_simulated_chip_lists_its_hot_pixels_and_mending_takes_them_out() -> None:
     for cfa in ["rgbw", "bayer"]:
         sensor = preset("low_noise", cfa)
@@ -89,9 +84,3 @@ def test_a_list_that_does_not_fit_the_frame_is_refused() -> None:
     for places in [[(0, 8)], [(-1, 0)], [(0, 0, 0)], [(0.5, 1.0)], [["a", "b"]]]:
         with pytest.raises(InputError, match=r"^defects: .* is not allowed; give rows and columns inside \(8, 8\)"):
             frame(np.zeros((8, 8)), RGBW, places)  # type: ignore[arg-type]
-
-
-def test_a_list_is_kept_in_the_frames_order_each_once() -> None:
-    raw = frame(np.zeros((8, 8)), RGBW, [(3, 1), (0, 2), (3, 1)])
-    assert raw.defects is not None
-    np.testing.assert_array_equal(raw.defects, [(0, 2), (3, 1)])

@@ -7,7 +7,6 @@ import pytest
 from builders import RGBW_PHASES, raw_image
 
 from isp.remosaic import bayer_tile, remosaic
-from rodcone.errors import InputError
 from sensor.calibration import ColourCalibration
 from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channel_map, channels, is_bayer, mask, plain
 from sensor.raw import RawImage
@@ -86,14 +85,6 @@ def test_calibration_goes_along_without_white() -> None:
     assert (made.colour.camera_to_xyz_a.shape, made.iso, made.black_dn) == ((3, 3), 50.0, 100.0)
 
 
-def test_other_mosaics_are_refused() -> None:
-    for cfa in [BAYER, MOSAICS["rgbw_4x4"]]:
-        with pytest.raises(
-            InputError, match=r"cfa: .* can't become Bayer; allowed: 2x2 with R, G, B and W, quad_rgbw, quad_bayer"
-        ):
-            remosaic(raw(cfa, flat()))
-
-
 # Quads
 
 
@@ -111,14 +102,6 @@ def test_a_quad_becomes_its_plain_mosaic_and_planes_stay_planes(name: str) -> No
             # beside half a DN of rounding, of the samples too: a ramp isn't quite one in units of noise
             expected = scene[channel][here]
             assert made.dn[here] - 100.0 == pytest.approx(expected, rel=1e-3 if slope else 0.0, abs=0.75), channel
-
-
-def test_a_quad_becomes_bayer() -> None:
-    for name in ["quad_bayer", "quad_rgbw"]:
-        made = remosaic(raw(MOSAICS[name], flat((32, 32))))
-        assert made.cfa == BAYER, name
-        for channel in "RGB":
-            assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}, name
 
 
 def test_samples_of_a_quad_that_lie_where_the_plain_mosaic_has_them_stay() -> None:

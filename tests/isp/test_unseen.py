@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import RGBW_4X4, RGBW_PHASES, raw_image
 
-from isp.pipeline import picture_interleaved, picture_interleaved_paper
+from isp.pipeline import picture_interleaved
 from isp.unseen import draw_unseen, without_unseen
 from sensor.cfa import RGBW, channels, mask, quad
 
@@ -113,15 +113,6 @@ def test_a_lamp_of_one_pixel_is_drawn_there_alone_and_neutral():
         assert np.abs(rgb).max() < 3.0, at
 
 
-def test_a_row_of_colours_is_drawn_even():
-    """R at 4000 and G at 2000 e- in turn give 3000 at each: a tent of 1 2 1."""
-    electrons = np.zeros((20, 40))
-    electrons[10, 10:30:2], electrons[10, 11:30:2] = 4000.0, 2000.0
-    rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
-    assert rgb[10, 11:29] == pytest.approx(np.full((18, 3), 3000.0), rel=1e-6)
-    assert rgb[[9, 11]] == pytest.approx(np.zeros((2, 40, 3)), abs=3.0)
-
-
 def test_a_line_goes_on_through_a_colour_that_it_has_little_of():
     """Sodium light on a column of R and B: B is within what W allows, and was dark between white dots."""
     electrons = np.zeros((40, 20))
@@ -129,14 +120,6 @@ def test_a_line_goes_on_through_a_colour_that_it_has_little_of():
     rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
     assert rgb[10:31, 10] == pytest.approx(np.full((21, 3), 4000.0), rel=1e-6)
     assert np.abs(rgb[10:31, [9, 11]]).max() < 3.0
-
-
-def test_the_papers_own_method_keeps_its_lamps():
-    electrons = np.zeros((24, 24))
-    electrons[12, 12] = 15_000.0
-    rgb = picture_interleaved_paper(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
-    assert rgb[12, 12, 2] < 1.0  # B has none of it
-    assert rgb[12, 16, 0] > 10.0
 
 
 def test_light_is_drawn_up_to_the_full_well():

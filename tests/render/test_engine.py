@@ -337,17 +337,6 @@ def test_seconds_are_those_of_all_the_calls_that_a_render_took(monkeypatch):
     assert (on.spp, on.seconds) == (16, 6.0)
 
 
-@pytest.mark.thorough
-def test_time_asked_for_ends_a_render_after_one_run_at_least():
-    made = small(max_seconds=0.001, spp=None)
-    assert (made.spp, made.stopped_by) == (32, "seconds")
-    small(spp=None, noise=0.5)  # compiled by now
-    longer = render(noisy_wall(), (48, 64), wavelength_nm=BANDS_NM, max_seconds=3.0)
-    assert longer.stopped_by == "seconds"
-    assert longer.spp > 32
-    assert longer.seconds < 5.0  # all the samples allowed would take minutes
-
-
 def test_a_ceiling_of_samples_ends_a_render():
     assert small(spp=None, max_spp=24).spp == 24
     made = small(spp=None, max_spp=200, noise=1e-6)

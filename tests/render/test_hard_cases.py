@@ -21,6 +21,7 @@ from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from rodcone.errors import InputError
 from rodcone.jit import backend
+from scenes.catalog import load
 from scenes.materials import ball, disk, floor, glass, glossy, matte, panel
 from scenes.reflectances import grey
 

@@ -9,7 +9,6 @@ from rodcone.colour_spaces import (
     D50_XYZ,
     D65_XY,
     adapt_to_d65,
-    decode_srgb,
     encode_srgb,
     luminance_of_srgb,
     xyz_from_xy,
@@ -21,10 +20,6 @@ def test_srgb_matrix_agrees_with_colour_science() -> None:
     xyz = np.random.default_rng(0).uniform(0.05, 0.9, (50, 3))
     theirs = colour_science().XYZ_to_sRGB(xyz, apply_cctf_encoding=False)
     assert np.abs(xyz_to_srgb(xyz) - theirs).max() < 2e-3  # they use the standard's matrix, rounded to four digits
-
-
-def test_d65_is_white_in_srgb() -> None:
-    assert xyz_to_srgb(xyz_from_xy(D65_XY)) == pytest.approx([1.0, 1.0, 1.0], abs=1e-12)
 
 
 def test_luminance_of_srgb_is_y() -> None:
@@ -44,12 +39,6 @@ def test_encoding_agrees_with_colour_science_and_clips() -> None:
     linear = np.concatenate([np.linspace(0, 0.003, 20), np.linspace(0, 1, 200)])  # its straight foot, and all of it
     assert np.abs(encode_srgb(linear) - colour_science().cctf_encoding(linear, function="sRGB")).max() < 1e-6
     assert encode_srgb(np.array([-0.5, 2.0])) == pytest.approx([0.0, 1.0], abs=1e-15)
-
-
-def test_decoding_is_the_inverse_of_encoding() -> None:
-    linear = np.linspace(0.0, 1.0, 101)
-    np.testing.assert_allclose(decode_srgb(encode_srgb(linear)), linear, atol=1e-7)  # the standard's own break: 1e-7
-    assert decode_srgb(np.array([0.0, 0.5, 1.0])) == pytest.approx([0.0, 0.2140411, 1.0], abs=1e-7)
 
 
 def test_whites_are_the_cies() -> None:

@@ -5,7 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, upload
+from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, backend
 
 pytestmark = pytest.mark.skipif(backend() == "numpy", reason="Dr.Jit has no backend here")
@@ -18,13 +18,6 @@ def test_values_and_type_are_kept_wherever_the_memory_begins() -> None:
             device = upload(values)
             assert device.numpy().dtype == dtype
             assert np.array_equal(device.numpy(), values.ravel()), (dtype, offset)
-
-
-def test_memory_is_aligned() -> None:
-    for length in range(1, 40):
-        made = aligned((length, 3), np.float32)
-        assert made.ctypes.data % ALIGNMENT == 0
-        assert made.shape == (length, 3)
 
 
 def test_division_is_exact_at_every_multiple() -> None:

@@ -39,15 +39,6 @@ def test_a_place_is_checked_by_making_its_folder_and_leaves_no_file(tmp_path):
     assert list(path.parent.iterdir()) == []
 
 
-def test_a_folder_is_no_place_for_a_file_and_a_file_none_for_a_folder(tmp_path):
-    (tmp_path / "file").write_text("")
-    with pytest.raises(IsADirectoryError) as error:
-        check_place(tmp_path)
-    assert error.value.filename == str(tmp_path)
-    with pytest.raises(OSError, match="file"):
-        check_place(tmp_path / "file" / "a.txt")
-
-
 def test_a_name_that_leads_out_of_its_folder_is_refused_and_one_below_it_is_a_place_in_it(tmp_path):
     folder = tmp_path / "pictures"
     (folder / "sub").mkdir(parents=True)

@@ -74,14 +74,6 @@ def test_the_users_value_comes_first_then_the_wheel_then_the_system(monkeypatch:
     assert llvm.find_llvm() is None
 
 
-def test_an_absent_wheel_is_no_error(monkeypatch: pytest.MonkeyPatch) -> None:
-    def absent(name: str) -> None:
-        raise llvm.metadata.PackageNotFoundError(name)
-
-    monkeypatch.setattr(llvm.metadata, "files", absent)
-    assert llvm._wheel_library() is None
-
-
 def test_the_wheels_library_is_a_file_of_an_accepted_version() -> None:
     library = llvm._wheel_library()
     if library is None:

@@ -105,24 +105,9 @@ def test_a_group_of_version_2_leaves_its_limit_less_its_use_and_parents_bind_too
     assert bounds(root) == {"what the control group's limit of 3.0 GB leaves": 2.4e9}
 
 
-def test_a_group_of_version_1_is_found_beside_other_controllers(tmp_path: Path) -> None:
-    root = system(tmp_path, proc__self__cgroup="9:name=systemd:/x\n4:cpu,memory:/a:b\n1:cpuset:/\n0::/\n")
-    folder = root / "sys/fs/cgroup/memory"
-    folder.mkdir(parents=True)  # a container sees its own group as the root, whatever its place
-    (folder / "memory.limit_in_bytes").write_text("2000000000\n")
-    (folder / "memory.usage_in_bytes").write_text("700000000\n")
-    (folder / "memory.stat").write_text("cache 1\ntotal_inactive_file 200000000\n")
-    assert bounds(root) == {"what the control group's limit of 2.0 GB leaves": 1.5e9}
-
-
 def test_a_system_that_tells_nothing_sets_no_bound(tmp_path: Path) -> None:
     assert bounds(tmp_path) == {}
     assert bounds(system(tmp_path, proc__meminfo="nonsense", proc__self__cgroup="0::/\n")) == {}
-
-
-def test_a_denoised_render_needs_more_for_each_group_and_the_denoiser() -> None:
-    plain, denoised = (memory(10**6, 20, 2, denoised=asked).total for asked in (False, True))
-    assert denoised - plain == pytest.approx(10**6 * (7 * 4 * 20 * 2 + 1300))
 
 
 def test_workers_add_up_and_the_largest_process_counts_for_limits_that_each_has() -> None:

@@ -2,20 +2,17 @@
 
 from collections.abc import Iterator
 from dataclasses import replace
-from io import BytesIO
 
 import numpy as np
 import pytest
 from builders import raw_image
 from matplotlib import pyplot
-from PIL import Image
 
 from isp.picture import Picture
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.errors import InputError
-from rodcone.plots import CHANNEL_COLOURS, png_of
-from scenes.catalog import load
+from rodcone.plots import CHANNEL_COLOURS
 from sensor.curves import rgbw
 from sensor.emva1288.characterise import characterise
 from sensor.presets import low_noise
@@ -92,15 +89,3 @@ def test_sources_of_noise_sum_to_the_noise() -> None:
             assert all(value >= 0 for value in sources.values())
             expected = float(noise_variance(np.array([[signal_e]]), sensor, 0.5)[0, 0])
             assert sum(value**2 for value in sources.values()) == pytest.approx(expected, rel=1e-12)
-
-
-def test_values_show_their_curves_in_a_notebook() -> None:
-    for value in (Spectrum(np.array([400.0, 700.0]), np.ones(2)), load("flat_field")):
-        with Image.open(BytesIO(value._repr_png_())) as picture:
-            assert picture.size == (600, 300)
-    assert not pyplot.get_fignums()
-
-
-def test_a_figure_for_a_page_is_a_png() -> None:
-    with Image.open(BytesIO(png_of(lambda axes: axes.plot([1, 2])))) as picture:
-        assert picture.size == (600, 300)

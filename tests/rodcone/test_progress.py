@@ -1,8 +1,6 @@
 """Progress on stderr: a bar that moves on a terminal, a line now and then elsewhere, and the time left on both."""
 
 import math
-import os
-import pty
 import re
 import threading
 import time
@@ -12,7 +10,7 @@ import pytest
 
 from rodcone import progress as module
 from rodcone.errors import InputError
-from rodcone.progress import duration, progress, render_words
+from rodcone.progress import progress, render_words
 
 
 @pytest.fixture
@@ -75,49 +73,6 @@ def test_what_is_refused_before_its_first_step_gets_no_line(often: None) -> None
     with pytest.raises(InputError), progress(file):
         refuse_late()
     assert file.getvalue() == ""
-
-
-def test_what_fails_ends_the_lines_too(often: None) -> None:
-    before = threading.active_count()
-    with pytest.raises(KeyboardInterrupt), progress(StringIO()):
-        raise KeyboardInterrupt
-    assert threading.active_count() == before
-
-
-def test_the_bar_moves_while_nothing_is_told_and_shows_the_time_left() -> None:
-    ours, theirs = pty.openpty()
-    drawn = bytearray()
-
-    def read() -> None:
-        while chunk := os.read(ours, 65536):
-            drawn.extend(chunk)
-            if b"END" in chunk:
-                return
-
-    reader = threading.Thread(target=read)
-    reader.start()
-    with os.fdopen(theirs, "w") as file:
-        with progress(file) as step:
-            step(render_words(math.inf), 0.0)
-            time.sleep(0.5)
-            pictures = drawn.count(b"compiling")
-            step("render", 0.1)
-            time.sleep(0.2)
-            step("render", 0.2)
-            time.sleep(0.7)
-        print("END", file=file, flush=True)
-        reader.join()
-    os.close(ours)
-    text = re.sub(r"\x1b\[[\d;?]*[A-Za-z]", "", drawn.decode())
-    frames = {line for line in re.split(r"[\r\n]+", text) if "compiling" in line}
-    assert pictures >= 3
-    assert len(frames) >= 2  # they differ: it moves
-    assert re.search(r"20 % +0:00:0\d +0:00:0[2-5]", text)
-
-
-def test_durations_read_as_estimates() -> None:
-    said = [duration(seconds) for seconds in (0.2, 99.4, 100.0, 5999.0, 6000.0)]
-    assert said == ["0 s", "99 s", "2 min", "100 min", "1.7 h"]
 
 
 def test_a_render_compiles_until_its_error_is_known() -> None:

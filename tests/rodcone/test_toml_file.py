@@ -1,6 +1,5 @@
 """TOML that would take a parser without limits down, and that a camera and a study both refuse it in one line."""
 
-import os
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -29,14 +28,6 @@ def test_hostile_toml_is_refused_in_one_line(read: Callable[[Path], Any], tmp_pa
         path.write_bytes(text.encode("utf-8", "surrogateescape"))
         with pytest.raises(InputError, match=told):
             read(path)
-
-
-@pytest.mark.timeout(10)
-@pytest.mark.parametrize("read", [read_sensor, read_study])
-def test_a_pipe_is_refused_and_not_waited_for(read: Callable[[Path], Any], tmp_path: Path) -> None:
-    os.mkfifo(tmp_path / "a.toml")
-    with pytest.raises(InputError, match="a folder or a device"):
-        read(tmp_path / "a.toml")
 
 
 def test_the_largest_file_and_the_largest_numbers_are_read(tmp_path: Path) -> None:

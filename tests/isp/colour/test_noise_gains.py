@@ -13,7 +13,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.toml_file import read_toml
 from scenes.reflectances import color_checker
 from sensor.cfa import BAYER, mask
-from sensor.curves import complementary, rgbw
+from sensor.curves import rgbw
 from sensor.raw import RawImage
 
 NM = DEFAULT_WAVELENGTH_NM
@@ -74,16 +74,6 @@ def test_a_frame_without_light_is_all_noise_and_finite(fit: ColourFit) -> None:
         assert found.matrix().sum(axis=1) == pytest.approx(1.0, abs=1e-6), offset
         # all channels alike but for their noise: one weight for each, whatever the colour
         assert np.ptp(found.matrix(), axis=0) == pytest.approx(0.0, abs=1e-3), offset
-
-
-def test_other_channels_are_taken_by_name() -> None:
-    names = ("C", "Y", "M", "W")
-    curves = complementary(rgbw())
-    fit = fit_colours(names, curves.band_average(names, NM, np.full(NM.size, 10.0)), NM, LIGHT, SURFACES)
-    raw = raw_image(np.full((16, 16), 600), ("CM", "YW"))
-    noise = np.diag(colours_in_noise(raw, fit, WhiteBalance(), "Y", FLAT).moments - fit.moments)
-    assert (noise[:3] > 0).all()
-    assert noise[3] == 0
 
 
 def test_the_table_holds_what_bilinear_interpolation_leaves_of_noise_in_the_dark() -> None:

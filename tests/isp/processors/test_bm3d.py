@@ -1,14 +1,12 @@
 """Processors that denoise with BM3D's own library: light kept, noise gone, the same bits from any thread."""
 
 import sys
-from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 from builders import RGBW_4X4, raw_image
 
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.sub_images import bm3d
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
@@ -45,15 +43,6 @@ def test_most_of_the_noise_of_a_flat_field_goes_and_no_light(name: str, level_e:
         sigma = np.sqrt(SHARES[channel] * level_e + image.dark_noise_e**2) / SHARES[channel]
         assert abs(picture.rgb[..., index].mean() - level_e) <= 5 * sigma / np.sqrt(count)
         assert picture.rgb[..., index].std() < 0.25 * sigma  # 16 samples averaged at the least
-
-
-def test_the_bits_are_the_same_from_any_thread() -> None:
-    require_library()
-    noisy = np.random.default_rng(5).standard_normal((40, 48, 3))
-    alone = bm3d(noisy, [1.0, 0.5, 2.0])
-    with ThreadPoolExecutor(2) as pool:
-        for result in pool.map(lambda _: bm3d(noisy, [1.0, 0.5, 2.0]), range(2)):
-            np.testing.assert_array_equal(result, alone)
 
 
 def test_a_tile_of_more_sites_is_refused_in_one_line_before_anything_is_denoised(

@@ -114,19 +114,6 @@ def test_nothing_beside_a_highlight_is_brighter_than_it() -> None:
             assert rgb.max() <= FULL_E * (1 + 1e-6), name
 
 
-def test_a_given_balance_takes_the_place_of_gray_world() -> None:
-    for name in AVAILABLE:
-        tile, unit = tile_of(name), unit_of(name)
-        names = channels(tile)
-        other = [neutral_of(name)[channel] * (2.0 if channel == "W" != unit else 1.0) for channel in names]
-        level = PROCESSORS[name].develop(grey(name, tile, np.full((20, 20), 800.0)), IDENTITY, balance=other)
-        assert level.balance == dict.fromkeys(names, "given"), name
-        assert unit in names, name
-        # W given as twice as sensitive as it is: half the luminance where W is that, none of a change where it isn't
-        expected = 400.0 if name in ENDS_IN_W else 800.0
-        assert level.rgb == pytest.approx(np.full((20, 20, 3), expected), rel=1e-5), name
-
-
 def test_listed_defects_are_mended_before_any_processor_sees_them() -> None:
     for name in AVAILABLE:
         raw = grey(name, tile_of(name), np.full((20, 20), 800.0))
@@ -145,17 +132,6 @@ def test_another_mosaic_is_refused_in_one_line() -> None:
         for matrix in (IDENTITY, fit):
             with pytest.raises(InputError, match=r"\Araw: mosaic .* allowed here: .*\Z"):
                 PROCESSORS[name].develop(raw, matrix)
-
-
-def test_a_wrong_matrix_neutral_or_balance_is_refused() -> None:
-    for name in {"rgbw_sato", "rgbw_gindele", "cmyw_yamagami", "bayer_malvar"}.intersection(AVAILABLE):
-        raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
-        with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
-            PROCESSORS[name].develop(raw, np.ones((2, 3)))
-        with pytest.raises(InputError, match=r"^neutral: \[1.0, 2.0\]"):
-            PROCESSORS[name].develop(raw, IDENTITY, neutral=[1, 2])
-        with pytest.raises(InputError, match=r"^balance: \[1.0, 2.0\]"):
-            PROCESSORS[name].develop(raw, IDENTITY, balance=[1, 2])
 
 
 def test_a_missing_library_names_its_extra() -> None:

@@ -9,9 +9,8 @@ from builders import BAYER_PHASES, raw_image
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.demosaic import malvar, menon
 from isp.processors.mosaic import balance_mosaic
-from rodcone.errors import InputError
 from rodcone.optional import optional_library
-from sensor.cfa import BAYER, RGBW
+from sensor.cfa import BAYER
 
 pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
 
@@ -25,14 +24,6 @@ def test_the_interior_is_the_librarys() -> None:
         ours = demosaic(mosaic, cfa)
         np.testing.assert_allclose(ours[12:-12, 12:-12], theirs[12:-12, 12:-12], rtol=0, atol=1e-9)
         assert np.abs(ours - theirs).max() > 1.0, (cfa, demosaic)  # the border is not
-
-
-def test_more_reflection_changes_nothing() -> None:
-    for demosaic in NAMES:
-        # so the padding reaches as far as the filters do, in every phase of the frame's corners
-        mosaic = np.random.default_rng(4).uniform(0, 1000, (37, 34))
-        more = demosaic(np.pad(mosaic, 24, mode="reflect"), ("GB", "RG"))[24:-24, 24:-24]
-        np.testing.assert_allclose(demosaic(mosaic, ("GB", "RG")), more, rtol=0, atol=1e-9)
 
 
 def test_malvars_filters_on_an_impulse() -> None:
@@ -52,14 +43,6 @@ def test_malvars_filters_on_an_impulse() -> None:
         assert blue[y - 2 : y + 3, x] == pytest.approx([-1.5, 0.0, 6.0, 0.0, -1.5]), cfa
 
 
-def test_a_grey_ramp_is_reproduced() -> None:
-    for cfa, demosaic in product(BAYER_PHASES, NAMES):
-        rows, columns = np.indices((40, 42))
-        ramp = 10.0 * rows + 4.0 * columns
-        planes = demosaic(ramp, cfa)[14:-14, 14:-14]
-        assert planes == pytest.approx(np.repeat(ramp[14:-14, 14:-14, None], 3, axis=2), abs=1e-9), (demosaic, cfa)
-
-
 def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> None:
     dn = np.tile(np.array([[600, 1100], [1100, 500]], np.uint16), (4, 4))
     dn[4, 5] = 15_100  # a green; beside it a red that reads 1.5 full wells when balanced
@@ -75,10 +58,3 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     lamp = raw_image(far, BAYER)
     mosaic, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert mosaic[0, 0] == pytest.approx(22_500.0)
-
-
-def test_other_tiles_are_refused() -> None:
-    with pytest.raises(
-        InputError, match=r"^raw: mosaic \('RG', 'BW'\) is not Bayer; allowed here: .*; use another processor"
-    ):
-        malvar(np.zeros((8, 8)), RGBW)

@@ -9,7 +9,7 @@ from builders import raw_image
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.own import MOST_BYTES, own_version, processor_of, require_consent, user_file
+from isp.processors.own import MOST_BYTES, own_version, processor_of, require_consent
 from rodcone.digests import digest_file
 from rodcone.errors import InputError
 from sensor.cfa import BAYER
@@ -96,8 +96,3 @@ def test_what_is_no_plain_file_is_refused(tmp_path: Path) -> None:
     (tmp_path / "long.py").write_bytes(b"#" * (MOST_BYTES + 1))
     for name, words in (("absent", "No such file"), ("folder", "device"), ("pipe", "device"), ("long", "it is over")):
         assert words in told(f"{tmp_path / name}.py:develop")
-
-
-def test_other_names_are_no_files() -> None:
-    for name in ["bayer", "mine.py", "mine.py:", "mine.py:a.b", "mine.py:a b", ":develop", ".py:f"]:
-        assert user_file(name) is None, name

@@ -1,6 +1,5 @@
 """Piecewise linear estimation as a processor: flat fields, highlights, and other curves."""
 
-import warnings
 from itertools import product
 
 import numpy as np
@@ -63,32 +62,12 @@ def test_other_curves_are_warned_of_in_one_line():
             PROCESSORS["ple_rgbw"].develop(raw, np.eye(3), neutral=neutral)
 
 
-def test_own_curves_are_not_warned_of():
-    raw = grey(BAYER_PHASES[0], np.full((16, 16), 1000.0))
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        picture = PROCESSORS["ple_bayer"].develop(raw, np.eye(3), neutral=own_prior().neutral_e[:3])
-    assert set(picture.balance) == set(channels(raw.cfa))
-
-
 @pytest.mark.sample(7)
 @pytest.mark.parametrize(("tile", "at"), LARGE)
 def test_a_flat_grey_field_stays_flat_and_grey_wherever_a_4x4_tile_begins(tile, at):
     turned = tuple("".join(row) for row in np.roll([list(row) for row in tile], (-at[0], -at[1]), (0, 1)))
     rgb = PROCESSORS["ple"].develop(grey(turned, np.full((17, 20), 1000.0)), np.eye(3)).rgb
     assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1.5e-3)
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("name", ["rgbw_4x4", "quad_bayer", "quad_rgbw"])
-def test_highlights_of_4x4_tiles_stay_grey_and_end_at_greens_full_well(name):
-    tile = MOSAICS[name]
-    balance = own_prior().neutral_e[: len(channels(tile))]
-    ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
-    rgb = PROCESSORS["ple"].develop(grey(tile, ramp), np.eye(3), balance=balance).rgb
-    # cells of a quad are four steps of the ramp apart
-    assert np.abs(rgb - rgb[..., 1:2]).max() < 1000.0
-    assert rgb[:, -20:] == pytest.approx(np.full((24, 20, 3), FULL_E), rel=2e-3)
 
 
 @pytest.mark.sample(1)
@@ -122,13 +101,6 @@ def test_what_the_prior_cant_develop_is_refused_in_one_line():
         with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: R, G, B and W .*use any_mosaic") as error:
             PROCESSORS["ple"].develop(raw_image(np.full(shape, 500), tile), np.eye(3))
         assert "\n" not in str(error.value), (tile, shape)
-
-
-def test_other_curves_of_a_quad_mosaic_are_warned_of():
-    (neutral,) = neutral_electrons(preset("studies/configs/sensors/narrow.toml"), ["D65"])
-    raw = grey(MOSAICS["quad_rgbw"], np.full((16, 16), 1000.0))
-    with pytest.warns(UserWarning, match=r"^curves: a neutral reads .* in RGBW, .*`rodcone train`$"):
-        PROCESSORS["ple"].develop(raw, np.eye(3), neutral=neutral)
 
 
 def test_one_channel_tells_nothing_of_the_light():

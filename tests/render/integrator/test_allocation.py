@@ -1,7 +1,5 @@
 """Samples where they are needed: rates of the pixels by closed forms, and no bias against uniform samples."""
 
-from operator import attrgetter
-
 import numpy as np
 import pytest
 from scipy.stats import t
@@ -97,22 +95,6 @@ def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
     assert np.array_equal(one.mean(axis=0)[~lit], other.mean(axis=0)[~lit])
     z = (one.mean(axis=0) - other.mean(axis=0))[lit] / error[lit]
     assert np.abs(z).max() < t.isf(1e-3 / 2 / z.size, 2 * repeats - 2)
-
-
-@pytest.mark.thorough
-def test_rates_are_kept_when_a_render_goes_on_from_another(tmp_path):
-    """Resumed, and read from a folder: the bits of one go."""
-    scene, options = load("cornell_box"), {"wavelength_nm": NM, "seed": 5}
-    whole = render(scene, (16, 16), spp=400, **options)
-    assert whole.counts.max() > whole.counts.min()
-    part = render(scene, (16, 16), spp=100, cache=tmp_path, **options)
-    assert np.array_equal(part.counts // part.counts.min(), whole.counts // whole.counts.min())
-    for on in (
-        render(scene, (16, 16), spp=400, resume=part, **options),
-        render(scene, (16, 16), spp=400, cache=tmp_path, **options),
-    ):
-        for name in ("radiance", "light.difference", "variance", "counts", "coverage.mean"):
-            assert np.array_equal(attrgetter(name)(on), attrgetter(name)(whole)), name
 
 
 def test_a_short_render_without_a_pilot_is_made_anew_where_more_is_asked_for():

@@ -11,13 +11,9 @@ from refusal import refusal
 from sensor.cfa import MOSAICS
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.device import draw_device
 from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
-from sensor.kernel.kernel import read_frame
 from sensor.photodiodes import binned
-from sensor.random import draw_key
-from sensor.readout import as_raw, read_out
 
 # Every term at once, each large enough to be measured on a small chip.
 PIXEL = PixelConfig(
@@ -152,32 +148,6 @@ def test_a_fault_of_5_per_cent_in_each_term_is_caught_in_20_chips(capsys):
 def test_chips_without_a_fault_are_let_pass_in_20_chips():
     # 200 comparisons within 4 standard errors: one would fail in 80 runs with fresh seeds
     assert [wrong(run(CHIP, seed)) for seed in range(SEEDS)] == [set()] * SEEDS
-
-
-@loop("exact", [False, True])
-def test_a_fault_of_5_per_cent_in_crosstalk_is_caught_by_lone_bright_pixels(exact):
-    shape, neighbours = (512, 512), ((2, 1), (2, 3), (1, 2), (3, 2))
-    light_e = np.zeros(shape)
-    light_e[2::4, 2::4] = 5000.0  # none at the border, where charge stays
-    quiet = replace(PIXEL, dark_current_e_per_s=0.0, column_gain_spread=0.0, column_offset_e=0.0, hot_pixel_share=0.0)
-    shares = []
-    for crosstalk in (0.05, 1.05 * 0.05):
-        sensor = replace(SENSOR, pixel=replace(quiet, crosstalk=crosstalk))
-        device = draw_device(sensor, shape, np.random.default_rng(5))
-        expose = read_out if exact else _read_by_engine
-        frame = expose(light_e, sensor, device, 0.0, np.random.default_rng(6)).electrons
-        given = np.mean([frame[row::4, column::4] for row, column in neighbours], axis=0)
-        all_of_it = given * 4 + frame[2::4, 2::4]
-        shares.append((given.mean() / all_of_it.mean(), given.std() / np.sqrt(given.size) / 5000.0))
-    (share, error), (faulty, _) = shares
-    assert error < 0.05 * 0.05 / 10
-    assert abs(share - 0.05) < 4 * error  # 6.3e-5
-    assert abs(faulty - 0.05) > 6 * error
-
-
-def _read_by_engine(light_e, sensor, device, exposure_s, rng):
-    dn = read_frame(light_e.astype(np.float32), sensor, device, exposure_s, draw_key(rng))
-    return as_raw(dn, sensor, exposure_s, engine="test")
 
 
 @pytest.mark.thorough

@@ -2,9 +2,7 @@
 
 import struct
 import sys
-import time
 from pathlib import Path
-from unittest.mock import Mock
 
 import numpy as np
 import pytest
@@ -196,16 +194,6 @@ def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side
     refusal(read_photograph, tmp_path / "shot.dng", match=rf"bytes can't hold the {side} x {side} pixels")
 
 
-@loop("error", [NotImplementedError("filters: 148"), ValueError("a\nb"), np.linalg.LinAlgError("c")])
-def test_what_comes_of_a_damaged_file_by_chance_is_one_line(
-    error: Exception, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """With some damaged patterns LibRaw answers from memory that it never wrote to, each time something else."""
-    path = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE)))
-    monkeypatch.setattr("sensor.raw_files.photograph._raw_image", Mock(side_effect=error))
-    refusal(read_photograph, path, match=r"is no photograph \(.*\); it is damaged, copy it again")
-
-
 @loop("order", ["<", ">"])
 @loop("below", [False, True])
 def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
@@ -222,18 +210,3 @@ def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
     assert read is not None
     assert read.gain_e_per_dn == pytest.approx(10.0)
     assert read.dark_noise_e == pytest.approx(1.0)
-
-
-def test_directories_without_end_are_left_at_once(tmp_path: Path) -> None:
-    """Each of 100 000 directories of no tag names the next; the profile stands in the last, and one names itself."""
-    starts = range(8, 8 + 6 * 100_000, 6)
-    chain = b"".join(struct.pack("<HI", 0, start + 6) for start in starts)
-    last = struct.pack("<HHHIII", 1, 51041, 12, 2, 0, 0)
-    (tmp_path / "a.dng").write_bytes(b"II*\0" + struct.pack("<I", 8) + chain + last)
-    start = time.process_time()
-    assert read_noise_profile(tmp_path / "a.dng", 1000.0) is None
-    (tmp_path / "b.dng").write_bytes(b"II*\0" + struct.pack("<IHI", 8, 0, 8))
-    assert read_noise_profile(tmp_path / "b.dng", 1000.0) is None
-    (tmp_path / "c.raf").write_bytes(b"FUJIFILMCCD-RAW ")  # a format of its own
-    assert read_noise_profile(tmp_path / "c.raf", 1000.0) is None
-    assert time.process_time() - start < 0.5

@@ -27,14 +27,6 @@ def printed(shares: dict[str, dict[str, float]]) -> list[str]:
     return [line.rstrip() for line in text.getvalue().splitlines()]
 
 
-def test_nothing_is_cut_off_in_100_columns() -> None:
-    lines = printed({f"{10**n}cd/m2": dict.fromkeys(TERMS, 0.0123 * 10**n) for n in range(-2, 5)})
-    assert max(map(len, lines)) <= 100
-    assert "…" not in "".join(lines)
-    bright = next(line for line in lines if line.startswith("100cd/m2")).split()
-    assert bright == ["100cd/m2", "1.23e+03", "12.3", "123%", *["123%"] * 6, "(123%)", "123%"]
-
-
 def test_levels_of_the_same_figures_share_a_line_and_what_is_common_is_the_title() -> None:
     lines = printed({"100cd/m2": {"bands": 0.05}, "570cd/m2": {"bands": 0.05}, "1cd/m2": {"bands": 0.01}})
     assert lines[0] == "still_life_outdoor own auto rgbw"

@@ -142,14 +142,6 @@ def test_light_within_bands_is_the_covariance_of_light_and_scene() -> None:
     assert expected > 0
 
 
-def test_a_scene_without_colour_has_no_light_term_in_any_light() -> None:
-    some = found(transport(even(), spectrum=illuminant("F11")), counts=COUNTS)
-    for count in COUNTS:
-        assert rms(some.bands[count].light) < 1e-6 * some.full.mean()
-    errors = [rms(some.bands[count].response) for count in (4, 8, 20, 40)]
-    assert errors[0] > errors[2] > 1e3 * errors[3]
-
-
 def test_jitter_is_the_variance_over_the_places_within_a_band() -> None:
     steps = np.where(np.arange(40) % 2, 0.7, 0.3)[:, None, None] * np.ones((1, *SIZE))
     made = transport(steps, spectrum=flat())
@@ -204,13 +196,6 @@ def test_an_effects_rms_is_free_of_monte_carlo_noise() -> None:
     one = some.lens["diffraction"][0].std() ** 2
     assert abs(product.mean()) < 5 * product.std() / np.sqrt(product.size)
     assert one > 5 * abs(product.mean())
-
-
-def test_a_ledger_counts_no_noise_as_an_effect() -> None:
-    """The same picture: the margin of two standard errors is all that is left, a third of the noise blurred away."""
-    some = found(transport(even(), noise=0.05, seed=1), diffraction=1.0)
-    row = weigh(CONDITION, "rgbw", low_noise(), some, 1.0, 1e-3, QUIET)
-    assert row.lens["diffraction"] < 0.5 * 1e-3 * some.lens["diffraction"][0].std()
 
 
 def test_monte_carlo_draws_have_the_stated_variance() -> None:
@@ -356,13 +341,6 @@ def test_choice_is_the_cheapest_of_all_that_fit() -> None:
     assert choice.count == 12
     assert choice.left_out[other] == frozenset(names)
     assert "diffraction" not in choice.left_out[CONDITION]
-
-
-def test_a_tiny_budget_models_everything_and_a_huge_one_nothing() -> None:
-    tiny = choose([weighed()], SIZES, BudgetShares(1e-9, 1e-10), 512)
-    assert (tiny.count, tiny.left_out[CONDITION]) == (40, frozenset())
-    huge = choose([weighed()], SIZES, BudgetShares(100.0, 1.0), 512)
-    assert (huge.count, huge.left_out[CONDITION]) == (4, frozenset((*IMAGING_TERMS, KERNEL)))
 
 
 def test_samples_are_those_that_monte_carlos_share_asks_for_up_to_the_studys() -> None:

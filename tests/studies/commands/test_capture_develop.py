@@ -1,7 +1,7 @@
 """`rodcone capture` and `rodcone develop`: files, exit codes, and grey walls whose picture is known on paper."""
 
 import json
-from dataclasses import asdict, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,15 +20,12 @@ from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.capture import capture
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out
-from sensor.presets import preset, preset_file
+from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
 from studies.photograph.camera import calibrate, iso_speed
-from studies.photograph.develop import develop_file
-from studies.photograph.picture_file import write_picture
 from studies.photograph.shot import Order, take
-from studies.study.study import SceneChoice, Study
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -143,16 +140,6 @@ def test_a_cube_that_ends_inside_the_window_is_photographed_with_a_warning(tmp_p
     code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 650)), "-o", str(out)])
     assert (code, printed.split()[0], err.count("radiance: its bands, 380 to 650 nm, don't fill")) == (0, str(out), 1)
     assert "they leave out 5.6% of R, 0.0% of G, 0.0% of B, 41.3% of W; give those bands, or narrow" in err
-
-
-def test_another_seed_is_another_chip(exr: Path, tmp_path: Path) -> None:
-    frames = []
-    for seed in ("1", "2"):
-        arguments = ["--seed", seed, "-o", str(tmp_path / "shot.tif"), "--exposure", "0s", "--sensor", "table1_pixel"]
-        call(["capture", str(exr), *arguments])
-        frames.append(read_raw(tmp_path / "shot.tif").electrons.ravel())
-    # In the dark DSNU makes 0.63 of the variance: so much would one chip's frames correlate. Five standard errors of 0.
-    assert abs(np.corrcoef(frames)[0, 1]) < 5 / np.sqrt(frames[0].size)
 
 
 def test_the_file_carries_the_calibration_for_the_light_or_the_white_balance_asked_for(
@@ -485,26 +472,6 @@ def test_what_cannot_be_developed_is_refused_and_leaves_no_picture(
     four = calibrate(preset("low_noise", "rgbw"), illuminant("D65"))  # none of its channels is a W
     write_raw(replace(raw, cfa=("RC", "GB"), colour=four), Path("four.tif"))
     check_refusals("develop", NOT_DEVELOPED, tmp_path)
-
-
-def test_a_raw_file_that_libraw_cant_read_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
-    monkeypatch.chdir(tmp_path)
-    Path("junk.nef").write_bytes(b"no raw file")
-    check_refusals("develop", [("junk.nef", "junk.nef ... LibRaw can't read it")], tmp_path)
-
-
-@pytest.mark.parametrize("kind", [str, Path])
-def test_from_python_paths_are_texts_or_paths(kind: type, exr: Path, tmp_path: Path) -> None:
-    sensor = tmp_path / "mine.toml"
-    sensor.write_bytes(preset_file("low_noise").read_bytes())
-    taken = take(Order(kind(exr), kind(tmp_path / "shot.dng"), sensor=kind(sensor), exposure="10ms"))
-    assert json.dumps(taken.facts)
-    developed = develop_file(kind(taken.paths[0]))
-    write_picture(developed.encoded, kind(tmp_path / "shot.png"))
-    assert (tmp_path / "shot.png").exists()
-    study = Study((SceneChoice(kind(exr)),), ("1cd/m2",), sensors=(kind(sensor),))
-    assert json.loads(json.dumps(asdict(study)))["sensors"] == [str(sensor)]
 
 
 @pytest.mark.sample(1)

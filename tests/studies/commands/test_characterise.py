@@ -2,7 +2,6 @@
 
 import json
 import re
-import warnings
 from xml.etree import ElementTree
 
 import pytest
@@ -10,7 +9,6 @@ from command_line import call, check_refusals
 
 from sensor.emva1288.characterise import characterise, configured
 from sensor.presets import low_noise, preset_file
-from studies.pages.plots import transfer_svg
 
 SPACE = "{http://www.w3.org/2000/svg}"
 SMALL = ["--height", "32", "--width", "48"]
@@ -63,13 +61,6 @@ def test_the_plot_is_one_svg_with_every_level_in_it_and_nothing_from_outside(tmp
     assert list(tmp_path.rglob("*")) == [tmp_path / "new", path]
 
 
-@pytest.mark.thorough
-def test_a_title_with_angle_brackets_is_text(found):
-    root = ElementTree.fromstring(transfer_svg(found, "<script>&"))
-    assert "<script>&" in [text.text for text in root.iter(f"{SPACE}text")]
-    assert list(root.iter(f"{SPACE}script")) == []
-
-
 def test_a_file_of_the_user_s_own_is_measured_too(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text(preset_file("low_noise").read_text("utf-8").replace("dsnu_e = 1.0", "dsnu_e = 9.0"), "utf-8")
@@ -78,21 +69,6 @@ def test_a_file_of_the_user_s_own_is_measured_too(tmp_path):
     assert code == 0
     assert figures["DSNU"]["configured"] == 9.0
     assert figures["DSNU"]["measured"] == pytest.approx(9.0, rel=0.1)
-
-
-def test_a_warning_is_one_line_without_its_place_in_the_code(tmp_path):
-    (tmp_path / "qe.csv").write_text(
-        "wavelength_nm,R,G,B,W\n400,0,0,0.4,0.4\n550,0,0.6,0,0.8\n700,0.5,0,0,0.9\n", "utf-8"
-    )
-    responses = '[responses]\ncsv = "qe.csv"\nrange_nm = [400.0, 700.0]\nquantum_efficiency = "relative"\n'
-    path = tmp_path / "mine.toml"
-    path.write_text(preset_file("low_noise").read_text("utf-8") + responses, "utf-8")
-    with warnings.catch_warnings():
-        warnings.simplefilter("default")
-        code, out, err = call(["characterise", str(path), *SMALL])
-    assert (code, out.count("DSNU"), err.count("\n")) == (0, 1, 1)
-    assert err.startswith("rodcone: sensor file ")
-    assert "its responses are relative" in err
 
 
 def test_bad_input_is_refused(tmp_path, monkeypatch):

@@ -40,14 +40,3 @@ def test_demo_prints_the_report_alone_on_stdout(tmp_path: Path) -> None:
     code, out, _ = call([*arguments, "--level", "10cd/m2", "--sensor", "low_noise"])
     assert (code, out.strip()) == (0, str(tmp_path / "o" / "report.html"))
     assert (tmp_path / "o" / "report.html").stat().st_size > 10_000
-
-
-@pytest.mark.thorough
-def test_a_reader_who_has_enough_ends_the_command_in_silence() -> None:
-    command = "import sys; from studies.commands.cli import main; main(['list'])"
-    with subprocess.Popen([sys.executable, "-c", command], stdout=subprocess.PIPE, stderr=subprocess.PIPE) as run:
-        assert run.stdout is not None
-        assert run.stderr is not None
-        run.stdout.close()
-        assert run.stderr.read() == b""
-    assert run.returncode == 0

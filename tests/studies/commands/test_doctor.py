@@ -127,23 +127,3 @@ def test_the_extras_are_those_of_the_project_and_what_they_bring() -> None:
     assert {name: list(brought) for name, (_, brought) in doctor.EXTRAS.items()} == {
         name: brought for name, brought in named.items() if name not in ("docs", "bench", "test", "dev")
     }
-
-
-def test_a_missing_distribution_is_a_fault_only_where_it_is_needed() -> None:
-    assert doctor.distribution_finding("pytest").value == pytest.__version__
-    assert not doctor.distribution_finding("rodcone-no-such-thing").ok
-    assert doctor.distribution_finding("rodcone-no-such-thing", needed=False) == doctor.Finding(
-        "rodcone-no-such-thing", "not installed", True
-    )
-
-
-def test_a_foreign_render_is_named_in_a_new_python(tmp_path: Path) -> None:
-    (tmp_path / "render").mkdir()
-    (tmp_path / "render" / "__init__.py").write_text("raise RuntimeError('the doctor must not import this')\n")
-    code = (
-        "from studies.commands.doctor import findings\nprint(*[each for each in findings() if not each.ok], sep='\\n')"
-    )
-    engine, render = in_folder(tmp_path, code).splitlines()
-    assert "engine" in engine
-    assert "package render" in render
-    assert str(tmp_path / "render") in render

@@ -1,21 +1,17 @@
 """What `rodcone list` says: every name that a catalogue knows, and temperatures as the spectra have them."""
 
 import json
-import re
 import subprocess
 import sys
 from importlib import import_module
 from pathlib import Path
 
-import colour
-import numpy as np
 import pytest
 from command_line import call, check_refusals
 
 from isp.processors.catalogue import PROCESSORS
 from render import illuminants
 from render.illuminants import illuminant
-from render.photometry import tristimulus
 from scenes import catalog
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
@@ -55,18 +51,6 @@ def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
     lines = printed("mosaics").splitlines()
     assert lines[0] == "mosaics"
     assert [line.split() for line in lines[1:3]] == [["rgbw", "RG/BW"], ["bayer", "RG/GB"]]
-
-
-def test_the_temperatures_are_those_of_the_spectra() -> None:
-    nm = np.arange(380.0, 781.0, 1.0)
-    stated_k = {
-        name: float(found[1]) for name, text in texts("lights").items() if (found := re.search(r"(\d+) K$", text))
-    }
-    assert len(stated_k) > 10
-    for name, temperature_k in stated_k.items():
-        xyz = tristimulus(illuminant(name).band_average(nm, 1.0), nm, np.ones(nm.size))
-        found_k = colour.temperature.xy_to_CCT(xyz[:2] / xyz.sum(), method="McCamy 1992")
-        assert found_k == pytest.approx(temperature_k, rel=0.01), name
 
 
 @pytest.mark.thorough

@@ -45,19 +45,6 @@ def test_an_example_comes_with_all_that_it_names_and_the_help_names_it(tmp_path)
         assert name in " ".join(new_command.study.__doc__.split()), name
 
 
-def test_two_examples_share_sensors_and_a_changed_one_is_left_alone(tmp_path):
-    first, second, third = (tmp_path / f"{name}.toml" for name in ("first", "second", "third"))
-    assert call(["new", "study", "responses", "-o", str(first)])[0] == 0
-    assert call(["new", "study", "metamers", "-o", str(second)])[0] == 0
-    sensor = tmp_path / "sensors" / "xyz.toml"
-    sensor.write_text("mine", "utf-8")
-    code, out, err = call(["new", "study", "metamers", "-o", str(third)])
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert "xyz.toml' exists and differs from the example's" in err
-    assert sensor.read_text("utf-8") == "mine"
-    assert not third.exists()
-
-
 def test_bad_input_is_refused_and_writes_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rows = (

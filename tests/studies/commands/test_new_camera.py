@@ -87,16 +87,6 @@ def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_mea
     assert sensor.responses.band_average(("G",), [536.0], [0.1])[0, 0] == pytest.approx(0.9125, rel=2e-3)
 
 
-def test_a_reports_gain_that_is_set_aside_is_told(tmp_path):
-    report = tmp_path / "report.toml"
-    lines = REPORT.read_text("utf-8").splitlines()
-    kept = [line for line in lines if not line.startswith("black_level_dn")]
-    report.write_text("\n".join(line if not line.startswith("K ") else "K = 0.36" for line in kept), "utf-8")
-    code, _, err = call(["new", "preset", "low_noise", "--noise", report, "-o", tmp_path / "mine.toml"])
-    assert (code, err.count("\n")) == (0, 1)
-    assert "K = 0.36 DN/e- is set aside: without black_level_dn it doesn't tell where the converter ends" in err
-
-
 def test_a_report_with_a_preset_that_lends_is_ready_for_any_scene(tmp_path):
     path = tmp_path / "mine.toml"
     assert call(["new", "preset", "low_noise", "--noise", REPORT, "-o", path]) == (0, f"{path}\n", "")
@@ -139,14 +129,3 @@ def test_what_is_not_allowed_is_refused_and_nothing_is_written(tmp_path, monkeyp
         ("--noise noise.xml", "another ending"),
     )
     check_refusals("new preset -o a.toml", rows, tmp_path)
-
-
-@pytest.mark.usefixtures("cameras")
-def test_neither_file_is_written_over(tmp_path):
-    for name in ("a.toml", "a_curves.csv"):
-        (tmp_path / name).write_text("mine", "utf-8")
-        code, _, err = call(["new", "preset", "--camera", "Maker Model One", "-o", tmp_path / "a.toml"])
-        assert code == 2
-        assert f"{name}' exists" in err
-        assert (tmp_path / name).read_text("utf-8") == "mine"
-        (tmp_path / name).unlink()

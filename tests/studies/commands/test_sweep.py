@@ -15,7 +15,6 @@ import sweep_sample as SAMPLE
 from any_cpu.configurations import environment
 from command_line import call, check_refusals
 
-from studies.commands.cli import app
 from studies.sweep.export import read_rows
 
 REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "flir_bfs_u3_50s5m.toml"
@@ -187,10 +186,3 @@ def test_new_cluster_writes_settings_and_both_refuse_what_they_cannot_do(tmp_pat
     assert "MALLOC_TRIM_THRESHOLD_: null" in (tmp_path / "dask.yaml").read_text("utf-8")
     rows = (("study spectrum -o s.toml", "did you mean 'spectra'?"), ("cluster -o dask.toml", "write dask.yaml"))
     check_refusals("new", rows, tmp_path)
-
-
-def test_shells_complete_the_sweeps_options() -> None:
-    for shell in ("bash", "zsh", "fish"):
-        text = app.generate_completion(prog_name="rodcone", shell=shell)
-        assert "dry-run" in text, shell
-        assert "cluster" in text, shell

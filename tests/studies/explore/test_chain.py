@@ -41,20 +41,6 @@ def test_every_mosaic_that_the_page_offers_is_developed(processor):
         assert np.ptp(photograph(small_transport(), controls).picture) > 0, mosaic
 
 
-def test_without_any_noise_raw_is_the_rounded_expectation():
-    """Shot noise and all other terms off; a full well is the converter's top."""
-    for frames in [1, 3]:
-        quiet = dict.fromkeys(("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s"), 0.0)
-        for level in (0.01, 25.0, 3000.0):
-            controls = Controls(level_cd_m2=level, pixel=quiet, shot_noise=False, frames=frames, seed=3)
-            exposed = photograph(small_transport(), controls).exposed
-            sensor, raw = exposed.sensor, exposed.raw
-            collected_e = np.minimum(exposed.expected_e, sensor.pixel.full_well_e)
-            wanted_dn = np.rint(collected_e / sensor.gain_e_per_dn)
-            assert sensor.black_dn == 0, frames  # five standard deviations of nothing
-            np.testing.assert_allclose(raw.electrons, frames * wanted_dn * sensor.gain_e_per_dn, rtol=1e-12)
-
-
 def test_without_shot_noise_read_noise_is_all_that_moves():
     """Its standard deviation over 1920 pixels of a grey frame is known to 1.6 %; four of these are allowed."""
     terms = {"read_noise_e": 6.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0}
@@ -180,10 +166,3 @@ def test_each_slow_processor_has_a_quick_one_of_its_mosaic():
         quick = stand_in(Controls(processor=name, mosaic=PROCESSORS[name].mosaic), 1000).processor
         assert not is_slow(quick)
         assert PROCESSORS[quick].mosaic == PROCESSORS[name].mosaic
-
-
-def test_a_camera_that_was_kept_is_refused_without_shot_noise_as_a_new_one_is():
-    memo, controls = Memo(), Controls(sensor="staggered")
-    photograph(small_transport(), controls, memo)
-    with pytest.raises(InputError, match="shot_noise: False with 'staggered'"):
-        photograph(small_transport(), replace(controls, shot_noise=False), memo)

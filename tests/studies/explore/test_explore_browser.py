@@ -262,26 +262,6 @@ def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
 
 
 @pytest.mark.thorough
-def test_keys_move_the_measured_pixel_and_take_another_exposure(browser, address):
-    page = CHROME.open_page(browser, address)
-    EXPLORE.settle(page, figures=True)
-    page.evaluate("document.querySelector('.explore canvas').focus()")
-    page.keyboard.press("ArrowDown")
-    said = page.evaluate(
-        """new Promise(done => (function look() { const text = document.querySelector(".budget p")?.textContent;
-           text ? done(text) : setTimeout(look, 20); })())"""
-    )
-    assert said.startswith("Row 25, column 24")
-    first = EXPLORE.picture(page)
-    page.keyboard.press("e")
-    page.evaluate(
-        "document.querySelector('.explore').dispatchEvent(new KeyboardEvent('keydown', {key: 'e', bubbles: true}))"
-    )
-    EXPLORE.settle(page)
-    assert not np.array_equal(first, EXPLORE.picture(page))
-
-
-@pytest.mark.thorough
 def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_sliders_rest(browser, address, one_render):
     page = CHROME.open_page(browser, address)
     EXPLORE.settle(page)

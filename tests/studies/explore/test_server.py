@@ -16,7 +16,7 @@ pytest.importorskip("websockets", reason="needs rodcone[explore]")
 from explore_browser import served as explorer
 
 from rodcone.errors import MOST_TOLD, InputError
-from studies.explore.controls import Controls, Lamp, controls_from, to_json
+from studies.explore.controls import Controls, controls_from, to_json
 from studies.explore.messages import read_message
 from studies.explore.server import BURST_S, MOST_A_SECOND, MOST_CHARACTERS_A_SECOND, listen
 from studies.explore.source import of_transport
@@ -192,14 +192,6 @@ def test_controls_that_are_not_allowed_are_refused():
     for content in NOT_ALLOWED:
         with pytest.raises(InputError, match=r"\A.*\Z"):
             controls_from(content)
-
-
-def test_a_light_of_a_file_is_refused(tmp_path):
-    path = tmp_path / "led.csv"
-    path.write_text("wavelength_nm,power\n400,1\n700,1\n", "utf-8")
-    for controls in (Controls(lamps={"sun": Lamp(str(path))}), Controls(reference_light=str(path))):
-        with pytest.raises(InputError, match="is a file on this machine"):
-            controls_from(to_json(controls))
 
 
 def test_controls_come_back_from_json():

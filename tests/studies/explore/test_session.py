@@ -2,8 +2,6 @@
 
 import json
 import threading
-import time
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -14,16 +12,15 @@ import pytest
 from explore_sample import BANDS, small_transport
 
 import rodcone as public
-from rodcone.errors import MOST_TOLD, InputError
+from rodcone.errors import InputError
 from sensor.presets import preset_file
 from sensor.readout import noise_variance
 from studies.explore import chain
-from studies.explore import session as SESSION
 from studies.explore.answers import noise_share
 from studies.explore.chain import expose_scene
 from studies.explore.controls import Controls
 from studies.explore.memo import Memo
-from studies.explore.session import MOST_NOTES, Session
+from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered, RenderOptions, of_transport, open_source
 
@@ -213,20 +210,6 @@ def test_a_burst_ends_for_a_newer_picture(session, interrupted):
     assert [each["number"] for each in page.headers] == [2]
 
 
-def test_a_burst_ends_where_its_page_is_closed(session, interrupted):
-    page, later = Page(), Page()
-    session.connect(page.send)
-    frames = interrupted(lambda: session.disconnect(page.send))
-    session.take(message("show", 1, **BURST), page.send)
-    while len(frames) < 3:
-        time.sleep(0.01)
-    time.sleep(0.5)  # enough for the other 61
-    assert len(frames) == 3
-    session.connect(later.send)
-    later.ask(session, "hello", 2)
-    assert page.headers == [{"kind": "taken over"}]
-
-
 @pytest.mark.parametrize("kind", ["dng", "histogram"])
 def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
     page = connected(session)
@@ -277,19 +260,6 @@ def test_a_render_that_answered_between_its_runs_has_the_bits_of_one_go():
     assert np.array_equal(alone.transport.radiance, answered.transport.radiance)
 
 
-def test_notes_of_an_answer_are_few_and_short(session, monkeypatch):
-    def warned(*arguments: Any) -> Any:
-        for number in range(50):
-            warnings.warn(f"{number} " + "y" * 100_000, stacklevel=2)
-        return {}, ()
-
-    monkeypatch.setattr(SESSION, "written", warned)
-    page = connected(session)
-    notes = page.ask(session, "histogram", 1, cameras=[{}])["notes"]
-    assert len(notes) == MOST_NOTES
-    assert max(map(len, notes)) <= MOST_TOLD
-
-
 WIDE = {"neighbourhood": 41.0, "patch": 9.0}
 
 
@@ -331,19 +301,6 @@ def test_a_picture_that_stays_as_it_is_is_sent_to_a_page_once(session):
     second.wait("show", 3)
     assert [len(each) for each in second.buffers[-1]] == [40 * 48 * 3] * 2
     assert second.buffers[-1][1] == second.buffers[-2][0]
-
-
-def test_another_view_of_one_connection_takes_over(session):
-    """As a notebook's widget that is shown twice: both count their requests from 1."""
-    page = connected(session)
-    for view in ("first", "second"):
-        session.take(message("hello", 1, page=view), page.send)
-        assert page.ask(session, "show", 2, page=view)["page"] == view
-        page.headers = [each for each in page.headers if each["kind"] != "show"]
-    assert [each["page"] for each in page.headers if each["kind"] == "taken over"] == ["first", "second"]
-    session.take(message("show", 3, page="first"), page.send)
-    assert page.ask(session, "show", 3, page="second")["page"] == "second"
-    assert [each["page"] for each in page.headers if each["kind"] == "show"] == ["second"]
 
 
 def test_what_another_page_asked_is_not_answered_to_the_new_one():

@@ -7,8 +7,6 @@ import pytest
 from command_line import check_refusals
 
 import rodcone as public
-from render.spectrum import DEFAULT_WAVELENGTH_NM
-from rodcone.memory import memory
 from studies.explore.answers import python_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
@@ -51,15 +49,6 @@ def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path
     exec(python_of(state.code, Controls()), names)
     assert np.array_equal(names["picture"], own.picture)  # type: ignore[arg-type]
     assert not np.array_equal(own.exposed.light.spectrum, shot.exposed.light.spectrum)
-
-
-def test_memory_for_a_photograph_is_that_of_its_pixels(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    """A photograph of one colour is packed to a few hundred bytes, by which it would seem to need nothing."""
-    path, asked = tmp_path / "plain.png", []
-    path.write_bytes(to_png(np.full((64, 48, 3), 102, np.uint8)))
-    monkeypatch.setattr("studies.explore.source.require_memory", lambda need, force: asked.append(need))
-    open_source(str(path), RenderOptions())
-    assert asked == [memory(64 * 48, DEFAULT_WAVELENGTH_NM.size, 1)]
 
 
 def test_bad_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

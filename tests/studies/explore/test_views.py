@@ -91,13 +91,6 @@ def test_noise_is_grey_on_average_and_its_spread_is_the_models():
     assert noise_scale_e(shot.exposed) > 0
 
 
-def test_noise_of_several_readings_is_grey_on_average():
-    for sensor in ["dual_gain", "staggered", "split_pixel"]:
-        shot = photograph(small_transport(), Controls(sensor=sensor, level_cd_m2=1.0))
-        grey = VIEWS["noise"](shot)[..., 0].astype(float)
-        assert grey.mean() == pytest.approx(127.5, abs=3.0), sensor
-
-
 def test_terms_that_belong_to_readings_are_refused_in_one_line():
     for changed in ({"pixel": {"read_noise_e": 2.0}}, {"shot_noise": False}):
         with pytest.raises(InputError, match="dual_gain"):
@@ -128,13 +121,6 @@ def test_snr_is_of_what_a_pixel_collects():
     share = 10 * np.log10(collected_e**2 / (collected_e + quantised)) / MOST_SNR_DB
     wanted = np.rint(255 * colormaps["viridis"](np.clip(share, 0.0, 1.0))[..., :3])
     assert np.abs(VIEWS["snr"](shot) - wanted).max() <= 1
-
-
-def test_a_bursts_pixel_is_read_beside_the_bursts_well():
-    exposed = photograph(small_transport(), Controls(level_cd_m2=1e5, exposure=TIME, exposure_s=0.1, frames=4)).exposed
-    told = pixel(exposed, 20, 11)
-    assert told["well_e"] == exposed.raw.full_well_e == pytest.approx(4 * exposed.sensor.pixel.full_well_e, rel=1e-9)
-    assert 0.9 < told["read_e"] / told["well_e"] < 1.1
 
 
 def test_the_truth_has_no_error():

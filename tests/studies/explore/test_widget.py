@@ -8,7 +8,6 @@ import pytest
 from explore_sample import small_transport
 
 import rodcone as public
-from rodcone.errors import InputError
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls
 
@@ -56,8 +55,3 @@ def test_the_widget_brings_the_pages_module_and_style(widget):
     assert ".explore" in made._css
     assert "http:" not in made._esm.replace("http://www.w3.org/2000/svg", "")
     assert "https:" not in made._esm
-
-
-def test_other_objects_are_refused():
-    with pytest.raises(InputError, match=r"give rodcone\.render"):
-        public.explore(np.ones((3, 3)))  # type: ignore[arg-type]

@@ -26,12 +26,6 @@ def test_each_figure_is_its_own_module_s() -> None:
     assert found.s_cielab_median < found.s_cielab_p95
 
 
-def test_pictures_that_are_the_truth_have_no_difference() -> None:
-    found = appearance(TRUTH, true_picture(TRUTH), 40.0)
-    assert (found.s_cielab_median, found.s_cielab_p95, found.flip_mean) == (0.0, 0.0, 0.0)
-    assert found.pu21_psnr_db == float("inf")
-
-
 def test_absolute_luminance_counts_for_pu21_alone_and_an_error_above_white_too() -> None:
     dim, bright = (appearance(PICTURE, true_picture(TRUTH), white) for white in (0.4, 4000.0))
     assert (dim.flip_mean, dim.s_cielab_p95) == (bright.flip_mean, bright.s_cielab_p95)

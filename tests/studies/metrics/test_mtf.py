@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 from scipy.special import erf
-from scipy.stats import t as student
 
 from render.engine import render
 from rodcone.errors import InputError
@@ -85,36 +84,6 @@ def test_scale_offset_sides_and_orientation_do_not_count() -> None:
         assert other.mtf50_cycles_per_px == pytest.approx(found.mtf50_cycles_per_px, rel=5e-3)  # other rows may go
         assert other.angle_deg == pytest.approx(5.0, abs=1e-3)
     assert edge_response(picture[:, ::-1]).angle_deg == pytest.approx(-5.0, abs=1e-3)
-
-
-def noise_of_mtf50(degrees: float, noise: float, truth: float) -> float:
-    """Relative standard deviation of MTF50 of a Gaussian blur, worked out on paper, for noise a share of the step.
-
-    A bin of a quarter pixel holds rows / 4 / cos samples. The derivative of two bins passes sin(2 pi f / 4) of their
-    noise, the window 0.397 of its variance (0.54^2 + 0.46^2 / 2) over 8 reach bins, of which the half in phase counts.
-    Both responses that are divided out raise it; the step itself is 1, MTF 0.5, its steepness 2 ln 2.
-    """
-    tilt, turn = np.tan(np.radians(degrees)), np.cos(np.radians(degrees))
-    rows = np.floor(SIDE * tilt) / tilt
-    bins, bin_noise = 8 * (SIDE / 2) * (1 - tilt) * turn, noise / np.sqrt(rows / 4 / turn)
-    passed = np.sin(2 * np.pi * truth / 4) / (np.sinc(truth / 2) * np.sinc(truth / 4))
-    return float(bin_noise * np.sqrt(0.397 * bins / 2) * passed / np.log(2))
-
-
-def test_noise_scatters_mtf50_about_its_truth_by_what_it_must() -> None:
-    for degrees in [3.0, 7.0]:
-        # 30 dB between the fields, 160 edges. By chance a bound fails once in 100 000: Student's for the mean, beside
-        # what the method allows itself, 4.4 standard errors for the deviation. 5 %: rows that end a turn, the edge's
-        # own fit.
-        noise, count, truth = 10**-1.5, 160, np.sqrt(np.log(2) / 2) / np.pi
-        rng, clean = np.random.default_rng(4), edge(degrees, gaussian(1.0))
-        found = [edge_response(clean + rng.normal(0, noise, clean.shape)).mtf50_cycles_per_px for _ in range(count)]
-        errors = np.array(found) / truth - 1
-        low, high = bounds(truth, 2 * np.log(2), 1.0, degrees)
-        chance = student.isf(0.5e-5, count - 1) * errors.std(ddof=1) / np.sqrt(count)
-        assert low - chance <= errors.mean() <= high + chance, degrees
-        expected = noise_of_mtf50(degrees, noise, truth)
-        assert errors.std(ddof=1) == pytest.approx(expected, rel=4.4 / np.sqrt(2 * (count - 1)) + 0.05), degrees
 
 
 def test_the_rendered_edge_has_its_lean_and_the_response_of_its_pixels() -> None:

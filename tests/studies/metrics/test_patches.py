@@ -41,15 +41,6 @@ def test_each_patch_of_a_render_has_its_own_reflectance() -> None:
     assert np.abs(patch_means(picture, MASKS) - truth).max() < 8 * error.max()
 
 
-def test_a_tilted_chart_is_found_through_its_own_placement() -> None:
-    # The still life's chart leans and stands aside; its patches shrink together and keep their order.
-    masks = patch_masks(load("still_life"), (192, 192), inner=0.8)
-    places = np.array([[mask.mean() for mask in np.nonzero(mask)] for mask in masks]).reshape(4, 6, 2)
-    assert masks.sum(axis=0).max() == 1
-    assert (np.diff(places[..., 0], axis=0) > 0).all()  # rows go down
-    assert (np.diff(places[..., 1], axis=1) > 0).all()  # columns go right
-
-
 def test_snr_of_even_steps_is_exact() -> None:
     # 10 -+ 1 by turns: n / (n - 1) is the sample's variance.
     masks = np.ones((1, 4, 4), dtype=bool)

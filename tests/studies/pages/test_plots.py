@@ -7,21 +7,19 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from matplotlib import rc_context, rcParams
+from matplotlib import rc_context
 from matplotlib.figure import Figure
 from PIL import Image
 
 from studies.pages.plots import (
     CHART,
     LABEL_GAP,
-    PNG_DPI,
     STYLE,
     blank,
     name_at_ends,
     picture_rows,
     plain_ticks,
     png_bytes,
-    spread,
     svg_text,
 )
 
@@ -45,14 +43,6 @@ def test_the_same_figure_is_the_same_file_however_often_and_in_whichever_order_i
         assert svg_text(first) == svg_text(second) == svg
 
 
-@pytest.mark.thorough
-def test_drawing_leaves_matplotlib_as_it_was() -> None:
-    before = dict(rcParams)
-    png_bytes(picture_rows([[("a", PICTURE)]]))
-    svg_text(chart())
-    assert dict(rcParams) == before
-
-
 def test_words_and_pixels_stand_in_the_svg_as_they_are() -> None:
     svg = svg_text(picture_rows([[("W & <b>", PICTURE), ("second", PICTURE[:, :3])]]))
     assert svg.startswith("<svg")
@@ -64,11 +54,6 @@ def test_words_and_pixels_stand_in_the_svg_as_they_are() -> None:
             shown = np.asarray(picture.convert("RGB"), dtype=float) / 255
         assert abs(shown - pixels).max() <= 1 / 255
     assert svg.count("image-rendering:pixelated") == 2
-
-
-def test_a_png_has_two_pixels_a_point() -> None:
-    with Image.open(BytesIO(png_bytes(chart()))) as picture:
-        assert picture.size == (CHART[0] * PNG_DPI // 72, CHART[1] * PNG_DPI // 72)
 
 
 def test_ticks_have_no_exponent_and_less_than_two_decades_have_1_2_and_5() -> None:
@@ -88,9 +73,3 @@ def test_names_at_the_ends_of_lines_keep_their_order_and_their_distance() -> Non
         assert sorted(heights, key=lambda name: heights[name]) == ["far", "low", "high"], log
         points = [height * 72 / figure.dpi for height in sorted(heights.values())]
         assert min(high - low for low, high in pairwise(points)) >= 0.9 * LABEL_GAP, log
-
-
-def test_labels_keep_their_distance() -> None:
-    placed = spread([100.0, 101.0, 199.0], 15, 0, 200)
-    assert placed == [100.0, 115.0, 199.0]
-    assert spread([199.0, 200.0], 15, 0, 200) == [185.0, 200.0]

@@ -16,7 +16,7 @@ from studies.metrics import metric as figures
 from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_data import ReportCell, ReportData
-from studies.pages.report_pictures import SHOWN_BYTES, ReportPictures
+from studies.pages.report_pictures import ReportPictures
 from studies.study.study_file import read_study
 from studies.sweep.row import Row
 
@@ -267,18 +267,6 @@ def test_a_camera_without_an_infrared_filter_has_a_page() -> None:
 
 
 @pytest.mark.thorough
-def test_a_study_of_one_thing_says_so() -> None:
-    page = page_of(SAMPLE.sample_report(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1]))
-    assert (
-        "Nothing to compare: one camera, sensor and exposure. PSNR 7.0\N{NO-BREAK SPACE}dB at moonlight to 28.6" in page
-    )
-    alone = page_of(SAMPLE.sample_report(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1], levels=1))
-    assert "PSNR 7.0\N{NO-BREAK SPACE}dB at moonlight." in alone
-    assert 'id="verdicts"' not in alone
-    assert "moonlight to" not in alone, "one level is no span"
-
-
-@pytest.mark.thorough
 def test_what_did_not_happen_is_not_explained() -> None:
     page = page_of(SAMPLE.sample_report())
     for words in ("denoised", "above the sensor's", "Held fixed</legend>\n\n</fieldset>"):
@@ -308,21 +296,3 @@ def test_the_largest_share_of_the_renders_noise_is_told_once() -> None:
     page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
     assert page.count("at most 5.2 % (office, table1_output, Interleaved)") == 1
     assert "Up to 3 % it doesn't show" in page
-
-
-@pytest.mark.thorough
-def test_pictures_beside_the_page_are_the_only_ones_it_may_fetch() -> None:
-    of = SAMPLE.sample_report()
-    assert "img-src data:;" in page_of(of)
-    less = replace(of, cells=(replace(of.cells[0], picture=None), *of.cells[1:]))
-    assert "img-src data: 'self' file:;" in unescape(page_of(less))
-
-
-@pytest.mark.thorough
-def test_numbers_of_300_cells_take_less_than_a_tenth_of_the_page() -> None:
-    """A page of 300 cells is to stay under 10 MB: `SHOWN_BYTES` of pictures are 8.7 MB of it in base64."""
-    cameras = tuple(f"camera_{number}" for number in range(11))
-    of = SAMPLE.sample_report(cameras=cameras, seeds=(0, 1, 2), exposures=("auto", "10ms"))
-    assert len(of.cells) == 308
-    page = page_of(replace(of, cells=tuple(replace(cell, picture=None) for cell in of.cells), truths=(None,)))
-    assert len(page.encode()) + SHOWN_BYTES * 4 / 3 < 1e7

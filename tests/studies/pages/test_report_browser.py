@@ -189,46 +189,6 @@ def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: P
 
 
 @pytest.mark.thorough
-def test_ciede2000_is_sharmas_on_colours_where_hues_turn(browser: Any, report: Path) -> None:
-    """Some of the pairs of table 1 of Sharma, Wu & Dalal 2005, made to catch wrong means of hues."""
-    pairs = [
-        ((50, 2.6772, -79.7751), (50, 0, -82.7485), 2.0425),
-        ((50, 2.5, 0), (50, 0, -2.5), 4.3065),
-        ((50, 2.49, -0.001), (50, -2.49, 0.0011), 7.2195),
-        ((50, -1, 2), (50, 0, 0), 2.3669),
-        ((2.0776, 0.0795, -1.135), (0.9033, -0.0636, -0.5514), 0.9082),
-        ((90.8027, -2.0831, 1.441), (91.1528, -1.6435, 0.0447), 1.4441),
-    ]
-    page = CHROME.open_page(browser, report)
-    for one, other, wanted in pairs:
-        assert page.evaluate(f"deltaE({list(one)}, {list(other)}, 0)") == pytest.approx(wanted, abs=1e-4)
-
-
-@pytest.mark.thorough
-def test_wipe_and_a_or_b(browser: Any, report: Path) -> None:
-    page = CHROME.open_page(browser, report)
-    page.evaluate("document.documentElement.style.scrollBehavior = 'auto'; byId('stage').scrollIntoView()")
-    box = page.evaluate("(({left, top, width}) => [left, top, width])(byId('stage').getBoundingClientRect())")
-    CHROME.drag(page, (box[0] + 0.5 * box[2], box[1] + 50), (box[0] + 0.25 * box[2], box[1] + 60))
-    assert page.evaluate("byId('wiper').value") == "25"
-    assert "75%" in page.evaluate("getComputedStyle(byId('over')).clipPath")
-    page.evaluate("byId('wiper').focus()")
-    page.keyboard.press("ArrowRight")
-    assert page.evaluate("byId('wiper').getAttribute('aria-valuetext')") == "26 % Interleaved, 74 % Bayer, bilinear"
-    page.evaluate("document.querySelector('[name=view][value=flip]').click(); document.activeElement.blur()")
-    tags = "[byId('tag-A').hidden, byId('tag-B').hidden, byId('flip').textContent]"
-    assert page.evaluate(tags) == [False, True, "Show B (key x)"]
-    for told in ([True, False, "Show A (key x)"], [False, True, "Show B (key x)"]):
-        page.keyboard.press("x")
-        assert page.evaluate(tags) == told
-    page.evaluate("document.querySelector('[name=view][value=side]').click()")
-    shown(page)
-    names = page.evaluate("[...document.querySelectorAll('#side figcaption')].map((one) => one.textContent)")
-    assert names == ["Interleaved", "Bayer, bilinear", "Reference, 256 samples"]
-    assert page.evaluate("getComputedStyle(byId('pair')).display") == "none"
-
-
-@pytest.mark.thorough
 def test_fits_the_window(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     for dark in (False, True):
@@ -397,12 +357,6 @@ def test_a_study_in_which_nothing_competes_shows_its_camera_beside_the_reference
         assert CHROME.complaints(page) == []
 
 
-def test_a_column_outside_the_picture_goes_back_to_its_last(browser: Any, axes: Path) -> None:
-    page = CHROME.open_page(browser, axes)
-    page.evaluate("(() => { byId('column').value = 9999; byId('column').dispatchEvent(new Event('change')) })()")
-    assert page.evaluate("byId('column').value") == "63"
-
-
 @pytest.fixture(scope="module")
 def views(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A report of two scenes under two spectra, of which one condition's pictures are left out."""
@@ -467,24 +421,6 @@ def shown_safely(page: Any) -> dict[str, Any]:
                      psnr: document.querySelector("#numbers td").textContent}})()"""
     )
     return value
-
-
-@pytest.mark.thorough
-def test_choice_of_metrics_and_rows_shows_their_charts(browser: Any, views: Path) -> None:
-    page = CHROME.open_page(browser, views)
-    drawn = "[...document.querySelectorAll('[data-metric=%s]')].filter((one) => one.getClientRects().length).length"
-    assert [page.evaluate(drawn % key) for key in ("psnr_db", "flip_mean", "chart_delta_e_mean")] == [2, 2, 0]
-    page.evaluate("document.querySelector('[name=metric][value=psnr_db]').click()")
-    assert [page.evaluate(drawn % key) for key in ("psnr_db", "flip_mean")] == [0, 2]
-    assert page.evaluate("document.querySelectorAll('[name=metric]').length") == 9, (
-        "the eight of every scene, and the chart's"
-    )
-    pick(page, "byId('rows')", 0)
-    titles = page.evaluate("[...document.querySelectorAll('#drawn h3')].map((one) => one.textContent)")
-    assert titles == ["still_life", "color_checker"]
-    lines = "document.querySelector('figure[data-metric=flip_mean]').querySelectorAll('.mark').length"
-    assert page.evaluate(lines) == 2 * 2, "two cameras at two levels"
-    assert CHROME.complaints(page) == []
 
 
 @pytest.mark.thorough

@@ -5,9 +5,7 @@ import json
 import re
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
-import browser as CHROME
 import numpy as np
 import pytest
 from command_line import call, check_refusals
@@ -16,7 +14,6 @@ from PIL import Image
 from studies.paper import held, levels
 from studies.paper.claims import ClaimCheck, at_least, at_most, over_seeds, range_text, value_text
 from studies.paper.figure1 import gain_db
-from studies.paper.figures_3_5 import likeness
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, as_json, make, write
 from studies.paper.patches import edge_columns
@@ -152,14 +149,6 @@ def test_edge_is_found_at_the_first_bright_column() -> None:
     np.testing.assert_array_equal(edge_columns(field), [4, 5, 6])
 
 
-def test_likeness_is_a_correlation_and_none_without_pixels() -> None:
-    plane, where = np.arange(16.0).reshape(4, 4), np.ones((4, 4), bool)
-    assert likeness(2 * plane + 1, plane, where) == pytest.approx(1.0)
-    assert likeness(-plane, plane, where) == pytest.approx(-1.0)
-    assert likeness(np.ones((4, 4)), plane, where) == 0.0
-    assert likeness(plane, plane, ~where) == 0.0
-
-
 def test_numbers_and_ranges_in_words() -> None:
     assert range_text(at_least("", 1.0, 0.95)) == "at least 0.95"
     assert range_text(at_most("", 1.0, 30.0)) == "at most 30"
@@ -169,20 +158,6 @@ def test_numbers_and_ranges_in_words() -> None:
     # 0.9496 would read 0.95 beside "at least 0.95", and fail: another digit tells why
     assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
     assert value_text(over_seeds("", np.array([1.0, 3.0]), unit="dB")) == "2 ± 13\N{NO-BREAK SPACE}dB"
-
-
-@CHROME.NEEDED
-def test_page_is_quiet_in_a_browser_and_fits_a_phone(paper: Paper, folder: Path, browser: Any) -> None:
-    shades = []
-    for dark in (False, True):
-        page = CHROME.open_page(browser, folder / "paper.html", width=360, dark=dark)
-        page.evaluate("Promise.all([...document.images].map((image) => image.decode()))")
-        assert CHROME.requests(page) == []
-        assert CHROME.complaints(page) == []
-        assert page.evaluate("document.documentElement.scrollWidth") == 360
-        shades.append(float(np.median(CHROME.screenshot(page))))
-    assert shades[0] > 200  # the page's own shade: light
-    assert shades[1] < 60  # and dark
 
 
 @pytest.mark.slow

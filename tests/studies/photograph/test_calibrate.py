@@ -111,12 +111,6 @@ def test_speed_is_78_over_the_exposure_that_fills_the_well() -> None:
     assert iso_speed(dull) == pytest.approx(iso_speed(sensor), rel=1e-12)  # it is counted at the sensor
 
 
-def test_speed_of_a_camera_without_green_is_not_noted() -> None:
-    assert iso_speed(camera({"W": flat()}, ("W",))) is None
-    blind = Spectrum(np.array([900.0, 1000.0]), np.array([1.0, 1.0]))
-    assert iso_speed(camera({"R": flat(), "G": blind, "B": flat()})) is None
-
-
 def test_what_cannot_be_calibrated_is_refused() -> None:
     blind = {"R": flat(), "G": flat(0.5), "B": Spectrum(np.array([900.0, 950.0]), np.array([1.0, 1.0]))}
     with pytest.raises(InputError, match=r"responses: B collects nothing under the light"):

@@ -26,20 +26,6 @@ def test_whole_factors_are_means_of_blocks_and_a_finer_grid_repeats() -> None:
     assert area_average(picture, (6, 8)) == pytest.approx(picture, rel=1e-12)
 
 
-def test_three_pixels_on_two_share_the_middle_one() -> None:
-    # each of two takes one and a half: (a + b / 2) / 1.5, (b / 2 + c) / 1.5
-    assert area_average(np.array([[3.0, 6.0, 12.0]]), (1, 2)) == pytest.approx(np.array([[4.0, 10.0]]))
-
-
-def test_the_mean_and_the_type_are_kept() -> None:
-    for shape in [(5, 7), (13, 4), (40, 31)]:
-        picture = RNG.random((11, 9)).astype(np.float32)
-        found = area_average(picture, shape)
-        assert found.shape == shape, shape
-        assert found.dtype == np.float32, shape
-        assert found.mean() == pytest.approx(picture.mean(), rel=1e-5), shape
-
-
 def test_independent_noise_falls_as_the_root_of_the_pixels_averaged() -> None:
     noise = RNG.standard_normal((400, 400))
     # 40 000 means of four: the standard error of their deviation is 0.35 %

@@ -8,7 +8,7 @@ import pytest
 from rodcone.errors import InputError
 from sensor.presets import preset_file
 from studies.study.levels import parse_exposure
-from studies.study.study import SceneChoice, Study, conditions, label, mosaics
+from studies.study.study import SceneChoice, Study, conditions, mosaics
 
 STUDY = Study((SceneChoice("still_life"), SceneChoice("flat_field", "A")), ("1cd/m2", "25cd/m2", "500lux"))
 
@@ -38,11 +38,6 @@ def test_mosaics_are_those_of_the_processors_each_once() -> None:
 def test_exposures_are_times_with_a_unit_or_auto() -> None:
     for text, seconds in [("auto", None), ("10ms", 0.01), ("0.5 s", 0.5), ("200us", 2e-4), ("1e-2s", 0.01)]:
         assert parse_exposure(text) == (None if seconds is None else pytest.approx(seconds, rel=1e-15)), (text, seconds)
-
-
-def test_files_are_called_by_their_own_names() -> None:
-    for value, name in [("/a/b/desk.exr", "desk.exr"), ("low_noise", "low_noise"), (3, "3")]:
-        assert label(value) == name, (value, name)
 
 
 def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:

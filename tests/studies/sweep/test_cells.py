@@ -34,11 +34,6 @@ def test_each_coordinate_gives_an_exposure_noise_of_its_own() -> None:
         assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(other, "rgbw", 0)), change
 
 
-def test_seed_and_mosaic_give_an_exposure_noise_of_their_own() -> None:
-    assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(AT, "rgbw", 1))
-    assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(AT, "bayer", 0))
-
-
 def test_fixed_patterns_belong_to_sensor_mosaic_and_seed_alone() -> None:
     streams = [("low_noise", "rgbw", 0), ("low_noise", "bayer", 0), ("low_noise", "rgbw", 1), ("x", "rgbw", 0)]
     drawn = [draws(device_stream(*place)) for place in streams]

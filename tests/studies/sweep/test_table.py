@@ -18,7 +18,7 @@ from studies.photograph.picture_file import to_png
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import keep
-from studies.sweep.table import FIGURES, lines, markdown
+from studies.sweep.table import lines, markdown
 
 HERE = Path()
 
@@ -72,11 +72,6 @@ def test_where_chooses_and_a_mean_over_cameras_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=words):
             lines(ROWS, HERE, by, show, where)
-
-
-def test_figures_are_the_ledgers_numbers() -> None:
-    assert {"psnr_db", "delta_e_median", "exposure_s", "snr_db", "chart_delta_e_mean", "substitution"} <= set(FIGURES)
-    assert not {"key", "picture", "seed", "mean_electrons", "host"} & set(FIGURES)
 
 
 def test_chart_colours_are_read_from_the_pictures(tmp_path: Path) -> None:

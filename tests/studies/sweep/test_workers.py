@@ -40,23 +40,6 @@ class Breaking(Executor):
         return future
 
 
-class Alternating(Executor):
-    """Executor of two workers that take turns: each call ends as the next one is asked for."""
-
-    def __init__(self) -> None:
-        self.cells: list[Cell] = []
-        self.open: list[tuple[Future[Any], Any]] = []
-
-    def submit(self, fn: Any, /, *args: Any, **kwargs: Any) -> Future[Any]:
-        self.cells.append(args[0])
-        self.open.append((Future(), lambda: fn(*args, **kwargs)))
-        future = self.open[-1][0]
-        while len(self.open) > (len(self.cells) < 4):  # the last of four ends too
-            ended, call = self.open.pop(0)
-            ended.set_result(call())
-        return future
-
-
 @pytest.fixture
 def cells(tmp_path: Path) -> list[Cell]:
     return SAMPLE.made_cells(tmp_path)
@@ -70,17 +53,6 @@ def test_every_cell_comes_back_once(at_once: int, cells: list[Cell]) -> None:
     assert sorted(keys) == sorted(cell.key for cell in cells)
     assert [row.key for row in run(cells, InThisProcess())] == [cell.key for cell in cells]
     assert list(run([], InThisProcess())) == []
-
-
-@pytest.mark.thorough
-def test_a_worker_makes_all_seeds_of_a_condition(cells: list[Cell]) -> None:
-    """What it prepares for the first serves the others; the other worker is at another condition."""
-    executor = Alternating()
-    assert len(list(run(cells, executor, at_once=2))) == 4
-    assert [(cell.condition.level, cell.seed) for cell in executor.cells] == [
-        *(("1cd/m2", 0), ("25cd/m2", 0)),
-        *(("1cd/m2", 1), ("25cd/m2", 1)),
-    ]
 
 
 def test_what_was_ready_comes_before_the_error(cells: list[Cell], tmp_path: Path) -> None:
