@@ -26,7 +26,7 @@ from scenes.catalog import load
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.response import expected_electrons
-from studies.study.render_noise import charged_share
+from studies.study.render_noise import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep import run_sweep as sweep_run
@@ -287,3 +287,26 @@ def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured
     share = charged_share(np.stack([whole - fold for fold in folds]), whole, sensor, row.exposure_s)
     assert row.mc_share == pytest.approx(share, rel=1e-3)  # single precision
     assert json.loads(row.render)["relative_mc_error"] > transport.relative_mc_error  # of all pixels, and their limit
+
+
+@pytest.mark.thorough
+def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_anew(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    study = Study((SceneChoice("slanted_edge"),), ("1cd/m2",), processors=("bayer",), render=limits)
+    finer = replace(study, render=replace(limits, spp=64))
+    assert [swept(each, tmp_path / "out").made for each in (study, finer, study)] == [1, 1, 0]
+    assert len(list((tmp_path / "out" / "renders").iterdir())) == 1
+    with open_results(tmp_path / "out") as base:
+        assert [row.spp for row in rows(base)] == [16]  # what the last run asked for
+        coarse, fine = sorted(rows(base, everything=True), key=lambda row: row.spp)
+    assert (coarse.spp, fine.spp) == (16, 64)
+    model = SAMPLE.stated(finer).renders[study.scenes[0]]
+    bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
+    transport = render(load("slanted_edge"), (16, 16), **bands, max_spp=64, cache=tmp_path / "out" / "renders")
+    sensor = preset("low_noise", "bayer")
+    whole = expected_electrons(form_image(transport.relight(luminance_cd_m2=1.0), sensor), sensor, fine.exposure_s)
+    halves = transport.relight_halves(luminance_cd_m2=1.0)
+    even, odd = (expected_electrons(form_image(half, sensor), sensor, fine.exposure_s) for half in halves)
+    share = monte_carlo_share((even - odd) / 2, whole, sensor, fine.exposure_s)
+    assert fine.mc_share == pytest.approx(share, rel=1e-4)  # float32 halves
+    assert 0 < fine.mc_share < coarse.mc_share
