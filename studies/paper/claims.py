@@ -3,9 +3,12 @@
 A verdict follows from the numbers and is never written by hand.
 """
 
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from math import inf, isfinite
+from pathlib import Path
 from typing import Literal, get_args
 
 import numpy as np
@@ -84,6 +87,18 @@ class Claim:
         """Reproduced where every check holds, under a condition where some do."""
         held = sum(check.holds for check in self.checks)
         return VERDICTS[0] if held == len(self.checks) else VERDICTS[1] if held else VERDICTS[2]
+
+
+@cache
+def _texts() -> dict[str, dict[str, str]]:
+    """Place, text and note of each claim, by its number."""
+    return tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
+
+
+def claim(number: int, checks: Iterable[ClaimCheck], **values: object) -> Claim:
+    """Claim of a number of `claims.toml`; `values` fill the braces of its note."""
+    text = _texts()[str(number)]
+    return Claim(text["where"], text["text"], tuple(checks), text.get("note", "").format(**values))
 
 
 def about(condition: str, value: float, claimed: float, unit: str = "") -> ClaimCheck:

@@ -19,7 +19,7 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import electrons_at_snr, noise_variance, read_out
 from studies.metrics.truth import light_of
-from studies.paper.claims import Claim, about, at_least, at_most
+from studies.paper.claims import Claim, about, at_least, at_most, claim
 from studies.paper.figures_3_5 import BRIGHT_CD_M2, GAIN_DB, LOW_CD_M2, PITCH_UM, WHOLE, measure_bright
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Setup, decibels, develop, exposures, sensor_of, view
@@ -124,52 +124,30 @@ def claims_early(
     lights : mapping
         `gathered` by the tile's name.
     """
-    note = "Correlation of luminance with the truth where W is full and no colour is, Figure 5's conditions."
     fused = [(name, values) for name, values in bright.items() if name != GINDELE]
-    # Where W is full.
-    fusion = Claim(
-        "Section 2",
-        "Early fusion gives away the light between the two mosaics",
-        tuple(
-            at_most(f"{name}, {reading}", value, WHOLE) for name, values in fused for reading, value in values.items()
+    return (
+        claim(
+            29,
+            (
+                at_most(f"{name}, {reading}", value, WHOLE)
+                for name, values in fused
+                for reading, value in values.items()
+            ),
+            whole=WHOLE,
         ),
-        f"{note} Sato 1983 and Kijima 2007 end at W's full well; whole would be {WHOLE:g} or more.",
-    )
-    recovery = Claim(
-        "Section 2",
-        "Gindele & Gallagher recover RGB where W saturates",
-        tuple(at_least(reading, value, WHOLE) for reading, value in bright[GINDELE].items()),
-        f"{note} On bilinear colours here; they build on Adams' demosaicking.",
-    )
-    # Sensitivities that match.
-    matching = Claim(
-        "Section 2",
-        "Matching sensitivities (a neutral density on W, complementary filters) costs dynamic range",
-        tuple(at_least(name, value, GAIN_DB, "dB") for name, value in lost_db.items()),
-        "Yamagami 1994. From the light that fills the most sensitive colour to that in which W's SNR is 1, even "
-        f"field, D65, {EXPOSURE_S * 1e3:g} ms: RGBW's range less that of W behind a density or of CMYW.",
-    )
-    colours = Claim(
-        "Section 2",
-        "Complementary filters make colour noisier",
-        tuple(at_least(name, value, 1.0, "×") for name, value in noise_ratios.items()),
-        "Noise of linear sRGB about its luminance, of single pixels of C, M, Y over that of R, G, B, each through "
-        "its own matrix. The filters pass more light, and the matrix back to primaries takes differences of it.",
-    )
-    kijima = Claim(
-        "Section 2",
-        "Kijima and Luo match the colours' sensitivity to W's",
-        tuple(
-            about(f"{channel}, {tile}, {how}", value, 1.0, "× W's light")
-            for tile, of_tile in lights.items()
-            for channel, values in of_tile.items()
-            for how, value in zip(HOW, values, strict=True)
+        claim(30, (at_least(reading, value, WHOLE) for reading, value in bright[GINDELE].items())),
+        claim(31, (at_least(name, value, GAIN_DB, "dB") for name, value in lost_db.items()), ms=EXPOSURE_S * 1e3),
+        claim(32, (at_least(name, value, 1.0, "×") for name, value in noise_ratios.items())),
+        claim(
+            33,
+            (
+                about(f"{channel}, {tile}, {how}", value, 1.0, "× W's light")
+                for tile, of_tile in lights.items()
+                for channel, values in of_tile.items()
+                for how, value in zip(HOW, values, strict=True)
+            ),
         ),
-        "Light of the combined colour sample over that of one W. Kijima's combination of samples, on the paper's "
-        "tile and Kodak's. Luo (reference 12): the paper says the same of both, and nothing that tells Luo's from "
-        "Kijima's, so there is no processor of its own.",
     )
-    return fusion, recovery, matching, colours, kijima
 
 
 def section_2(setup: Setup) -> tuple[Claim, ...]:

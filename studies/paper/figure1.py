@@ -14,7 +14,7 @@ from sensor.response import channel_electrons
 from studies.metrics.truth import light_of
 from studies.pages import report_text as text
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, near, over_seeds
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, near, over_seeds
 from studies.paper.setup import (
     READINGS,
     TODAY,
@@ -57,24 +57,15 @@ def half_snr_db(seen: View, reading: str, dark: bool) -> float:
 
 def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tuple[Claim, ...]:
     """Noise in the dark half, none to be seen in the lit one: SNR of a green pixel by reading [dB]."""
-    note = (
-        f"Halves of {DARK_CD_M2:g} and {LIT_CD_M2:g} cd/m², one exposure of {LONGEST_S * 1e3:g} ms, Bayer: ours, "
-        "the paper gives no conditions; low_noise is a pixel of today. f/2.8, the pixel of 6 µm at f/4. Median SNR of "
-        "a green pixel; visible means under 30 dB, as the paper says."
-    )
     return (
-        Claim(
-            "Figure 1a",
-            "The scotopic part of one photograph shows noise",
-            tuple(at_most(name, value, VISIBLE_NOISE_DB, "dB") for name, value in dark_db.items()),
-            note,
+        claim(
+            6,
+            (at_most(name, value, VISIBLE_NOISE_DB, "dB") for name, value in dark_db.items()),
+            dark=DARK_CD_M2,
+            lit=LIT_CD_M2,
+            ms=LONGEST_S * 1e3,
         ),
-        Claim(
-            "Figure 1a",
-            "Its well-lit part shows none",
-            tuple(at_least(name, value, VISIBLE_NOISE_DB, "dB") for name, value in lit_db.items()),
-            "As above.",
-        ),
+        claim(7, (at_least(name, value, VISIBLE_NOISE_DB, "dB") for name, value in lit_db.items())),
     )
 
 
@@ -127,20 +118,10 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) 
     """
     shown_db = {"shot noise alone": shot_db} | {f"{name}, all noise": value for name, value in all_db.items()}
     return (
-        Claim(
-            "Figure 1b",
-            "From pixels of 6 µm to 2 µm the SNR falls 3 times, 9.54 dB",
-            tuple(near(name, value, CLAIMED_DB, MARGIN_DB, "dB") for name, value in shown_db.items()),
-            f"A green pixel on a uniform field, 100 cd/m² of D65, f/4, {EXPOSURE_S * 1e3:g} ms (ours: the paper gives "
-            "no time). Well in proportion to area, dark noise in electrons kept. Dark noise makes the fall steeper, "
-            "fixed pattern makes it flatter.",
+        claim(
+            8, (near(name, value, CLAIMED_DB, MARGIN_DB, "dB") for name, value in shown_db.items()), ms=EXPOSURE_S * 1e3
         ),
-        Claim(
-            "Figure 1b",
-            "The picture of the smaller pixels is visibly worse",
-            (over_seeds("table1_output, PSNR of 6 µm over 2 µm", psnr_gain_db, low=1.0, unit="dB"),),
-            "Developed Bayer pictures against the noise-free truth, mean over seeds; a decibel is easily seen.",
-        ),
+        claim(9, [over_seeds("table1_output, PSNR of 6 µm over 2 µm", psnr_gain_db, low=1.0, unit="dB")]),
     )
 
 

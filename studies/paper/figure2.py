@@ -15,7 +15,7 @@ from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
-from studies.paper.claims import Claim, PaperFigure, about, at_least
+from studies.paper.claims import Claim, PaperFigure, about, at_least, claim
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
 from studies.photograph.snr import channel_e, snr
@@ -85,16 +85,10 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
         Of `coverage`.
     """
     return (
-        Claim(
-            "Figure 2",
-            "W passes what R, G and B pass, all of 400-700 nm",
-            (at_least("W over the largest of the three, at its least", least, 1.0, "×"),),
-            "Curves of the project's own, fitted to ISETCam's interleaved RGBW sensor.",
-        ),
-        Claim(
-            "Section 2",
-            "W gathers about 6 times the signal of G and 10 times that of R and of B",
-            tuple(
+        claim(10, [at_least("W over the largest of the three, at its least", least, 1.0, "×")]),
+        claim(
+            11,
+            (
                 about(f"{channel}, {light}, 380-780 nm", value, CLAIMED[channel], "×")
                 for light, of_light in ratios.items()
                 for channel, value in of_light.items()
@@ -114,30 +108,25 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
         As `bright`, without fixed pattern.
     """
     roots = {channel: sqrt(value) for channel, value in signal_ratios("D65").items()}
-    conditions = f"One pixel of each, {SNR_EXPOSURE_S * 1e3:g} ms, f/2.8, D65;"
     return (
-        Claim(
-            "Section 2",
-            "W's SNR is about 6 times that of G and 10 times that of R and of B",
-            tuple(
+        claim(
+            12,
+            (
                 about(f"{channel}, {name}, {where}: {gain.dark:.0%} dark noise", gain.ratio, CLAIMED[channel], "×")
                 for where, by_sensor in (("moonlight", moon), ("W full", bright))
                 for name, of_sensor in by_sensor.items()
                 for channel, gain in of_sensor.items()
             ),
-            f"{conditions} in moonlight, and where W is nearly full. The per cent are dark noise's part of W's "
-            "variance: where it is nearly all of it, the SNR goes as the signal.",
+            ms=SNR_EXPOSURE_S * 1e3,
         ),
-        Claim(
-            "Section 2",
-            "Where shot noise dominates, W's gain in SNR is the root of its gain in signal",
-            tuple(
+        claim(
+            13,
+            (
                 about(f"{channel}, {name}: {gain.shot:.0%} shot noise", gain.ratio, roots[channel], "×")
                 for name, of_sensor in pure.items()
                 for channel, gain in of_sensor.items()
             ),
-            f"{conditions} where W is nearly full, fixed pattern (PRNU) left out. The per cent are shot noise's part "
-            "of the colour's variance. low_noise is a pixel of today, with 1.5 e⁻ of read noise.",
+            ms=SNR_EXPOSURE_S * 1e3,
         ),
     )
 

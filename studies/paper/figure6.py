@@ -9,7 +9,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import encode_srgb
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, near, over_seeds
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, near, over_seeds
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -72,45 +72,24 @@ def claims_6(
         By reading.
     """
     wanted = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
-    note = "still_life at 25 cd/m² and f/2.8 with Table 1's pixel, study paper_6.toml."
     return (
-        Claim(
-            "Figure 6",
-            "Interleaved is less noisy than Bayer at 5, 10 and 20 ms",
-            tuple(at_most(name, one.noise / bayer[name].noise, 1.0, "×") for name, one in interleaved.items()),
-            f"{note} Scatter of the picture's luminance, held in 0..1 as on a screen, interleaved over Bayer.",
-        ),
-        Claim(
-            "Figure 6, ours",
-            "It is better by PSNR as well, which counts blur and colour",
-            tuple(
+        claim(19, (at_most(name, one.noise / bayer[name].noise, 1.0, "×") for name, one in interleaved.items())),
+        claim(
+            20,
+            (
                 over_seeds(name, one.psnr_db - bayer[name].psnr_db, low=0.0, unit="dB")
                 for name, one in interleaved.items()
             ),
-            f"{note} The paper judges by eye.",
         ),
-        Claim(
-            "Figure 6",
-            "W replaces the luminance at 5 ms, and not at 10 and 20 ms",
-            tuple(
+        claim(
+            21,
+            (
                 near(f"{name}, {'on' if wanted[name] else 'off'}", one.substituted or 0.0, float(wanted[name]), 0.0)
                 for name, one in interleaved.items()
             ),
-            "Share of the exposures in which W replaced it. The paper gives no threshold: each reading has its own, "
-            "set by this very figure (docs/decisions/0005); what is shown is that one threshold tells the times apart.",
         ),
-        Claim(
-            "Section 3.1.3",
-            "Where W replaces the luminance, noise falls a lot",
-            tuple(at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()),
-            f"Noise without substitution over that with it, {DARKEST}.",
-        ),
-        Claim(
-            "Section 3.1.3",
-            "Colour appearance shifts slightly",
-            tuple(at_most(name, swap.delta_e, SLIGHT, "ΔE2000") for name, swap in swaps.items()),
-            "Median CIEDE2000 between the mean pictures with and without.",
-        ),
+        claim(22, (at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()), exposure=DARKEST),
+        claim(23, (at_most(name, swap.delta_e, SLIGHT, "ΔE2000") for name, swap in swaps.items())),
     )
 
 

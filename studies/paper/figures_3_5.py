@@ -18,7 +18,7 @@ from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least, at_most, beside, over_seeds
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least, at_most, beside, claim, over_seeds
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -69,29 +69,13 @@ def colour_and_white(raw: RawImage, seen: View, camera: Camera) -> tuple[Image, 
 
 def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
     """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
-    note = (
-        f"still_life at {LOW_CD_M2:g} cd/m² and {LOW_S * 1e3:g} ms: the paper says low light. Noise is the "
-        "scatter of luminance over exposures."
+    light = {"cd_m2": LOW_CD_M2, "ms": LOW_S * 1e3}
+    noises = (
+        at_most(f"{name}, W's noise over the colours'", one.white_noise / one.colour_noise, 0.5, "×")
+        for name, one in stages.items()
     )
-    return (
-        Claim(
-            "Figure 3",
-            "In the dark the colour image is noisy and the monochrome one clean",
-            tuple(
-                at_most(f"{name}, W's noise over the colours'", one.white_noise / one.colour_noise, 0.5, "×")
-                for name, one in stages.items()
-            ),
-            note,
-        ),
-        Claim(
-            "Figure 3",
-            "The result of both is better than the colour image",
-            tuple(
-                over_seeds(f"{name}, PSNR gained", one.gain_db, low=GAIN_DB, unit="dB") for name, one in stages.items()
-            ),
-            note,
-        ),
-    )
+    gains = (over_seeds(f"{name}, PSNR gained", one.gain_db, low=GAIN_DB, unit="dB") for name, one in stages.items())
+    return claim(14, noises, **light), claim(15, gains, **light)
 
 
 def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
@@ -161,24 +145,15 @@ def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
 def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
     """W partly full and the result whole, by reading."""
     return (
-        Claim(
-            "Figure 5",
-            "At 200 cd/m², 66 ms and 3 µm W is partly saturated",
-            tuple(ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in bright.items()),
-            "still_life, f/2.8; the well in proportion to area.",
-        ),
-        Claim(
-            "Figure 5",
-            "The result is whole where W is saturated",
+        claim(17, (ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in bright.items())),
+        claim(
+            18,
             (
                 *(at_least(f"{name}, colours not full", one.result_likeness, WHOLE) for name, one in bright.items()),
                 *(at_least(f"{name}, a colour full too", one.full_likeness, WHOLE) for name, one in bright.items()),
             ),
-            "Correlation of the result's luminance with the truth's over those pixels. W's own is "
-            + " and ".join(f"{one.white_likeness:.2f} ({name})" for name, one in bright.items())
-            + ". Of the colours' pixels "
-            + " and ".join(f"{one.colours_full:.0%}" for one in bright.values())
-            + " are full too.",
+            white=" and ".join(f"{one.white_likeness:.2f} ({name})" for name, one in bright.items()),
+            full=" and ".join(f"{one.colours_full:.0%}" for one in bright.values()),
         ),
     )
 

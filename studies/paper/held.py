@@ -14,7 +14,7 @@ from sensor.config import SensorConfig
 from sensor.shake import blur_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, PaperFigure, beside, over_seeds
+from studies.paper.claims import Claim, PaperFigure, beside, claim, over_seeds
 from studies.paper.setup import (
     DEFAULT,
     PAPER,
@@ -110,26 +110,25 @@ def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], 
         for name, (theirs, ours) in pairs.items()
     )
     return (
-        Claim(
-            "Abstract",
-            "By hand, W's light allows a shorter exposure than Bayer's",
-            tuple(
-                over_seeds(f"{name}, best time shorter by", x, low=LEVEL_OCTAVES, unit="octaves")
+        claim(
+            27,
+            (
+                over_seeds(f"{name}, best time shorter by", x, LEVEL_OCTAVES, unit="octaves")
                 for name, x in octaves.items()
             ),
-            f"still_life, {READING}, tremor of a hand (sensor.shake), PSNR over {len(TIMES_S)} times. Bayer's best "
-            f"and the interleaved one's: {times}. The tile gathers {more_light:.2f} times Bayer's light, "
-            f"{log2(more_light):.2f} octaves; "
-            f"{mean_octaves / log2(more_light):.0%} of that become a shorter time.",
+            reading=READING,
+            count=len(TIMES_S),
+            times=times,
+            more_light=more_light,
+            octaves=log2(more_light),
+            share=mean_octaves / log2(more_light),
         ),
-        Claim(
-            "Abstract",
-            "By hand, the picture at the best time is better than Bayer's at its own",
-            tuple(
+        claim(
+            28,
+            (
                 over_seeds(f"{name}, PSNR gained", ours.psnr_db - theirs.psnr_db, low=0.0, unit="dB")
                 for name, (theirs, ours) in pairs.items()
             ),
-            "As above.",
         ),
     )
 

@@ -20,7 +20,7 @@ from studies.metrics.appearance import flip
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import measure, psnr_db
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, over_seeds
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, claim, over_seeds
 from studies.paper.figures_3_5 import GAIN_DB
 from studies.paper.setup import (
     CAMERAS,
@@ -124,54 +124,44 @@ def where_white_fills(one: LevelCurves) -> float:
 
 def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
     """Steps of quality, steps of W's part, and what W gains."""
-    (psnr_at, psnr), (delta_at, delta), (flip_at, seen) = (
-        largest_step(*pair) for pair in ((one.psnr_db, -1.0), (one.delta_e, 1.0), (one.flip, 1.0))
-    )
-    any_db = largest_step(one.psnr_db, 0.0)
-    fills_at, log_levels = where_white_fills(one), np.log2(LEVELS_CD_M2)
-    ends = [
-        np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in one.psnr_db.T])
-        for side in (-0.5, 0.5)
-    ]
-    means, margins = one.gain_db.mean(axis=1), half_width(one.gain_db)
-    best, least = one.gain_db[(means - margins).argmax()], one.gain_db[(means + margins).argmin()]
-    note = (
+    how = (
         f"still_life, {READING}, {len(LEVELS_CD_M2)} levels from {LEVELS_CD_M2[0]:g} to {LEVELS_CD_M2[-1]:g} cd/m², "
         "exposed for green up to 66 ms."
     )
+    # Quality from level to level, and over the octave in which W fills.
+    (psnr_at, psnr), (delta_at, delta), (flip_at, seen) = (
+        largest_step(*pair) for pair in ((one.psnr_db, -1.0), (one.delta_e, 1.0), (one.flip, 1.0))
+    )
+    fills_at, log_levels = where_white_fills(one), np.log2(LEVELS_CD_M2)
+    before, after = (
+        np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in one.psnr_db.T])
+        for side in (-0.5, 0.5)
+    )
+    qualities = (
+        over_seeds("PSNR, largest fall from level to level", psnr, high=GAIN_DB, unit="dB"),
+        over_seeds("CIEDE2000, largest rise", delta, high=SEEN_DELTA_E),
+        over_seeds("FLIP, largest rise", seen, high=SEEN_FLIP),
+        over_seeds("PSNR, fall over the octave in which W fills", before - after, high=GAIN_DB, unit="dB"),
+    )
+    places = {"psnr_at": psnr_at, "delta_at": delta_at, "flip_at": flip_at, "fills_at": fills_at}
+    # W's part
+    parts = (
+        at_most("share of similarity by W, largest step", _step(one.similarity), SMOOTH),
+        at_most("substitution's weight, largest step", _step(one.weight), SMOOTH),
+        ClaimCheck("share of similarity by W, in starlight", float(one.similarity[0].mean()), 0.95, 1.0),
+        at_most("share of similarity by W, in full sun", float(one.similarity[-1].mean()), 0.5),
+    )
+    # What W gains
+    means, margins = one.gain_db.mean(axis=1), half_width(one.gain_db)
+    best, least = one.gain_db[(means - margins).argmax()], one.gain_db[(means + margins).argmin()]
+    gains = (
+        over_seeds("gain over the frame without W, largest", best, low=GAIN_DB, unit="dB"),
+        over_seeds("gain over the frame without W, least", least, low=-LEVEL_DB, unit="dB"),
+    )
     return (
-        Claim(
-            "Abstract",
-            "The picture's quality changes gracefully with light",
-            (
-                over_seeds("PSNR, largest fall from level to level", psnr, high=GAIN_DB, unit="dB"),
-                over_seeds("CIEDE2000, largest rise", delta, high=SEEN_DELTA_E),
-                over_seeds("FLIP, largest rise", seen, high=SEEN_FLIP),
-                over_seeds("PSNR, fall over the octave in which W fills", ends[0] - ends[1], high=GAIN_DB, unit="dB"),
-            ),
-            f"{note} The largest are up to {psnr_at:.3g}, {delta_at:.3g} and {flip_at:.3g} cd/m²; W fills at "
-            f"{fills_at:.3g} cd/m². With more light PSNR gains up to {any_db[1].mean():.1f} dB from level to level.",
-        ),
-        Claim(
-            "Abstract",
-            "W's part in the picture falls smoothly as light grows",
-            (
-                at_most("share of similarity by W, largest step", _step(one.similarity), SMOOTH),
-                at_most("substitution's weight, largest step", _step(one.weight), SMOOTH),
-                ClaimCheck("share of similarity by W, in starlight", float(one.similarity[0].mean()), 0.95, 1.0),
-                at_most("share of similarity by W, in full sun", float(one.similarity[-1].mean()), 0.5),
-            ),
-            f"{note} Half of a share at once is taken for a jump.",
-        ),
-        Claim(
-            "Section 3",
-            "W makes the picture better, at no level worse",
-            (
-                over_seeds("gain over the frame without W, largest", best, low=GAIN_DB, unit="dB"),
-                over_seeds("gain over the frame without W, least", least, low=-LEVEL_DB, unit="dB"),
-            ),
-            f"{note} Without W: the same frame with W as if full, and no substitution.",
-        ),
+        claim(24, qualities, how=how, gain_db=_step(one.psnr_db), **places),
+        claim(25, parts, how=how),
+        claim(26, gains, how=how),
     )
 
 

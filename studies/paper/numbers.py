@@ -12,7 +12,7 @@ from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
 from studies.metrics.truth import light_of
-from studies.paper.claims import Claim, ClaimCheck, about, near
+from studies.paper.claims import Claim, ClaimCheck, about, claim, near
 from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
@@ -51,27 +51,18 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
     # The spread of n differences has the relative error 1/sqrt(2 n): 5 of them, a false alarm in 2 million.
     margin = decibels(1 + 5 / sqrt(2 * FLAT_SIDE**2)) + 0.01
     return (
-        Claim(
-            "Section 1",
-            "Moonlight through f/5.6 brings about 10 photons per µm² and second",
-            tuple(about(f"D65, {name}", value, 10.0, "µm⁻² s⁻¹") for name, value in per_um2_s.items()),
-            f"The paper gives no luminance: {MOONLIGHT_CD_M2:g} cd/m² is the one at which its number is right, twice "
-            "what 0.3 lux of a full moon make of a reflectance of 0.18.",
+        claim(
+            1,
+            (about(f"D65, {name}", value, 10.0, "µm⁻² s⁻¹") for name, value in per_um2_s.items()),
+            moonlight=MOONLIGHT_CD_M2,
         ),
-        Claim(
-            "Section 1",
-            "One photon for a pixel of 2 µm in 25 ms of moonlight",
-            tuple(about(f"D65, {name}", value * 2.0**2 * 0.025, 1.0, "photons") for name, value in per_um2_s.items()),
-            "Fill factor 1.",
-        ),
-        Claim(
-            "Section 1",
-            "1000 photons have an SNR of 30 dB",
+        claim(2, (about(f"D65, {name}", value * 2.0**2 * 0.025, 1.0, "photons") for name, value in per_um2_s.items())),
+        claim(
+            3,
             (
                 near("closed form, √1000", decibels(sqrt(1000.0)), 30.0, 0.01, "dB"),
                 near("1000 e⁻ read out, shot noise alone", measured_db, 30.0, margin, "dB"),
             ),
-            "That noise on a uniform field is visible under 30 dB is a finding about observers, and isn't judged here.",
         ),
     )
 
@@ -90,23 +81,12 @@ def range_spans(view: View) -> dict[str, float]:
 
 def range_claim(spans: Mapping[str, float]) -> Claim:
     """Eight decades from day to night, to the order of magnitude; `spans` as of `range_spans`."""
-    return Claim(
-        "Section 1",
-        "Scene intensities span about 10⁸ from day to night",
-        tuple(ClaimCheck(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()),
-        "Moonlight 0.036 cd/m², full sun 100 000 lux on a reflectance of 0.18, moonless clear sky 0.002 lux; of pixels "
-        "0.1 and 99.9 %.",
-    )
+    return claim(4, (ClaimCheck(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()))
 
 
 def table_claim(swing_wells: Mapping[str, float]) -> Claim:
     """Whether Table 1 agrees with itself: the voltage swing [full wells] by reading."""
-    return Claim(
-        "Table 1",
-        "The voltage swing is what a full well gives",
-        tuple(about(name, wells, 1.0, "× the well") for name, wells in swing_wells.items()),
-        "1.08 V over 30 µV/e⁻ is 36 000 e⁻, the well 15 000 e⁻. Here the well clips; the swing is only reported.",
-    )
+    return claim(5, (about(name, wells, 1.0, "× the well") for name, wells in swing_wells.items()))
 
 
 def number_claims(view: View) -> tuple[Claim, ...]:

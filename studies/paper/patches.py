@@ -23,7 +23,7 @@ from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, sensor_of, view
 
@@ -93,15 +93,8 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
 
 def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
     """The statement of Figure 4; `shares` of the pixels beside the edge by condition."""
-    return (
-        Claim(
-            "Figure 4",
-            "The patch around x is nearer to that of y, on its side of an edge, than to that of z beyond it",
-            tuple(at_least(name, share, SHARE, "of the x") for name, share in shares.items()),
-            f"slanted_edge, contrast 4, W's patches of {PATCH} × {PATCH} in units of noise, "
-            f"{EXPOSURE_S * 1e3:g} ms; x {ASIDE} pixels from the edge, y and z {AWAY} from x. Chance gives one half.",
-        ),
-    )
+    checks = (at_least(name, share, SHARE, "of the x") for name, share in shares.items())
+    return (claim(16, checks, patch=PATCH, ms=EXPOSURE_S * 1e3, aside=ASIDE, away=AWAY),)
 
 
 def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
@@ -186,15 +179,13 @@ def difference(reading: str, patch: int) -> float:
 
 def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim, ...]:
     """The two limits of eq. (1); largest differences [ppm] by patch and reading."""
-    names = {1: "A patch of one pixel makes eq. (1) the bilateral filter", 5: "A larger one makes it non-local means"}
     return tuple(
-        Claim(
-            "Section 3.1",
-            names[patch],
-            tuple(at_most(f"{name}, {patch} × {patch}", value, SAME_PPM, "ppm") for name, value in found.items()),
-            f"Largest difference on a noisy edge of {FRAME_SIDE} × {FRAME_SIDE} pixels of W, distances in electrons.",
+        claim(
+            number,
+            (at_most(f"{name}, {patch} × {patch}", value, SAME_PPM, "ppm") for name, value in values.items()),
+            side=FRAME_SIDE,
         )
-        for patch, found in differences.items()
+        for number, (patch, values) in enumerate(differences.items(), 34)
     )
 
 
