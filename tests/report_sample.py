@@ -27,7 +27,7 @@ LEVELS = (
 )
 SENSORS = (ReportSensor("table1_output", preset("table1_output")), ReportSensor("low_noise", preset("low_noise")))
 CAMERAS = ("interleaved", "bayer")
-RENDER = ReportRender("", 256, 40, 41.2, "llvm_ad_spectral", "path + specfilm", "seconds", 0.031, 0.42)
+RENDER = ReportRender("", 256, 40, 41.2, "path + specfilm", "seconds", 0.031)
 AXES = ("scenes", "spectra", "sensors", "exposures", "balances", "cameras", "seeds")
 Change = Callable[[Row], Row | None]
 

@@ -44,19 +44,15 @@ class ReportRender:
     ----------
     relative_mc_error : float
         Of the scene under its own lights.
-    brightest_share : float
-        Largest share of the sensor's noise variance, in the brightest light.
     """
 
     scene: str
     spp: float | None = None
     bands: int | None = None
     seconds: float | None = None
-    variant: str | None = None
     integrator: str | None = None
     stopped_by: str | None = None
     relative_mc_error: float | None = None
-    brightest_share: float | None = None
 
 
 @dataclass(frozen=True)

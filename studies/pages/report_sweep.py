@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import replace
 from importlib import metadata
 from itertools import product
 from pathlib import Path
@@ -135,9 +135,8 @@ def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
     first = next((row for row in rows if row.scene == scene), None)
     if first is None:
         return ReportRender(scene)
-    names = {field.name for field in fields(ReportRender)}
-    further = {name: fact for name, fact in _further(first).items() if name in names}
-    return ReportRender(scene, first.spp, first.bands, first.render_s, first.variant, **further)
+    further = {name: _further(first)[name] for name in ("integrator", "stopped_by", "relative_mc_error")}
+    return ReportRender(scene, first.spp, first.bands, first.render_s, **further)
 
 
 def render_notes(rows: Sequence[Row]) -> list[str]:

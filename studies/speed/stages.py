@@ -9,7 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.interleaved import reconstruct
-from isp.reference import reconstruct_reference
 from isp.settings import Settings
 from render.engine import render
 from render.radiance import SpectralRadiance
@@ -31,7 +30,7 @@ from studies.speed.points import Measured, Stage, Times, electrons, mean_error, 
 from studies.study.levels import parse_level
 
 MOST_BANDS = 40
-STAGES = 6
+STAGES = 5
 Image = NDArray[np.float64]
 T = TypeVar("T")
 
@@ -97,7 +96,7 @@ def stages(bench: Bench, scene: Scene, sensor: SensorConfig) -> Iterator[Stage]:
     view_deg = horizontal_view_deg(scene.geometry["sensor"], radiance.shape[:2])
     yield _lens(bench, sensor, radiance, exposure_s, view_deg)
     yield _readout(bench, sensor, radiance, exposure_s)
-    yield from _reconstruction(bench, sensor, radiance, exposure_s)
+    yield _reconstruction(bench, sensor, radiance, exposure_s)
 
 
 def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport, Stage]:
@@ -170,10 +169,8 @@ def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exp
     )
 
 
-def _reconstruction(
-    bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float
-) -> Iterator[Stage]:
-    """Compare neighbourhoods and patches with the noise-free channels, and the kernel with NumPy's double precision."""
+def _reconstruction(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
+    """Compare neighbourhoods and patches with the noise-free channels."""
     raw = _capture(bench, sensor, radiance, exposure_s)()
     noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
     truth = channel_electrons(form_image(radiance, sensor), sensor, exposure_s)
@@ -185,25 +182,8 @@ def _reconstruction(
     question = f"How far does the reconstruction look? {bench.picture}x{bench.picture}"
     reference = "the noise-free channels; times: of the largest neighbourhood and patch"
     made = timed(calls, bench.repeats)
-    yield _stage(
+    return _stage(
         "neighbourhood and patch", question, reference, noise_e, made, lambda image: _rms_e(image, truth, sensor)
-    )
-    small = replace(raw, dn=raw.dn[:64, :64])
-    smallest = Settings(neighbourhood=bench.neighbourhoods[0], patch=bench.patches[0])
-    forms: dict[str, Callable[[], NDArray[np.floating]]] = {
-        "Dr.Jit, single": partial(reconstruct, small, smallest),
-        "NumPy, double": partial(reconstruct_reference, small, smallest),
-    }
-    results = timed(forms, 1)
-    exact, _ = results["NumPy, double"]
-    question = "Kernel or the equations as written?"
-    yield _stage(
-        "reconstruction's precision",
-        question,
-        "NumPy, double",
-        noise_e,
-        results,
-        lambda image: float(np.sqrt(np.mean((image.astype(np.float64) - exact) ** 2))),
     )
 
 

@@ -86,7 +86,6 @@ def test_every_stage_is_measured(measured: list[Stage]) -> None:
     # An even field: more light modelled is nearer to the whole lens, and diffraction changes nothing in it.
     plain, falloff, glare, whole = (each.error_e for each in by_name["lens"].points)
     assert plain > falloff > glare > whole == 0.0
-    assert by_name["reconstruction's precision"].points[0].error_e < 0.1
 
 
 @pytest.mark.thorough
