@@ -1,6 +1,5 @@
 """What `make verify` keeps: a part that is done is not done again, one that failed or met other code is."""
 
-import json
 import sys
 from pathlib import Path
 from typing import Any
@@ -55,23 +54,3 @@ def test_other_code_is_tried_anew(steps: Steps, monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(verify, "code_digest", lambda: "another state")
     verify.main()
     assert steps.ran == ["first", "second"] * 2
-
-
-def test_fuzzing_goes_on_to_its_count_and_ends_at_a_finding(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    counts = tmp_path / "counts.json"
-    monkeypatch.setattr(verify, "FUZZED", counts)
-    monkeypatch.setattr(verify, "FUZZ_INPUTS", 1000)
-    seen: list[int] = []
-
-    def run(*words: str) -> tuple[int, str]:
-        seen.append(400 * (len(seen) + 1))
-        row = {"tried": seen[-1], "refused": seen[-1] - 1, "accepted": 1, "findings": 0}
-        counts.write_text(json.dumps({"exr 0": row}))
-        return 0, ""
-
-    monkeypatch.setattr(verify, "command", run)
-    assert verify.damaged_files() == (True, "1200 inputs tried, 1199 refused, 1 read, 0 findings")
-    assert seen == [400, 800, 1200]
-    monkeypatch.setattr(verify, "FUZZ_INPUTS", 2000)
-    monkeypatch.setattr(verify, "command", lambda *words: (1, "exr: a finding"))
-    assert verify.damaged_files() == (False, "exr: a finding")

@@ -8,7 +8,7 @@ from isp.planes import fill
 from isp.settings import WINDOW
 from isp.similarity.guide import reliability, reliability_of_mean, saturated_fraction
 from isp.similarity.noise_distance import noise_distances
-from sensor.cfa import BAYER, RGBW, channels
+from sensor.cfa import BAYER, RGBW
 
 
 def exposure(electrons, tile=RGBW):
@@ -78,39 +78,3 @@ def test_a_single_plane_of_independent_pixels_has_twice_the_patch_area():
     table = noise_distances(("W",), 5, 4)[0][0, 0]
     assert table[4, 4] == 0.0
     assert np.count_nonzero(table - 50.0) == 1  # D of n pairs of unit variance is 2n, whatever the overlap
-
-
-@pytest.mark.thorough
-@pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4])
-@pytest.mark.parametrize("patch", [1, 5])
-def test_noise_distance_is_the_mean_over_random_mosaics(tile, patch):
-    """Monte Carlo over 40 white mosaics; each entry may be 6.5 of its standard errors off.
-
-    Student's t with 39 degrees of freedom is that far off with probability 1.0e-7; at most 4 x 16 x 49 entries a case
-    give a false alarm under 4e-4, and the seed is fixed.
-    """
-    size, reach, half = 128, 3, patch // 2
-    rng = np.random.default_rng(11)
-    for letter, table in zip(channels(tile), noise_distances(tile, patch, reach), strict=True):
-        means = []
-        for _ in range(40):
-            plane = fill(rng.normal(size=(size, size)), tile, letter)
-            means.append(_mean_distances(plane, (len(tile), len(tile[0])), reach, half))
-        error = np.std(means, axis=0, ddof=1) / np.sqrt(len(means))
-        assert (np.abs(np.mean(means, axis=0) - table) <= 6.5 * error + 1e-12).all()
-
-
-def _mean_distances(plane, tile_shape, reach, half):
-    """Mean over the frame of the squared patch distance by phase and offset, far from the border."""
-    margin = 16
-    inner = slice(margin, plane.shape[0] - margin)  # 96: a multiple of every tile
-    result = np.empty((*tile_shape, 2 * reach + 1, 2 * reach + 1))
-    for row in range(-reach, reach + 1):
-        for column in range(-reach, reach + 1):
-            squares = (plane - np.roll(plane, (-row, -column), (0, 1))) ** 2
-            for axis in (0, 1):
-                squares = sum(np.roll(squares, step, axis) for step in range(-half, half + 1))
-            distance = squares[inner, inner]
-            blocks = distance.reshape(96 // tile_shape[0], tile_shape[0], 96 // tile_shape[1], tile_shape[1])
-            result[:, :, row + reach, column + reach] = blocks.mean((0, 2))
-    return result

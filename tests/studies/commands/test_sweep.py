@@ -1,12 +1,9 @@
 """`rodcone sweep`, `export`, `new study` and `new cluster`: results alone on stdout, one line for whatever is wrong."""
 
 import json
-import os
-import signal
 import sqlite3
 import subprocess
 import sys
-import time
 from contextlib import closing
 from pathlib import Path
 
@@ -156,29 +153,6 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(
     assert (code, out, err.count("\n")) == (1, "", 1)
     assert "pictures: No space left on device; make room: " in err
     assert "keeps what is done" in err
-
-
-@pytest.mark.slow
-def test_ctrl_c_says_what_is_kept_and_exits_with_130(study: Path, tmp_path: Path) -> None:
-    """A real SIGINT to the whole group of processes, as a terminal sends it, while two workers run."""
-    command = [sys.executable, "-c", "from studies.commands.cli import main; main()", "sweep", str(study)]
-    options = ["-o", str(tmp_path / "out"), "--workers", "2", "--as-stated", "--set", f"seeds={list(range(400))}"]
-    process = subprocess.Popen(
-        [*command, *options], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
-    )
-    for _ in range(600):
-        if any((tmp_path / "out" / "pictures").rglob("*.png")):
-            break
-        time.sleep(0.1)
-    os.killpg(process.pid, signal.SIGINT)
-    out, err = process.communicate(timeout=60)
-    assert (process.returncode, out) == (130, "")
-    assert (
-        err.splitlines()[-1] == f"rodcone: stopped; {tmp_path / 'out'} keeps what is done, and the same command goes on"
-    )
-    assert len(err.splitlines()) == 1
-    with closing(sqlite3.connect(tmp_path / "out" / "ledger.sqlite")) as base:
-        assert 0 < base.execute("SELECT count(*) FROM cells").fetchone()[0] < 800
 
 
 def test_new_cluster_writes_settings_and_both_refuse_what_they_cannot_do(tmp_path: Path) -> None:

@@ -267,24 +267,6 @@ def test_a_camera_without_an_infrared_filter_has_a_page() -> None:
 
 
 @pytest.mark.thorough
-def test_what_did_not_happen_is_not_explained() -> None:
-    page = page_of(SAMPLE.sample_report())
-    for words in ("denoised", "above the sensor's", "Held fixed</legend>\n\n</fieldset>"):
-        assert words not in page
-    assert "The light is denoised" in page_of(SAMPLE.sample_report(denoised=True))
-    noisy = SAMPLE.sample_report(lambda row: replace(row, mc_share=3.5 if row.level == "office" else 0.5, spp=64.0))
-    words = re.search(r'<p class="warning">(.*?)</p>', page_of(noisy))
-    assert words is not None
-    # 64 samples with 3.5 times the variance: 224 with as much, the next power of 2
-    said = unescape(words[1])
-    assert said.startswith("The render's noise")
-    assert "3.5 times the sensor's" in said
-    assert said.endswith(
-        "256 samples a pixel would do (office, table1_output, Interleaved; above the sensor's in 4 of 28 pictures)."
-    )
-
-
-@pytest.mark.thorough
 def test_every_metric_is_explained() -> None:
     assert set(figures.MEANINGS) == {metric.key for metric in figures.METRICS}
     page = unescape(page_of(SAMPLE.sample_report()))

@@ -101,24 +101,6 @@ def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: A
 
 
 @pytest.mark.thorough
-def test_slider_by_keyboard_changes_picture_and_numbers(browser: Any, report: Path) -> None:
-    page = CHROME.open_page(browser, report)
-    results = SAMPLE.sample_report()
-    page.evaluate("document.getElementById('level').focus()")
-    page.keyboard.press("Home")
-    before = shown(page)
-    page.keyboard.press("ArrowRight")
-    after = shown(page)
-    assert (before["level"], after["level"]) == ("moonlight", "street light")
-    psnr_db = SAMPLE.sample_row(1, 0, "interleaved").psnr_db
-    assert after["psnr"] == f"{psnr_db:.1f}" != before["psnr"]
-    assert after["spoken"].startswith("street light, 0.5")
-    assert "street light" in after["status"]
-    assert after["a"] == row_of(results, 2) != before["a"]
-    assert CHROME.complaints(page) == []
-
-
-@pytest.mark.thorough
 def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     results = SAMPLE.sample_report()

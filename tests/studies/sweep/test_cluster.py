@@ -108,29 +108,6 @@ def test_workers_with_many_threads_are_refused(tmp_path: Path) -> None:
         assert "\n" not in str(told.value)
 
 
-@pytest.mark.slow
-def test_a_cluster_that_goes_away_is_told_in_one_line_and_what_is_done_is_kept(
-    tmp_path: Path, capfd: pytest.CaptureFixture[str]
-) -> None:
-    study = SAMPLE.small_study(tmp_path, seeds=tuple(range(200)))
-
-    def orphaned(run: Any, scheduler: "subprocess.Popen[bytes]", cells: Sequence[Cell]) -> Iterator[Row]:
-        for count, row in enumerate(run(cells)):
-            if count == 5:
-                scheduler.kill()
-            yield row
-
-    with (
-        cluster(tmp_path, "--nworkers", "1", "--nthreads", "1") as (address, scheduler),
-        pytest.raises(InputError, match="went away; what is done is kept") as told,
-        on_cluster(address, 60.0) as run,
-    ):
-        SAMPLE.swept(study, tmp_path / "out", partial(orphaned, run, scheduler))
-    assert "\n" not in str(told.value)
-    assert capfd.readouterr() == ("", "")
-    assert 6 <= len(SAMPLE.content(tmp_path / "out")) < 400
-
-
 def test_a_cluster_that_does_not_answer_is_told_in_time() -> None:
     pytest.importorskip("distributed", reason="rodcone[cluster] is not installed")
     began = time.monotonic()

@@ -5,7 +5,6 @@ import json
 import os
 import shutil
 import struct
-import sys
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -13,7 +12,6 @@ from datetime import datetime
 from functools import partial
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
 
 import numpy as np
 import pytest
@@ -238,32 +236,6 @@ def test_a_scene_that_cannot_be_read_is_told_before_the_first_is_rendered(tmp_pa
             swept(replace(study, scenes=(*study.scenes, choice)), tmp_path / "out")
         assert "\n" not in str(told.value)
     assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.thorough
-def test_one_render_serves_all_spectra_and_a_finer_one_goes_on_from_it(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A grey wall under a constant environment: 1 cd/m^2 of it is pi / 0.5 lux whatever the light's spectrum."""
-    asked: list[Any] = []
-    make = sys.modules["studies.study.lit_scene"].render
-    monkeypatch.setattr("studies.study.lit_scene.render", lambda *a, **k: asked.append(k["max_spp"]) or make(*a, **k))
-    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
-    study = Study(
-        (SceneChoice("flat_field"),), ("1cd/m2", "100lux"), ("own", "A"), processors=("bayer",), render=limits
-    )
-    assert swept(study, tmp_path).made == 4
-    assert swept(study, tmp_path).made == 0
-    assert asked == [16]
-    with open_results(tmp_path) as base:
-        table = rows(base)
-        for row in table:
-            assert row.illuminance_lux == pytest.approx(row.luminance_cd_m2 * 2 * 3.141593, rel=1e-5)
-            expected = 1.0 if row.level == "1cd/m2" else 100.0 / (2 * 3.141593)
-            assert row.luminance_cd_m2 == pytest.approx(expected, rel=1e-5)
-        assert len({row.picture for row in table}) == 4
-    assert swept(replace(study, render=replace(limits, spp=32)), tmp_path).made == 0  # the same light, to the bit
-    assert asked == [16, 32]
 
 
 @pytest.mark.thorough
