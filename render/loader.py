@@ -160,6 +160,13 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
     return loaded
 
 
+def load_unlit(scene: Scene, size: tuple[int, int]) -> Any:
+    """Mitsuba's scene without its lights, each shape by itself, for what is seen whatever the light."""
+    description = scene.lit({})
+    description["sensor"] = {**description["sensor"], "film": _recorder(size)}
+    return _load(scene, description)
+
+
 def _with_common_shapes(scene: Scene) -> Scene:
     """Load the shapes that belong to no light once, for all groups' scenes to hold, and the surfaces of lamps.
 

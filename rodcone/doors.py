@@ -182,7 +182,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "shake": _TEXT,
         **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything"), _FLAG),
         **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
-        **dict.fromkeys(("progress", "step", "runner"), _CALL),
+        **dict.fromkeys(("progress", "step", "runner", "make"), _CALL),
         "develop_file.path": _paths,
         "read_study.changes": _each(_TEXT),
         "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),

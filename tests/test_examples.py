@@ -14,8 +14,8 @@ QUICK = {"03_sensor"}  # renders nothing: under a second
 WRITTEN = re.compile(r"\b[\w/]+\.(?:png|dng|exr|html)\b")
 
 
-def test_scripts_are_numbered_from_1_to_8() -> None:
-    assert [path.stem[:3] for path in SCRIPTS] == [f"{number:02d}_" for number in range(1, 9)]
+def test_scripts_are_numbered_from_1_to_9() -> None:
+    assert [path.stem[:3] for path in SCRIPTS] == [f"{number:02d}_" for number in range(1, 10)]
 
 
 def test_a_script_is_a_page() -> None:

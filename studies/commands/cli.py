@@ -44,6 +44,7 @@ app = App(
 app.command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
 app.command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
+app.command("studies.commands.dataset:dataset", name="dataset", help="Make raw frames and their truth to train on.")
 app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
 app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")

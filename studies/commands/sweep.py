@@ -149,7 +149,7 @@ def sweep(
         print_result(_words(sizes), vars(sizes), json=json)
         return 0
     check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
-    with nullcontext(_local(workers)) if cluster is None else on_cluster(cluster) as runner:
+    with nullcontext(local_runner(workers)) if cluster is None else on_cluster(cluster) as runner:
         planned = partial(_plan, task, out, reference, as_stated)
         swept, report = make_all(task, out, planned, runner, clock)
     say(f"its report is {report}")
@@ -185,7 +185,7 @@ def make_all(
         What was made, and the report.
     """
     # the folder first: one that can't be written fails before anything is rendered
-    with at_work(out), _saying_what_is_kept(out), progress(sys.stderr) as step:
+    with at_work(out), saying_what_is_kept(out), progress(sys.stderr) as step:
         with clock.stage("plan"):
             plan = planned(step)
         swept = run_sweep(study, out, plan, runner, step, clock=clock)
@@ -210,7 +210,8 @@ def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(
     print(out)
 
 
-def _local(workers: int | None) -> Runner:
+def local_runner(workers: int | None) -> Runner:
+    """Run tasks in so many processes, one for each core where left out; one alone is this process."""
     count = workers or cores()
     return partial(run, executor=InThisProcess()) if count == 1 else partial(run_in_processes, workers=count)
 
@@ -238,7 +239,7 @@ def _words(sizes: Estimate) -> str:
 
 
 @contextmanager
-def _saying_what_is_kept(out: Path) -> Iterator[None]:
+def saying_what_is_kept(out: Path) -> Iterator[None]:
     """Say what is kept where Ctrl-C or a full disk ends the sweep."""
     try:
         yield

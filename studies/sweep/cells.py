@@ -100,6 +100,11 @@ class Cell:
     render: RenderRecord
     budget_share: float | None = None
 
+    @property
+    def kind(self) -> tuple[str, Condition]:
+        """Cells of one kind differ by their seeds, and share what a processor prepares."""
+        return self.processor, self.condition
+
 
 def labels(condition: Condition) -> dict[str, Any]:
     """Condition as a row names it: a file by its name, without its folder."""

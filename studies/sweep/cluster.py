@@ -15,17 +15,15 @@ from urllib.parse import urlsplit
 
 from rodcone.errors import InputError, one_line
 from rodcone.jit import backend
-from studies.sweep.cells import Cell
 from studies.sweep.provenance import versions
-from studies.sweep.row import Row
-from studies.sweep.workers import cores, run
+from studies.sweep.run_cell import run_cell
+from studies.sweep.workers import Task, cores, run
 
 PATIENCE_S = 30.0  # for scheduler and workers to answer
-Rows = Generator[Row, None, None]
 
 
 @contextmanager
-def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callable[[Sequence[Cell]], Rows]]:
+def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callable[..., Generator[Any, None, None]]]:
     """Connect to a scheduler and give a function that runs cells on its workers; dask replaces a worker that dies.
 
     Parameters
@@ -49,13 +47,15 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
         yield partial(_run, client, address, slots, threads)
 
 
-def _run(client: Any, address: str, slots: int, threads: int, cells: Sequence[Cell]) -> Rows:
+def _run(
+    client: Any, address: str, slots: int, threads: int, cells: Sequence[Task], make: Callable[..., Any] = run_cell
+) -> Generator[Any, None, None]:
     """Run cells; each worker holds two, so that it never waits for the next."""
     from distributed import KilledWorker
 
     executor = client.get_executor(pure=False)
     try:
-        yield from run(cells, executor, at_once=2 * slots, threads=threads)
+        yield from run(cells, executor, at_once=2 * slots, threads=threads, make=make)
     except KilledWorker as error:
         raise InputError(f"cluster: {one_line(error)}; what is done is kept; give workers more memory") from error
     except CancelledError as error:

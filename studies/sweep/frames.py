@@ -4,14 +4,11 @@ Light is linear: a mosaic's expected electrons at any level and exposure are tho
 cell reads one (h, w) array from its path, whatever the number of bands, and no array goes through a scheduler.
 """
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
-from io import BytesIO
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
@@ -20,8 +17,7 @@ from render.illuminants import illuminant, is_light_file
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
-from rodcone.digests import digest, digest_inputs
-from rodcone.files import replacing
+from rodcone.digests import digest_inputs
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, most_informative_s
@@ -35,7 +31,7 @@ from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
 from studies.study.study import Study
 from studies.sweep.provenance import versions
-from studies.sweep.stored import is_whole, keep
+from studies.sweep.stored import is_whole, keep_array, keep_facts, read_facts
 
 
 @dataclass(frozen=True)
@@ -92,13 +88,9 @@ def frame_key(
 
 def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
     """Frame made earlier; None where it or a file that it names is missing or damaged, so that it is made again."""
-    try:
-        stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
-    except (OSError, ValueError):
+    facts = read_facts(folder, key)
+    if facts is None:
         return None
-    if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
-        return None
-    facts = stored["facts"]
     files = {name: folder / facts.pop(name) for name in ("truth", "electrons", "errors")}
     if not all(is_whole(path) for path in files.values()):
         return None
@@ -136,7 +128,7 @@ def make_frames(
         "light": {name: value.tolist() for name, value in vars(light).items()},
         "white_cd_m2": white,
         "lux_per_cd_m2": lux_per_cd_m2(transport, study.levels),
-        "truth": keep(folder, _npy(true_srgb(picture, light, white)), ".npy"),
+        "truth": keep_array(folder, true_srgb(picture, light, white)),
     }
     for key, (preset, sensor) in wanted.items():
         radiances: tuple[SpectralRadiance, ...] = views
@@ -148,11 +140,10 @@ def make_frames(
         facts = scene | {
             "auto_s": unit_exposure_s(radiances[0], preset),
             "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
-            "electrons": keep(folder, _npy(unmoved if sensor.lens.shake_um else whole), ".npy"),
-            "errors": keep(folder, _npy(np.stack(errors).astype(np.float32)), ".npy"),
+            "electrons": keep_array(folder, unmoved if sensor.lens.shake_um else whole),
+            "errors": keep_array(folder, np.stack(errors).astype(np.float32)),
         }
-        with replacing(folder / f"{key}.json") as (text,):
-            text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
+        keep_facts(folder, key, facts)
 
 
 def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longest_s: float) -> float:
@@ -178,9 +169,3 @@ def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum
     """
     nm: Floats = np.arange(DEFAULT_WAVELENGTH_NM[0], max(sensor.window_nm[1], VISIBLE_NM[1]), 10.0)
     return colour_fit(sensor, processor, light_in_bands(spectrum, nm, band_widths(nm)))
-
-
-def _npy(array: NDArray[np.floating]) -> memoryview:
-    file = BytesIO()
-    np.save(file, array)
-    return file.getbuffer()

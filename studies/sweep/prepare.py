@@ -40,8 +40,8 @@ from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
-# Folders beside the results database; the last is of a plan's renders.
-RENDERS, FRAMES, PICTURES, PILOTS = "renders", "frames", "pictures", "pilots"
+# Folders beside the results database: the fourth of a plan's renders, the last two of a data set's planes and shards.
+FOLDERS = RENDERS, FRAMES, PICTURES, PILOTS, PLANES, SET = "renders", "frames", "pictures", "pilots", "planes", "set"
 FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ran their NumPy forms.",)
 
 
@@ -90,14 +90,12 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     if cells is not None:
         return cells
     with job.clock.stage("renders"):
-        model = job.plan.renders.get(opened.choice)
-        share = partial(_brightest_share, job, opened)
-        transport, assumed = make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
+        transport, assumed = scene_transport(job, opened, progress)
     with job.clock.stage("what cells share"):
         record = RenderRecord(
             content=digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data),
             facts=render_facts(transport, photographed(transport, 1.0)),
-            brightest_share=None if job.study.render.noise_share is None else share(transport),
+            brightest_share=None if job.study.render.noise_share is None else _brightest_share(job, opened, transport),
             notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
         _make_files(job, opened, record, transport)
@@ -106,6 +104,12 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     if cells is None:
         raise OSError(None, "files just written are gone", str(job.out / FRAMES))
     return cells
+
+
+def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
+    """Transport of a scene, rendered or out of the folder of renders; with what had to be assumed of a file."""
+    model, share = job.plan.renders.get(opened.choice), partial(_brightest_share, job, opened)
+    return make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
 
 
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:

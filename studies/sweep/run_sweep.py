@@ -25,7 +25,7 @@ from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
 from studies.sweep.database import FILE, add, done, forget_old, note_run, note_stages, open_results, rows, want
-from studies.sweep.prepare import FRAMES, PICTURES, PILOTS, RENDERS, Job, known_cells, scene_cells
+from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
 
@@ -64,7 +64,7 @@ def at_work(out: Path) -> Iterator[None]:
 
 
 def _remove_half_written(out: Path) -> None:
-    for top in (out / name for name in (RENDERS, FRAMES, PICTURES, PILOTS)):
+    for top in (out / name for name in FOLDERS):
         # of a linked folder, which others may share, no lock of this one tells who is at work in it
         for folder, _, files in os.walk(top) if not top.is_symlink() else ():
             for file in files:

@@ -3,10 +3,17 @@
 Against accidents, not intent: bit rot, files cut short, runs that were killed.
 """
 
+import json
+from collections.abc import Mapping
 from functools import lru_cache
+from io import BytesIO
 from pathlib import Path
+from typing import Any
 
-from rodcone.digests import digest_bytes, digest_file
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.digests import digest, digest_bytes, digest_file
 from rodcone.errors import InputError, one_line
 from rodcone.files import inside, replacing
 
@@ -19,6 +26,30 @@ def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
     with replacing(place) as (part,):
         part.write_bytes(content)
     return f"{name[:2]}/{name}{ending}"
+
+
+def keep_array(folder: Path, array: NDArray[Any]) -> str:
+    """Write an array as ``.npy`` by `keep`."""
+    file = BytesIO()
+    np.save(file, array)
+    return keep(folder, file.getbuffer(), ".npy")
+
+
+def keep_facts(folder: Path, key: str, facts: Mapping[str, Any]) -> None:
+    """Write what goes by a key as JSON with its digest, whole or not at all."""
+    with replacing(folder / f"{key}.json") as (text,):
+        text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
+
+
+def read_facts(folder: Path, key: str) -> dict[str, Any] | None:
+    """Facts of `keep_facts`; None where they are missing or damaged."""
+    try:
+        stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
+    except (OSError, ValueError):
+        return None
+    if not isinstance(stored, dict) or digest(stored.get("facts")) != stored.get("digest"):
+        return None
+    return dict(stored["facts"])
 
 
 def is_whole(path: Path) -> bool:

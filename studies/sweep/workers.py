@@ -5,20 +5,17 @@ import os
 import signal
 import threading
 from collections import Counter, deque
-from collections.abc import Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
 from functools import partial
 from multiprocessing import active_children
 from multiprocessing.connection import wait as wait_for
 from multiprocessing.process import BaseProcess
-from typing import Any
+from typing import Any, Protocol
 
 from rodcone.child_process import SAFE_PATH
 from rodcone.errors import InputError
-from studies.study.study import Condition
-from studies.sweep.cells import Cell
-from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
 
 LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
@@ -28,13 +25,26 @@ _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS
 # After a kill, multiprocessing's own process removes the semaphores, and would warn that it did.
 _QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 
-Kind = tuple[Condition, str]
+
+class Task(Protocol):
+    """What a worker makes a result of: a cell of a sweep, a shard of a data set.
+
+    Tasks of one kind share what their maker prepares; the result of each has its key.
+    """
+
+    @property
+    def key(self) -> str:
+        """Hash of all that decides the result."""
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """What a task shares with others of its kind; names it in a message."""
 
 
 class WorkerLostError(RuntimeError):
     """A worker died while the executor held `cells`."""
 
-    def __init__(self, cells: Sequence[Cell]) -> None:
+    def __init__(self, cells: Sequence[Task]) -> None:
         super().__init__("a worker died")
         self.cells = tuple(cells)
 
@@ -58,8 +68,13 @@ def cores() -> int:
 
 
 def run(
-    cells: Iterable[Cell], executor: Executor, *, at_once: int = 1, threads: int | None = None
-) -> Generator[Row, None, None]:
+    cells: Iterable[Task],
+    executor: Executor,
+    *,
+    at_once: int = 1,
+    threads: int | None = None,
+    make: Callable[..., Any] = run_cell,
+) -> Generator[Any, None, None]:
     """Run cells on an executor and give their rows as they come, in no order.
 
     After Ctrl-C no further cell is started; the rows of those that run are still given, then it is raised.
@@ -74,6 +89,8 @@ def run(
         the other; twice as many where a worker would wait long for the next.
     threads : int, optional
         For Dr.Jit in each worker.
+    make : callable
+        Makes the result of a task; of a cell its row.
 
     Raises
     ------
@@ -82,10 +99,10 @@ def run(
     WorkerLostError
         Where the executor broke; rows that were ready have been given.
     """
-    call, waiting = partial(run_cell, most_threads=threads), dict[Kind, deque[Cell]]()
+    call, waiting = partial(make, most_threads=threads), dict[Hashable, deque[Task]]()
     for cell in cells:
-        waiting.setdefault(_kind(cell), deque()).append(cell)
-    running: dict[Future[Row], Cell] = {}
+        waiting.setdefault(cell.kind, deque()).append(cell)
+    running: dict[Future[Any], Task] = {}
     try:
         while True:
             while waiting and len(running) < at_once:
@@ -108,14 +125,9 @@ def run(
             future.cancel()
 
 
-def _kind(cell: Cell) -> Kind:
-    """Cells of one kind differ by their seeds, and share what a processor prepares."""
-    return cell.condition, cell.processor
-
-
-def _take(waiting: dict[Kind, deque[Cell]], running: Iterable[Cell]) -> Cell:
+def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task:
     """Take the next cell: of a kind that none runs of, so that the worker which has just made one makes its others."""
-    busy = {_kind(cell) for cell in running}
+    busy = {cell.kind for cell in running}
     kind = next((kind for kind in waiting if kind not in busy), next(iter(waiting)))
     cell = waiting[kind].popleft()
     if not waiting[kind]:
@@ -123,7 +135,7 @@ def _take(waiting: dict[Kind, deque[Cell]], running: Iterable[Cell]) -> Cell:
     return cell
 
 
-def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
+def _finished(running: dict[Future[Any], Task]) -> Iterator[Any]:
     """Rows of the cells that finished next; an error among them is raised after the rows."""
     ready, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in [future for future in ready if future.exception() is None]:
@@ -136,7 +148,9 @@ def _finished(running: dict[Future[Row], Cell]) -> Iterator[Row]:
         future.result()
 
 
-def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None, None]:
+def run_in_processes(
+    cells: Sequence[Task], workers: int, make: Callable[..., Any] = run_cell
+) -> Generator[Any, None, None]:
     """Run cells on spawned processes; a pool in which one died is made anew.
 
     The cells that a broken pool held are run again, after all others and one by one: where memory was short each now
@@ -150,13 +164,13 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
     """
     threads = max(1, cores() // workers)
     waiting, deaths = {cell.key: cell for cell in cells}, Counter[str]()
-    given_up: list[Cell] = []
+    given_up: list[Task] = []
     while waiting:
         untried = [cell for cell in waiting.values() if not deaths[cell.key]]
         batch, at_once = (untried, workers) if untried else (list(waiting.values()), 1)
         with _pool(workers, threads) as pool:
             try:
-                for row in run(batch, pool, at_once=at_once, threads=threads):
+                for row in run(batch, pool, at_once=at_once, threads=threads, make=make):
                     del waiting[row.key]
                     yield row
             except WorkerLostError as lost:
@@ -165,8 +179,9 @@ def run_in_processes(cells: Sequence[Cell], workers: int) -> Generator[Row, None
     if given_up:
         first = given_up[0]
         raise InputError(
-            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first {first.processor} of "
-            f"{first.condition}; the others are done; the memory may be short: give fewer --workers, or run again"
+            f"cells: {len(given_up)} ended their worker {MOST_DEATHS} times, the first "
+            f"{' of '.join(map(str, first.kind))}; the others are done; the memory may be short: give fewer --workers, "
+            "or run again"
         )
 
 

@@ -1,0 +1,78 @@
+"""The card of a set: what is in it, how bright and how noisy, who may use it, and how it was made."""
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rodcone.files import replacing
+from studies.dataset.sample import PLANES
+from studies.dataset.shards import MANIFEST, read_manifest
+from studies.study.render_noise import noise_note
+
+CARD = "README.md"
+_SNR_DB = (-np.inf, 0.0, 10.0, 20.0, 30.0, np.inf)
+_NOISE = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, np.inf)
+_BAR = 30  # characters of the longest
+
+
+def write_card(folder: Path) -> None:
+    """Write the card of a set by its manifest."""
+    with replacing(folder / CARD) as (place,):
+        place.write_text(card(read_manifest(folder)), "utf-8")
+
+
+def card(lines: Sequence[dict[str, Any]]) -> str:
+    """Card as Markdown, of a manifest's lines."""
+    of_kind = {kind: [line for line in lines if line["kind"] == kind] for kind in ("set", "scene", "shard", "sample")}
+    (head,), samples = of_kind["set"], of_kind["sample"]
+    size = sum(line["bytes"] for line in of_kind["shard"]) / 1e9
+    licences = Counter(line["licence"] for line in of_kind["scene"])
+    splits = {
+        split: [sum(line["samples"] for line in of_kind["shard"] if line["split"] == split),
+                sum(line["split"] == split for line in of_kind["scene"])]
+        for split in dict.fromkeys(line["split"] for line in of_kind["shard"])
+    }  # fmt: skip
+    parts = [
+        f"# {head['name']}",
+        f"{len(samples)} raw frames of simulated cameras with the truth behind them, {size:.3g} GB in "
+        f"{len(of_kind['shard'])} shards. Made by rodcone {head['rodcone']}:",
+        f"    {head['command']}",
+        _table(("split", "samples", "scenes"), [(split, *counts) for split, counts in splits.items()]),
+        "A scene is in one split alone, chosen by its hash. Shards are tar files in WebDataset's layout: "
+        "`KEY.raw.npy` (DN), `KEY.json` (facts: mosaic, black and white level, gain, noise, exposure, light) and",
+        _table(("file", "what it holds"), [(f"`KEY.{name}.npy`", PLANES[name]) for name in head["planes"]]),
+        f"Facts of noise: the variance of a pixel is a x + b + c x² [DN²], x its mean above black. `{MANIFEST}` lists "
+        "scenes, shards with their digests, and samples.",
+        "## Light, noise and the render's own noise",
+        _counts("level", Counter(x["level"] for x in sorted(samples, key=lambda x: x["luminance_cd_m2"]))),
+        _counts("SNR, dB", _histogram([line["snr_db"] for line in samples], _SNR_DB)),
+        _counts("render's variance over the sensor's", _histogram([x["render_noise"] for x in samples], _NOISE)),
+        *(note for note in [noise_note(max((x["render_noise"] for x in samples), default=0.0), 0)] if note),
+        "## Licences",
+        _table(("scenes", "licence"), [(count, text) for text, count in licences.items()]),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def _histogram(values: Sequence[float], edges: Sequence[float]) -> Counter[str]:
+    counts, _ = np.histogram(values, edges)
+    return Counter({_range(low, high): int(n) for low, high, n in zip(edges[:-1], edges[1:], counts, strict=True)})
+
+
+def _range(low: float, high: float) -> str:
+    if np.isinf(low):
+        return f"under {high:g}"
+    return f"{low:g} and more" if np.isinf(high) else f"{low:g} to {high:g}"
+
+
+def _counts(what: str, counts: Counter[str]) -> str:
+    most = max(counts.values(), default=1) or 1
+    return _table((what, "samples", ""), [(name, n, "█" * round(_BAR * n / most)) for name, n in counts.items()])
+
+
+def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+    lines = [head, ["---"] * len(head), *rows]
+    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)

@@ -1,0 +1,219 @@
+"""From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
+
+import re
+from collections.abc import Callable, Generator, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from importlib import metadata
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from isp.processors.own import processor_of
+from rodcone.digests import digest
+from rodcone.errors import InputError
+from rodcone.files import is_half_written
+from rodcone.progress import Step, render_words, told
+from studies.budget.ledger import as_stated
+from studies.dataset.card import CARD, write_card
+from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
+from studies.dataset.sample import SURFACES, Sample, frame_labels
+from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
+from studies.dataset.truth_files import Facts, code_digests, scene_facts, scene_hash, truth_of
+from studies.study.lit_scene import OpenedScene, open_all
+from studies.study.study import Study, label
+from studies.sweep.cells import Cell
+from studies.sweep.database import open_results
+from studies.sweep.prepare import SET, Job, known_cells, scene_cells
+from studies.sweep.provenance import versions
+from studies.sweep.run_sweep import at_work
+
+SPLITS = {"train": 0.8, "validation": 0.1, "test": 0.1}  # share of the scenes, in the mean
+PREPARED = 0.5  # of the progress bar, for the scenes' files
+_NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_-]")
+_SHARD = re.compile(rf"({'|'.join(SPLITS)})-\d{{6}}\.tar")
+
+Runner = Callable[..., Generator[Any, None, None]]
+
+
+@dataclass(frozen=True)
+class SetMade:
+    """What was done: the folder of the set, its samples and shards, and how many of these this run made."""
+
+    folder: Path
+    samples: int
+    shards: int
+    made: int
+
+
+def make_set(
+    study: Study, out: Path, order: SetOrder, command: str, runner: Runner, step: Step | None = None
+) -> SetMade:
+    """Make the shards of a set that are missing, their manifest and card, in the folder ``set`` of a sweep's folder.
+
+    After Ctrl-C, a kill or a full disk the next call goes on. The processors of the study stand for their mosaics.
+
+    Parameters
+    ----------
+    study : Study
+    out : Path
+        Folder; renders and frames stay in it, where a sweep of the same study finds them.
+    order : SetOrder
+    command : str
+        That makes the set, for manifest and card.
+    runner : callable
+        Takes shards and ``make``, gives what `studies.dataset.shards.make_shard` returns as it comes.
+    step : callable, optional
+        Called with what is being done and the share that is done.
+
+    Raises
+    ------
+    InputError
+        For cameras whose raw frames a sample can't hold, parts that don't fit, too little room on the disk, foreign
+        files in the folder, or another set in it.
+    OSError
+        Where a file can't be written.
+    """
+    check_cameras(study, order)
+    scenes, folder = open_all(study), out / SET
+    with at_work(out), told(step) as show, open_results(out) as base:
+        folder.mkdir(exist_ok=True)
+        earlier = _earlier(folder)
+        job = Job(study, as_stated(study), out, base)
+        require_room(bytes_needed(study, job.plan.renders, scenes, order), out)
+        # the files that samples are cut from
+        samples, scene_lines = list[Sample](), list[dict[str, Any]]()
+        for index, opened in enumerate(scenes.values()):
+            rendering = partial(_show_render, show, index, len(scenes))
+            cells = known_cells(job, opened) or scene_cells(job, opened, rendering)
+            facts = scene_facts(job, opened, cells, rendering)
+            samples += _samples_of(job, opened, cells, facts, order)
+            scene_lines.append(_scene_line(opened, facts))
+        # the shards
+        shards = into_shards(samples, order.shards, folder)
+        head = [_head(study, order, samples, command), *scene_lines]
+        if earlier and earlier[0]["identity"] != head[0]["identity"]:
+            raise InputError(
+                f"out: {folder} holds another set, {earlier[0]['command']!r}; allowed: a new folder or that of the "
+                "same set; choose another with --out"
+            )
+        wanted = {shard.key for shard in shards}
+        standing = [made for made in shards_of(earlier) if made.key in wanted and stands(folder, made)]
+        write_manifest(folder, head, standing)
+        there = {made.key for made in standing}
+        missing = [shard for shard in shards if shard.key not in there]
+        for count, made in enumerate(runner(missing, make=make_shard), start=1):
+            standing.append(made)
+            write_manifest(folder, head, standing)
+            show(f"shard {count} of {len(missing)}", PREPARED + (1 - PREPARED) * count / len(missing))
+        write_card(folder)
+    return SetMade(folder, len(samples), len(shards), len(missing))
+
+
+def _show_render(show: Step, index: int, count: int, share: float, error: float) -> None:
+    show(f"scene {index + 1} of {count}: {render_words(error)}", PREPARED * (index + share) / count)
+
+
+def split_of(scene: str) -> str:
+    """Split of a scene by its hash alone, so that it never is in two."""
+    place = int(scene[:12], 16) / 16**12
+    bounds = np.cumsum(list(SPLITS.values()))
+    return list(SPLITS)[min(int(np.searchsorted(bounds, place, side="right")), len(SPLITS) - 1)]
+
+
+def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
+    """Shards of each split, in proportion to its samples, which lie in the order of their keys' hashes: mixed."""
+    shards = []
+    for split in SPLITS:
+        chosen = sorted((x for x in samples if x.split == split), key=lambda x: digest(x.key))
+        number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
+        parts = [chosen[len(chosen) * i // number : len(chosen) * (i + 1) // number] for i in range(number)]
+        for index, part in enumerate(parts):
+            made_from = [(x.key, x.cell.key, _file_names(x), x.planes, x.window, x.parts) for x in part]
+            key = digest([made_from, versions(), code_digests()])
+            shards.append(Shard(key, (folder / f"{split}-{index:06d}.tar").resolve(), tuple(part)))
+    return shards
+
+
+def _earlier(folder: Path) -> Lines:
+    """Manifest of the set in a folder; nothing of a new one. Foreign files are refused."""
+    for path in folder.iterdir():
+        if path.name not in (MANIFEST, CARD) and not _SHARD.fullmatch(path.name) and not is_half_written(path):
+            raise InputError(f"out: {folder} holds a foreign file, {path.name!r}; allowed: a set; move it away")
+    return read_manifest(folder) if (folder / MANIFEST).exists() else []
+
+
+def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
+    """Samples of a scene; cells that differ in what is done with a frame alone are one."""
+    hash_of_scene = scene_hash(opened)
+    planes = tuple(name for name in order.planes if "surfaces" in facts["files"] or name not in SURFACES)
+    samples = dict[str, Sample]()
+    for cell in cells:
+        mosaic = processor_of(cell.processor).mosaic
+        parts = (*frame_labels(cell).values(), mosaic)
+        frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).replace(".", "p")) for part in parts)
+        windows = list(_windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop))
+        if not windows:
+            raise InputError(f"crop: {order.crop} is over the frames' side; allowed: up to that; raise render.size")
+        for part, window in enumerate(windows):
+            key = f"{frame}_s{cell.seed}" + (f"_{window[0]}-{window[1]}" if order.crop else "")
+            known = samples.get(key)
+            if known and frame_labels(known.cell) != frame_labels(cell):
+                raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
+            samples[key] = known or Sample(
+                key=key,
+                cell=cell,
+                mosaic=mosaic,
+                scene_hash=hash_of_scene,
+                split=split_of(hash_of_scene),
+                truth=truth_of(job, facts, cell),
+                planes=planes,
+                part=part,
+                window=window,
+                parts=len(windows) if order.crop else 1,
+            )
+    return list(samples.values())
+
+
+def _windows(shape: tuple[int, ...], crop: int | None) -> Iterator[tuple[int, int, int, int]]:
+    if crop is None:
+        yield 0, 0, shape[0], shape[1]
+        return
+    for row in range(0, shape[0] - crop + 1, crop):
+        for column in range(0, shape[1] - crop + 1, crop):
+            yield row, column, crop, crop
+
+
+def _file_names(sample: Sample) -> list[str]:
+    """Names of the files that a sample reads: each is its content's digest."""
+    truth, cell = sample.truth, sample.cell
+    paths = (truth.channels, truth.lit, truth.surfaces, cell.electrons, cell.errors, cell.truth)
+    return [path.name for path in paths if path]
+
+
+def _scene_line(opened: OpenedScene, facts: Facts) -> dict[str, Any]:
+    source = opened.choice.source
+    return {
+        "kind": "scene",
+        "name": opened.choice.label,
+        "hash": scene_hash(opened),
+        "split": split_of(scene_hash(opened)),
+        "licence": "its owner's" if Path(source).suffix else "MIT, as rodcone; no texture of others",
+        "objects": facts["objects"],
+        "materials": facts["materials"],
+    }
+
+
+def _head(study: Study, order: SetOrder, samples: Sequence[Sample], command: str) -> dict[str, Any]:
+    axes = ("levels", "spectra", "exposures", "sensors", "processors", "seeds")
+    return {
+        "kind": "set",
+        "name": study.name,
+        "rodcone": metadata.version("rodcone"),
+        "command": command,
+        "identity": digest([sorted(sample.key for sample in samples), vars(order)]),
+        "samples": len(samples),
+        "planes": order.planes,
+        "axes": {name: [label(value) for value in getattr(study, name)] for name in axes},
+    }

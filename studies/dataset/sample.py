@@ -1,0 +1,205 @@
+"""A sample of a data set: a raw frame, or a part of one, and what is true of it."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
+from functools import lru_cache
+from math import log10
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from sensor.capture import expose
+from sensor.cfa import channels, mask
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.raw import RawImage
+from sensor.readout import noise_sources, noise_variance
+from studies.study.render_noise import OF_PIXELS, charged_share
+from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
+
+# Truth that a sample may hold beside its raw frame; channel, group and colour are last axes.
+PLANES = {
+    "mosaic_e": "expected photo-electrons of the mosaic",
+    "channels_e": "expected photo-electrons behind every filter at every pixel, in the order of `channels`",
+    "rgb": "linear sRGB adapted to D65, 1 is white, not clipped",
+    "xyz": "CIE XYZ under the scene's own light, Y in cd/m2",
+    "depth": "distance along the camera's axis in m, 0 for none",
+    "normals": "unit normals: x right, y down, z into the scene",
+    "ids": "numbers of object and material in the scene's lists, from 1; 0 for none",
+    "shares": "share of each light group in Y, in the order of `groups`",
+}
+SURFACES = ("depth", "normals", "ids")  # a picture file has none
+
+Arrays = dict[str, NDArray[Any]]
+
+
+@dataclass(frozen=True)
+class TruthFiles:
+    """Arrays that samples of one frame are cut from, float32.
+
+    Attributes
+    ----------
+    channels : Path
+        Expected electrons behind every filter at 1 cd/m^2 and 1 s, (h, w, channel).
+    lit : Path
+        XYZ at 1 cd/m^2, then the share of each light group in Y, (h, w, 3 + group).
+    surfaces : Path or None
+        Depth, normal, object and material, (h, w, 6); None of a picture file.
+    illuminants : mapping of str to any
+        Bands [nm], and by light group its emission in them at 1 cd/m^2 of the scene.
+    """
+
+    channels: Path
+    lit: Path
+    surfaces: Path | None
+    illuminants: Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Sample:
+    """What a sample is made from. It travels to its worker as it is; arrays travel as paths.
+
+    Attributes
+    ----------
+    key : str
+        Name in the set: letters, digits, ``-`` and ``_``.
+    cell : Cell
+        The frame. Its processor and white balance don't matter.
+    mosaic : str
+        As `sensor.variations.vary` takes it.
+    scene_hash : str
+        Of the scene's shapes, whatever its light.
+    split : str
+    truth : TruthFiles
+    planes : tuple of str
+        Of `PLANES`.
+    part : int
+        Number among the parts of the frame.
+    window : (int, int, int, int)
+        First row and column of the part, its height and width.
+    parts : int
+        Of the frame. A part is exposed as a frame of its own; the whole frame is the sweep's, to the bit.
+    """
+
+    key: str
+    cell: Cell
+    mosaic: str
+    scene_hash: str
+    split: str
+    truth: TruthFiles
+    planes: tuple[str, ...]
+    part: int
+    window: tuple[int, int, int, int]
+    parts: int
+
+
+def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
+    """Arrays of a sample by name, the raw frame first, and its facts as JSON holds them."""
+    cell, sensor = sample.cell, sample.cell.sensor
+    row, column, height, width = sample.window
+    place = np.s_[row : row + height, column : column + width]
+    light = cell.luminance_cd_m2 * cell.exposure_s
+    expected_e = np.asarray(_opened(cell.electrons)[place], dtype=np.float64) * light
+    raw = _exposed(sample, expected_e)
+    arrays: Arrays = {"raw": raw.dn}
+    made: dict[str, Callable[[], NDArray[Any]]] = {
+        "mosaic_e": lambda: expected_e,
+        "channels_e": lambda: _opened(sample.truth.channels)[place] * light,
+        "rgb": lambda: _opened(cell.truth)[place],
+        "xyz": lambda: _opened(sample.truth.lit)[place][..., :3] * cell.luminance_cd_m2,
+        "depth": lambda: _surfaces(sample)[place][..., 0],
+        "normals": lambda: _surfaces(sample)[place][..., 1:4],
+        "ids": lambda: _surfaces(sample)[place][..., 4:].astype(np.uint16),
+        "shares": lambda: _opened(sample.truth.lit)[place][..., 3:],
+    }
+    for name in sample.planes:
+        array = made[name]()
+        arrays[name] = array if array.dtype == np.uint16 else np.ascontiguousarray(array, dtype=np.float32)
+    return arrays, _facts(sample, sensor, raw, expected_e)
+
+
+def _exposed(sample: Sample, expected_e: NDArray[np.float64]) -> RawImage:
+    cell, shape = sample.cell, (expected_e.shape[0], expected_e.shape[1])
+    stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
+    if sample.parts > 1:
+        stream = stream.spawn(sample.part + 1)[-1]
+    device = draw_device(cell.sensor, shape, device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
+    return expose(expected_e, cell.sensor, cell.exposure_s, device, stream, exact=True)
+
+
+def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDArray[np.float64]) -> dict[str, Any]:
+    cell, shape = sample.cell, raw.shape
+    row, column, height, width = sample.window
+    light = cell.luminance_cd_m2 * cell.exposure_s
+    errors_e = _opened(cell.errors)[:, row : row + height, column : column + width] * light
+    variance_e2 = noise_variance(expected_e, sensor, cell.exposure_s)
+    # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
+    shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
+    mean_e = {name: float(expected_e[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
+    return {
+        "key": sample.key,
+        "split": sample.split,
+        "scene_hash": sample.scene_hash,
+        **frame_labels(cell),
+        "mosaic": list(sensor.cfa),
+        "channels": list(channels(sensor.cfa)),
+        "seed": cell.seed,
+        "window": list(sample.window),
+        "luminance_cd_m2": cell.luminance_cd_m2,
+        "exposure_s": cell.exposure_s,
+        "white_cd_m2": cell.white_cd_m2,
+        "black_dn": raw.black_dn,
+        "white_dn": raw.white_dn,
+        "gain_e_per_dn": raw.gain_e_per_dn,
+        "noise": noise_coefficients(sensor, cell.exposure_s),
+        "sources_e": {name: noise_sources(value, sensor, cell.exposure_s) for name, value in mean_e.items()},
+        "mean_e": mean_e,
+        "dark_current_e": sensor.pixel.dark_current_e_per_s * cell.exposure_s,
+        "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
+        "saturated": float(raw.saturated.mean()),
+        "render_noise": {
+            "mean": charged_share(errors_e, expected_e, sensor, cell.exposure_s),
+            "of_95_percent": float(np.quantile(shares, OF_PIXELS)),
+        },
+        "groups": list(sample.truth.illuminants["groups"]),
+        "illuminants": dict(sample.truth.illuminants),
+        "lens": asdict(sensor.lens),
+    }
+
+
+def frame_labels(cell: Cell) -> dict[str, Any]:
+    """Scene, spectrum, level, exposure and sensor by their names: of a condition what decides a single frame."""
+    return {name: value for name, value in labels(cell.condition).items() if name not in ("white_balance", "frames")}
+
+
+def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dict[str, float]]:
+    """Variance of a pixel of each channel: a x + b + c x^2 [DN^2], x its mean above black [DN], dark current left out.
+
+    b holds all that doesn't depend on light, a x the shot noise, c x^2 what is in proportion to it: PRNU.
+    """
+    scale_e, gain = sensor.pixel.full_well_e, sensor.gain_e_per_dn
+    shape = 2 * len(sensor.cfa), 2 * len(sensor.cfa[0])
+    dark, half, full = (noise_variance(np.full(shape, x * scale_e), sensor, exposure_s) for x in (0.0, 0.5, 1.0))
+    result = {}
+    for name in channels(sensor.cfa):
+        at = mask(sensor.cfa, name, shape)
+        low, middle, high = (float(variance[at].mean()) for variance in (dark, half, full))
+        square = (high - 2 * middle + low) * 2 / scale_e**2
+        slope = (high - low) / scale_e - square * scale_e
+        result[name] = {"a": slope / gain, "b": low / gain**2, "c": square}
+    return result
+
+
+def _surfaces(sample: Sample) -> NDArray[Any]:
+    assert sample.truth.surfaces is not None
+    return _opened(sample.truth.surfaces)
+
+
+@lru_cache(maxsize=64)
+def _opened(path: Path) -> NDArray[Any]:
+    """Array that is read where it is looked at."""
+    array: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
+    return array

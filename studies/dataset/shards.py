@@ -1,0 +1,158 @@
+"""Shards of a data set: plain tar files in WebDataset's layout, the manifest that lists them, and reading both."""
+
+import json
+import tarfile
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from rodcone.digests import digest_file
+from rodcone.errors import InputError, one_line
+from rodcone.files import inside, replacing
+from studies.dataset.sample import Arrays, Sample, make_sample
+from studies.sweep.run_cell import limit_threads
+
+MANIFEST = "manifest.jsonl"
+# Of a sample in a manifest.
+_TOLD = ("key", "scene", "scene_hash", "level", "luminance_cd_m2", "sensor", "mosaic", "snr_db", "saturated")
+Lines = list[dict[str, Any]]
+
+
+@dataclass(frozen=True)
+class Shard:
+    """A shard to make: a task of `studies.sweep.workers`.
+
+    Attributes
+    ----------
+    key : str
+        Hash of all that decides its bytes.
+    path : Path
+    samples : tuple of Sample
+        In the shard's order.
+    """
+
+    key: str
+    path: Path
+    samples: tuple[Sample, ...]
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """Its file's name: each shard is of a kind of its own."""
+        return (self.path.name,)
+
+
+@dataclass(frozen=True)
+class ShardMade:
+    """A shard that stands: its key, and its lines in the manifest, the first its own and one a sample."""
+
+    key: str
+    lines: Lines
+
+
+def make_shard(shard: Shard, most_threads: int | None = None) -> ShardMade:
+    """Write a shard, whole or not at all; the same samples give the same bytes, whoever writes them and when.
+
+    Raises
+    ------
+    OSError
+        Where an array can't be read, or the file not be written.
+    """
+    if most_threads is not None:
+        limit_threads(most_threads)
+    lines: Lines = []
+    with replacing(shard.path) as (place,):
+        with tarfile.open(place, "w", format=tarfile.GNU_FORMAT) as tar:
+            for sample in shard.samples:
+                arrays, facts = make_sample(sample)
+                for name, array in arrays.items():
+                    file = BytesIO()
+                    np.save(file, array)
+                    _add(tar, f"{sample.key}.{name}.npy", file.getvalue())
+                _add(tar, f"{sample.key}.json", json.dumps(facts).encode())
+                kept = {name: facts[name] for name in _TOLD}
+                lines.append({"kind": "sample", **kept, "render_noise": facts["render_noise"]["mean"]})
+        size, made = place.stat().st_size, digest_file(place)
+    first = shard.samples[0]
+    head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.samples)}
+    return ShardMade(shard.key, [head | {"bytes": size, "digest": made, "made_from": shard.key}, *lines])
+
+
+def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
+    member = tarfile.TarInfo(name)  # of time 0 and no owner
+    member.size = len(content)
+    tar.addfile(member, BytesIO(content))
+
+
+def write_manifest(folder: Path, head: Lines, shards: Sequence[ShardMade]) -> None:
+    """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
+    lines = head + [line for made in sorted(shards, key=lambda made: made.lines[0]["name"]) for line in made.lines]
+    with replacing(folder / MANIFEST) as (place,):
+        place.write_text("".join(f"{json.dumps(line)}\n" for line in lines), "utf-8")
+
+
+def read_manifest(folder: Path) -> Lines:
+    """Lines of a set's manifest.
+
+    Raises
+    ------
+    InputError
+        Where there is none, or it is damaged.
+    """
+    path = folder / MANIFEST
+    try:
+        lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
+        if not lines or lines[0]["kind"] != "set" or not all("kind" in line for line in lines):
+            raise ValueError("its first line is not a set's")
+    except (OSError, ValueError, LookupError, TypeError) as error:
+        raise InputError(
+            f"{path}: it is no manifest of a set ({one_line(error)}); allowed: what rodcone dataset wrote; run it again"
+        ) from error
+    return lines
+
+
+def shards_of(lines: Lines) -> list[ShardMade]:
+    """Shards that a manifest lists, each with its samples' lines."""
+    made: list[ShardMade] = []
+    for line in lines:
+        if line["kind"] == "shard":
+            made.append(ShardMade(line["made_from"], [line]))
+        elif line["kind"] == "sample":
+            made[-1].lines.append(line)
+    return made
+
+
+def stands(folder: Path, made: ShardMade) -> bool:
+    """Whether a shard's file is what was written."""
+    head = made.lines[0]
+    path = inside(folder, head["name"])
+    return path.is_file() and path.stat().st_size == head["bytes"] and digest_file(path) == head["digest"]
+
+
+def read_shard(path: Path) -> Iterator[tuple[Arrays, dict[str, Any]]]:
+    """Arrays by name and facts of each sample.
+
+    Raises
+    ------
+    InputError
+        For a file that is cut or damaged.
+    """
+    arrays: Arrays = {}
+    try:
+        with tarfile.open(path) as tar:
+            for member in tar:
+                file = tar.extractfile(member)
+                assert file is not None
+                name = member.name.split(".", 1)[1]
+                if name == "json":
+                    yield arrays, json.loads(file.read())
+                    arrays = {}
+                else:
+                    arrays[name.removesuffix(".npy")] = np.load(BytesIO(file.read()), allow_pickle=False)
+    except (tarfile.TarError, EOFError, ValueError, LookupError) as error:
+        raise InputError(
+            f"{path}: it is no whole shard ({one_line(error)}); run rodcone dataset again, which makes it"
+        ) from error

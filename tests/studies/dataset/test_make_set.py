@@ -1,0 +1,282 @@
+"""A study becomes shards: the same bits whoever makes them, read alike by two readers, nothing lost or overwritten."""
+
+import io
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Generator, Sequence
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+import sweep_sample as SAMPLE
+
+from rodcone.digests import digest
+from rodcone.errors import InputError
+from studies.dataset import order as order_module
+from studies.dataset.card import CARD
+from studies.dataset.make_set import make_set, split_of
+from studies.dataset.order import SetOrder, generated_scenes
+from studies.dataset.shards import MANIFEST, Shard, ShardMade, read_manifest, read_shard
+from studies.study.lit_scene import open_all
+from studies.sweep.cluster import on_cluster
+from studies.sweep.run_sweep import sweep
+from studies.sweep.workers import InThisProcess, run, run_in_processes
+
+ORDER = SetOrder(shards=3, crop=16)
+HERE = partial(run, executor=InThisProcess())
+STUDY = """
+scenes = [{{ source = "scene.exr", light = "E" }}]
+levels = ["1cd/m2", "25cd/m2"]
+processors = ["bayer", "interleaved"]
+seeds = 2
+"""
+
+
+def made(folder: Path, out: str = "out", runner: Any = HERE, order: SetOrder = ORDER, **changes: Any) -> Path:
+    """Set of the small study: 16x20 pixels at two levels, two seeds, Bayer and RGBW."""
+    study = SAMPLE.small_study(folder, processors=("bayer", "interleaved"), **changes)
+    return make_set(study, folder / out, order, "rodcone dataset", runner).folder
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+class Entry(NamedTuple):
+    name: str
+    content: bytes
+
+
+def entries(data: bytes) -> list[Entry]:
+    """Regular files of a tar (POSIX ustar): blocks of 512, name at 0, size in octal at 124, kind at 156."""
+    found, place, long_name = [], 0, ""
+    while data[place : place + 512].strip(b"\0"):
+        head = data[place : place + 512]
+        size = int(head[124:136].strip(b"\0 "), 8)
+        assert head[136:148].strip(b"\0 0") == b"", "a time"
+        body = data[place + 512 : place + 512 + size]
+        if head[156:157] == b"L":  # GNU: the next one's name
+            long_name = body.rstrip(b"\0").decode()
+        else:
+            found.append(Entry(long_name or head[:100].rstrip(b"\0").decode(), body))
+            long_name = ""
+        place += 512 + -(-size // 512) * 512
+    return found
+
+
+@pytest.fixture(scope="module")
+def stored(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return made(tmp_path_factory.mktemp("set"))
+
+
+def test_two_readers_give_the_same_arrays(stored: Path) -> None:
+    shards = sorted(stored.glob("*.tar"))
+    samples = [sample for path in shards for sample in read_shard(path)]
+    assert len(samples) == 2 * 2 * 2
+    by_name = {entry.name: entry.content for path in shards for entry in entries(path.read_bytes())}
+    assert len(by_name) == len(samples) * (1 + 1 + 5)  # raw, facts, and planes of a picture without surfaces
+    for arrays, facts in samples:
+        assert arrays["raw"].shape == (16, 16)
+        assert arrays["raw"].dtype == np.uint16
+        assert set(arrays) == {"raw", "mosaic_e", "channels_e", "rgb", "xyz", "shares"}
+        for name, array in arrays.items():
+            other = np.load(io.BytesIO(by_name[f"{facts['key']}.{name}.npy"]))
+            np.testing.assert_array_equal(array, other, strict=True)
+        assert facts == json.loads(by_name[f"{facts['key']}.json"])
+
+
+@pytest.mark.filterwarnings("ignore::pytest.PytestUnraisableExceptionWarning")  # it leaves files open
+def test_webdataset_reads_them_too(stored: Path) -> None:
+    webdataset = pytest.importorskip("webdataset")
+    ours = {facts["key"]: arrays for path in sorted(stored.glob("*.tar")) for arrays, facts in read_shard(path)}
+    urls = [str(path) for path in sorted(stored.glob("*.tar"))]
+    theirs = {x["__key__"]: x for x in webdataset.WebDataset(urls, shardshuffle=False).decode()}
+    assert set(theirs) == set(ours)
+    for key, arrays in ours.items():
+        for name, array in arrays.items():
+            np.testing.assert_array_equal(theirs[key][f"{name}.npy"], array, strict=True)
+
+
+def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
+    folder = made(tmp_path, order=SetOrder(shards=1))
+    for arrays, facts in read_shard(next(folder.glob("*.tar"))):
+        tile, order = facts["mosaic"], facts["channels"]
+        for row, column in np.ndindex(4, 4):
+            behind = arrays["channels_e"][row, column, order.index(tile[row % 2][column % 2])]
+            assert arrays["mosaic_e"][row, column] == pytest.approx(behind, rel=1e-6)
+        assert arrays["xyz"][..., 1].mean() == pytest.approx(facts["luminance_cd_m2"], rel=1e-6)
+        np.testing.assert_allclose(arrays["shares"], 1.0, atol=1e-6)
+        light = facts["illuminants"]
+        per_nm = np.array(light["groups"][facts["groups"][0]])
+        assert per_nm.shape == SAMPLE.NM.shape == np.array(light["wavelength_nm"]).shape
+
+
+def test_the_same_bits_over_workers(stored: Path, tmp_path: Path) -> None:
+    assert content(made(tmp_path, runner=partial(run_in_processes, workers=2))) == content(stored)
+
+
+@pytest.mark.slow
+def test_the_same_bits_over_a_cluster(stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.setenv("PYTHONSAFEPATH", "1")  # workers import nothing of the folder in which they start
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+        on_cluster(cluster.scheduler_address) as runner,
+    ):
+        assert content(made(tmp_path, runner=runner)) == content(stored)
+
+
+def test_a_set_goes_on_where_it_was_stopped_and_mends_a_shard_cut_in_half(stored: Path, tmp_path: Path) -> None:
+    calls: list[str] = []
+
+    def stopped(shards: Sequence[Shard], make: Any, most: int = 1) -> Generator[ShardMade, None, None]:
+        for count, shard in enumerate(shards):
+            if count == most:
+                raise KeyboardInterrupt
+            calls.append(shard.path.name)
+            yield make(shard)
+
+    with pytest.raises(KeyboardInterrupt):
+        made(tmp_path, runner=stopped)
+    assert len([line for line in read_manifest(tmp_path / "out" / "set") if line["kind"] == "shard"]) == 1
+    folder = made(tmp_path, runner=partial(stopped, most=99))
+    assert len(calls) == len(set(calls)) == 3  # none twice
+    assert content(folder) == content(stored)
+    half = next(folder.glob("*.tar"))
+    half.write_bytes(half.read_bytes()[: half.stat().st_size // 2 + 100])
+    with pytest.raises(InputError, match=f"{half.name}: it is no whole shard"):
+        list(read_shard(half))
+    made(tmp_path, runner=partial(stopped, most=99))
+    assert calls[3:] == [half.name]
+    assert content(folder) == content(stored)
+
+
+@pytest.mark.thorough
+def test_the_same_bits_after_a_kill(stored: Path, tmp_path: Path) -> None:
+    SAMPLE.picture(tmp_path / "scene.exr")
+    (tmp_path / "study.toml").write_text(STUDY.format())
+    command = [sys.executable, "-m", "rodcone", "dataset", "study.toml", "-o", "out", "--shards", "3", "--crop", "16"]
+    first = subprocess.Popen([*command, "--workers", "2"], cwd=tmp_path, start_new_session=True)
+    folder, end = tmp_path / "out" / "set", time.monotonic() + 120
+    while not list(folder.glob("*.tar")) and first.poll() is None and time.monotonic() < end:
+        time.sleep(0.02)
+    os.killpg(first.pid, signal.SIGKILL)
+    first.wait()
+    subprocess.run([*command, "--workers", "1"], cwd=tmp_path, check=True, capture_output=True)
+    found, whole = content(folder), content(stored)
+    assert found.keys() == whole.keys()
+    assert {x: found[x] for x in whole if x.endswith(".tar")} == {x: whole[x] for x in whole if x.endswith(".tar")}
+
+
+def test_the_whole_frame_is_that_of_the_sweep(tmp_path: Path) -> None:
+    """The same study swept in the same folder develops the frames that the set holds: nothing is rendered twice."""
+    folder = made(tmp_path, order=SetOrder(planes=("rgb",), shards=1))
+    frames = {path.name for path in (tmp_path / "out" / "frames").rglob("*.npy")}
+    study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
+    sweep(study, tmp_path / "out", SAMPLE.stated(study), SAMPLE.here)
+    assert {path.name for path in (tmp_path / "out" / "frames").rglob("*.npy")} == frames
+    assert len(list(read_shard(next(folder.glob("*.tar"))))) == 8
+
+
+@pytest.mark.parametrize(
+    ("changes", "words"),
+    [
+        ({"order": SetOrder(crop=32)}, "crop: 32 is over the frames' side"),
+        ({"order": SetOrder(crop=17)}, "crop: 17 cuts the tile of 2x2 pixels; allowed: its multiples; give 16"),
+        ({"sensors": ("dual_gain",)}, "'dual_gain' bins or merges readings"),
+        ({"frames": (2,)}, r"frames: \[2\] in a data set"),
+        ({"sensor_side_um": 100.0}, "sensor-side-um: 100.0 in a data set"),
+    ],
+)
+def test_what_no_set_can_hold_is_told_in_a_line(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words) as told:
+        made(tmp_path, **changes)
+    assert "\n" not in str(told.value)
+
+
+def test_a_wrong_order_is_told_in_a_line() -> None:
+    for values, words in (
+        ({"planes": ("depht",)}, "did you mean 'depth'"),
+        ({"shards": 0}, "shards: 0"),
+        ({"crop": 3}, "crop: 3"),
+    ):
+        with pytest.raises(InputError, match=words):
+            SetOrder(**values)  # type: ignore[arg-type]
+
+
+def test_another_set_and_foreign_files_are_refused_and_left_alone(stored: Path, tmp_path: Path) -> None:
+    folder = tmp_path / "out" / "set"
+    made(tmp_path)
+    before = content(folder)
+    with pytest.raises(InputError, match="holds another set, 'rodcone dataset'"):
+        made(tmp_path, seeds=(0, 1, 2))
+    (folder / "thesis.tar").write_bytes(b"mine")
+    with pytest.raises(InputError, match=r"holds a foreign file, 'thesis.tar'; allowed: a set; move it away"):
+        made(tmp_path)
+    assert content(folder) == before | {"thesis.tar": b"mine"}
+    strange = tmp_path / "strange"
+    strange.mkdir()
+    (strange / "letter.txt").write_text("mine")
+    with pytest.raises(InputError, match=r"holds other files, such as 'letter.txt'"):
+        made(tmp_path, out="strange")
+
+
+def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = type(shutil.disk_usage(tmp_path))
+    monkeypatch.setattr(order_module.shutil, "disk_usage", lambda _: usage(100_000, 0, 100_000))
+    with pytest.raises(InputError, match=r"out: the set needs about [\d.e-]+ GB more; allowed: 0.0001 GB"):
+        made(tmp_path)
+    assert list((tmp_path / "out" / "set").iterdir()) == []
+
+
+def test_the_room_asked_for_is_that_of_the_set(tmp_path: Path) -> None:
+    """It is over what is written, and not by more than heads and rounding: 20 kB a sample."""
+    folder = made(tmp_path, order=SetOrder(shards=1))
+    study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
+    needed = order_module.bytes_needed(study, {}, open_all(study), SetOrder(shards=1))
+    written = sum(path.stat().st_size for path in (tmp_path / "out").rglob("*.npy")) + sum(
+        path.stat().st_size for path in folder.glob("*.tar")
+    )
+    assert 0.5 * needed < written < 1.3 * needed
+
+
+def test_splits_hold_their_shares_and_no_scene_twice() -> None:
+    # digests of 4 000 names: 3 200 in train with a standard deviation of 25, of which 5 are one in 2 million
+    names = [split_of(digest(index)) for index in range(4000)]
+    assert abs(names.count("train") - 3200) < 5 * 25.3
+    assert abs(names.count("test") - 400) < 5 * 19.0
+    # the bounds themselves
+    assert split_of("0" * 32) == "train"
+    assert split_of(f"{int(0.85 * 16**12):012x}" + 20 * "0") == "validation"
+    assert split_of("f" * 32) == "test"
+
+
+def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
+    lines = read_manifest(stored)
+    samples = [line for line in lines if line["kind"] == "sample"]
+    scenes = {line["hash"]: line["split"] for line in lines if line["kind"] == "scene"}
+    shards = [line for line in lines if line["kind"] == "shard"]
+    assert lines[0]["samples"] == len(samples) == sum(line["samples"] for line in shards) == 8
+    assert {scenes[line["scene_hash"]] for line in samples} == {line["split"] for line in shards}
+    assert [line["name"] for line in shards] == sorted(path.name for path in stored.glob("*.tar"))
+    assert [line["bytes"] for line in shards] == [(stored / line["name"]).stat().st_size for line in shards]
+    text = (stored / CARD).read_text("utf-8")
+    assert "8 raw frames" in text
+    assert "| 1cd/m2 | 4 |" in text
+    (stored.parent / MANIFEST).write_text("{}\n")
+    with pytest.raises(InputError, match="no manifest of a set"):
+        read_manifest(stored.parent)
+
+
+def test_drawn_scenes_are_counted_from_a_seed() -> None:
+    first, more, other = generated_scenes(3, 0), generated_scenes(5, 0), generated_scenes(3, 1)
+    assert more[:3] == first
+    assert not {x.source for x in first} & {x.source for x in other}
+    assert len({x.source for x in more}) == 5

@@ -1,0 +1,116 @@
+"""A sample's raw frame is its truth with the noise that it states, every source in it."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import sweep_sample as SAMPLE
+
+from sensor.config import SensorConfig
+from sensor.presets import low_noise
+from studies.dataset.sample import Arrays, Sample, TruthFiles, make_sample, noise_coefficients
+
+SIZE = (128, 128)
+LIGHT = {"wavelength_nm": [], "width_nm": [], "groups": {}}
+# One source each, large beside the others; and all together.
+SOURCES: dict[str, dict[str, float]] = {
+    # without any dark noise whole electrons meet whole DN, whose rounding then isn't the even error that is stated
+    "shot noise": {"read_noise_e": 1.0, "dsnu_e": 0.0, "prnu": 0.0},
+    "read noise": {"read_noise_e": 30.0, "prnu": 0.0},
+    "DSNU": {"dsnu_e": 30.0, "prnu": 0.0},
+    "PRNU": {"prnu": 0.05},
+    "column gains": {"column_gain_spread": 0.02, "prnu": 0.0},
+    "column offsets": {"column_offset_e": 20.0},
+    "dark current": {"dark_current_e_per_s": 2000.0, "prnu": 0.0},
+    "all": {"read_noise_e": 5.0, "dsnu_e": 4.0, "prnu": 0.02, "dark_current_e_per_s": 300.0},
+}
+
+
+def with_pixel(**values: float) -> SensorConfig:
+    sensor = low_noise("bayer")
+    return replace(sensor, pixel=replace(sensor.pixel, **values))
+
+
+Made = tuple[Arrays, dict[str, Any]]
+
+
+def sample_of(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> Sample:
+    """Frame of 128x128 over a ramp of expected electrons, 40 to 90 e- at 1 cd/m^2."""
+    cell = SAMPLE.made_cells(folder)[0]
+    ramp = np.broadcast_to(np.linspace(40.0, 90.0, SIZE[1]), SIZE) / cell.exposure_s
+    files = {"electrons": ramp, "errors": np.zeros((1, *SIZE)), "truth": np.zeros((*SIZE, 3))}
+    for name, array in files.items():
+        np.save(folder / f"{name}.npy", array)
+    cell = replace(cell, sensor=sensor, luminance_cd_m2=level_cd_m2, **{x: folder / f"{x}.npy" for x in files})
+    truth = TruthFiles(channels=folder, lit=folder, surfaces=None, illuminants=LIGHT)
+    return Sample("key", cell, "bayer", "0" * 32, "train", truth, ("mosaic_e",), 0, (0, 0, *SIZE), 1)
+
+
+def taken(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> list[Made]:
+    """The frame by eight chips."""
+    sample = sample_of(folder, sensor, level_cd_m2)
+    return [make_sample(replace(sample, cell=replace(sample.cell, seed=seed))) for seed in range(8)]
+
+
+def squares(samples: list[Made]) -> np.ndarray:
+    """Squared difference of raw and truth over the stated variance, a frame of each place in the tile."""
+    found = []
+    for arrays, facts in samples:
+        mean_dn = (arrays["mosaic_e"].astype(float) + facts["dark_current_e"]) / facts["gain_e_per_dn"]
+        off_dn = arrays["raw"].astype(float) - facts["black_dn"] - mean_dn
+        for row, column in np.ndindex(2, 2):
+            noise = facts["noise"][facts["mosaic"][row][column]]
+            x = arrays["mosaic_e"][row::2, column::2] / facts["gain_e_per_dn"]
+            variance = noise["a"] * x + noise["b"] + noise["c"] * x**2
+            found.append(off_dn[row::2, column::2] ** 2 / variance)
+    return np.array(found)
+
+
+def z_of(samples: list[Made]) -> float:
+    """How far the mean square is from 1, in its own standard errors.
+
+    Column terms are alike along a column, and pixels of a tile's two rows share them: a column's mean is one draw.
+    """
+    values = squares(samples).reshape(len(samples), 2, 2, SIZE[0] // 2, SIZE[1] // 2).mean(axis=(1, 3)).ravel()
+    return float((values.mean() - 1) / (values.std(ddof=1) / np.sqrt(values.size)))
+
+
+# 24 conditions, and a normal's 4.5 standard errors are passed by 7e-6 of them: one false alarm in 6 000 runs.
+@pytest.mark.sample(6)
+@pytest.mark.parametrize("level_cd_m2", [0.05, 1.0, 100.0])
+@pytest.mark.parametrize("source", SOURCES)
+def test_raw_minus_truth_has_the_stated_variance(source: str, level_cd_m2: float, tmp_path: Path) -> None:
+    assert abs(z_of(taken(tmp_path, with_pixel(**SOURCES[source]), level_cd_m2))) < 4.5
+
+
+def test_a_set_whose_prnu_is_twice_what_it_states_is_found(tmp_path: Path) -> None:
+    stated = taken(tmp_path, with_pixel(prnu=0.01), 100.0)
+    doubled = taken(tmp_path, with_pixel(prnu=0.02), 100.0)
+    mixed = [(arrays, facts) for (arrays, _), (_, facts) in zip(doubled, stated, strict=True)]
+    assert abs(z_of(doubled)) < 4.5
+    assert z_of(mixed) > 20
+
+
+def test_coefficients_are_those_of_the_data_sheet() -> None:
+    sensor, time_s = with_pixel(read_noise_e=3.0, dsnu_e=2.0, prnu=0.02, dark_current_e_per_s=50.0), 0.1
+    gain = sensor.gain_e_per_dn
+    for noise in noise_coefficients(sensor, time_s).values():
+        assert noise["a"] == pytest.approx(1 / gain, rel=1e-9)
+        assert noise["b"] == pytest.approx((3.0**2 + 2.0**2 + 50.0 * 0.1 + gain**2 / 12) / gain**2, rel=1e-9)
+        assert noise["c"] == pytest.approx(0.02**2, rel=1e-9)
+
+
+def test_parts_of_a_frame_have_noise_of_their_own_and_one_chip(tmp_path: Path) -> None:
+    sample = sample_of(tmp_path, with_pixel(prnu=0.2), 20.0)
+
+    def part(number: int) -> np.ndarray:
+        window = (64 * (number // 2), 0, 64, 64)  # the ramp runs along columns: all see the same light
+        return make_sample(replace(sample, part=number, parts=4, window=window))[0]["raw"].astype(float)
+
+    raws = [part(number) for number in range(4)]
+    assert not any(np.array_equal(raws[0], other) for other in raws[1:])
+    assert not np.array_equal(raws[2], raws[3])  # the same light
+    np.testing.assert_array_equal(part(2), raws[2])  # whatever was made before
+    assert np.corrcoef(raws[0].ravel(), raws[3].ravel())[0, 1] > 0.9  # the chip's fixed pattern
