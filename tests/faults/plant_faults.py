@@ -26,7 +26,8 @@ from pathlib import Path
 from typing import Any
 
 ROOT = Path(__file__).resolve().parents[2]
-PARTS = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "pyproject.toml")
+PARTS = ("rodcone", "render", "scenes", "sensor", "isp", "studies", "tests", "benchmarks", "docs/make")
+PARTS += ("pyproject.toml",)
 MINUTES = 8  # for one fault's tests
 ALL, MAKE_TEST = "not slow", "not slow and not thorough"  # what `make test-all` and `make test` run
 

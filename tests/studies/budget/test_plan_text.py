@@ -1,14 +1,16 @@
 """A plan's table: nothing cut off in 100 columns, conditions of the same figures in one line, all terms named."""
 
+from dataclasses import replace
 from io import StringIO
 
+import pytest
 from rich.console import Console
 
 from sensor.presets import low_noise
 from studies.budget.ledger import Ledger, Plan, Term
-from studies.budget.plan_text import plan_table
-from studies.study.model import ImageModel
-from studies.study.study import Condition, SceneChoice
+from studies.budget.plan_text import cost_over_reference, plan_json, plan_table, reasons
+from studies.study.model import ImageModel, RenderModel
+from studies.study.study import BudgetShares, Condition, RenderLimits, SceneChoice, Study
 
 TERMS = ("Monte Carlo", "level", "bands", "light within bands", "diffraction", "veiling glare", "cos^4", "kernel")
 
@@ -39,3 +41,46 @@ def test_terms_under_a_tenth_of_a_per_cent_everywhere_are_named_below() -> None:
     lines = printed({"1cd/m2": {"bands": 0.01, "level": 0.0009}})
     left_out = ", ".join(name for name in TERMS if name != "bands")
     assert " ".join(lines).endswith(f"under 0.1% everywhere: {left_out}")
+
+
+SCENE = SceneChoice("still_life")
+CONDITION = Condition(SCENE, "own", "1cd/m2", "auto", "low_noise")
+
+
+def planned(bands: int, spp: int, *, diffraction: float, veiling_glare: float, exact: bool) -> Plan:
+    """Two mosaics of one condition, the second with twice the errors."""
+    ledgers = tuple(
+        Ledger(CONDITION, mosaic, 0.066, 10.0, (Term("Monte Carlo", 1.0, share),), 2.0, share)
+        for mosaic, share in (("bayer", 0.05), ("rgbw", 0.1))
+    )
+    lens = replace(low_noise().lens, diffraction=diffraction, veiling_glare=veiling_glare, horizontal_view_deg=0.0)
+    nm = tuple(380 + 400 / bands * (index + 0.5) for index in range(bands))
+    render = RenderModel(nm, (400 / bands,) * bands, spp)
+    return Plan(renders={SCENE: render}, images={CONDITION: ImageModel(lens, exact)}, ledgers=ledgers)
+
+
+def test_reasons_and_costs_are_counted_once_more() -> None:
+    """Nanoseconds a pixel: 85 for a sample's band and 12 more a sample; a lens 55 a band, glare 4.5, exactness 40."""
+    plan = planned(8, 64, diffraction=1.0, veiling_glare=0.0, exact=False)
+    reference = planned(40, 256, diffraction=1.0, veiling_glare=0.01, exact=True)
+    ratio = (85 * 20 * 64 + 2 * 55 * 8) / (85 * 52 * 256 + 2 * (59.5 * 40 + 40))
+    assert cost_over_reference(plan, reference, SCENE) == pytest.approx(ratio)
+    shares = BudgetShares(total=0.2, monte_carlo=0.02)
+    study = Study((SCENE,), ("1cd/m2",), budget=shares, render=RenderLimits(spp=64))
+    budget, chosen, short = reasons(study, plan, reference)
+    assert budget.startswith("Budget: 20% of the sensor's own noise variance, 2% of it for Monte Carlo noise.")
+    assert chosen == (
+        f"still_life: 8 bands of 50 nm, 64 samples a pixel; render and lens cost about {ratio:.2g} of the reference's"
+    )
+    # a variance of 10 % at 64 samples is one of 2 % at five times as many
+    assert short == (
+        "still_life: Monte Carlo noise reaches 10% in the worst condition; 3.2e+02 samples would keep the aim, and "
+        "render.spp allows 64"
+    )
+    found = plan_json(study, plan, reference)
+    assert found["renders"][0]["monte_carlo_share"] == 0.1
+    assert found["renders"][0]["cost_over_reference"] == pytest.approx(ratio)
+    text = StringIO()
+    Console(file=text, width=100).print(plan_table(plan))
+    assert "rgbw" in text.getvalue(), "the worse mosaic"
+    assert text.getvalue().split()[-4:] == ["10", "2", "10%", "10%"]

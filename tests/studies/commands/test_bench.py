@@ -1,6 +1,8 @@
 """Speed against error: the front, what is measured, and the page."""
 
 import json
+import re
+from html import unescape
 from pathlib import Path
 
 import pytest
@@ -10,6 +12,8 @@ from hypothesis import strategies as st
 
 from scenes.catalog import load
 from sensor.presets import preset
+from studies.commands.bench import _print_stage
+from studies.pages.speed_page import LEAST_SHARE, bench_page
 from studies.speed.points import Measured, Stage, Times, front, stage_json, timed
 from studies.speed.stages import STAGES, Bench, stages
 
@@ -71,6 +75,33 @@ def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path) -> Non
 @pytest.fixture(scope="module")
 def measured() -> list[Stage]:
     return list(stages(TINY, load(TINY.scene), preset(TINY.sensor)))
+
+
+NUMBERS = {
+    "choice": "7 bands", "seconds": 0.0125, "time_over_reference": 0.25, "processor_s": 1.5,
+    "processor_over_reference": 0.75, "first_s": 3.25, "error_e": 2.5, "share_of_noise_variance": 0.0637,
+    "on_front": True,
+}  # fmt: skip
+
+
+def test_every_number_of_a_choice_stands_in_page_and_table_with_its_factor_and_unit(capsys) -> None:
+    small = NUMBERS | {"choice": "all", "share_of_noise_variance": LEAST_SHARE / 2, "on_front": False}
+    facts = {"name": "bands", "question": "How many?", "reference": "40 bands", "reference_s": 0.05,
+             "reference_processor_s": 2.0, "noise_e": 12.5, "points": [NUMBERS, small]}  # fmt: skip
+    results = {"rodcone": "1", "settings": {"scene": "s", "sensor": "p"}, "machine": {"processor": "P", "cores": 2}}
+    page = unescape(bench_page(results | {"environment": {}, "stages": [facts]})).replace("\N{NO-BREAK SPACE}", " ")
+    assert "Reference: 40 bands; it takes 50 ms, 2 s of processor time. The sensor's own noise is 12.5 e⁻." in page
+    rows = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", page)]
+    assert list(zip(*rows, strict=True)) == [
+        ("Choice", "7 bands", "all"), ("Time", "12.5 ms", "12.5 ms"), ("Over the reference's", "0.25", "0.25"),
+        ("Processor", "1.5 s", "1.5 s"), ("Over the reference's", "0.75", "0.75"), ("First call", "3.25 s", "3.25 s"),
+        ("Error, e⁻", "2.5", "2.5"), ("Share of the noise variance", "6.4 %", "under 0.001 %"),
+        ("Front", "on the front", ""),
+    ]  # fmt: skip
+    _print_stage(facts)
+    lines = [line.split() for line in capsys.readouterr().out.splitlines()]
+    assert " ".join(lines[2]) == "reference: 40 bands, 0.05 s, processor 2 s; sensor noise 12.5 e-"
+    assert lines[4] == ["*7", "bands", "0.0125", "0.25", "1.5", "0.75", "2.5", "6.4%"]
 
 
 @pytest.mark.thorough

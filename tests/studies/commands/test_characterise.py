@@ -27,6 +27,9 @@ def test_the_table_sets_every_figure_beside_its_configured_value(found):
         assert f"{figure.configured:.5g}" in rows[figure.name]
         assert f"{figure.measured:.5g}" in rows[figure.name]
         assert figure.unit in rows[figure.name]
+        if figure.error:  # the last column, counted from the three before it, which have five and two digits
+            configured, measured, error, off = map(float, rows[figure.name][-4:])
+            assert off == pytest.approx((measured - configured) / error, abs=0.2, rel=0.06)
     assert all(note in out for note in found.notes)
 
 

@@ -31,6 +31,9 @@ def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path):
     code, printed, err = call(["characterise", "--from", *flats, "--dark", *darks, "-o", out])
     assert code == 0
     assert [line.split()[0] for line in printed.splitlines()] == ["figure", "gain", "read", "DSNU", "PRNU"]
+    for line in printed.splitlines()[1:]:
+        measured, low, high = map(float, line.split()[-3:])
+        assert low < measured < high
     assert "pitch_um and fill_factor are yours to add" in err
     assert out.read_text("utf-8").startswith("# A camera measured from flat1.tif and others.")
     found = json.loads(call(["characterise", "--from", *flats, "--dark", *darks, "--json"])[1])
