@@ -13,6 +13,7 @@ from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
 from rodcone.brief import brief
 from rodcone.colour_spaces import white_of
+from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
 from rodcone.jit import Backend
 from rodcone.notebook import preview_png
@@ -76,6 +77,7 @@ class Picture:
     def __truediv__(self, scale: ArrayLike) -> Image:
         return np.asarray(self.rgb / np.asarray(scale))
 
+    @method
     def encode(self, white: float | None = None, encoding: str = "srgb") -> Image:
         """Encode the picture for a display: shape (h, w, 3), 0 to 1.
 
@@ -91,6 +93,7 @@ class Picture:
         require_range("white", level, 1e-12, 1e12, "give electrons of green")
         return encode(self.rgb / level, encoding)
 
+    @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
         """Draw R, G and B along a row, the middle one by default, into Matplotlib's axes."""
         planes = dict(zip("RGB", np.moveaxis(self.rgb, -1, 0), strict=True))

@@ -10,7 +10,7 @@ from typing import Any
 from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.matte import matte_surface, with_matte_surfaces
 from render.integrator.reflectance_table import with_rows
-from render.scene import Node, Scene, uniform_node, walk
+from render.scene import Node, Scene, emitter_paths, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError, one_line
@@ -149,7 +149,7 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
             f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
         )
     names = list(scene.groups)
-    carried = [] if len(names) == 1 else [x for x in names if scene.is_environment(x)][:1]
+    carried = [] if len(names) == 1 else [x for x in names if is_environment(scene, x)][:1]
     apart = [name for name in names if name not in carried]
     geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
     scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
@@ -165,6 +165,13 @@ def load_unlit(scene: Scene, size: tuple[int, int]) -> Any:
     description = scene.lit({})
     description["sensor"] = {**description["sensor"], "film": _recorder(size)}
     return _load(scene, description)
+
+
+def is_environment(scene: Scene, group: str) -> bool:
+    """Whether a group is one light of one spectrum and of the same radiance from all around."""
+    lights = scene.groups[group]
+    kinds = [emitter_paths(scene.geometry)[path] for path in lights.emitters]
+    return kinds == ["constant"] and not lights.coloured
 
 
 def _with_common_shapes(scene: Scene) -> Scene:

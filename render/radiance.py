@@ -9,6 +9,7 @@ from render.photometry import luminance, tristimulus
 from render.spectrum import band_widths
 from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
+from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
 from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
@@ -81,6 +82,7 @@ class SpectralRadiance:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm)
 
+    @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
         """Draw the luminance along a row, the middle one by default, into Matplotlib's axes."""
         return draw_line({"": self.luminance()}, row, axes, "luminance, cd/m²")

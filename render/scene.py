@@ -11,6 +11,7 @@ import numpy as np
 from render.published_spectra import optical_constant
 from render.spectrum import Spectrum
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError, one_line, require_fields, unknown
 from rodcone.plots import draw_curves, png_of
 from rodcone.types import Floats
@@ -137,12 +138,6 @@ class Scene:
         film = self.geometry["sensor"].get("film", {})
         return int(film.get("height", OWN_SIDE)), int(film.get("width", OWN_SIDE))
 
-    def is_environment(self, group: str) -> bool:
-        """Whether a group is one light of one spectrum and of the same radiance from all around."""
-        lights = self.groups[group]
-        kinds = [emitter_paths(self.geometry)[path] for path in lights.emitters]
-        return kinds == ["constant"] and not lights.coloured
-
     def _repr_png_(self) -> bytes:
         curves = {
             name: (group.spectrum.wavelength_nm, group.power * group.spectrum.values)
@@ -158,6 +153,7 @@ class Scene:
         """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 
+    @method
     def lit(self, emission: Mapping[str, Node]) -> Node:
         """Plain dict with the named groups at the given emission (a Mitsuba spectrum); other groups are removed."""
         result: Node = _copy(self.geometry)

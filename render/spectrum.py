@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError
 from rodcone.plots import Axes, draw_curves, png_of
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
@@ -56,6 +57,7 @@ class Spectrum:
         object.__setattr__(self, "wavelength_nm", nm)
         object.__setattr__(self, "values", values)
 
+    @method
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the curve into Matplotlib's axes, new ones by default."""
         return draw_curves({"": (self.wavelength_nm, self.values)}, axes, x="wavelength, nm", y="value")
@@ -67,6 +69,7 @@ class Spectrum:
         """Return the spectrum times a number."""
         return Spectrum(self.wavelength_nm, self.values * factor)
 
+    @method
     def band_average(self, wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
         """Mean over each band ``wavelength_nm +- width_nm / 2``, shape (band,); exact for the linear pieces."""
         centre, half = np.asarray(wavelength_nm, dtype=np.float64), np.asarray(width_nm, dtype=np.float64) / 2

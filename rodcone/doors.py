@@ -14,11 +14,12 @@ from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, cast
 
 from rodcone.errors import InputError, require_kind, require_range
 from rodcone.time_text import parse_time
 
+F = TypeVar("F", bound=Callable[..., Any])
 Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives what the function is called with
 
 
@@ -189,7 +190,13 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("spectra", "powers"), _plain(Mapping, "a dict by light group")),
         **dict.fromkeys(("luminance_cd_m2", "illuminance_lux"), _NUMBER),
         "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
-        **dict.fromkeys(("options", "more", "controls"), lambda _, value: value),
+        **dict.fromkeys(("self", "options", "more", "controls"), lambda _, value: value),
+        **dict.fromkeys(("Picture.encode.white", "row"), lambda _, value: value),  # checked where they are used
+        "axes": _value("matplotlib.axes:Axes", "give axes of Matplotlib, or leave it out"),
+        "emission": _plain(Mapping, "a dict by light group"),
+        "index": _each(_WHOLE),
+        "SensorConfig.check_frame.shape": lambda name, value: tuple(_each(_WHOLE)(name, value)),
+        "values": _value("numpy:ndarray", "give an array (..., h, w)"),
     }
 )
 # Functions that look at the result, and warn.
@@ -227,7 +234,7 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
                 bound.arguments[key] = checks[key](key, value)
             except InputError:
                 for other, its in given.items():
-                    if _passes(checks[key], its) and _passes(checks[other], value):
+                    if other != "self" and _passes(checks[key], its) and _passes(checks[other], value):
                         raise InputError(
                             f"{name}: {key} and {other} stand in each other's place; write {order}"
                         ) from None
@@ -238,6 +245,11 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         return result
 
     return checked
+
+
+def method(function: F) -> F:
+    """A method of a public value with the checks of its arguments before it, as `door` has them."""
+    return cast(F, door(function.__qualname__, function))
 
 
 def _left_out(parameter: Parameter, value: Any) -> bool:

@@ -8,6 +8,7 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError
 
 
@@ -56,6 +57,7 @@ class ColourCalibration:
                 f"neutral: {self.neutral.tolist()!r} is not allowed; give a positive response of each channel"
             )
 
+    @method
     def part(self, index: Sequence[int]) -> "ColourCalibration":
         """Calibration of some of the channels; ``R, G, B`` have to stay in front."""
         kept = list(index)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
 from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
@@ -150,6 +151,7 @@ class SensorConfig:
             chip=Chip(),
         )
 
+    @method
     def pixel_sums(self, values: NDArray[Any]) -> NDArray[Any]:
         """What the raw image's pixels hold of values of photodiodes, shape (..., h, w).
 
@@ -161,6 +163,7 @@ class SensorConfig:
         self._check_even(values.shape[-2:])
         return values if self.chip.sites == 1 else block_sums(values)
 
+    @method
     def check_frame(self, shape: tuple[int, ...]) -> None:
         """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
         check_covers(self.cfa, shape)

@@ -14,6 +14,7 @@ from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.brief import brief
 from rodcone.csv_file import read_columns
+from rodcone.doors import method
 from rodcone.errors import InputError, require_range, unknown
 from rodcone.plots import Axes, draw_curves
 
@@ -59,6 +60,7 @@ class Responses:
         """Pickle the mapping as a dict: a mapping proxy can't be pickled."""
         return Responses, (dict(self.curves), self.relative)
 
+    @method
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw each channel's curve into Matplotlib's axes, new ones by default."""
         curves = {name: (curve.wavelength_nm, curve.values) for name, curve in self.curves.items()}

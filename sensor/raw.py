@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
 from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
@@ -173,6 +174,7 @@ class RawImage:
                 "calibrate this camera"
             )
 
+    @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
         """Draw the electrons along a row, the middle one by default, into Matplotlib's axes, by channel."""
         planes = {x: np.where(mask(self.cfa, x, self.shape), self.electrons, np.nan) for x in channels(self.cfa)}

@@ -8,6 +8,7 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.brief import brief
+from rodcone.doors import method
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
 from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
@@ -78,6 +79,7 @@ class Characterisation:
         noise = np.sqrt(np.where(self.transfer.variance_dn2 > 0, self.transfer.variance_dn2, np.nan))
         return np.asarray((self.transfer.mean_dn - self.dark_mean_dn) / noise)
 
+    @method
     def plot(self, axes: Axes | None = None) -> Axes:
         """Draw the photon transfer, temporal noise over signal, into Matplotlib's axes, new ones by default."""
         signal_e = (self.transfer.mean_dn - self.dark_mean_dn) / self.gain_dn_per_e

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from dataclasses import fields, replace
 from functools import partial, wraps
-from inspect import Parameter, signature, unwrap
+from inspect import Parameter, getattr_static, isfunction, signature, unwrap
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -79,6 +79,11 @@ RIGHT: dict[str, Any] = {
     "levels_cd_m2": [1.0],
     "exposure": "10ms",
     "prior": "drawn",
+    "emission": {},
+    "index": [0, 1, 2, 3],
+    "values": np.ones((16, 16)),
+    "band_average.wavelength_nm": [550.0],
+    "band_average.width_nm": [10.0],
 }
 NEVER: tuple[Any, ...] = (
     1j,
@@ -195,6 +200,28 @@ def test_a_wrong_field_of_a_value_is_refused_in_one_line_or_means_something() ->
         for wrong in WRONG
     )
     assert not (faults := faults_of(calls)), faults
+
+
+def methods_of(value: object) -> Iterable[tuple[str, Callable[..., Any]]]:
+    names = (name for name in dir(type(value)) if not name.startswith("_"))
+    return ((name, getattr(value, name)) for name in names if isfunction(getattr_static(type(value), name)))
+
+
+def test_a_wrong_argument_of_a_method_is_refused_in_one_line_or_means_something() -> None:
+    picture = public.develop(RAW)
+    found = (*VALUES, SENSOR, DEVICE, IRRADIANCE, TRANSPORT, picture, public.calibrate("low_noise", "A"))
+    by_class = {type(value).__name__: value for value in found}
+    calls = [
+        (f"{of}.{name}: {key}", wrong, partial(with_wrong, method, given, key, wrong))
+        for of, value in by_class.items()
+        for name, method in methods_of(value)
+        for given in [arguments(name, method, Path())]
+        for key in signature(method).parameters
+        for wrong in WRONG
+    ]
+    assert len(calls) > 700
+    arrays = tuple(one for one in NEVER if not isinstance(one, np.ndarray))  # a pixel's sum may be of any of them
+    assert not (faults := faults_of(calls, never=arrays)), faults
 
 
 def test_a_wrong_light_is_refused_in_one_line_or_is_the_power_of_all() -> None:

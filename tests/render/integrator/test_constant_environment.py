@@ -10,6 +10,7 @@ from scipy.stats import norm
 from render.engine import render
 from render.error_estimates import relative_error
 from render.geometry import look_at, to_world, translate
+from render.loader import is_environment
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from scenes.materials import ball, checks, floor, glass, matte, panel
@@ -134,9 +135,9 @@ def test_a_render_gone_on_from_and_a_cached_one_keep_the_correlation(tmp_path):
 
 def test_a_sky_of_its_own_colour_or_with_another_light_is_rendered_by_itself():
     scene = courtyard()
-    assert scene.is_environment("sky")
-    assert not scene.is_environment("lamp")
+    assert is_environment(scene, "sky")
+    assert not is_environment(scene, "lamp")
     own = replace(scene.groups["sky"], coloured=True)
-    assert not replace(scene, groups=scene.groups | {"sky": own}).is_environment("sky")
+    assert not is_environment(replace(scene, groups=scene.groups | {"sky": own}), "sky")
     together = LightGroup(("sky", "lamp/emitter"), flat())
-    assert not replace(scene, groups={"all": together}).is_environment("all")
+    assert not is_environment(replace(scene, groups={"all": together}), "all")

@@ -28,7 +28,13 @@ def test_every_row_is_there_and_this_environment_is_sound() -> None:
     assert all("\n" not in each.value and each.value for each in found)
     assert all(each.ok for each in found), [each for each in found if not each.ok]
     assert rows["backend"].value.split(":")[0] == jit.backend()
-    assert int(rows["Dr.Jit threads"].value) >= 1
+    assert int(rows["Dr.Jit threads"].value) == jit.dr.thread_count()
+
+
+def test_threads_are_those_that_this_process_may_use_of_the_machines(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(os, "sched_getaffinity", lambda process: {3}, raising=False)
+    monkeypatch.setattr(os, "cpu_count", lambda: 8)
+    assert doctor.Finding("CPU threads", "1 of 8") in doctor.findings()
 
 
 def test_one_fault_makes_the_exit_code_1(monkeypatch: pytest.MonkeyPatch) -> None:

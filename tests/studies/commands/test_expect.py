@@ -4,6 +4,7 @@ import csv
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import call, check_refusals
 
@@ -14,13 +15,17 @@ FEW = ["low_noise", "--mosaic", "bayer", "--mosaic", "RG/BW", "--level", "moonli
 
 
 def test_the_table_has_the_first_camera_and_gains_over_it() -> None:
-    code, out, _ = call(["expect", *FEW])
+    """436 lux on surfaces that give back 18 % are 436 x 0.18 / pi = 25.0 cd/m2."""
+    code, out, _ = call(["expect", *FEW, "--level", "436lux"])
     assert code == 0
-    bayer, rgbw = ([row.psnr_db for row in expect(low_noise(tile), [0.036, 25.0])] for tile in ("bayer", "rgbw"))
-    head, first, second, *_ = out.splitlines()
-    assert head.split()[-2:] == ["moonlight", "25cd/m2"]
+    rows = [expect(low_noise(tile), [0.036, 25.0, 436 * 0.18 / np.pi]) for tile in ("bayer", "rgbw")]
+    bayer, rgbw = ([row.psnr_db for row in of] for of in rows)
+    head, first, second, *colours = out.splitlines()
+    assert head.split()[-3:] == ["moonlight", "25cd/m2", "436lux"]
     assert first.split() == ["low_noise", "bayer", *(f"{db:.2f}" for db in bayer)]
     assert second.split() == ["low_noise", "RG/BW", *(f"{a - b:+.2f}" for a, b in zip(rgbw, bayer, strict=True))]
+    assert colours[0].startswith("error of a*, b*")
+    assert [line.split()[2:] for line in colours[1:]] == [[f"{row.colour:.2f}" for row in of] for of in rows]
 
 
 @pytest.mark.thorough

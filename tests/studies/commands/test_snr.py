@@ -1,10 +1,14 @@
 """`rodcone snr`: a table, JSON, a plot, and what isn't allowed."""
 
 import json
+from math import pi
 from pathlib import Path
 
 import pytest
 from command_line import call, check_refusals
+
+from sensor.presets import low_noise
+from sensor.readout import electrons_at_snr
 
 
 def test_a_faster_lens_needs_less_light_as_the_camera_equation_has_it() -> None:
@@ -15,6 +19,16 @@ def test_a_faster_lens_needs_less_light_as_the_camera_equation_has_it() -> None:
         needed[number] = json.loads(out)["low_noise"][1]["luminance_cd_m2"]
     # irradiance is pi L / (1 + 4 N^2) of a far scene
     assert needed["4"] / needed["2"] == pytest.approx((1 + 4 * 16) / (1 + 4 * 4), rel=1e-9)
+
+
+def test_the_table_holds_the_light_of_each_channel() -> None:
+    head, _, green, *_ = call(["snr", "low_noise", "--at", "10"])[1].splitlines()
+    assert head.split()[2:4] == ["electrons", "cd/m2"]
+    name, channel, *figures = green.split()
+    electrons, luminance_cd_m2, lux = map(float, figures)
+    assert (name, channel) == ("low_noise", "G")
+    assert electrons == pytest.approx(electrons_at_snr(10.0, low_noise(), 0.033), rel=1e-3)
+    assert lux == pytest.approx(luminance_cd_m2 * pi / 0.18, rel=1e-3)
 
 
 def test_several_sensors_stand_in_one_table_and_one_plot(tmp_path: Path) -> None:
