@@ -10,11 +10,13 @@ import pytest
 from render.engine import render
 from render.error_estimates import Halves
 from render.reference import FOLDER, SHIPPED, find_reference, require_agreement, save_reference
+from rodcone.progress import duration
 from scenes.catalog import load
 from studies.budget.ledger import as_stated
 from studies.commands.cli import main
 from studies.commands.demo import STUDY
 from studies.study.lit_scene import film_of, open_choice
+from studies.study.render_noise import MARGIN
 from studies.study.study_file import read_study
 
 pytestmark = pytest.mark.thorough
@@ -57,7 +59,9 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(
     until = str(first["share"] / 1.5)
     assert call("reference", "--size", "32", "--until", until, "--out", str(folder)) == 0
     printed = capsys.readouterr()
-    assert "of the sensor's variance in 95 % of pixels; about" in printed.err
+    # its first look is where the first call ended: variance falls with the samples, and these with the time
+    left = duration(first["seconds"] * (MARGIN * first["share"] / float(until) - 1))
+    assert f"of the sensor's variance in 95 % of pixels; about {left} more to {float(until):g}" in printed.err
     second = stored().certificate
     assert second["share"] <= float(until)
     assert second["samples"] > first["samples"]
