@@ -213,6 +213,7 @@ class RawImage:
         plain = ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
         return next((noise for noise in self.channel_noise if noise.channel == channel), plain)
 
+    @method
     def noise_at_sites(self, electrons: NDArray[Any]) -> NDArray[Any]:
         """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
 
@@ -255,6 +256,7 @@ class RawImage:
         """Where the pixel counts as saturated, shape (h, w)."""
         return self.full_at_sites(self.dn)
 
+    @method
     def full_at_sites(self, dn: NDArray[Any]) -> NDArray[np.bool_]:
         """Where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
         full = np.asarray(dn >= self.saturation_e / self.gain_e_per_dn + self.black_dn)

@@ -82,6 +82,7 @@ RIGHT: dict[str, Any] = {
     "emission": {},
     "index": [0, 1, 2, 3],
     "values": np.ones((16, 16)),
+    "dn": RAW.dn,
     "band_average.wavelength_nm": [550.0],
     "band_average.width_nm": [10.0],
 }
