@@ -295,7 +295,6 @@ def _checked_defects(defects: ArrayLike, shape: tuple[int, int]) -> NDArray[np.i
     fits = pixels.ndim == 2 and pixels.shape[1] == 2 and pixels.dtype.kind in "iu"
     if not fits or np.any((pixels < 0) | (pixels >= np.array(shape))):
         raise InputError(
-            f"defects: an array of shape {pixels.shape} is not allowed; give rows and columns inside {shape} as (n, 2) "
-            "whole numbers"
+            f"defects: shape {pixels.shape} is not allowed; give rows and columns inside {shape}, (n, 2) whole numbers"
         )
     return np.unique(pixels.astype(np.intp), axis=0)
