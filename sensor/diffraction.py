@@ -1,6 +1,7 @@
 """Transfer functions of diffraction and defocus."""
 
 from collections.abc import Callable
+from itertools import product
 from math import inf
 
 import numpy as np
@@ -41,33 +42,36 @@ def sampled_otf(
 ) -> Callable[[float], NDArray[np.float64]]:
     """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, as a function of the wavelength.
 
-    The function gives an array of shape `shape`, 1 at the first. What all bands share is computed once.
+    The function gives an array of shape `shape`, 1 at the first. What all bands share is computed once. Samples know a
+    frequency and its copies, one sampling frequency away, by their sum alone. In focus no point image gets negative.
 
     Parameters
     ----------
     folded : bool
-        False: the function itself, cut at the samples' Nyquist frequency. True: with its copies one sampling frequency
-        away added, which is the transform of the point image taken at the samples (Poisson's sum). That is nowhere
-        negative, and below the pixels' Nyquist frequency the same wherever the lens's limit lies under the sampling
-        frequency less that.
+        False, for a picture's pixels: the mean of the copies' transfers by the energy that a square pixel passes of
+        each, sinc^2. A pixel's light is somewhere in its square, and this is the best linear estimate of what the next
+        pixels get of it, of the four nearest copies. True, for samples finer than the pixels: the sum of the copies,
+        which is the transform of the point image taken at the samples (Poisson's sum), and below the pixels' Nyquist
+        frequency the lens's own wherever its limit lies under the sampling frequency less that.
     """
-    rows, columns = (np.arange(size) / (2 * size * step_um) for size in shape)
-    copies = [(0, 0), (-1, 0), (0, -1), (-1, -1)] if folded and lens.diffraction else [(0, 0)]
-
-    def frequency_per_um(down: int, across: int) -> Floats:
-        return np.asarray(np.hypot(rows[:, None] + down / step_um, columns + across / step_um))
-
-    discs = [defocus_otf(frequency_per_um(*copy), lens.defocus_um) for copy in copies if lens.defocus_um]
+    rows, columns = (np.arange(size) / (2 * size) for size in shape)
+    # Along an axis sinc^2 of f and of f - 1, over their sum.
+    energies = [((1 - f) ** 2 / ((1 - f) ** 2 + f**2), f**2 / ((1 - f) ** 2 + f**2)) for f in (rows, columns)]
+    copies = []
+    for down, across in product((0, 1), (0, 1)) if lens.diffraction or not folded else [(0, 0)]:
+        frequency_per_um = np.hypot(rows[:, None] - down, columns - across) / step_um
+        weight: Floats = np.ones(shape) if folded else energies[0][down][:, None] * energies[1][across]
+        if lens.defocus_um:
+            weight = weight * defocus_otf(frequency_per_um, lens.defocus_um)
+        copies.append((frequency_per_um, weight, frequency_per_um.min()))
 
     def of_band(wavelength_nm: float) -> Floats:
-        if not lens.diffraction:
-            return discs[0] if discs else np.ones(shape)
         limit, total = limit_per_um(wavelength_nm, lens), np.zeros(shape)
-        for number, (down, across) in enumerate(copies):
-            nearest = np.hypot(rows[-1] * bool(down), columns[-1] * bool(across))  # where a copy comes closest to 0
-            if nearest < limit:
-                transfer = diffraction_otf(frequency_per_um(down, across), wavelength_nm, lens)
-                total += transfer * discs[number] if discs else transfer
+        for frequency_per_um, weight, nearest_per_um in copies:
+            if not lens.diffraction:
+                total += weight
+            elif nearest_per_um < limit:
+                total += weight * diffraction_otf(frequency_per_um, wavelength_nm, lens)
         return total
 
     return of_band

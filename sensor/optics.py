@@ -30,7 +30,7 @@ DIAGONAL = 1.25  # over the width of a picture of 4:3
 APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
 AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
 _BANDS_A_THREAD = 16  # a band at work takes as much memory as a dozen bands of float32
-_LEAST_SHARE = 5e-4  # of a point's light: a smaller share in the negative lobes isn't stated
+_LEAST_LOSS = 5e-4  # of the MTF: a smaller one isn't stated
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Parameters
     ----------
     radiance : SpectralRadiance
-        Box-filtered samples. One sample a pixel contains the pixel's aperture already and lacks the optical transfer
-        function alone; detail finer than a pixel has aliased by then.
+        Box-filtered samples. One sample a pixel contains the pixel's aperture already; where in the pixel its light
+        lies it doesn't tell (`sensor.diffraction.sampled_otf`).
     sensor : SensorConfig
         A term of its lens that is 0 costs nothing; `left_out` says what that leaves out.
     samples_per_pixel : int
@@ -154,7 +154,7 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     def one_band(band: int) -> None:
         light = radiance.values[..., band] * per_radiance
         if otf is not None:
-            spectrum = scipy.fft.dctn(light, type=2)
+            spectrum = scipy.fft.dctn(light, type=2, overwrite_x=True)
             spectrum *= otf(float(radiance.wavelength_nm[band]))
             light = scipy.fft.idctn(spectrum, type=2, overwrite_x=True)
             if light.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
@@ -179,10 +179,10 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
     if not lens.diffraction:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
         lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
-    if samples_per_pixel == 1 and (share := negative_lobe_share(sensor)) >= _LEAST_SHARE:
+    if samples_per_pixel == 1 and (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
         lines.append(
-            f"detail finer than a pixel: {share:.1%} of a point's light is taken from around it, to 0 at "
-            "most, and given to its own pixel; 4 samples a pixel are free of that"
+            f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist; "
+            "4 samples a pixel don't"
         )
     if samples_per_pixel > 1 and lens.diffraction:
         # What the nearest copy adds at the pixels' Nyquist frequency (`sensor.diffraction.sampled_otf`).
@@ -214,13 +214,13 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
     return (*lines, "aberrations, distortion, flare, polarisation: not modelled, their cost isn't estimated")
 
 
-def negative_lobe_share(sensor: SensorConfig) -> float:
-    """Share of a point's light in the negative lobes of its image, at one sample a pixel and within 32 pixels."""
-    point = np.zeros((64, 64))
-    point[32, 32] = 1.0
-    otf = sampled_otf((64, 64), sensor.site_pitch_um, sensor.lens, folded=False)
-    image = scipy.fft.idctn(scipy.fft.dctn(point) * otf(WAVELENGTH_NM))
-    return float(-image[image < 0].sum())
+def loss_within_pixels(sensor: SensorConfig) -> float:
+    """Largest loss of the MTF along an axis up to Nyquist, 550 nm, as one sample a pixel is imaged."""
+    lens, steps = sensor.lens, np.arange(64) / 128
+    ideal = diffraction_otf(steps / sensor.site_pitch_um, WAVELENGTH_NM, lens) if lens.diffraction else 1.0
+    ideal = ideal * defocus_otf(steps / sensor.site_pitch_um, lens.defocus_um)
+    imaged = sampled_otf((1, 64), sensor.site_pitch_um, lens, folded=False)(WAVELENGTH_NM)[0]
+    return float(np.max((ideal - imaged) * np.sinc(steps)))
 
 
 def _at_nyquist(transfer: float) -> str:

@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 from loop import loop
+from scipy.fft import dctn, idctn
 from scipy.integrate import quad
 from scipy.special import j0, j1
 
@@ -203,3 +204,57 @@ def test_one_sample_a_pixel_has_the_pixel_s_aperture_once():
     at_nyquist = np.interp(0.5, frequency, mtf)
     assert at_nyquist == pytest.approx(0.36, abs=0.01)
     assert theory(np.array([0.5]), 2.8, 2.2, 5.0)[0] == pytest.approx(0.36, abs=0.005)
+
+
+# One sample a pixel
+
+
+@loop("pitch_um", [1.0, 2.2, 6.0])
+@loop("f_number", [1.4, 2.8, 5.6, 11.0])
+def test_a_lamp_of_one_pixel_has_no_dots_around_it(f_number, pitch_um):
+    """Its image falls off along a row as the rings' mean does, and is nowhere negative."""
+    lamp = np.zeros((65, 65))
+    lamp[32, 32] = 1.0
+    sensor = camera(pitch_um, f_number=f_number, diffraction=1.0)
+    nm = np.arange(400.0, 701.0, 10.0)
+    planes = np.repeat(lamp[..., None], nm.size, axis=2)
+    signed = SpectralRadiance(planes, nm, signed=True)  # nothing is cut
+    made = form_image(signed, sensor).values / camera_equation(sensor.lens)
+    assert made.min() > -1e-15
+    np.testing.assert_allclose(made.sum(axis=(0, 1)), 1.0, rtol=1e-12)
+    white = made.mean(axis=2)
+    tail = white[32, 33:]
+    # Dots: a pixel brighter than its neighbours in the row. From the fourth on the tail is 1/r^3 and what is
+    # left of the rings, 1.2 at most where a pixel is narrower than one; with the transfer cut at Nyquist it was 5 and more.
+    assert (tail[3:-1] / np.sqrt(tail[2:-2] * tail[4:])).max() < 1.25
+
+
+def test_the_tail_of_a_lamp_is_the_airy_pattern_s():
+    """Beyond the first rings a pixel gets the share of the pattern's envelope N lambda / (pi^2 r^3), summed over it."""
+    lamp = np.zeros((129, 129))
+    lamp[64, 64] = 1.0
+    nm = np.arange(400.0, 701.0, 5.0)
+    radiance = SpectralRadiance(np.repeat(lamp[..., None], nm.size, axis=2), nm)
+    sensor = camera(diffraction=1.0)
+    white = form_image(radiance, sensor).values.mean(axis=2) / camera_equation(sensor.lens)
+    for r in (6, 9, 14):
+        envelope = 2.8 * nm.mean() * 1e-3 / (np.pi**3 * (r * 2.2) ** 3) * 2.2**2
+        assert white[64, 64 + r] == pytest.approx(envelope, rel=0.25)
+
+
+def test_around_lamps_one_sample_a_pixel_is_nearer_to_sixteen_than_a_transfer_cut_at_nyquist():
+    """Lamps a thousand times as bright as what surrounds them, anywhere within pixels."""
+    rng = np.random.default_rng(5)
+    fine = np.ones((4 * 64, 4 * 80))
+    for _ in range(12):
+        row, column = rng.integers(0, 250), rng.integers(0, 310)
+        fine[row : row + 4, column : column + 6] = 1000.0
+    pixels = fine.reshape(64, 4, 80, 4).mean(axis=(1, 3))
+    truth = image(fine, 4, diffraction=1.0)
+    rows, columns = (np.arange(size) / (2 * size * 2.2) for size in pixels.shape)
+    cut = idctn(dctn(pixels) * diffraction_otf(np.hypot(rows[:, None], columns), 550.0, IDEAL))
+    dark = truth < 3  # beside a lamp both are as far off: it may lie anywhere within its pixels
+    made, cut_at_nyquist = (
+        np.sqrt(np.mean((x - truth)[dark] ** 2)) for x in (image(pixels, diffraction=1.0), np.maximum(cut, 0))
+    )
+    assert made < cut_at_nyquist / 5

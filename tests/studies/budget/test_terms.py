@@ -271,11 +271,11 @@ def test_saturated_pixels_are_left_out() -> None:
 
 
 def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> None:
-    """A lamp in the dark: what diffraction takes below 0 has no light, no noise of it and no jitter."""
+    """A lamp in the dark: what a lens out of focus takes below 0 has no light, no noise of it and no jitter."""
     planes = np.zeros((40, *SIZE))
     planes[::2, 12, 12], planes[1::2, 12, 12] = 0.5, 1.0
     sensor = low_noise()
-    some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0)
+    some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0, defocus_um=2.2)
     assert (some.full.mean(axis=0) < 0).any()
     row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
     kept = 1e-5 * np.maximum(some.full.mean(axis=0), 0.0)
@@ -283,6 +283,9 @@ def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> N
         noise_variance(kept, sensor, 0.01)[kept < sensor.pixel.full_well_e].mean()
     )
     assert np.isfinite([row.kernel, row.level, *row.jitter.values(), *row.lens.values()]).all()
+    some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0)  # in focus nothing is below 0
+    assert (some.full >= 0).all()
+    row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
     sharp = 1e-5 * (some.full + some.lens["diffraction"]).mean(axis=0)[12, 12]  # the lamp's electrons, all in one pixel
     relative = 1e-10 * some.sharp[0, 12, 12] ** 2 * 128 / sharp**2 + 1 / 16
     values = np.zeros(planes[0].size)
