@@ -17,7 +17,7 @@ from sensor.shake import shaken
 
 
 def capture(
-    radiance: SpectralRadiance,
+    radiance: SpectralRadiance | SpectralIrradiance,
     sensor: SensorConfig,
     exposure_s: float | None = None,
     device: Device | None = None,
@@ -38,8 +38,9 @@ def capture(
 
     Parameters
     ----------
-    radiance : SpectralRadiance
-        Quickest as float32 with band-planar memory, as renders are.
+    radiance : SpectralRadiance or SpectralIrradiance
+        Quickest as float32 with band-planar memory, as renders are. An image on the sensor, of `form_image`, saves
+        forming it again.
     sensor : SensorConfig
     exposure_s : float, optional
         0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
@@ -63,16 +64,19 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
+    formed = isinstance(radiance, SpectralIrradiance)
     if device is None:
-        shape = radiance.shape[0] // samples_per_pixel, radiance.shape[1] // samples_per_pixel
+        rows, columns = (size if formed else size // samples_per_pixel for size in radiance.values.shape[:2])
+        shape = rows, columns
         device = draw_device(sensor, shape, np.random.default_rng([0, 0]))
     rng = np.random.default_rng([0, 1]) if rng is None else rng
-    numpy_runs, scaled = exact or backend() == "numpy", samples_per_pixel == 1 and not spreads(sensor.lens)
-    light: SpectralRadiance | SpectralIrradiance = radiance
-    if numpy_runs or not scaled or sensor.lens.shake_um:
-        light = form_image(radiance, sensor, samples_per_pixel)
+    numpy_runs = exact or backend() == "numpy"
+    scaled = samples_per_pixel == 1 and not spreads(sensor.lens) and not formed
+    light = radiance
+    if isinstance(light, SpectralRadiance) and (numpy_runs or not scaled or sensor.lens.shake_um):
+        light = form_image(light, sensor, samples_per_pixel)
     if exposure_s is None:
-        image = light if isinstance(light, SpectralIrradiance) else form_image(radiance, sensor)
+        image = light if isinstance(light, SpectralIrradiance) else form_image(light, sensor)
         exposure_s = auto_exposure_s(image, sensor)
     expected_e: NDArray[np.floating]
     if isinstance(light, SpectralIrradiance) and sensor.lens.shake_um:

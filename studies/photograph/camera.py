@@ -25,7 +25,7 @@ from sensor.cfa import channels, mask, unit_channel
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
-from sensor.optics import camera_equation, falloff, form_image
+from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
@@ -259,9 +259,12 @@ def capture(
     """
     sensor = preset("low_noise") if sensor is None else sensor
     sensor = replace(sensor, lens=held_lens(sensor.lens, shake))
+    seen: SpectralRadiance | SpectralIrradiance = radiance
     if exposure_s is None:
-        exposure_s = exposure_by_rule_s(AUTO_INFORMATION, form_image(radiance, sensor, samples_per_pixel), sensor)
-    raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
+        image = form_image(radiance, sensor, samples_per_pixel)
+        exposure_s = exposure_by_rule_s(AUTO_INFORMATION, image, sensor)
+        seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
+    raw = frame_of(seen, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:
         colour = calibrate(sensor, light or illuminant("D65"))
     except InputError:

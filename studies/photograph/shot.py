@@ -25,7 +25,7 @@ from sensor.cfa import channels, is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
-from sensor.optics import form_image, left_out
+from sensor.optics import form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from sensor.response import expected_electrons
@@ -181,11 +181,13 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if step:
         step("exposure", 0.9)
     radiance = transport.relight(spectra, **level)
+    image = form_image(radiance, sensor)
     if exposure_s is None:
-        exposure_s = exposure_by_rule_s(order.exposure, form_image(radiance, sensor), sensor)
+        exposure_s = exposure_by_rule_s(order.exposure, image, sensor)
+    seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
-    taken = [capture(radiance, sensor, exposure_s, device, rng) for _ in range(order.frames)]
+    taken = [capture(seen, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
     lens, iso = sensor.lens, iso_speed(sensor)
     raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]
