@@ -225,7 +225,7 @@ def test_a_lamp_of_one_pixel_has_no_dots_around_it(f_number, pitch_um):
     white = made.mean(axis=2)
     tail = white[32, 33:]
     # Dots: a pixel brighter than its neighbours in the row. From the fourth on the tail is 1/r^3 and what is
-    # left of the rings, 1.2 at most where a pixel is narrower than one; with the transfer cut at Nyquist it was 5 and more.
+    # left of the rings, 1.2 at most where a pixel is narrower than one; cut at Nyquist the transfer made it 5 and more.
     assert (tail[3:-1] / np.sqrt(tail[2:-2] * tail[4:])).max() < 1.25
 
 
