@@ -39,7 +39,7 @@ def number(result):
     return float(np.ravel(result() if callable(result) else result)[0])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", PRESETS)
 def test_our_procedure_finds_what_the_stranger_finds_in_the_same_frames(name, emva):
     data_1288, results_1288, sums = emva

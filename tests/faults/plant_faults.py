@@ -75,10 +75,24 @@ class _Exchange(ast.NodeTransformer):
         self.old, self.new, self.count = _syntax(there), _syntax(instead), 0
 
     def visit(self, node: ast.AST) -> Any:
-        if type(node) is not type(self.old) or ast.dump(node) != ast.dump(self.old):
+        if isinstance(node, ast.Expr) and isinstance(self.new, ast.stmt) and _same(node.value, self.old):
+            self.count += 1  # a call alone on its line, and a statement in its place
+            return self.new
+        if not _same(node, self.old):
             return self.generic_visit(node)
         self.count += 1
         return self.new
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two pieces of syntax are equal, wherever they stand; most differ at once."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, ast.AST):
+        return all(_same(getattr(one, name, None), getattr(other, name, None)) for name in one._fields)
+    if isinstance(one, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    return bool(one == other)
 
 
 def _syntax(piece: str) -> ast.AST:
@@ -89,8 +103,8 @@ def _syntax(piece: str) -> ast.AST:
     return statement.value if isinstance(statement, ast.Expr) else statement
 
 
-def planted(fault: Fault, text: str) -> str:
-    """The file's code with the fault in it, without its comments."""
+def planted(fault: Fault, text: str) -> ast.Module:
+    """Syntax of the file with the fault in it."""
     tree = ast.parse(text)
     functions = [node for node in ast.walk(tree) if getattr(node, "name", None) == fault.function]
     scope = functions[0] if functions else tree
@@ -99,7 +113,7 @@ def planted(fault: Fault, text: str) -> str:
         exchange.visit(scope)
         if exchange.count != 1:
             raise SystemExit(f"{fault.name}: {there!r} stands {exchange.count} times in {fault.file}; write it anew")
-    return ast.unparse(ast.fix_missing_locations(tree))
+    return ast.fix_missing_locations(tree)
 
 
 def drawn(count: int, day: date) -> list[Fault]:
@@ -134,7 +148,7 @@ def plant(fault: Fault, copy: Path, markers: str = ALL) -> dict[str, Any]:
     text = file.read_text()
     start = time.perf_counter()
     try:
-        file.write_text(planted(fault, text))
+        file.write_text(ast.unparse(planted(fault, text)))
         code, test = run_tests(copy, fault.tests, markers)
     finally:
         file.write_text(text)

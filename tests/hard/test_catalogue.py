@@ -9,8 +9,8 @@ from rodcone.jit import backend
 needs_kernel = pytest.mark.skipif(backend() == "numpy", reason="without Dr.Jit a case takes minutes")
 
 # One of each kind, on the shared render alone and without a long search; and more for `make test-all`.
-QUICK = ("all_saturated", "well_1e6_8bit", "frame_5x7")
-THOROUGH = ("starlight", "neighbours_1e8", "all_black_quiet", "half_saturated", "prnu_50")
+QUICK = ("all_saturated", "well_1e6_8bit")
+THOROUGH = ("frame_5x7", "starlight", "neighbours_1e8", "all_black_quiet", "half_saturated", "prnu_50")
 BY_NAME = {case.name: case for case in CASES}
 
 
@@ -32,6 +32,7 @@ def test_the_catalogue_names_each_of_at_least_60_cases_once():
     assert {*QUICK, *THOROUGH} <= set(BY_NAME)
 
 
+@pytest.mark.thorough
 @needs_kernel
 def test_every_invariant_says_something_about_an_ordinary_scene():
     margins = run_case(BY_NAME["starlight"]).margins

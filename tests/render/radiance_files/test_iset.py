@@ -43,6 +43,7 @@ def test_photons_become_watts_by_planck_constant_and_frequency(tmp_path: Path) -
     assert read.relative_mc_error == 0
 
 
+@pytest.mark.thorough
 def test_older_names_of_photons_and_wavelengths_are_known(tmp_path: Path) -> None:
     read = read_iset_scene(save(tmp_path, data=PHOTONS, wavelength=NM[:, None]))
     assert read.values == pytest.approx(PHOTONS * JOULE, rel=6e-8)
@@ -74,11 +75,13 @@ def test_photons_of_old_files_are_stretched_from_integers(tmp_path: Path, dtype:
     assert np.all(np.abs(read.values / JOULE - PHOTONS) <= half_step + 1e-7 * PHOTONS)
 
 
+@pytest.mark.thorough
 def test_basis_coefficients_give_photons(tmp_path: Path) -> None:
     path, photons = basis_file(tmp_path)
     assert read_iset_scene(path).values == pytest.approx(photons * JOULE, rel=1e-6)
 
 
+@pytest.mark.thorough
 def test_the_mean_that_was_taken_out_is_added(tmp_path: Path) -> None:
     mean = 1e14 * np.arange(NM.size)
     path, photons = basis_file(tmp_path, imgMean=mean)
@@ -109,6 +112,7 @@ def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
     assert read.values == pytest.approx(np.maximum(photons, 0) * JOULE, rel=6e-7)
 
 
+@pytest.mark.thorough
 @loop("form", ["struct", "photons"])
 def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form: str, tmp_path: Path) -> None:
     photons = PHOTONS.copy()
@@ -117,6 +121,7 @@ def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form
         read_iset_scene(in_form(form, photons, tmp_path))
 
 
+@pytest.mark.thorough
 def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
     with pytest.warns(UserWarning, match="half-way"):
         read = read_iset_scene(save(tmp_path, photons=PHOTONS[:, :, :3], wave=np.array([400.0, 410.0, 430.0])))

@@ -474,7 +474,7 @@ def test_what_cannot_be_developed_is_refused_and_leaves_no_picture(
     check_refusals("develop", NOT_DEVELOPED, tmp_path)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("cfa", ["rccb", "rccc", "ryyb", "mono"])
 def test_other_mosaics_are_captured_and_developed(cfa: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -89,6 +89,7 @@ def test_cells_come_by_scene_exposure_level_and_camera(out: Path) -> None:
     assert [group.truth for group in group_views(report)] == [0, 0, 1, 1]
 
 
+@pytest.mark.thorough
 def test_the_page_holds_the_names_as_text_and_the_means_over_seeds(out: Path) -> None:
     page = render_report(*sweep_report(out))
     title = re.search(r"<title>(.*?)</title>", page)
@@ -141,6 +142,7 @@ def test_pictures_fill_the_page_up_to_its_size(out: Path, monkeypatch: pytest.Mo
     assert len(sweep_report(out)[1].flip_maps) == 2, "those that are compared at first are in any page"
 
 
+@pytest.mark.thorough
 def test_the_mean_of_a_map_is_the_figure_of_its_picture(out: Path) -> None:
     """Figures are of pictures before 8 bits, whose steps move FLIP by some thousandths."""
     results, pictures = sweep_report(out)
@@ -178,6 +180,7 @@ def test_the_loupe_begins_where_the_edges_are() -> None:
     assert busiest(np.zeros((1, 1, 3), np.uint8)) == (0, 0)
 
 
+@pytest.mark.thorough
 def test_cells_not_made_yet_are_dashes_and_the_page_says_how_many(out: Path, tmp_path: Path) -> None:
     part = copied(out, tmp_path)
     with closing(sqlite3.connect(part / FILE)) as base, base:
@@ -205,6 +208,7 @@ def test_a_sensor_whose_file_is_gone_is_said_to_be() -> None:
     assert "<p>Its file is no longer there.</p>" in render_report(report, pictures)
 
 
+@pytest.mark.thorough
 def test_what_is_no_sweep_or_has_lost_a_picture_is_one_line(out: Path, tmp_path: Path) -> None:
     with pytest.raises(InputError, match=r"holds no ledger\.sqlite"):
         sweep_report(tmp_path)
@@ -229,6 +233,7 @@ def test_the_command_writes_the_page_whole_and_prints_its_path(out: Path, tmp_pa
     check_refusals(f"report {out}", [(f"-o {tmp_path}/absent/r.html", "choose another place")], tmp_path, code=1)
 
 
+@pytest.mark.thorough
 def test_a_picture_that_is_a_link_out_of_the_folder_is_not_read(out: Path, tmp_path: Path) -> None:
     part = copied(out, tmp_path)
     (part / "pictures").unlink()
