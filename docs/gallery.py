@@ -70,14 +70,14 @@ def scene_section(name: str) -> str:
         "levels": "cd/m² and lux" if scene.reference_plane else "cd/m²",
         "options in Python": ", ".join(f"`{option}`" for option in options) or "none",
     }
-    told = "; ".join(f"{fact}: {value}" for fact, value in facts.items())
+    sentence = "; ".join(f"{fact}: {value}" for fact, value in facts.items())
     return f"""## {name}
 
 {texts("scenes")[name].partition(" Lights: ")[0]}
 
 ![{name}]({name}.webp)
 
-{told[0].upper()}{told[1:]}.
+{sentence[0].upper()}{sentence[1:]}.
 
 ```sh
 {commands(name)[0]}

@@ -34,8 +34,8 @@ class Block:
 
 def blocks(text: str) -> Iterator[Block]:
     """Fenced blocks of a page, in order."""
-    for found in FENCE.finditer(text):
-        yield Block(found[1], found[2] or "", found[3], text.count("\n", 0, found.start(3)) + 1)
+    for fence in FENCE.finditer(text):
+        yield Block(fence[1], fence[2] or "", fence[3], text.count("\n", 0, fence.start(3)) + 1)
 
 
 def run(page: Path, folder: Path) -> None:
@@ -52,9 +52,9 @@ def run(page: Path, folder: Path) -> None:
             Path(block.title).parent.mkdir(parents=True, exist_ok=True)
             Path(block.title).write_text(block.code, "utf-8")
         elif block.language == "python":
-            with redirect_stdout(StringIO()) as told:
+            with redirect_stdout(StringIO()) as output:
                 exec(compile("\n" * (block.line - 1) + block.code, str(page), "exec"), names)
-            printed[number] = told.getvalue()
+            printed[number] = output.getvalue()
         elif block.language == "sh":
             code, printed[number] = run_shell(block.code)
             if code:
@@ -64,15 +64,15 @@ def run(page: Path, folder: Path) -> None:
 
 def run_shell(code: str) -> tuple[int, str]:
     """Exit code and output of a shell block; what it leaves in the background is ended with it."""
-    with tempfile.TemporaryFile("w+", encoding="utf-8") as told:
-        shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", code], stdout=told, start_new_session=True)
+    with tempfile.TemporaryFile("w+", encoding="utf-8") as output:
+        shell = subprocess.Popen(["bash", "-euo", "pipefail", "-c", code], stdout=output, start_new_session=True)
         try:
             shell.wait()
         finally:
             with suppress(ProcessLookupError):
                 os.killpg(shell.pid, signal.SIGTERM)
-        told.seek(0)
-        return shell.returncode, told.read()
+        output.seek(0)
+        return shell.returncode, output.read()
 
 
 if __name__ == "__main__":

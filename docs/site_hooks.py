@@ -81,17 +81,17 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
     printed = json.loads(outputs.read_text("utf-8"))
     numbers = count()
 
-    def with_output(found: re.Match[str]) -> str:
-        told = printed.get(str(next(numbers)), "").rstrip()
-        return found[0] + (f'\n\n``` {{ .text .output title="prints" }}\n{told}\n```' if told else "")
+    def with_output(fence: re.Match[str]) -> str:
+        output = printed.get(str(next(numbers)), "").rstrip()
+        return fence[0] + (f'\n\n``` {{ .text .output title="prints" }}\n{output}\n```' if output else "")
 
     return FENCE.sub(with_output, markdown)
 
 
 def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
     """Write formulas as MathML, which browsers show by themselves, and lead names of modules to their pages."""
-    html = FORMULA.sub(lambda found: mathml(found[2], block=found[1] == "div"), html)
-    return NAME.sub(lambda found: found[0] if found[1] else linked(found[2], found[0], page.url), html)
+    html = FORMULA.sub(lambda match: mathml(match[2], block=match[1] == "div"), html)
+    return NAME.sub(lambda match: match[0] if match[1] else linked(match[2], match[0], page.url), html)
 
 
 def modules(package: str) -> list[str]:
@@ -109,8 +109,8 @@ def decisions_page() -> str:
     """List of the decisions by their own headings."""
     paths = sorted((ROOT / "docs" / "decisions").glob("*.md"))
     lines = [f"- [{path.read_text('utf-8').partition(chr(10))[0].lstrip('# ')}]({path.name})" for path in paths]
-    told = "Why things are as they are: each record states the question, what was found, and what was decided."
-    return f"# Decisions\n\n{told}\n\n" + "\n".join(lines)
+    lead = "Why things are as they are: each record states the question, what was found, and what was decided."
+    return f"# Decisions\n\n{lead}\n\n" + "\n".join(lines)
 
 
 def results_page(path: Path) -> str:
@@ -126,8 +126,8 @@ def api_page() -> str:
     """List of the packages, in the order in which light goes through them."""
     rows = [f"| [`{name}`]({name}/index.md) | {summary(ROOT / name / '__init__.py')} |" for name in PACKAGES]
     order = "`studies > isp > (scenes | sensor) > render > rodcone`"
-    told = f"Imports point one way: {order}. The commands: [Commands](commands.md)."
-    return f"# API\n\n{told}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
+    lead = f"Imports point one way: {order}. The commands: [Commands](commands.md)."
+    return f"# API\n\n{lead}\n\n| package | what |\n|---|---|\n" + "\n".join(rows)
 
 
 def package_page(package: str) -> str:
@@ -157,9 +157,9 @@ def linked(name: str, code: str, url: str) -> str:
     """`code` as a link to the page of the module that `name` begins with; as it is where there is none."""
     name = ".".join(_PUBLIC.get(name.removeprefix("rodcone."), (name,)))
     package, _, inner = name.partition(".")
-    found = [module for module in modules(package) if f"{inner}.".startswith(f"{module}.")]
-    if not found:
+    names = [module for module in modules(package) if f"{inner}.".startswith(f"{module}.")]
+    if not names:
         return code
-    module = max(found, key=len)
+    module = max(names, key=len)
     anchor = f"#{name}" if inner != module else ""
     return f'<a href="{get_relative_url(f"api/{package}/{module}.html", url)}{anchor}">{code}</a>'

@@ -37,8 +37,8 @@ for light_e, ratio in zip(electrons, rodcone.snr(electrons, sensor, "20ms"), str
     print(f"{light_e:7.0f} e-: SNR {ratio:6.2f}, by shot noise alone {light_e**0.5:6.2f}")
 
 # In how little light does a pixel reach an SNR of 10, by channel?
-for found in rodcone.light_for_snr(10.0, sensor, "D65", "33ms"):
-    print(f"SNR 10 in {found.channel}: {found.electrons:.0f} e-, {found.luminance_cd_m2:.2f} cd/m2")
+for light in rodcone.light_for_snr(10.0, sensor, "D65", "33ms"):
+    print(f"SNR 10 in {light.channel}: {light.electrons:.0f} e-, {light.luminance_cd_m2:.2f} cd/m2")
 
 # The photon-transfer procedure on one simulated chip: it sees frames alone, and finds the numbers above.
 chip = rodcone.characterise(sensor, (size, size), seed=1)

@@ -166,8 +166,8 @@ def write_page(run: LastRun, folder: Path, out: Path, table_out: Path) -> None:
 
 def _entry(given: str) -> Entry:
     """Sensor of a file with Bayer, as it exists, or a preset with RGBW."""
-    own, real = preset(given), given.endswith(".toml")
-    return Entry(plain_name(label(given)), vary(own, "bayer" if real else "rgbw"), BAYER if real else RGBW)
+    sensor, real = preset(given), given.endswith(".toml")
+    return Entry(plain_name(label(given)), vary(sensor, "bayer" if real else "rgbw"), BAYER if real else RGBW)
 
 
 def conditions_of(rows: Sequence[Row], sensor: str) -> list[Condition]:
@@ -178,12 +178,12 @@ def conditions_of(rows: Sequence[Row], sensor: str) -> list[Condition]:
     InputError
         Where a processor lacks a picture that another has, or there are fewer than two seeds.
     """
-    found: dict[str, dict[str, dict[int, Row]]] = {}
+    by_level: dict[str, dict[str, dict[int, Row]]] = {}
     for row in rows:
         if plain_name(row.sensor) == sensor:
-            found.setdefault(row.level, {}).setdefault(row.processor, {})[row.seed] = row
+            by_level.setdefault(row.level, {}).setdefault(row.processor, {})[row.seed] = row
     seeds = sorted({row.seed for row in rows})
-    lacking = [level for level, of in found.items() for by_seed in of.values() if sorted(by_seed) != seeds]
+    lacking = [level for level, of in by_level.items() for by_seed in of.values() if sorted(by_seed) != seeds]
     if len(seeds) < 2 or lacking:
         raise InputError(
             f"seeds: {seeds} of {sensor} lack pictures at {lacking}; allowed: two seeds or more, and a whole sweep; "
@@ -195,7 +195,7 @@ def conditions_of(rows: Sequence[Row], sensor: str) -> list[Condition]:
             next(iter(of.values()))[seeds[0]].luminance_cd_m2,
             {name: tuple(by_seed[seed] for seed in seeds) for name, by_seed in of.items()},
         )
-        for level, of in found.items()
+        for level, of in by_level.items()
     ]
     return sorted(conditions, key=lambda condition: condition.luminance_cd_m2)
 
@@ -214,7 +214,7 @@ def leads_of(metric: Metric, conditions: Sequence[Condition], ours: str, theirs:
     return leads(metric, *(np.array([x.figures(name, metric) for x in conditions]) for name in (ours, theirs)))
 
 
-def lead_rows(metric: Metric, found: Mapping[str, Leads]) -> list[list[str]]:
+def lead_rows(metric: Metric, leads_by_name: Mapping[str, Leads]) -> list[list[str]]:
     """Return leads with half their intervals: a line each, light across."""
     return [
         [
@@ -224,7 +224,7 @@ def lead_rows(metric: Metric, found: Mapping[str, Leads]) -> list[list[str]]:
                 for mean, half in zip(x.mean, x.half, strict=True)
             ),
         ]
-        for name, x in found.items()
+        for name, x in leads_by_name.items()
     ]
 
 
@@ -240,14 +240,16 @@ def results(
     """Return the page's generated parts, and every figure as CSV; parameters as `write_page`."""
     beside = beside_each_other(conditions, entries)
     levels = [level_text(x.level) for x in beside]
-    own = next(entry for entry in entries if entry.processor == RGBW)
+    rgbw = next(entry for entry in entries if entry.processor == RGBW)
     area = EqualArea(study["sensor_side_um"], max(entry.sensor.pixel.pitch_um for entry in entries))
-    green, white = (own.sensor.responses.curves[channel] for channel in "GW")
+    green, white = (rgbw.sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     scene = study["scenes"][0]["source"]
     worst = max(row.mc_share for x in beside for rows in x.rows.values() for row in rows)
     paper = {
-        metric: lead_rows(metric, {x.words: leads_of(metric, beside, own.words, x.words) for x in entries if x != own})
+        metric: lead_rows(
+            metric, {x.words: leads_of(metric, beside, rgbw.words, x.words) for x in entries if x != rgbw}
+        )
         for metric in (PSNR, DELTA_E, FLIP)
     }
     white_pixel = {
@@ -257,16 +259,16 @@ def results(
     tables = {
         **light_rows(entries, beside, _light(scene), area.coarsest_um),
         **{_with_unit(metric): metric_rows(metric, beside) for metric in SHOWN},
-        **{f"lead of {own.words}: {_with_unit(metric)}": rows for metric, rows in paper.items()},
+        **{f"lead of {rgbw.words}: {_with_unit(metric)}": rows for metric, rows in paper.items()},
         **{f"lead of {RGBW} over {BAYER}: {_with_unit(metric)}": rows for metric, rows in white_pixel.items()},
     }
     parts = {
-        "set-up": f"Here: scene `{scene}`, {area.side_um:g} µm, f/{own.sensor.lens.f_number:g}, at most "
+        "set-up": f"Here: scene `{scene}`, {area.side_um:g} µm, f/{rgbw.sensor.lens.f_number:g}, at most "
         f"{duration(study['longest_exposure_s'])}, compared at {area.coarsest_um:g} µm. Green's filter passes "
         f"{percent(float(green.values.max() / at_peak))}. The render's own noise, which counts as texture, has at most "
         f"{percent(worst)} of the sensor's variance.",
         "sensors": sensors_table(entries, area),
-        "summary": summary_table(beside, own.words),
+        "summary": summary_table(beside, rgbw.words),
         "white pixel": table([f"lead in {_with_unit(PSNR)}", *levels], white_pixel[PSNR]),
     }
     rows = [[name, *cells] for name, of_table in tables.items() for cells in of_table]
@@ -279,32 +281,33 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
     for entry in entries:
         path, pixel = REPORTS / f"{entry.name}.toml", entry.sensor.pixel
         report = read_report(path) if path.is_file() else None
-        told = {} if report is None else report.figures
+        figures = {} if report is None else report.figures
         dsnu, prnu = f"{pixel.dsnu_e:.3g}", f"{100 * pixel.prnu:.3g}"
         rows.append(
             [
                 f"`{entry.name}`" + ("" if report is None else f": {report.camera}"),
                 f"{pixel.pitch_um:g}",
                 str(area.shape((1, 1), pixel.pitch_um)[0]),
-                _efficiency(entry.sensor, told),
+                _efficiency(entry.sensor, figures),
                 f"{pixel.read_noise_e:.3g}",
                 significant(pixel.full_well_e),
                 significant(pixel.full_well_e / pixel.pitch_um**2),
-                dsnu if report is None or "DSNU1288" in told else f"({dsnu})",
-                prnu if report is None or "PRNU1288" in told else f"({prnu})",
+                dsnu if report is None or "DSNU1288" in figures else f"({dsnu})",
+                prnu if report is None or "PRNU1288" in figures else f"({prnu})",
             ]
         )
     head = ["sensor", "pitch [µm]", "pixels across", "quantum efficiency", "read noise [e⁻]", "clip [e⁻]"]
     return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
 
 
-def _efficiency(sensor: SensorConfig, told: Mapping[str, float]) -> str:
+def _efficiency(sensor: SensorConfig, figures: Mapping[str, float]) -> str:
     """Simulated quantum efficiency of W, in brackets without a report; the report's beside it where it differs."""
-    at_nm, white = told.get("lambda_nm", AT_NM), sensor.responses.curves["W"]
+    at_nm, white = figures.get("lambda_nm", AT_NM), sensor.responses.curves["W"]
     value = 100 * sensor.pixel.fill_factor * float(np.interp(at_nm, white.wavelength_nm, white.values))
-    if not told:
+    if not figures:
         return f"({value:.1f} % at {at_nm:g} nm: the paper's W, fill factor {sensor.pixel.fill_factor:g})"
-    published = "" if abs(value - told["eta"]) < 0.05 else f"; published: {told['eta']:g} %"  # half of the last digit
+    alike = abs(value - figures["eta"]) < 0.05  # half of the last digit
+    published = "" if alike else f"; published: {figures['eta']:g} %"
     return f"{value:.1f} % at {at_nm:g} nm{published}"
 
 
@@ -320,9 +323,11 @@ def light_rows(
     )
     rows: dict[str, list[list[str]]] = {times: [], electrons: [], snr: [], area: []}
     for entry in entries:
-        rows[times].append([entry.words, *(duration(each.rows[entry.words][0].exposure_s) for each in beside)])
+        rows[times].append(
+            [entry.words, *(duration(condition.rows[entry.words][0].exposure_s) for condition in beside)]
+        )
         gain_db = 20 * log10(coarsest_um / entry.sensor.pixel.pitch_um)
-        for channel in (each for each in channels(entry.sensor.cfa) if each in "GW"):
+        for channel in [name for name in channels(entry.sensor.cfa) if name in "GW"]:
             for name in (electrons, snr, area):
                 rows[name].append([f"{entry.words}, {channel}"])
             for condition in beside:
@@ -346,13 +351,13 @@ def metric_rows(metric: Metric, beside: Sequence[Condition]) -> list[list[str]]:
     return rows
 
 
-def summary_table(beside: Sequence[Condition], own: str) -> str:
+def summary_table(beside: Sequence[Condition], rgbw: str) -> str:
     """Return the first two sensors by PSNR at each level, and the place of one."""
     rows = []
     for condition in beside:
         psnr_db = {name: condition.mean(name, PSNR) for name in condition.rows}
         order = sorted(psnr_db, key=lambda name: -psnr_db[name])
-        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in (*order[:2], own)]
+        cells = [f"{order.index(name) + 1}. {name}: {fixed(psnr_db[name], 1)} dB" for name in (*order[:2], rgbw)]
         rows.append([level_text(condition.level), *cells])
     return table(["by PSNR", "first", "second", "the paper's pixel"], rows)
 

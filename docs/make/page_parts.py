@@ -19,7 +19,7 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
     """
     for name, content in parts.items():
         place = re.compile(rf"(<!-- {name} -->\n).*?(<!-- end -->)", re.DOTALL)
-        text, count = place.subn(lambda found, new=content: f"{found[1]}\n{new}\n\n{found[2]}", text)
+        text, count = place.subn(lambda part, new=content: f"{part[1]}\n{new}\n\n{part[2]}", text)
         if count != 1:
             raise KeyError(name)
     return text

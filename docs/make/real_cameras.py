@@ -61,9 +61,9 @@ class PublishedFigure:
 
 def camera_of(numbers: PixelNumbers, report: EmvaReport) -> SensorConfig:
     """Chip of a report for the bench; a pitch that isn't told plays no part there."""
-    told = {key: each.value for key, each in numbers.pixel.items()}
+    reported = {key: number.value for key, number in numbers.pixel.items()}
     lent = {"pitch_um": 5.0, "dsnu_e": 0.0, "prnu": 0.0}
-    pixel = PixelConfig(**{**{key: lent[key] for key in missing(numbers)}, **told})
+    pixel = PixelConfig(**{**{key: lent[key] for key in missing(numbers)}, **reported})
     return SensorConfig(
         pixel, LensConfig(2.8), cfa=("W",), bits=report.bits or 12, black_level_dn=report.black_level_dn
     )
@@ -73,9 +73,9 @@ def rows_of(report: EmvaReport, seed: int = 0) -> list[PublishedFigure]:
     """Figures of a report: published, configured, and recovered from the frames of one simulated chip."""
     numbers = numbers_of(report)
     sensor = camera_of(numbers, report)
-    found = characterise(sensor, SHAPE, seed, EXPOSURE_S)
-    figures, half = report.figures, found.saturation_e / 2
-    noise_e = hypot(found.figure("dark noise").configured, sensor.gain_e_per_dn / sqrt(12))
+    chip = characterise(sensor, SHAPE, seed, EXPOSURE_S)
+    figures, half = report.figures, chip.saturation_e / 2
+    noise_e = hypot(chip.figure("dark noise").configured, sensor.gain_e_per_dn / sqrt(12))
     in_closed_form = 20 * log10(half / sqrt(half + noise_e**2))
     clip_told = "K" in figures and report.bits is not None and report.black_level_dn is not None
     inputs = {"sigma_d", "DSNU1288", "PRNU1288", "mu_I", "K" if clip_told else "mu_e_sat"}
@@ -92,20 +92,20 @@ def rows_of(report: EmvaReport, seed: int = 0) -> list[PublishedFigure]:
     )
     rows = [
         PublishedFigure(
-            symbol, unit, figures.get(symbol), each.configured * factor, each.measured * factor, symbol in inputs
+            symbol, unit, figures.get(symbol), figure.configured * factor, figure.measured * factor, symbol in inputs
         )
         for symbol, unit, name, factor in measured
-        for each in [found.figure(name)]
+        for figure in [chip.figure(name)]
         if symbol in figures or symbol not in ("DSNU1288", "PRNU1288", "mu_I")
     ]
     return [
         *rows,
-        PublishedFigure("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, _snr_db(found, half), False),
+        PublishedFigure("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, _snr_db(chip, half), False),
     ]
 
 
-def _snr_db(found: Characterisation, light_e: float) -> float:
-    return 20 * log10(float(np.interp(light_e, found.transfer.light_e, found.snr)))
+def _snr_db(chip: Characterisation, light_e: float) -> float:
+    return 20 * log10(float(np.interp(light_e, chip.transfer.light_e, chip.snr)))
 
 
 def results(reports: Mapping[str, EmvaReport]) -> tuple[dict[str, str], str]:

@@ -134,8 +134,8 @@ def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, .
         replace(
             one,
             checks=tuple(
-                replace(check, default=None if own.value == check.value else own.value)
-                for check, own in zip(one.checks, other.checks, strict=True)
+                replace(check, default=None if default_check.value == check.value else default_check.value)
+                for check, default_check in zip(one.checks, other.checks, strict=True)
             ),
         )
         for one, other in zip(claims, defaults, strict=True)

@@ -99,7 +99,7 @@ def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
     shape, rng, lights = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0), dict[str, tuple[float, float]]()
     for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
         sites = mask(tile, channel, shape).astype(np.float64)
-        total, squares = (scipy.ndimage.convolve(sites, each, mode="wrap") for each in (weights, weights**2))
+        total, squares = (scipy.ndimage.convolve(sites, kernel, mode="wrap") for kernel in (weights, weights**2))
         samples = 1 / float((squares / total**2).mean())  # that a weighted mean is worth
         combined = combine(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
         lights[channel] = samples * mean_e / WHITE_E, float(combined.mean() ** 2 / combined.var()) / WHITE_E

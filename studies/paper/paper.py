@@ -66,7 +66,7 @@ def make(setup: Setup) -> Paper:
         step("begins", 0.0)
         made.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
-    claims = (*numbers, *(claim for _, own in made for claim in own), *section_2(setup), *section_3_1())
+    claims = (*numbers, *(claim for _, of_figure in made for claim in of_figure), *section_2(setup), *section_3_1())
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
 

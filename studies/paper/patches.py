@@ -105,10 +105,10 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         columns = edge_columns(seen.radiance.luminance())
         for reading in READINGS:
             raw = exposures(Camera(reading), seen, "20ms")[0]
-            found = triplets(raw, columns)
-            shares[f"{reading}, {name}"] = found.share
+            edge = triplets(raw, columns)
+            shares[f"{reading}, {name}"] = edge.share
             if name == next(iter(LEVELS)):
-                parts.append((reading, planes(raw)[channels(raw.cfa).index("W")], found))
+                parts.append((reading, planes(raw)[channels(raw.cfa).index("W")], edge))
     caption = (
         f"W beside an edge at {next(iter(LEVELS))}, in units of noise, and the patches around x, y and z enlarged. "
         "The numbers are their distances."
@@ -120,10 +120,10 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
     """For each reading the plane around one x with three boxes, and beside it their patches large."""
     figure = blank(len(parts) * (SIDE + 150), SIDE + 28)
-    for (reading, plane, found), part in zip(parts, figure.subfigures(1, len(parts), squeeze=False)[0], strict=True):
+    for (reading, plane, edge), part in zip(parts, figure.subfigures(1, len(parts), squeeze=False)[0], strict=True):
         axes = part.subplot_mosaic([["plane", name, "."] for name in "xyz"], width_ratios=(10, 3, 5))
-        middle = len(found.places) // 2
-        row, column = found.places[middle].tolist()
+        middle = len(edge.places) // 2
+        row, column = edge.places[middle].tolist()
         side = min(CROP, *plane.shape)
         top, left = (
             min(max(at - side // 2, 0), size - side) for at, size in zip((row, column), plane.shape, strict=True)
@@ -131,7 +131,7 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
         low, high = np.percentile(plane, [1, 99])
         shown = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
         show_picture(axes["plane"], shown[top:, left:][:side, :side], reading)
-        words = {"x": "x", "y": f"y, {found.to_y[middle]:.1f} away", "z": f"z, {found.to_z[middle]:.1f} away"}
+        words = {"x": "x", "y": f"y, {edge.to_y[middle]:.1f} away", "z": f"z, {edge.to_z[middle]:.1f} away"}
         for name, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
             i, j = row + down - PATCH // 2, column + across - PATCH // 2
             corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates

@@ -116,12 +116,12 @@ class View:
 @cache
 def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
     """Table 1's camera under one reading, or the figures' variation of it with pixels of 2, 3 or 6 um."""
-    own = preset(reading)
+    sensor = preset(reading)
     if pitch_um is not None:
-        noise = {name: getattr(own.pixel, name) for name in ("read_noise_e", "dsnu_e")}
-        other = preset(f"table1_output_{pitch_um}um")
-        own = replace(other, pixel=replace(other.pixel, **noise))
-    return vary(own, mosaic)
+        noise = {name: getattr(sensor.pixel, name) for name in ("read_noise_e", "dsnu_e")}
+        pixel_preset = preset(f"table1_output_{pitch_um}um")
+        sensor = replace(pixel_preset, pixel=replace(pixel_preset.pixel, **noise))
+    return vary(sensor, mosaic)
 
 
 @dataclass(frozen=True)

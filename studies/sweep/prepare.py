@@ -63,7 +63,7 @@ class Job:
     @cached_property
     def software(self) -> dict[str, Processor]:
         """Each processor, loaded once."""
-        return {name: processor_of(name, own) for name, own in self.own.items()}
+        return {name: processor_of(name, user_versions) for name, user_versions in self.own.items()}
 
 
 Imaged = tuple[str, str, LensConfig, str]  # spectrum, sensor, modelled lens and mosaic: what a frame belongs to

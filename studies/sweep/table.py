@@ -112,9 +112,9 @@ def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequenc
     means: list[float | None] = []
     halves: list[float | None] = []
     for name in show:
-        found = [_figure(row, name, folder) for row in group]
-        values = [value for value in found if value is not None]
-        whole = len(values) == len(found)  # a mean over the seeds that happen to have the figure would be biased
+        figures = [_figure(row, name, folder) for row in group]
+        values = [value for value in figures if value is not None]
+        whole = len(values) == len(figures)  # a mean over the seeds that happen to have the figure would be biased
         means.append(float(np.mean(values)) if whole else None)
         halves.append(float(half_width(np.array(values))) if whole and len(values) > 1 else None)
     return TableLine(at, tuple(means), tuple(halves))
