@@ -36,8 +36,10 @@ app = App(
     help="Camera simulation from spectral scene to developed picture: interleaved RGBW beside Bayer.",
     help_epilogue="-o is short for --out.",
     version=lambda: metadata.version("rodcone"),
-    # A flag has no --no-flag, a list no --empty-list.
-    default_parameter=Parameter(negative=(), converter=_converted),
+    # A flag has no --no-flag, a list no --empty-list; that a flag is off and a list empty goes without saying.
+    default_parameter=Parameter(
+        negative=(), converter=_converted, show_default=lambda value: None if value is False or value == () else value
+    ),
 )
 
 
@@ -45,12 +47,12 @@ app.command("studies.commands.bench:bench", name="bench", help="Measure speed ag
 app.command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
 app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
 app.command("studies.commands.dataset:dataset", name="dataset", help="Make raw frames and their truth to train on.")
-app.command("studies.commands.demo:demo", name="demo", help="Photograph a scene from moonlight to daylight.")
+app.command("studies.commands.demo:demo", name="demo", help="Compare RGBW and Bayer from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
-app.command("studies.commands.doctor:doctor", name="doctor", help="Print versions, and what is wrong.")
-app.command("studies.commands.expect:expect", name="expect", help="Compute the error to expect of a mosaic by light.")
-app.command("studies.commands.explore:explore", name="explore", help="Play with a camera on a page of this machine.")
-app.command("studies.commands.list:list_names", name="list", help="Print what the commands know by name.")
+app.command("studies.commands.doctor:doctor", name="doctor", help="Say what is installed, and whether all is well.")
+app.command("studies.commands.expect:expect", name="expect", help="Compute which error to expect in which light.")
+app.command("studies.commands.explore:explore", name="explore", help="Open a page on which sliders change a camera.")
+app.command("studies.commands.list:list_names", name="list", help="List scenes, lights, sensors and other names.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
 app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")

@@ -40,7 +40,7 @@ def demo(
     Parameters
     ----------
     out
-        Folder for report.html and results.json, with the sweep's ledger and pictures.
+        Folder for report.html and results.json, with the sweep's results database and pictures.
     scene
         Scene by name, such as still_life (the default), still_life_outdoor, night_street or cornell_box. Or a file: a
         Mitsuba scene (.xml), spectral radiance (.exr, or .mat of ISETCam), a cube described by a .toml beside it

@@ -41,13 +41,14 @@ def reference(
     Parameters
     ----------
     scene
-        Scene by name or a Mitsuba scene (.xml), lit, photographed and in the bands as by rodcone demo.
+        Scene by name, or a Mitsuba scene (.xml). Light, exposure and bands are those of rodcone demo.
     size
         Longer side of the picture in pixels, 256 by default.
     until
-        Noise variance of the render over the sensor's own to reach in 95 % of the pixels, at every level of the demo.
+        Stop once the render's noise variance is this share of the sensor's own, in 95 % of the pixels, at every level
+        of the demo.
     max_seconds
-        Time for the render, at most, earlier calls' included.
+        Longest time for the render, earlier calls included.
     out
         Folder of references; by default that of the variable RODCONE_REFERENCES, or the one in your home.
     """

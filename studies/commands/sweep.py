@@ -52,7 +52,7 @@ class Estimate:
     Attributes
     ----------
     cells, kept, renders, workers : int
-        `kept` cells are in the ledger from an earlier run; `renders` counts scenes, not files of radiance.
+        `kept` cells are in the results database from an earlier run; `renders` counts scenes, not files of radiance.
     seconds : float
         With so many workers; renders and cells that exist already are counted too.
     bytes : float
@@ -107,7 +107,7 @@ def sweep(
     force: bool = False,
     json: bool = False,
 ) -> int:
-    """Make every picture of a study, write its figures into a ledger, and make a report; prints the ledger's path.
+    """Make every picture of a study, note its figures in a results database, and write a report; prints its path.
 
     Whatever ends it (Ctrl-C, a kill, a full disk), the same command goes on with the cells that are missing.
 
@@ -116,7 +116,7 @@ def sweep(
     study
         Study file (.toml); `rodcone new study` writes one to start from.
     out
-        Folder of the ledger, the pictures and the renders.
+        Folder of the results database, the pictures and the renders.
     set
         KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
     workers
@@ -232,7 +232,7 @@ def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estima
 
 def _words(sizes: Estimate) -> str:
     return (
-        f"{sizes.cells} cells, {sizes.kept} in the ledger from the last run; {sizes.renders} to render\n"
+        f"{sizes.cells} cells, {sizes.kept} kept from the last run; {sizes.renders} to render\n"
         f"about {duration(sizes.seconds)} with {sizes.workers} workers, at most {sizes.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )
@@ -271,7 +271,7 @@ def table(
     by
         Axes joined by commas, with a line for each combination: scene, spectrum, level, exposure, sensor, processor.
     show
-        Figures, joined by commas: the ledger's columns, electrons_W (G, R, B), pair_delta_e and
+        Figures, joined by commas: the database's columns, electrons_W (G, R, B), pair_delta_e and
         true_pair_delta_e of scene metamers, daylight_delta_e of scene color_checker.
     where
         AXIS=VALUE to keep, such as level=10lux; may be given several times.

@@ -110,7 +110,7 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
     code, text, err = call(command)
     assert (code, err) == (0, "")
-    assert text.startswith("6 cells, 0 in the ledger from the last run; 0 to render\nabout ")
+    assert text.startswith("6 cells, 0 kept from the last run; 0 to render\nabout ")
     assert not out.exists()
     still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
     code, text, _ = call([*command, *still])
