@@ -91,7 +91,7 @@ $(if $(problem),$(error $(problem)))
 @if [ "$$(cat $(COMPLETE) 2>/dev/null)" != "$$(pwd -P)" ] || ! $(BIN)/python -c "" 2>/dev/null; then \
 	echo "Making $(VENV) with $$("$(PYTHON)" --version)" && rm -rf $(VENV) && "$(PYTHON)" -m venv $(VENV); fi
 @rm -f $(COMPLETE)
-@echo "Installing rodcone and its libraries into $(VENV): once, minutes at most, some 300 MB to download"
+@echo "Installing rodcone and its libraries into $(VENV): once, minutes at most, 210 MB or more to download"
 @$(BIN)/python -m pip install --quiet --disable-pip-version-check --editable "$(1)"
 @pwd -P > $(COMPLETE) && touch $(2)
 @echo "Installed."

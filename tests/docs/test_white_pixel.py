@@ -1,0 +1,49 @@
+"""The page of the white pixel: means over named and drawn scenes apart, positive where RGBW is better."""
+
+from dataclasses import replace
+
+import pytest
+from report_sample import SENSORS, sample_report
+from white_pixel import PAGE, main, parts
+
+from rodcone.errors import InputError
+from studies.pages.report_data import ReportData, ReportScene
+from studies.sweep.row import Row
+
+# PSNR [dB] of RGBW over Bayer by scene; the seeds of both mosaics move in step.
+LEADS_DB = {"still_life": 1.0, "night_street": 3.0, "generated-1": -2.5, "generated-2": -0.5}
+
+
+def swept(*cameras: str) -> ReportData:
+    def change(row: Row) -> Row:
+        lead_db = LEADS_DB[row.scene] if row.processor == "ple_rgbw" else 0.0
+        return replace(row, psnr_db=20.0 + 0.3 * row.seed + lead_db)
+
+    scenes = tuple(ReportScene(name, 128, 96) for name in LEADS_DB)
+    report = sample_report(
+        change, levels=2, scenes=scenes, sensors=SENSORS[:1], seeds=(0, 1), cameras=cameras,
+        balances=("as-shot", "gray-world"),
+    )  # fmt: skip
+    return replace(report, environment={"rodcone": "0.2.0+abc"})
+
+
+def test_leads_are_means_over_named_and_over_drawn_scenes_by_balance() -> None:
+    content, figure, table = parts(swept("ple_bayer", "ple_rgbw"))
+    for balance in ("balanced as shot", "balanced by Gray World"):
+        assert f"| mean of 2 named scenes, {balance} | +2.0 ± 0.0 | +2.0 ± 0.0 |" in content["psnr_db"]
+        assert f"| mean of 2 drawn scenes, {balance} | **−1.5 ± 0.0** | **−1.5 ± 0.0** |" in content["psnr_db"]
+        assert f'PSNR [dB],"generated-1, {balance}",**−2.5 ± 0.0**' in table
+        assert figure.count(f">{balance}</text>") == 2  # a line in each chart
+    assert "rodcone 0.2.0+abc: scenes of 128 pixels on the longer side, 2 seeds" in content["set-up"]
+
+
+def test_the_page_has_a_place_for_every_part() -> None:
+    text = PAGE.read_text("utf-8")
+    assert [name for name in parts(swept("ple_rgbw", "ple_bayer"))[0] if text.count(f"<!-- {name} -->") != 1] == []
+
+
+def test_another_study_is_refused() -> None:
+    with pytest.raises(InputError, match="ple_bayer"):
+        parts(swept("ple_rgbw", "bayer"))
+    with pytest.raises(SystemExit, match="give the sweep's folder"):
+        main([])
