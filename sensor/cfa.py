@@ -34,6 +34,7 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType(
         # Kodak's, after Compton & Hamilton, "Image sensor with improved light sensitivity", US patent 8 139 130; some
         # begin it two rows later, with W B W G.
         "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
+        "rgbw_sparse": ("RGRG", "GBWB", "RGRG", "WBGB"),  # ours: Bayer with W in a quarter of green's places
         # Cameras in cars: one red pixel in four, or one red and one blue, the others clear (C).
         "rccc": ("RC", "CC"),
         "rccb": ("RC", "CB"),

@@ -115,7 +115,7 @@ def _sum(one: Spectrum, other: Spectrum) -> Spectrum:
 
 
 def complementary(responses: Responses) -> Responses:
-    """Responses of C, M and Y, and of W where `responses` has it.
+    """Responses of C, M and Y, and of G and W where `responses` has them.
 
     Each filter is assumed to pass what two of the primary filters pass together: C = G + B, M = R + B, Y = R + G. A
     matrix then takes C, M and Y exactly back to R, G and B.
@@ -128,8 +128,7 @@ def complementary(responses: Responses) -> Responses:
     _require_channels(responses, "RGB")
     primaries = responses.curves
     curves = {channel: _sum(*(primaries[primary] for primary in pair)) for channel, pair in _COMPLEMENTS.items()}
-    if "W" in responses.curves:
-        curves["W"] = responses.curves["W"]
+    curves |= {name: curve for name, curve in primaries.items() if name in "GW"}
     return Responses(curves, responses.relative)
 
 

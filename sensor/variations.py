@@ -10,10 +10,17 @@ from sensor.config import SensorConfig
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
+CYYM: Tile = ("CY", "YM")  # Bayer with complements, yellow in green's place: Kodak's DCS 620x
+CYGM: Tile = ("CY", "GM")  # cameras for video, and compact cameras about 1998
 
 # Mosaics with filters of their own: their tile, and what makes their responses from the camera's.
 VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = MappingProxyType(
-    {"rgbw_nd": (RGBW, neutral_density), "cmyw": (CMYW, complementary)}
+    {
+        "rgbw_nd": (RGBW, neutral_density),
+        "cmyw": (CMYW, complementary),
+        "cyym": (CYYM, complementary),
+        "cygm": (CYGM, complementary),
+    }
 )
 
 
@@ -29,8 +36,8 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         With curves of R, G, B and W.
     mosaic : str
         A name of `sensor.cfa.MOSAICS`; ``own``, the camera's own with its own curves; or ``rgbw_nd`` (W behind a
-        neutral density that gives it G's sensitivity) or
-        ``cmyw`` (cyan, magenta, yellow and W); `sensor.curves` states what is assumed of these filters.
+        neutral density that gives it G's sensitivity), ``cmyw`` (cyan, magenta, yellow and W), ``cyym`` or ``cygm``;
+        `sensor.curves` states what is assumed of these filters.
 
     Raises
     ------

@@ -11,8 +11,10 @@ from cyclopts import Parameter
 
 from rodcone.errors import InputError
 from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
+from sensor.cfa import OWN
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
+from sensor.variations import vary
 from studies.commands.console import print_json, print_table, require_place, write_text
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
@@ -64,7 +66,7 @@ def expect(
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
         f"{name} {tile}".strip(): expect_errors(
-            preset(name, tile.split("/") if "/" in tile else tile or None),
+            preset(name, tile.split("/")) if "/" in tile else vary(preset(name), tile or OWN),
             list(levels.values()),
             light,
             exposure if time_s is None else time_s,

@@ -1,0 +1,177 @@
+"""Expected gains of mosaics beside those of simulation: `docs/make/design.py HASH`, about an hour on one core.
+
+HASH is a commit's: ten scenes are drawn from it that no setting was chosen on. Each is lit by D65, photographed by each
+mosaic at seven levels of light, and developed by `ple`, whose prior is trained anew where a mosaic's curves need it.
+Radiance, priors and rows are kept in out/design; the page's table and docs/results/design.csv are written from them.
+"""
+
+import json
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from functools import cache, partial
+from math import log10, sqrt
+from pathlib import Path
+
+import numpy as np
+from page_parts import RESULTS, csv_text, fill
+from skimage.color import rgb2lab
+
+from isp.ple.prior import Prior, load_prior, own_prior, save_prior
+from isp.processors.catalogue import NAMED
+from isp.processors.piecewise import picture_ple
+from render.engine import render
+from render.illuminants import illuminant
+from render.transport import Transport
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from scenes.catalog import load
+from scenes.levels import DEMO_LEVELS
+from sensor.cfa import channels, tile_of
+from sensor.config import SensorConfig
+from sensor.curves import Responses
+from sensor.presets import preset
+from sensor.variations import vary
+from studies.design.expect import expect
+from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.photograph.camera import capture, colour_fit, develop_to_scale
+from studies.training.train import train_prior
+
+PAGE = Path(__file__).resolve().parents[1] / "design.md"
+FOLDER = Path("out/design")
+SCENES, SIDE, SPP = 10, 128, 256
+SENSORS = ("low_noise", "table1_output")
+LEVELS = {level.name: level.luminance_cd_m2 for level in DEMO_LEVELS}
+BAYER = "bayer"
+# Mosaics by name or rows. `ple` knows R, G, B and W: other curves stand in their places, with a prior of their own.
+MOSAICS: Mapping[str, Mapping[str, str]] = {
+    **{name: {} for name in (BAYER, "rgbw", "rgbw_sparse", "rgbw_4x4", "rgbw_nd", "quad_bayer", "quad_rgbw")},
+    **{rows: {} for rows in ("RBWB/GRGR/RWBB/BGRG", "WRWG/GWBW", "GRGB/GBGR")},
+    "rccb": {"C": "W"},
+    "ryyb": {"Y": "G"},
+    "cyym": {"C": "R", "Y": "G", "M": "B"},
+    "cmyw": {"C": "R", "Y": "G", "M": "B"},
+    "cygm": {"C": "R", "Y": "G", "M": "B", "G": "W"},
+}
+FIGURES = ("psnr_db", "luminance_db", "colour")
+
+
+def camera(name: str, mosaic: str) -> SensorConfig:
+    """Sensor with a mosaic, as it is."""
+    sensor = preset(name)
+    return replace(sensor, cfa=tile_of(mosaic.split("/"))) if "/" in mosaic else vary(sensor, mosaic)
+
+
+def in_places(sensor: SensorConfig, places: Mapping[str, str]) -> SensorConfig:
+    """Sensor whose channels have the letters of `ple`."""
+    curves = {places.get(name, name): sensor.responses.curves[name] for name in channels(sensor.cfa)}
+    if "W" not in curves:
+        curves["W"] = preset("low_noise").responses.curves["W"]
+    tile = tuple("".join(places.get(letter, letter) for letter in row) for row in sensor.cfa)
+    return replace(sensor, cfa=tile, responses=Responses({**preset("low_noise").responses.curves, **curves}))
+
+
+@cache
+def prior_of(mosaic: str) -> Prior:
+    """`ple`'s prior for a mosaic's curves."""
+    if set(MOSAICS[mosaic]) <= {"C"}:
+        return own_prior()
+    path = FOLDER / f"{mosaic.replace('cyym', 'cmyw')}.npz"
+    if not path.exists():
+        sensor = in_places(camera(SENSORS[0], mosaic), MOSAICS[mosaic])
+        save_prior(train_prior(replace(sensor, cfa=("RG", "BW")), f"{mosaic}.toml", 1), path)
+    return load_prior(path)
+
+
+def scene_rows(name: str, transport: Transport) -> Iterator[dict[str, str | float]]:
+    """Errors of each sensor, level and mosaic in one scene."""
+    for sensor_name in SENSORS:
+        for level, luminance_cd_m2 in LEVELS.items():
+            radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
+            light = light_in_bands(illuminant("D65"), radiance.wavelength_nm, radiance.widths_nm)
+            white_cd_m2 = shown_white_cd_m2(transport, luminance_cd_m2)
+            truth = encode_srgb(true_srgb(radiance, light, white_cd_m2))
+            for number, mosaic in enumerate(MOSAICS):
+                sensor = in_places(camera(sensor_name, mosaic), MOSAICS[mosaic])
+                rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, number])
+                raw = capture(radiance, sensor, rng=rng)
+                processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior_of(mosaic)))
+                fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
+                linear, _ = develop_to_scale(raw, processor, fit, sensor, light, white_cd_m2, balance=neutral)
+                shown = encode_srgb(linear)
+                off = rgb2lab(shown) - rgb2lab(truth)
+                yield {
+                    "scene": name, "sensor": sensor_name, "level": level, "mosaic": mosaic,
+                    "psnr_db": -10 * log10(np.mean((shown - truth) ** 2)),
+                    "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
+                    "colour": sqrt(np.mean(off[..., 1:] ** 2) * 2),
+                }  # fmt: skip
+
+
+def simulated(commit: str) -> list[dict[str, str | float]]:
+    """Rows of all scenes drawn from a commit's hash; those of finished scenes are read."""
+    rows = []
+    for number in range(SCENES):
+        name = f"generated-{int(commit, 16) + number:x}"
+        path = FOLDER / f"{name}.json"
+        if not path.exists():
+            transport = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
+            path.write_text(json.dumps(list(scene_rows(name, transport))))
+        rows += json.loads(path.read_text())
+        print(name, file=sys.stderr)
+    return rows
+
+
+def gains(rows: Sequence[Mapping[str, str | float]]) -> list[dict[str, str | float]]:
+    """Expected and simulated gains over Bayer of each sensor, mosaic and level, with twice the standard error."""
+    found = {(row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
+    scenes, result = sorted({str(row["scene"]) for row in rows}), []
+    for sensor in SENSORS:
+        expected = {mosaic: expect(camera(sensor, mosaic), list(LEVELS.values())) for mosaic in MOSAICS}
+        for mosaic in list(MOSAICS)[1:]:
+            for index, level in enumerate(LEVELS):
+                line: dict[str, str | float] = {"sensor": sensor, "mosaic": mosaic, "level": level}
+                for figure in FIGURES:
+                    of, beside = (_decibels(figure, getattr(expected[m][index], figure)) for m in (mosaic, BAYER))
+                    gain = np.array([
+                        np.subtract(*(_decibels(figure, float(found[scene, sensor, m, level][figure]))
+                                      for m in (mosaic, BAYER)))
+                        for scene in scenes
+                    ])  # fmt: skip
+                    line[f"{figure}_expected"] = of - beside
+                    line[f"{figure}_simulated"] = float(gain.mean())
+                    line[f"{figure}_error"] = 2 * float(gain.std(ddof=1)) / sqrt(len(scenes))
+                result.append(line)
+    return result
+
+
+def _decibels(figure: str, value: float) -> float:
+    return -20 * log10(value) if figure == "colour" else value
+
+
+def main(commit: str) -> None:
+    """Write the page's parts and the table of all gains."""
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    lines = gains(simulated(commit))
+    (RESULTS / "design.csv").write_text(
+        csv_text(list(lines[0]), [[x if isinstance(x, str) else f"{x:.3f}" for x in line.values()] for line in lines])
+    )
+    agreement = ["| sensor | figure | RMS difference [dB] | sign alike over 0.3 dB |", "|---|---|---|---|"]
+    for sensor in SENSORS:
+        for figure in FIGURES:
+            of = [line for line in lines if line["sensor"] == sensor]
+            foretold, seen = (np.array([line[f"{figure}_{kind}"] for line in of], dtype=float)
+                              for kind in ("expected", "simulated"))  # fmt: skip
+            clear = np.abs(seen) > 0.3
+            alike = (np.sign(foretold[clear]) == np.sign(seen[clear])).sum()
+            rms = sqrt(np.mean((foretold - seen) ** 2))
+            agreement.append(f"| `{sensor}` | {figure} | {rms:.2f} | {alike} of {clear.sum()} |")
+    table = ["| PSNR over Bayer, expected / simulated [dB] | " + " | ".join(LEVELS) + " |", "|---" * 8 + "|"]
+    for mosaic in list(MOSAICS)[1:]:
+        of = [line for line in lines if line["sensor"] == SENSORS[0] and line["mosaic"] == mosaic]
+        cells = [f"{line['psnr_db_expected']:+.1f} / {line['psnr_db_simulated']:+.1f}" for line in of]
+        table.append(f"| `{mosaic}` | {' | '.join(cells)} |")
+    PAGE.write_text(fill(PAGE.read_text(), {"proof": "\n".join(agreement), "gains": "\n".join(table)}))
+
+
+if __name__ == "__main__":
+    main(sys.argv[1])
