@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 Doubles = NDArray[np.float64]
+LEAST_OPEN = 1e-8  # share of a sample's values that aren't full, at the least
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +93,7 @@ def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Double
     if np.isinf(noise.full_e):
         return variance
     open_share = ndtr((noise.full_e - mean_e) / np.sqrt(variance + spread_e2))
-    return np.asarray(variance / np.maximum(open_share, 1e-8))
+    return np.asarray(variance / np.maximum(open_share, LEAST_OPEN))
 
 
 @dataclass(frozen=True, eq=False)

@@ -62,7 +62,7 @@ def expect(
         Print one JSON object: a list of errors by level for each camera.
     """
     require_place(out, ".csv", ".svg")
-    levels = {text: _luminance(text) for text in level} if level else _levels_between(over)
+    levels = {text: _luminance(text) for text in level} if level else levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
         f"{name} {tile}".strip(): expect_errors(
@@ -100,7 +100,7 @@ def _luminance(text: str) -> float:
     return value if unit == UNITS[0] else value * AVERAGE_REFLECTANCE / pi
 
 
-def _levels_between(over: str) -> dict[str, float]:
+def levels_between(over: str) -> dict[str, float]:
     """Named levels from one to another, such as street:classroom."""
     names = list(NAMED)
     first, colon, last = over.partition(":")

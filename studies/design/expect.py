@@ -1,7 +1,7 @@
 """Expected error of a sensor under a prior over patches, at a level of light: closed form, no render, no pictures."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from math import hypot, log10, sqrt
 
@@ -10,11 +10,12 @@ import numpy as np
 from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.photometry import tristimulus
-from render.spectrum import Floats
+from render.spectrum import Floats, Spectrum
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, luminance_of_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import unknown
 from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
+from sensor.curves import Responses
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import camera_equation
 from sensor.readout import spread_charge
@@ -88,10 +89,19 @@ def responses_e(sensor: SensorConfig, view: LitPrior) -> Floats:
     return np.asarray(weights * light.spectrum @ view.basis * camera_equation(sensor.lens))
 
 
-def metric_forms(prior: SpectralPrior, view: LitPrior, reflectance: float) -> Floats:
-    """W of encoded sRGB, encoded luminance, L* and (a*, b*) for errors of a patch of mean luminous reflectance 1.
+def unit_response_e(sensor: SensorConfig, view: LitPrior) -> Floats:
+    """Electrons of a pixel of response 1 in each band, as `responses_e` has them; shape (band, coefficient)."""
+    light, ones = view.light, Spectrum(np.array([300.0, 1100.0]), np.ones(2))
+    even = replace(sensor, cfa=("W",), responses=Responses({"W": ones})).undivided
+    weights = electrons_per_irradiance(even, light.wavelength_nm, light.width_nm, 1.0)[0]
+    return np.asarray((weights * light.spectrum)[:, None] * view.basis * camera_equation(sensor.lens))
 
-    Shape (metric, component, pixel, coefficient, coefficient), at the middle pixels. Reflectance 1 is shown as white.
+
+def metric_rows(prior: SpectralPrior, view: LitPrior, reflectance: float) -> tuple[Floats, ...]:
+    """R of encoded sRGB, encoded luminance, L* and (a*, b*) for errors of a patch of mean luminous reflectance 1.
+
+    Each has the shape (component, pixel, direction, coefficient), at the middle pixels; |R e|^2 is the squared error.
+    Reflectance 1 is shown as white.
     """
     means, to_xyz = prior.patches.means[:, middle_pixels()], view.xyz * reflectance
     to_srgb = xyz_to_srgb(to_xyz.T).T
@@ -104,8 +114,7 @@ def metric_forms(prior: SpectralPrior, view: LitPrior, reflectance: float) -> Fl
     root = (relative ** (-2 / 3) / 3)[..., None] * (to_xyz / white[:, None])
     lab = np.stack([116 * root[..., 1, :], 500 * (root[..., 0, :] - root[..., 1, :]),
                     200 * (root[..., 1, :] - root[..., 2, :])], axis=-2)  # fmt: skip
-    rows = (srgb / sqrt(3), luminance, lab[..., :1, :], lab[..., 1:, :])
-    return np.stack([row.swapaxes(-1, -2) @ row for row in rows])
+    return srgb / sqrt(3), luminance, lab[..., :1, :], lab[..., 1:, :]
 
 
 def _curve_slope(linear: Floats) -> Floats:
@@ -121,11 +130,16 @@ def middle_pixels() -> np.ndarray[tuple[int], np.dtype[np.intp]]:
 
 def sampling_of(sensor: SensorConfig, responses: Floats) -> Floats:
     """H of a patch: electrons of each sample from each pixel's coefficients, crosstalk included."""
-    shape, pixels = (PATCH, PATCH), PATCH**2
+    shape = (PATCH, PATCH)
     site = sum(index * mask(sensor.cfa, name, shape) for index, name in enumerate(channels(sensor.cfa)))
-    spread = np.stack([spread_charge(one.reshape(shape), sensor.pixel.crosstalk).ravel() for one in np.eye(pixels)])
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
-    return np.asarray(spread.T[:, :, None] * responses[np.ravel(site)][None])
+    return np.asarray(spread_of(sensor.pixel.crosstalk)[:, :, None] * responses[np.ravel(site)][None])
+
+
+def spread_of(crosstalk: float) -> Floats:
+    """Share of each pixel's electrons (second axis) that each pixel of a patch collects (first axis)."""
+    shape = (PATCH, PATCH)
+    return np.stack([spread_charge(one.reshape(shape), crosstalk).ravel() for one in np.eye(PATCH**2)]).T
 
 
 def expect(
@@ -159,7 +173,7 @@ def expect(
     spectral, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     responses = responses_e(sensor, seen)
-    sampling, drawn = sampling_of(sensor, responses), _drawn_pixels(prior) @ responses.T
+    sampling, drawn = sampling_of(sensor, responses), drawn_pixels(prior) @ responses.T
     known, linear = (
         sampled(patches, sampling, middle_pixels()) for patches in (spectral.patches, pooled_patches(prior))
     )
@@ -190,9 +204,10 @@ def expect(
 
 @cache
 def _forms(prior: str, light: str) -> Floats:
-    """`metric_forms` at each reflectance, shape (reflectance, metric, component, pixel, coefficient, coefficient)."""
+    """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
     spectral, seen = load_prior(prior), view_of(prior, light)
-    return np.stack([metric_forms(spectral, seen, reflectance) for reflectance in spectral.reflectances])
+    by_reflectance = [metric_rows(spectral, seen, reflectance) for reflectance in spectral.reflectances]
+    return np.stack([np.stack([row.swapaxes(-1, -2) @ row for row in rows]) for rows in by_reflectance])
 
 
 @cache
@@ -202,7 +217,7 @@ def pooled_patches(prior: str) -> Gaussians:
 
 
 @cache
-def _drawn_pixels(prior: str) -> Floats:
+def drawn_pixels(prior: str) -> Floats:
     """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
     spectral, rng, count = load_prior(prior), np.random.default_rng(0), METERED**2
     component, pixel = rng.choice(len(spectral.patches.weights), count, p=spectral.patches.weights), middle_pixels()[0]

@@ -3,7 +3,9 @@
 import numpy as np
 from numpy.testing import assert_allclose
 
+from isp.design.choice import every_channel, picked, projected
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
+from isp.design.slope import Case, error_slopes
 
 PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
 MIDDLE = np.array([2, 3])
@@ -117,3 +119,40 @@ def test_a_full_sample_tells_nothing_and_one_at_the_well_half() -> None:
     assert_allclose(sample_variance(np.array([100.0]), np.array([50.0]), noise), 200.0)
     assert sample_variance(np.array([1000.0]), np.array([0.0]), noise)[0] > 1e10
     assert_allclose(sample_variance(np.array([10.0]), np.array([0.0]), noise), 10.0)
+
+
+def test_the_slope_is_that_of_differences() -> None:
+    """Central differences, one entry of H after another; some samples are half full."""
+    prior, noise, rng = mixture(3), Noise(dark_e=2.0, prnu=0.01, full_e=60.0), np.random.default_rng(7)
+    sampling = mosaic()
+    rows = rng.standard_normal((3, len(MIDDLE), 2, COEFFICIENTS))
+    forms = (rows.swapaxes(-1, -2) @ rows)[None]
+
+    def error_of(h: np.ndarray) -> float:
+        return float(expected_error(prior.weights, sampled(prior, h, MIDDLE), np.full(PIXELS, 40.0), noise, forms)[0])
+
+    cases = [Case(40.0, noise, rows), Case(3.0, noise, rows)]
+    (error, _), (slope, _) = error_slopes(prior, sampling, MIDDLE, cases)
+    assert_allclose(error, error_of(sampling), rtol=1e-10)
+    for place in np.ndindex(sampling.shape):
+        step = np.zeros_like(sampling)
+        step[place] = 3e-5
+        difference = (error_of(sampling + step) - error_of(sampling - step)) / 6e-5
+        assert_allclose(slope[place], difference, rtol=1e-6, atol=1e-9 * np.abs(slope).max(), err_msg=str(place))
+
+
+def test_a_tile_picks_its_samples() -> None:
+    prior, rng = mixture(2), np.random.default_rng(8)
+    responses, channel = rng.uniform(0.5, 1.0, (3, COEFFICIENTS)), rng.integers(3, size=PIXELS)
+    spread = np.eye(PIXELS) + 0.1 * rng.random((PIXELS, PIXELS))
+    rows = rng.standard_normal((2, len(MIDDLE), 2, COEFFICIENTS))
+    noise = Noise(dark_e=2.0, prnu=0.01, full_e=60.0)
+    sampling = spread[:, :, None] * responses[channel]
+    more = rng.standard_normal((2, len(MIDDLE), 1, COEFFICIENTS))
+    forms = np.stack([row.swapaxes(-1, -2) @ row for row in (rows, more)])
+    plain = expected_error(prior.weights, sampled(prior, sampling, MIDDLE), np.full(PIXELS, 30.0), noise, forms)
+    chosen = projected(every_channel(prior, responses, MIDDLE), rows, more)
+    samples = picked(chosen.samples, channel, spread)
+    assert_allclose(
+        expected_error(prior.weights, samples, np.full(PIXELS, 30.0), noise, chosen.forms), plain, rtol=1e-10
+    )

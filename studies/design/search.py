@@ -1,0 +1,326 @@
+"""Search for the tile, and for the filters, of the least expected error over several levels of light."""
+
+from collections.abc import Callable, MutableMapping
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.optimize import minimize
+
+from isp.design.choice import Projected, every_channel, picked, projected
+from isp.design.expected_error import expected_error
+from isp.design.slope import Case, error_slopes
+from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
+from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError, unknown
+from sensor.cfa import MOSAICS, Tile, channels
+from sensor.config import SensorConfig
+from sensor.curves import Responses
+from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
+from studies.design.expect import (
+    LitPrior,
+    drawn_pixels,
+    metric_rows,
+    middle_pixels,
+    noise_of,
+    responses_e,
+    spread_of,
+    unit_response_e,
+    view_of,
+)
+
+BEHIND = 10.0  # what a decibel beyond the bound costs, in decibels of mean gain
+COOLING_DB = 0.05  # temperature of the first step
+STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
+Known = MutableMapping[str, list[list[float]]]  # gains of the tiles that were tried, by their rows
+Progress = Callable[[str, float], None]
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """What a mosaic is sought for.
+
+    Attributes
+    ----------
+    sensor : SensorConfig
+        Pixel, lens and responses of the letters; its own mosaic doesn't count.
+    levels_cd_m2 : (level,) float64
+        Mean luminances of scenes.
+    weights : (level,) float64
+        Of the levels in the mean gain; sum 1.
+    reference : tuple of str
+        Tile that gains are over.
+    behind_db : float
+        How far a design may fall behind the reference at any level in PSNR, in luminance, and in a* and b*.
+    letters : str
+        Channels to choose from.
+    light, exposure, prior : str
+        As `studies.design.expect.expect` takes them.
+    """
+
+    sensor: SensorConfig
+    levels_cd_m2: Floats
+    weights: Floats
+    reference: Tile
+    behind_db: float = 0.1
+    letters: str = "RGBW"
+    light: str = "D65"
+    exposure: str = AUTO_INFORMATION
+    prior: str = "drawn"
+
+    def score(self, gains_db: Floats) -> float:
+        """Mean gain in PSNR, less what lies behind the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
+        return float(self.weights @ gains_db[0] + BEHIND * min(0.0, gains_db.min() + self.behind_db))
+
+
+@dataclass(frozen=True, eq=False)
+class Search:
+    """A goal with what all its tiles share.
+
+    Attributes
+    ----------
+    goal : Goal
+    prior : SpectralPrior
+    letters : str
+        Channels to choose from, and the reference's.
+    responses : (letter, coefficient) float64
+        Electrons in a second from a coefficient of 1, reflectance 1 having 1 cd/m^2.
+    every : tuple of Projected
+        For each of the prior's reflectances.
+    """
+
+    goal: Goal
+    prior: SpectralPrior
+    letters: str
+    responses: Floats
+    every: tuple[Projected, ...]
+
+
+def search_for(goal: Goal) -> Search:
+    """Sample every channel at every pixel.
+
+    Raises
+    ------
+    InputError
+        For a letter without a curve, or an unknown light or prior.
+    """
+    if goal.prior not in PRIORS:
+        raise unknown("prior", goal.prior, PRIORS)
+    prior, seen = load_prior(goal.prior), view_of(goal.prior, goal.light)
+    letters = "".join(dict.fromkeys(goal.letters + "".join(goal.reference)))
+    # A tile of one row lists its channels in an order of its own.
+    sensor = replace(goal.sensor, cfa=(letters,))
+    responses = responses_e(sensor, seen)[[channels(sensor.cfa).index(letter) for letter in letters]]
+    samples = every_channel(prior.patches, responses, middle_pixels())
+    scenes = [_rows(prior, seen, reflectance) for reflectance in prior.reflectances]
+    return Search(goal, prior, letters, responses, tuple(projected(samples, *rows) for rows in scenes))
+
+
+def _rows(prior: SpectralPrior, seen: LitPrior, reflectance: float) -> tuple[Floats, ...]:
+    """R of encoded sRGB, of encoded luminance, and of a* and b*."""
+    srgb, luminance, _, colour = metric_rows(prior, seen, reflectance)
+    return srgb, luminance, colour
+
+
+def lights(goal: Goal, prior: SpectralPrior, sensor: SensorConfig, responses: Floats) -> list[tuple[float, float]]:
+    """Luminance times exposure of reflectance 1 [cd s m^-2], and exposure [s], at each level by the goal's rule.
+
+    `responses` are those of the sensor's channels, shape (channel, coefficient).
+    """
+    per_second_e = np.maximum(drawn_pixels(goal.prior) @ responses.T, 0.0)
+    whites = goal.levels_cd_m2 / prior.reflectances.mean()
+    times_s = [exposure_of_electrons_s(goal.exposure, per_second_e * white, sensor) for white in whites]
+    return [(float(white * time_s), time_s) for white, time_s in zip(whites, times_s, strict=True)]
+
+
+def tile_db(search: Search, tile: Tile) -> Floats:
+    """Expected error of a tile's pictures at each level, component known, shape (3, level) [dB, more is better].
+
+    Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab.
+    """
+    goal, prior = search.goal, search.prior
+    sensor = replace(goal.sensor, cfa=tile)
+    responses = search.responses[[search.letters.index(name) for name in channels(tile)]]
+    places = [search.letters.index(tile[y % len(tile)][x % len(tile[0])]) for y, x in np.ndindex(PATCH, PATCH)]
+    spread = spread_of(sensor.pixel.crosstalk) if sensor.pixel.crosstalk else None
+    samples = [picked(one.samples, np.array(places), spread) for one in search.every]
+    errors: dict[str, Floats] = {}
+    result = []
+    for light, time_s in lights(goal, prior, sensor, responses):
+        noise = noise_of(sensor, time_s)
+        key = f"{light:.9g} {noise}"  # at full exposure more light changes nothing
+        if key not in errors:
+            by_reflectance = [
+                expected_error(prior.patches.weights, one, np.full(PATCH**2, mean * light), noise, every.forms)
+                for one, every, mean in zip(samples, search.every, prior.reflectances, strict=True)
+            ]
+            errors[key] = np.mean(by_reflectance, axis=0)
+        result.append(-10 * np.log10(errors[key]))
+    return np.transpose(result)
+
+
+def standing_for(tile: Tile) -> Tile:
+    """One of the tiles that a tile turns into by turning, mirroring and shifting: the first by the alphabet."""
+    cells = np.array([list(row) for row in tile])
+    turned = [np.rot90(mirrored, turns) for mirrored in (cells, cells.T) for turns in range(4)]
+    moved = (np.roll(cell, shift, (0, 1)) for cell in turned for shift in np.ndindex(cell.shape))
+    return min(tuple("".join(row) for row in cell) for cell in moved)
+
+
+def best_tile(search: Search, side: int, steps: int, seed: int, known: Known, progress: Progress) -> Tile:
+    """Tile of the best score: of all where `side` is 2, else by annealing with several starts.
+
+    Parameters
+    ----------
+    search : Search
+    side : int
+        Pixels of the tile, 2 or 4.
+    steps : int
+        Tiles to look at where `side` is 4.
+    seed : int
+    known : mapping
+        Gains of the tiles that were tried: what is in it isn't computed again, and what is computed is put into it.
+    progress : callable
+        Called with the best tile and the share that is done.
+    """
+    reference_db = tile_db(search, search.goal.reference)
+
+    def score(tile: Tile) -> float:
+        if (key := "/".join(tile)) not in known:
+            known[key] = (tile_db(search, tile) - reference_db).tolist()
+        return search.goal.score(np.array(known[key]))
+
+    best = standing_for(search.goal.reference)
+    best_score = score(best)
+
+    def look_at(tile: Tile, share: float) -> float:
+        nonlocal best, best_score
+        value = score(tile)
+        if value > best_score:
+            best, best_score = tile, value
+        progress(f"{'/'.join(best)} {best_score:+.2f} dB", share)
+        return value
+
+    if side == 2:
+        tiles = sorted({standing_for(("".join(t[:2]), "".join(t[2:]))) for t in product(search.goal.letters, repeat=4)})
+        for index, tile in enumerate(tiles):
+            look_at(tile, (index + 1) / len(tiles))
+        return best
+    starts = [
+        tile for tile in MOSAICS.values() if len(tile) in (2, 4) and set("".join(tile)) <= set(search.goal.letters)
+    ]
+    starts = sorted({standing_for(_whole(tile, side)) for tile in starts}, key=score, reverse=True)[:4]
+    each = steps // len(starts)
+    for number, start in enumerate(starts):
+        rng = np.random.default_rng([seed, number])
+        tile, value = start, look_at(start, number / len(starts))
+        for step in range(each):
+            changed = standing_for(_changed(tile, search.goal.letters, rng))
+            new = look_at(changed, (number * each + step + 1) / (each * len(starts)))
+            if new > value or rng.random() < np.exp((new - value) / (COOLING_DB * (1 - step / each))):
+                tile, value = changed, new
+    return best
+
+
+def _whole(tile: Tile, side: int) -> Tile:
+    return tuple(row * (side // len(row)) for row in tile * (side // len(tile)))
+
+
+def _changed(tile: Tile, letters: str, rng: np.random.Generator) -> Tile:
+    """Another letter at a site, or two sites that change places."""
+    cells = np.array([list(row) for row in tile])
+    one, other = (tuple(rng.integers(size) for size in cells.shape) for _ in range(2))
+    if rng.random() < 0.5:
+        cells[one] = rng.choice(list(letters))
+    else:
+        cells[one], cells[other] = cells[other], cells[one]
+    return tuple("".join(row) for row in cells)
+
+
+def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> SensorConfig:
+    """Sensor of a tile whose filters pass what makes the score best; W stays clear.
+
+    A filter's transmittance is the logistic function of a sum of bumps, times the clear pixel's response. Exposures
+    follow the goal's rule between rounds of L-BFGS; within one they stand still, so that the slope is the whole slope.
+
+    Parameters
+    ----------
+    goal : Goal
+    tile : tuple of str
+    rounds : int
+    progress : callable
+        Called with the score and the share that is done.
+
+    Raises
+    ------
+    InputError
+        For a sensor without W, whose curve is that of a clear pixel.
+    """
+    if "W" not in goal.sensor.responses.curves:
+        raise InputError("curves: the sensor has no W, what a pixel without a filter collects; add W to its responses")
+    search = search_for(replace(goal, letters=goal.letters + "W"))
+    prior, seen, names = search.prior, view_of(goal.prior, goal.light), channels(tile)
+    reference_db = tile_db(search, goal.reference)
+    places = np.array([names.index(tile[y % len(tile)][x % len(tile[0])]) for y, x in np.ndindex(PATCH, PATCH)])
+    spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
+    scenes = [(mean, row) for mean in prior.reflectances for row in _rows(prior, seen, mean)]
+    # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
+    nm = seen.light.wavelength_nm
+    curves = {
+        name: np.interp(nm, curve.wavelength_nm, curve.values) for name, curve in goal.sensor.responses.curves.items()
+    }
+    clear_e = curves["W"][:, None] * unit_response_e(goal.sensor, seen)
+    bumps = np.exp(-(((nm[:, None] - np.arange(nm[0], nm[-1] + STEP_NM, STEP_NM)) / STEP_NM) ** 2) / 2)
+    free = np.array([name != "W" for name in names])
+
+    def transmittances(logits: Floats) -> Floats:
+        result = np.ones((len(names), len(nm)))
+        result[free] = 1 / (1 + np.exp(-logits.reshape(-1, bumps.shape[1]) @ bumps.T))
+        return result
+
+    def sensor_of(logits: Floats) -> SensorConfig:
+        passed = transmittances(logits) * curves["W"]
+        responses = {name: Spectrum(nm, values) for name, values in zip(names, passed, strict=True)}
+        return replace(goal.sensor, cfa=tile, responses=Responses(responses, goal.sensor.responses.relative))
+
+    def cost(logits: Floats, moments: list[tuple[float, float]]) -> tuple[float, Floats]:
+        """Score with the other sign, and its slope."""
+        shares, sensor = transmittances(logits), sensor_of(logits)
+        sampling = spread[:, :, None] * (shares @ clear_e)[places]
+        gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
+        for index, (light, time_s) in enumerate(moments):
+            if same := [before for before in range(index) if moments[before][0] == light]:
+                gains_db[:, index], by_sample[:, index] = gains_db[:, same[0]], by_sample[:, same[0]]
+                continue
+            cases = [Case(mean * light, noise_of(sensor, time_s), row) for mean, row in scenes]
+            errors, slopes = error_slopes(prior.patches, sampling, middle, cases)
+            for metric in range(3):  # cases of sRGB, luminance and colour take turns
+                error, slope = errors[metric::3].mean(), slopes[metric::3].mean(axis=0)
+                gains_db[metric, index], by_sample[metric, index] = (
+                    -10 * np.log10(error),
+                    -10 / np.log(10) * slope / error,
+                )
+        gains_db -= reference_db
+        weights = np.zeros_like(gains_db)
+        weights[0] = goal.weights
+        if gains_db.min() < -goal.behind_db:
+            weights[np.unravel_index(gains_db.argmin(), gains_db.shape)] += BEHIND
+        by_sample = np.tensordot(weights, by_sample, 2)
+        by_pixel = np.einsum("sp,spc->pc", spread, by_sample)
+        by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])
+        by_logit = (by_response @ clear_e.T * shares * (1 - shares))[free] @ bumps
+        return -goal.score(gains_db), -by_logit.ravel()
+
+    start = np.clip(np.stack([curves[name] for name in names])[free] / curves["W"], 0.003, 0.997)
+    logits = np.linalg.lstsq(bumps, np.log(start / (1 - start)).T, rcond=1e-6)[0].T.ravel()
+    best = (np.inf, logits)
+    for number in range(rounds + 1):
+        sensor = sensor_of(logits)
+        moments = [
+            (round(light, 9), time_s) for light, time_s in lights(goal, prior, sensor, transmittances(logits) @ clear_e)
+        ]
+        best = min(best, (cost(logits, moments)[0], logits), key=lambda pair: pair[0])
+        progress(f"filters {-best[0]:+.2f} dB", number / (rounds + 1))
+        if number < rounds:
+            logits = minimize(cost, logits, (moments,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
+    return sensor_of(best[1])

@@ -1,0 +1,77 @@
+"""A design as one self-contained page: its tile and filters, gains over light, and what it gives up."""
+
+from collections.abc import Mapping, Sequence
+
+from matplotlib import rc_context
+
+from rodcone.plots import CHANNEL_COLOURS
+from sensor.cfa import Tile
+from sensor.config import SensorConfig
+from studies.design.expect import ExpectedError
+from studies.design.search import Goal
+from studies.pages.expect_chart import gain_svg
+from studies.pages.page import address, own_file, write_out
+from studies.pages.plots import CHART, INK, STYLE, blank, plain_ticks, svg_text
+
+
+def tile_text(tile: Tile) -> str:
+    """Rows of a tile, as --mosaic takes them."""
+    return "/".join(tile)
+
+
+def design_page(
+    goal: Goal,
+    camera: SensorConfig,
+    levels: Mapping[str, float],
+    by_camera: Mapping[str, Sequence[ExpectedError]],
+    tried: int,
+) -> str:
+    """Return the page's HTML; the first of `by_camera` is the reference, the second the design."""
+    reference, design, *_ = by_camera.values()
+    given_up = [
+        f"{level}: {figure} {loss:.2f} {unit}"
+        for level, one, other in zip(levels, design, reference, strict=True)
+        for figure, loss, unit in (
+            ("PSNR", other.psnr_db - one.psnr_db, "dB"),
+            ("luminance", other.luminance_db - one.luminance_db, "dB"),
+            ("a*, b*", one.colour - other.colour, "in Lab"),
+        )
+        if loss > 0.005
+    ]
+    rows = [
+        (name, [f"{one.psnr_db - other.psnr_db:+.2f}" for one, other in zip(errors, reference, strict=True)],
+         [f"{other.colour - one.colour:+.2f}" for one, other in zip(errors, reference, strict=True)])
+        for name, errors in list(by_camera.items())[1:]
+    ]  # fmt: skip
+    return write_out(
+        "design.html.j2",
+        tile=tile_text(camera.cfa),
+        reference=next(iter(by_camera)),
+        goal=goal,
+        levels=list(levels),
+        rows=rows,
+        given_up=given_up,
+        tried=tried,
+        pictures=[address("svg+xml", svg.encode()) for svg in (_drawn(camera), gain_svg(by_camera))],
+        style=own_file("report.css"),
+    )
+
+
+@rc_context(STYLE)
+def _drawn(camera: SensorConfig) -> str:
+    """Draw the tile and the responses of its channels."""
+    figure = blank(2 * CHART[0], CHART[1])
+    tile, responses = figure.subplots(1, 2)
+    for y, row in enumerate(camera.cfa):
+        for x, letter in enumerate(row):
+            colour = "#eeeeee" if letter == "W" else CHANNEL_COLOURS.get(letter, INK)
+            tile.fill((x, x + 1, x + 1, x), (-y, -y, -y - 1, -y - 1), color=colour, ec=INK)
+            tile.text(x + 0.5, -y - 0.5, letter, ha="center", va="center")
+    tile.set(aspect="equal", title="tile")
+    tile.axis("off")
+    for letter in dict.fromkeys("".join(camera.cfa)):
+        curve = camera.responses.curves[letter]
+        responses.plot(curve.wavelength_nm, curve.values, color=CHANNEL_COLOURS.get(letter, INK))
+    responses.set(xlim=(380, 780), ylim=(0, 1.05), title="electrons per photon", xlabel="nm")
+    plain_ticks(responses)
+    return svg_text(figure)

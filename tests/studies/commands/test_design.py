@@ -1,0 +1,55 @@
+"""The command `rodcone design`: what it writes other commands take, and each wrong option is refused in one line."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call, check_refusals
+
+from rodcone import read_study
+from sensor.presets import preset
+from studies.design.expect import expect
+
+FEW = ["design", "low_noise", "--tile", "2x2", "--letters", "RGB", "--over", "classroom:classroom"]
+
+
+@pytest.mark.thorough
+def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) -> None:
+    code, out, _ = call([*FEW, "-o", tmp_path / "found", "--behind", "9"])
+    assert code == 0
+    tile = tuple(out.splitlines()[0].split("/"))
+    camera = preset(tmp_path / "found" / "sensor.toml")
+    assert camera.cfa == tile
+    assert camera.pixel == preset("low_noise").pixel
+    held = json.loads((tmp_path / "found" / "tried.json").read_text("utf-8"))["gains_db"]
+    one, other = (expect(preset("low_noise", rows), [25.0])[0].psnr_db for rows in (tile, ("BG", "GR")))
+    assert abs(held["/".join(tile)][0][0] - (one - other)) < 0.05  # a tile's place in the patch
+    assert max(gains[0][0] for gains in held.values()) == held["/".join(tile)][0][0]
+    assert read_study(tmp_path / "found" / "study.toml").processors[0] == "ple"
+    page = (tmp_path / "found" / "design.html").read_text("utf-8")
+    assert "/".join(tile) in page
+    assert "rgbw_4x4" in page
+
+
+@pytest.mark.slow
+def test_filters_are_written_as_curves_that_read_back(tmp_path: Path) -> None:
+    assert call([*FEW, "--filters", "-o", tmp_path / "found", "--behind", "9"])[0] == 0
+    camera = preset(tmp_path / "found" / "sensor.toml")
+    given = preset("low_noise").responses.curves["G"]
+    green = camera.responses.curves["G"]
+    assert np.abs(green.values - np.interp(green.wavelength_nm, given.wavelength_nm, given.values)).max() > 0.02
+
+
+def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
+    rows = (
+        ("--tile 3x3 -o found", "tile: '3x3' is unknown"),
+        ("--letters RGQ -o found", "letters: 'Q' is unknown"),
+        ("--over noon:midnight -o found", "over: 'noon:midnight' is not a range of levels"),
+        ("--weights 1 --weights 2 -o found", "for 7 levels"),
+        ("--behind -1 -o found", "behind: -1"),
+        ("--never-worse-than bayr -o found", "did you mean 'bayer'"),
+        ("--light D66 -o found", "did you mean 'D65'"),
+        ("--prior draw -o found", "did you mean 'drawn'"),
+    )
+    check_refusals("design low_noise", rows, tmp_path)

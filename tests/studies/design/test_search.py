@@ -1,0 +1,82 @@
+"""The search's figures against `expect`, its symmetry, what it keeps, and filters that it makes better."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+from sensor.cfa import Tile
+from sensor.presets import preset
+from studies.design import search as searching
+from studies.design.expect import expect
+from studies.design.search import Goal, best_filters, best_tile, search_for, standing_for, tile_db
+
+LEVELS = np.array([0.036, 25.0])
+BAYER: Tile = ("RG", "GB")
+
+
+def goal(**changes: object) -> Goal:
+    """Two levels of equal weight, Bayer as the reference."""
+    return replace(Goal(preset("low_noise"), LEVELS, np.array([0.5, 0.5]), BAYER), **changes)
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, pytest.param(0.03, marks=pytest.mark.thorough)])
+def test_a_tiles_figures_are_those_of_expect(crosstalk: float) -> None:
+    sensor = preset("low_noise", ("RBWB", "GRGR", "RWBB", "BGRG"))
+    sensor = replace(sensor, pixel=replace(sensor.pixel, crosstalk=crosstalk))
+    rows = expect(sensor, LEVELS)
+    psnr_db, luminance_db, colour_db = tile_db(search_for(goal(sensor=sensor)), sensor.cfa)
+    assert_allclose(psnr_db, [row.psnr_db for row in rows], atol=1e-9)
+    assert_allclose(luminance_db, [row.luminance_db for row in rows], atol=1e-9)
+    assert_allclose(colour_db, [-20 * np.log10(row.colour) for row in rows], atol=1e-9)
+
+
+def test_turned_mirrored_and_shifted_tiles_are_one() -> None:
+    assert standing_for(("GB", "RG")) == standing_for(("BG", "GR")) == standing_for(BAYER) == ("BG", "GR")
+    tile = np.array([list(row) for row in ("RBWB", "GRGR", "RWBB", "BGRG")])
+    for turned in (np.rot90(tile), tile.T, np.roll(tile, (1, 3), (0, 1)), tile[::-1]):
+        assert standing_for(tuple("".join(row) for row in turned)) == standing_for(tuple("".join(r) for r in tile))
+    assert standing_for(("RG", "BW")) != standing_for(BAYER)
+
+
+@pytest.mark.thorough
+def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_known(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    # Three letters: 3^4 tiles are 21 but for turns, mirrors and shifts (Burnside's lemma over the 32 moves).
+    search, known, shares = search_for(goal(letters="RGB")), {}, []
+    best = best_tile(search, 2, 0, 0, known, lambda _, share: shares.append(share))
+    assert len(known) == 21
+    assert shares[-1] == 1.0
+    assert shares == sorted(shares)
+    scores = {tile: search.goal.score(np.array(gains)) for tile, gains in known.items()}
+    assert scores["/".join(best)] == max(scores.values())
+
+    again = []
+    monkeypatch.setattr(searching, "tile_db", lambda _, tile: again.append(tile) or np.zeros((3, 2)))
+    assert best_tile(search, 2, 0, 0, known, lambda *_: None) == best
+    assert again == [BAYER]  # what gains are over
+
+
+def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
+    gains = np.zeros((3, 2))
+    assert goal().score(gains) == 0.0
+    gains[0], gains[1, 1] = 0.5, -0.1
+    assert goal().score(gains) == pytest.approx(0.5)
+    gains[1, 1] = -0.2
+    assert goal().score(gains) < 0.0
+
+
+@pytest.mark.thorough
+def test_filters_get_better_and_stay_filters() -> None:
+    wanted = goal(levels_cd_m2=LEVELS[1:], weights=np.ones(1), behind_db=100.0)
+    before = tile_db(search_for(wanted), BAYER)
+    camera = best_filters(wanted, BAYER, 1, lambda *_: None)
+    after = tile_db(search_for(replace(wanted, sensor=camera, letters="RGB")), BAYER)
+    assert after[0, 0] > before[0, 0] + 0.3
+    clear = preset("low_noise").responses.curves["W"]
+    for name in "RGB":
+        curve = camera.responses.curves[name]
+        assert np.all(curve.values >= 0)
+        assert np.all(curve.values <= np.interp(curve.wavelength_nm, clear.wavelength_nm, clear.values) + 1e-12)
