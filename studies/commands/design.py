@@ -18,7 +18,8 @@ from sensor.config import SensorConfig
 from sensor.presets import preset, preset_file
 from studies.commands.expect import levels_between
 from studies.design.expect import expect
-from studies.design.search import Goal, Known, best_filters, best_tile, search_for
+from studies.design.filters import best_filters
+from studies.design.search import Goal, Known, best_tile, search_for
 from studies.pages.design_page import design_page, tile_text
 
 SIDES = {"2x2": 2, "4x4": 4}

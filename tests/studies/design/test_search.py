@@ -10,7 +10,8 @@ from sensor.cfa import Tile
 from sensor.presets import preset
 from studies.design import search as searching
 from studies.design.expect import expect
-from studies.design.search import Goal, best_filters, best_tile, search_for, standing_for, tile_db
+from studies.design.filters import best_filters
+from studies.design.search import Goal, best_tile, search_for, standing_for, tile_db
 
 LEVELS = np.array([0.036, 25.0])
 BAYER: Tile = ("RG", "GB")

@@ -1,0 +1,107 @@
+"""Filters of the least expected error for a tile, by the slope of the closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import minimize
+
+from isp.design.slope import Case, error_slopes
+from isp.design.spectral_prior import PATCH
+from render.spectrum import Floats, Spectrum
+from rodcone.errors import InputError
+from sensor.cfa import Tile, channels
+from sensor.config import SensorConfig
+from sensor.curves import Responses
+from studies.design.expect import middle_pixels, noise_of, spread_of, unit_response_e, view_of
+from studies.design.search import BEHIND, Goal, Progress, lights, rows_of, search_for, tile_db
+
+STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
+
+
+def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> SensorConfig:
+    """Sensor of a tile whose filters pass what makes the score best; W stays clear.
+
+    A filter's transmittance is the logistic function of a sum of bumps, times the clear pixel's response. Exposures
+    follow the goal's rule between rounds of L-BFGS; within one they stand still, so that the slope is the whole slope.
+
+    Parameters
+    ----------
+    goal : Goal
+    tile : tuple of str
+    rounds : int
+    progress : callable
+        Called with the score and the share that is done.
+
+    Raises
+    ------
+    InputError
+        For a sensor without W, whose curve is that of a clear pixel.
+    """
+    if "W" not in goal.sensor.responses.curves:
+        raise InputError("curves: the sensor has no W, what a pixel without a filter collects; add W to its responses")
+    search = search_for(replace(goal, letters=goal.letters + "W"))
+    prior, seen, names = search.prior, view_of(goal.prior, goal.light), channels(tile)
+    reference_db = tile_db(search, goal.reference)
+    places = np.array([names.index(tile[y % len(tile)][x % len(tile[0])]) for y, x in np.ndindex(PATCH, PATCH)])
+    spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
+    scenes = [(mean, row) for mean in prior.reflectances for row in rows_of(prior, seen, mean)]
+    # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
+    nm = seen.light.wavelength_nm
+    curves = {
+        name: np.interp(nm, curve.wavelength_nm, curve.values) for name, curve in goal.sensor.responses.curves.items()
+    }
+    clear_e = curves["W"][:, None] * unit_response_e(goal.sensor, seen)
+    bumps = np.exp(-(((nm[:, None] - np.arange(nm[0], nm[-1] + STEP_NM, STEP_NM)) / STEP_NM) ** 2) / 2)
+    free = np.array([name != "W" for name in names])
+
+    def transmittances(logits: Floats) -> Floats:
+        result = np.ones((len(names), len(nm)))
+        result[free] = 1 / (1 + np.exp(-logits.reshape(-1, bumps.shape[1]) @ bumps.T))
+        return result
+
+    def sensor_of(logits: Floats) -> SensorConfig:
+        passed = transmittances(logits) * curves["W"]
+        responses = {name: Spectrum(nm, values) for name, values in zip(names, passed, strict=True)}
+        return replace(goal.sensor, cfa=tile, responses=Responses(responses, goal.sensor.responses.relative))
+
+    def cost(logits: Floats, moments: list[tuple[float, float]]) -> tuple[float, Floats]:
+        """Score with the other sign, and its slope."""
+        shares, sensor = transmittances(logits), sensor_of(logits)
+        sampling = spread[:, :, None] * (shares @ clear_e)[places]
+        gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
+        for index, (light, time_s) in enumerate(moments):
+            if same := [before for before in range(index) if moments[before][0] == light]:
+                gains_db[:, index], by_sample[:, index] = gains_db[:, same[0]], by_sample[:, same[0]]
+                continue
+            cases = [Case(mean * light, noise_of(sensor, time_s), row) for mean, row in scenes]
+            errors, slopes = error_slopes(prior.patches, sampling, middle, cases)
+            for metric in range(3):  # cases of sRGB, luminance and colour take turns
+                error, slope = errors[metric::3].mean(), slopes[metric::3].mean(axis=0)
+                gains_db[metric, index], by_sample[metric, index] = (
+                    -10 * np.log10(error),
+                    -10 / np.log(10) * slope / error,
+                )
+        gains_db -= reference_db
+        weights = np.zeros_like(gains_db)
+        weights[0] = goal.weights
+        if gains_db.min() < -goal.behind_db:
+            weights[np.unravel_index(gains_db.argmin(), gains_db.shape)] += BEHIND
+        by_sample = np.tensordot(weights, by_sample, 2)
+        by_pixel = np.einsum("sp,spc->pc", spread, by_sample)
+        by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])
+        by_logit = (by_response @ clear_e.T * shares * (1 - shares))[free] @ bumps
+        return -goal.score(gains_db), -by_logit.ravel()
+
+    start = np.clip(np.stack([curves[name] for name in names])[free] / curves["W"], 0.003, 0.997)
+    logits = np.linalg.lstsq(bumps, np.log(start / (1 - start)).T, rcond=1e-6)[0].T.ravel()
+    best = (np.inf, logits)
+    for number in range(rounds + 1):
+        sensor = sensor_of(logits)
+        moments = [
+            (round(light, 9), time_s) for light, time_s in lights(goal, prior, sensor, transmittances(logits) @ clear_e)
+        ]
+        best = min(best, (cost(logits, moments)[0], logits), key=lambda pair: pair[0])
+        progress(f"filters {-best[0]:+.2f} dB", number / (rounds + 1))
+        if number < rounds:
+            logits = minimize(cost, logits, (moments,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
+    return sensor_of(best[1])
