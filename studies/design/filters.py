@@ -39,6 +39,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     """
     if "W" not in goal.sensor.responses.curves:
         raise InputError("curves: the sensor has no W, what a pixel without a filter collects; add W to its responses")
+    # What all rounds share.
     search = search_for(replace(goal, letters=goal.letters + "W"))
     prior, seen, names = search.prior, view_of(goal.prior, goal.light), channels(tile)
     reference_db = tile_db(search, goal.reference)
@@ -92,6 +93,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         by_logit = (by_response @ clear_e.T * shares * (1 - shares))[free] @ bumps
         return -goal.score(gains_db), -by_logit.ravel()
 
+    # Rounds: exposures by the rule, then filters for these exposures.
     start = np.clip(np.stack([curves[name] for name in names])[free] / curves["W"], 0.003, 0.997)
     logits = np.linalg.lstsq(bumps, np.log(start / (1 - start)).T, rcond=1e-6)[0].T.ravel()
     best = (np.inf, logits)
