@@ -57,7 +57,7 @@ def main(size: str) -> None:
         light = (sample["raw.npy"] - float(facts["black_dn"])) * facts["gain_e_per_dn"]  # electrons
         mean_e = np.mean(list(facts["mean_e"].values()))
         shown.append(np.concatenate([np.repeat(light[..., None] / mean_e / 5, 3, axis=-1), sample["rgb.npy"]]))
-        print(facts["level"], facts["mosaic"], f"{facts['snr_db']:.0f} dB, variance of G:", facts["noise"]["G"])
+        print(facts["level"], facts["tile"], f"{facts['snr_db']:.0f} dB, variance of G:", facts["noise"]["G"])
     rodcone.write_picture(np.clip(rodcone.encode_srgb(np.concatenate(shown, axis=1)), 0, 1), "batch.png")
 
 

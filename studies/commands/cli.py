@@ -53,6 +53,7 @@ app.command("studies.commands.design:design", name="design", help="Search for th
 app.command("studies.commands.doctor:doctor", name="doctor", help="Say what is installed, and whether all is well.")
 app.command("studies.commands.expect:expect", name="expect", help="Compute which error to expect in which light.")
 app.command("studies.commands.explore:explore", name="explore", help="Open a page on which sliders change a camera.")
+app.command("studies.commands.judge:judge", name="judge", help="Measure pictures of a set against its truth.")
 app.command("studies.commands.list:list_names", name="list", help="List scenes, lights, sensors and other names.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
 app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")

@@ -152,7 +152,7 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
     for cell in cells:
         mosaic = processor_of(cell.processor).mosaic
         parts = (*frame_labels(cell).values(), mosaic)
-        frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).replace(".", "p")) for part in parts)
+        frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
         windows = list(_windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop))
         if not windows:
             raise InputError(f"crop: {order.crop} is over the frames' side; allowed: up to that; raise render.size")

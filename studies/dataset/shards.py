@@ -18,7 +18,8 @@ from studies.sweep.run_cell import limit_threads
 
 MANIFEST = "manifest.jsonl"
 # Of a sample in a manifest.
-_TOLD = ("key", "scene", "scene_hash", "level", "luminance_cd_m2", "sensor", "mosaic", "snr_db", "saturated")
+_TOLD = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
+         "snr_db", "saturated")  # fmt: skip
 Lines = list[dict[str, Any]]
 
 

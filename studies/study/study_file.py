@@ -11,7 +11,8 @@ from rodcone.errors import InputError, one_line, require_whole
 from rodcone.toml_file import is_tuple, parse_toml, read_toml, strict_converter, structured
 from studies.study.study import FILES, SceneChoice, Study
 
-_EXAMPLES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
+_VALUES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
+EXAMPLES = Path(__file__).parents[1] / "configs"
 MOST_SEEDS = 100_000
 
 
@@ -21,7 +22,8 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
     Parameters
     ----------
     path : str or Path
-        TOML with the fields of `Study`; names of files in it are relative to its folder.
+        TOML with the fields of `Study`; names of files in it are relative to its folder. Where no such file is, a name
+        of `EXAMPLES`.
     changes : sequence of str
         ``key=value`` such as ``render.spp=64``, the value in TOML's notation, in place of the file's own.
     trust_code : bool
@@ -32,6 +34,9 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
     InputError
         For a file that can't be read, an unknown key (the likely one is named), or a value that isn't allowed.
     """
+    example = EXAMPLES / f"{path}.toml"
+    if not Path(path).exists() and example.parent == EXAMPLES and example.is_file():
+        path = example
     try:
         content = read_toml(Path(path))
     except (OSError, ValueError) as error:
@@ -58,9 +63,9 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         return structured(content, Study, _CONVERTER, "see rodcone new study")
     except InputError as error:
         words = str(error)
-        example = _EXAMPLES.get(words.partition(":")[0])
-        if example and "not a text" in words:
-            words = f"{words}; write {example}"
+        value = _VALUES.get(words.partition(":")[0])
+        if value and "not a text" in words:
+            words = f"{words}; write {value}"
         raise InputError(f"study {str(path)!r}: {words}") from error
 
 

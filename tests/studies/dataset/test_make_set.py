@@ -107,7 +107,7 @@ def test_webdataset_reads_them_too(stored: Path) -> None:
 def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
     folder = made(tmp_path, order=SetOrder(shards=1))
     for arrays, facts in read_shard(next(folder.glob("*.tar"))):
-        tile, order = facts["mosaic"], facts["channels"]
+        tile, order = facts["tile"], facts["channels"]
         for row, column in np.ndindex(4, 4):
             behind = arrays["channels_e"][row, column, order.index(tile[row % 2][column % 2])]
             assert arrays["mosaic_e"][row, column] == pytest.approx(behind, rel=1e-6)

@@ -61,7 +61,7 @@ def squares(samples: list[Made]) -> np.ndarray:
         mean_dn = (arrays["mosaic_e"].astype(float) + facts["dark_current_e"]) / facts["gain_e_per_dn"]
         off_dn = arrays["raw"].astype(float) - facts["black_dn"] - mean_dn
         for row, column in np.ndindex(2, 2):
-            noise = facts["noise"][facts["mosaic"][row][column]]
+            noise = facts["noise"][facts["tile"][row][column]]
             x = arrays["mosaic_e"][row::2, column::2] / facts["gain_e_per_dn"]
             variance = noise["a"] * x + noise["b"] + noise["c"] * x**2
             found.append(off_dn[row::2, column::2] ** 2 / variance)

@@ -1,0 +1,75 @@
+"""The command `rodcone judge`."""
+
+from csv import writer
+from dataclasses import asdict
+from io import StringIO
+from math import isfinite
+from pathlib import Path
+
+from rodcone.errors import require_whole
+from studies.commands.console import print_json, print_table, require_place, write_text
+from studies.commands.sweep import MOST_WORKERS, local_runner
+from studies.dataset.judge import MEASURED, Score
+from studies.dataset.judge import judge as judge_pictures
+from studies.dataset.judge_page import judge_page
+from studies.metrics.metric import DECIDING
+
+
+def judge(
+    pictures: Path,
+    /,
+    *,
+    of: Path,
+    name: str | None = None,
+    out: Path | None = None,
+    workers: int | None = None,
+    json: bool = False,
+) -> None:
+    """Measure developed pictures of a set against its truth, beside the project's own; prints a table.
+
+    Parameters
+    ----------
+    pictures
+        Folder of KEY.png, KEY.tif or KEY.npy by the keys of the set's manifest, encoded sRGB in which white is 1.
+    of
+        Folder that rodcone dataset made; where rodcone sweep developed the same study in it, its figures stand beside.
+    name
+        Whose pictures they are; the folder's name by default.
+    out
+        File with every metric: a page (.html) or a table (.csv).
+    workers
+        Processes on this machine, one for each core by default.
+    json
+        Print one JSON object instead of the table.
+    """
+    require_place(out, ".html", ".csv")
+    if workers is not None:
+        require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
+    head, scores = judge_pictures(pictures, of, name or pictures.resolve().name, local_runner(workers))
+    if out is not None:
+        write_text(out, _csv(scores) if out.suffix.lower() == ".csv" else judge_page(head, scores))
+    if json:
+        print_json({"set": head, "scores": [asdict(score) for score in scores]})
+        return
+    columns = ("camera", "level", "developed by", "scenes", *(metric.name for metric in DECIDING))
+    print_table(columns, [_row(score) for score in scores], words=3)
+
+
+def _row(score: Score) -> tuple[str, ...]:
+    figures = [
+        " ± ".join(f"{of[x.key]:.{x.digits + 1}f}" for of in (score.means, score.halves) if isfinite(of[x.key]))
+        for x in DECIDING
+    ]
+    return score.camera, score.level, score.developer, str(score.scenes or ""), *figures
+
+
+def _csv(scores: list[Score]) -> str:
+    text = StringIO()
+    table = writer(text)
+    keys = [metric.key for metric in MEASURED]
+    halves = [f"{key}_half" for key in keys]
+    table.writerow(["camera", "level", "luminance_cd_m2", "developer", "scenes", *keys, *halves])
+    for x in scores:
+        figures = [of[key] for of in (x.means, x.halves) for key in keys]
+        table.writerow([x.camera, x.level, x.luminance_cd_m2, x.developer, x.scenes, *figures])
+    return text.getvalue()

@@ -1,0 +1,254 @@
+"""Anyone's developed pictures of a set against its truth: every metric by condition, with intervals over scenes."""
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from PIL import Image
+
+from isp.processors.catalogue import NAMED
+from rodcone.colour_spaces import decode_srgb, encode_srgb
+from rodcone.errors import InputError, one_line
+from rodcone.optional import quietly_imported
+from sensor.presets import names, preset
+from studies.dataset.make_set import Runner
+from studies.dataset.shards import Lines, read_manifest, read_shard, shards_of, stands
+from studies.design.expect import expect
+from studies.metrics.appearance import appearance, true_picture
+from studies.metrics.confidence import half_width
+from studies.metrics.metric import METRICS, ON_TARGETS
+from studies.metrics.quality import measure, psnr_db
+from studies.study.levels import parse_exposure
+from studies.sweep.database import FILE
+from studies.sweep.export import read_rows
+from studies.sweep.prepare import SET
+from studies.sweep.run_cell import limit_threads
+
+MEASURED = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
+EXPECTED_UNDER = "D65"
+SENSORS = Path(__file__).parents[1] / "configs" / "sensors"
+ENDINGS = (".png", ".tif", ".tiff", ".npy")
+_OVERSHOOT = 0.01  # of values in an array, beyond 0 to 1
+# What is often mistaken, and what would undo it: pictures that come this much nearer to the truth by it are refused.
+_MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
+    "linear values; encode them as sRGB": encode_srgb,
+    "encoded twice; encode them once": decode_srgb,
+    "blue in red's place; write R, G, B": lambda picture: picture[..., ::-1],
+    "upside down": lambda picture: picture[::-1],
+    "mirrored": lambda picture: picture[:, ::-1],
+}
+_NEARER_DB = 3.0
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Judging:
+    """Pictures of one shard's samples, by their keys: a task of `studies.sweep.workers`; its own key is the shard's."""
+
+    key: str
+    path: Path
+    pictures: Mapping[str, Path]
+
+    @property
+    def kind(self) -> tuple[object, ...]:
+        """Each shard is of a kind of its own."""
+        return (self.key,)
+
+
+@dataclass(frozen=True)
+class Judged:
+    """Figures of a task's pictures."""
+
+    key: str
+    rows: list[Row]
+
+
+@dataclass(frozen=True)
+class Score:
+    """Means over the scenes of a condition, and half their 95 % intervals, by metric.
+
+    Attributes
+    ----------
+    camera : str
+        Sensor, mosaic, light and exposure.
+    level : str
+    developer : str
+        Whose pictures; a processor of the project's own goes by its name.
+    luminance_cd_m2 : float
+    scenes : int
+    means, halves : dict of str to float
+    """
+
+    camera: str
+    level: str
+    developer: str
+    luminance_cd_m2: float
+    scenes: int
+    means: dict[str, float]
+    halves: dict[str, float]
+
+
+def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Row, list[Score]]:
+    """What a set is, and the scores of its conditions: of the pictures, and of processors that a sweep developed it by.
+
+    Parameters
+    ----------
+    pictures : Path
+        Folder of files named ``KEY.png``, ``.tif`` or ``.npy`` by the set's keys: encoded sRGB in which white is 1. Of
+        each level and camera all, or none.
+    out : Path
+        Folder of `studies.dataset.make_set.make_set`.
+    developer : str
+        Name of whoever made the pictures.
+    runner : callable
+        As `make_set` takes it.
+
+    Raises
+    ------
+    InputError
+        For pictures that are missing, unknown, of another size or in another encoding, and a set that isn't whole.
+    """
+    manifest = read_manifest(out / SET)
+    if "rgb" not in manifest[0]["planes"]:
+        raise InputError(f"of: {out} was made without rgb; allowed: a set with it; make one with --truth rgb")
+    samples = [line for line in manifest if line["kind"] == "sample"]
+    found = _pictures_of(pictures, samples)
+    tasks = []
+    for made in shards_of(manifest):
+        if not stands(out / SET, made):
+            raise InputError(f"of: {made.lines[0]['name']} isn't what was written; run rodcone dataset again")
+        here = {line["key"]: found[line["key"]] for line in made.lines[1:] if line["key"] in found}
+        name = made.lines[0]["name"]
+        tasks += [Judging(name, (out / SET / name).resolve(), here)] if here else []
+    rows = [row for judged in runner(tasks, make=judge_shard) for row in judged.rows]
+    _check_encoding(rows)
+    result = scores(rows, developer)
+    at = {(score.camera, score.level) for score in result}
+    own_rows = [vars(row) for row in read_rows(out)] if (out / FILE).is_file() else []
+    for name in dict.fromkeys(row["processor"] for row in own_rows if row["processor"] in NAMED):
+        of_own = [row | {"mosaic": NAMED[name].mosaic} for row in own_rows if row["processor"] == name]
+        result += [score for score in scores(of_own, name) if (score.camera, score.level) in at]
+    result += expected([line for line in samples if _condition(line) in at])
+    return manifest[0], sorted(result, key=lambda score: (score.camera, score.luminance_cd_m2))
+
+
+_PLACE = ("sensor", "mosaic", "spectrum", "exposure", "level")
+
+
+def _condition(row: Row) -> tuple[str, str]:
+    """Camera and level."""
+    *camera, level = (row[name] for name in _PLACE)
+    return ", ".join(camera), level
+
+
+def expected(samples: Lines) -> list[Score]:
+    """PSNR that `rodcone expect` computes of each condition; without sensors that aren't this package's."""
+    known = {name: name for name in names()} | {path.name: str(path) for path in SENSORS.glob("*.toml")}
+    conditions = {_condition(line): line for line in samples if line["sensor"] in known}
+    result = []
+    for (camera, level), line in conditions.items():
+        light = line["luminance_cd_m2"]
+        exposure = parse_exposure(line["exposure"]) or line["exposure"]
+        error = expect(preset(known[line["sensor"]], line["tile"]), [light], EXPECTED_UNDER, exposure)[0]
+        nothing = {metric.key: math.nan for metric in MEASURED}
+        means = nothing | {"psnr_db": error.psnr_db}
+        result.append(Score(camera, level, f"expect, {EXPECTED_UNDER}", light, 0, means, nothing))
+    return result
+
+
+def judge_shard(task: Judging, most_threads: int | None = None) -> Judged:
+    """Measure the pictures of a shard's samples."""
+    if most_threads is not None:
+        limit_threads(most_threads)
+    rows = []
+    for arrays, facts in read_shard(task.path):
+        if facts["key"] in task.pictures:
+            truth = true_picture(arrays["rgb"].astype(np.float64))
+            encoded = read_picture(task.pictures[facts["key"]], truth.encoded.shape[:2])
+            figures = vars(measure(encoded, truth.encoded, truth.lab))
+            figures |= vars(appearance(decode_srgb(encoded), truth, facts["white_cd_m2"]))
+            mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}
+            place = {name: facts[name] for name in ("scene", "luminance_cd_m2", *_PLACE)}
+            rows.append({**place, **figures, "mistakes": mistakes})
+    return Judged(task.key, rows)
+
+
+def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
+    """Picture as encoded values from 0 to 1, (h, w, 3).
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, of another size or with values beyond.
+    """
+    try:
+        if path.suffix == ".npy":
+            values = np.load(path, allow_pickle=False)
+        elif path.suffix == ".png":
+            if path.read_bytes()[24:25] == b"\x10":
+                raise ValueError("16 bits a channel, of which its reader keeps 8; write a TIFF or an array")
+            with Image.open(path, formats=("PNG",)) as image:
+                values = np.asarray(image)
+        else:
+            values = quietly_imported("tifffile").imread(path)
+        if values.shape != (*shape, 3):
+            raise ValueError(f"shape {values.shape}; allowed: {(*shape, 3)}")
+        if values.dtype.kind == "u":
+            return np.asarray(values / np.iinfo(values.dtype).max, dtype=np.float64)
+        if values.dtype.kind != "f" or not np.isfinite(values).all():
+            raise ValueError(f"values of type {values.dtype}, or not finite; allowed: finite floats from 0 to 1")
+        if values.min() < -_OVERSHOOT or values.max() > 1 + _OVERSHOOT:
+            raise ValueError(f"values from {values.min():.3g} to {values.max():.3g}; allowed: 0 to 1, 1 is white")
+    except Exception as error:  # damaged files fail in many ways
+        raise InputError(f"{path}: it is no picture of this set ({one_line(error)})") from None
+    return np.asarray(np.clip(values, 0, 1), dtype=np.float64)
+
+
+def scores(rows: Sequence[Row], developer: str) -> list[Score]:
+    """Scores of each condition; samples of a scene are averaged first, since scenes alone are independent."""
+    conditions: dict[tuple[str, str], dict[str, list[Row]]] = {}
+    for row in rows:
+        conditions.setdefault(_condition(row), {}).setdefault(row["scene"], []).append(row)
+    result = []
+    for (camera, level), by_scene in conditions.items():
+        keys = ("luminance_cd_m2", *(metric.key for metric in MEASURED))
+        figures = {key: np.array([np.mean([row[key] for row in x]) for x in by_scene.values()]) for key in keys}
+        luminance = float(figures.pop("luminance_cd_m2").mean())
+        means = {key: float(values.mean()) for key, values in figures.items()}
+        halves = {key: float(half_width(values)) for key, values in figures.items()}
+        result.append(Score(camera, level, developer, luminance, len(by_scene), means, halves))
+    return result
+
+
+def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:
+    """Files by the set's keys: of each condition all or none."""
+    files = {path.stem: path for path in sorted(folder.glob("*")) if path.suffix.lower() in ENDINGS}
+    keys = {line["key"] for line in samples}
+    if unknown := sorted(files.keys() - keys):
+        raise InputError(f"pictures: {unknown[0]!r} is no key of the set; allowed: such as {min(keys)!r}; rename it")
+    if not files:
+        raise InputError(f"pictures: {folder} holds none; allowed: {', '.join(ENDINGS)}, named such as {min(keys)!r}")
+    begun = {_condition(line) for line in samples if line["key"] in files}
+    missing = [line["key"] for line in samples if _condition(line) in begun and line["key"] not in files]
+    if missing:
+        raise InputError(
+            f"pictures: {len(missing)} are missing, such as {missing[0]!r}; allowed: all of a level and camera, or "
+            "none; add them"
+        )
+    return files
+
+
+def _check_encoding(rows: Sequence[Row]) -> None:
+    psnr = np.mean([row["psnr_db"] for row in rows])
+    undone = {words: np.mean([row["mistakes"][words] for row in rows]) for words in _MISTAKES}
+    words = max(undone, key=lambda words: undone[words])
+    if undone[words] > psnr + _NEARER_DB:
+        raise InputError(
+            f"pictures: they look {words} (PSNR {undone[words]:.1f} dB after that, {psnr:.1f} dB as they are); "
+            "allowed: encoded sRGB, R, G, B, upright"
+        )

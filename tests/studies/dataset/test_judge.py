@@ -1,0 +1,225 @@
+"""Pictures judged by a set's truth: closed forms, a sweep's own figures, mistakes recognised, bad input in a line."""
+
+import csv
+import json
+import shutil
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import scipy
+import sweep_sample as SAMPLE
+from command_line import call
+
+from rodcone.colour_spaces import decode_srgb, encode_srgb
+from rodcone.errors import InputError
+from sensor.presets import low_noise, preset_file
+from studies.dataset.judge import MEASURED, Score, judge
+from studies.dataset.make_set import make_set
+from studies.dataset.order import SetOrder
+from studies.dataset.shards import read_shard
+from studies.design.expect import expect
+from studies.photograph.picture_file import write_picture
+from studies.study.study import SceneChoice, Study
+from studies.sweep.export import read_rows
+from studies.sweep.workers import InThisProcess, run
+
+HERE = partial(run, executor=InThisProcess())
+SIGMA = 0.02
+SCENES = 3
+
+
+@pytest.fixture(scope="module")
+def out(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Folder of a set of three pictures at two levels by Bayer, and of a sweep of the same study.
+
+    The sensor is a file of one's own, for which nothing is computed in closed form: that takes a second.
+    """
+    folder = tmp_path_factory.mktemp("judged")
+    shutil.copy(preset_file("low_noise"), folder / "mine.toml")
+    return made(folder, str(folder / "mine.toml"))
+
+
+def made(folder: Path, sensor: str) -> Path:
+    scenes = []
+    for index in range(SCENES):
+        path = SAMPLE.picture(folder / f"scene{index}.exr", (16, 20 + 2 * index))
+        scenes.append(SceneChoice(str(path), "E"))
+    study = Study(tuple(scenes), ("1cd/m2", "25cd/m2"), sensors=(sensor,), processors=("bayer",))
+    make_set(study, folder / "out", SetOrder(planes=("rgb",), shards=2), "rodcone dataset", HERE)
+    SAMPLE.swept(study, folder / "out")
+    return folder / "out"
+
+
+def truths(out: Path) -> dict[str, tuple[np.ndarray, dict[str, Any]]]:
+    samples = (sample for path in (out / "set").glob("*.tar") for sample in read_shard(path))
+    return {facts["key"]: (encode_srgb(arrays["rgb"].astype(float)), facts) for arrays, facts in samples}
+
+
+def noisy(out: Path, folder: Path, change: Callable[[np.ndarray], np.ndarray] = lambda picture: picture) -> Path:
+    """The truth with white noise of `SIGMA`, then what somebody does to it by mistake."""
+    folder.mkdir()
+    rng = np.random.default_rng(3)
+    for key, (truth, _) in sorted(truths(out).items()):
+        picture = np.clip(truth + SIGMA * rng.standard_normal(truth.shape), 0, 1)
+        np.save(folder / f"{key}.npy", np.clip(change(picture), 0, 1))
+    return folder
+
+
+def of(scores: list[Score], developer: str) -> list[Score]:
+    return [score for score in scores if score.developer == developer]
+
+
+def test_white_noise_has_the_psnr_of_its_sigma_and_students_interval(out: Path, tmp_path: Path) -> None:
+    folder = noisy(out, tmp_path / "mine")
+    head, scores = judge(folder, out, "mine", HERE)
+    assert head["samples"] == 2 * SCENES
+    by_level: dict[str, list[float]] = {}
+    for key, (truth, facts) in truths(out).items():
+        error = np.load(folder / f"{key}.npy") - truth
+        by_level.setdefault(facts["level"], []).append(-10 * np.log10((error**2).mean()))
+    for score in of(scores, "mine"):
+        values = np.array(by_level[score.level])
+        assert score.scenes == SCENES
+        assert score.means["psnr_db"] == pytest.approx(values.mean(), abs=1e-9)
+        # 16 x 20 pixels of three colours: one standard error of the variance is 4.5 %, 0.2 dB
+        assert score.means["psnr_db"] == pytest.approx(-20 * np.log10(SIGMA), abs=0.6)
+        interval = scipy.stats.t.interval(0.95, SCENES - 1, values.mean(), scipy.stats.sem(values))
+        assert score.halves["psnr_db"] == pytest.approx((interval[1] - interval[0]) / 2, rel=1e-9)
+        assert set(score.means) == {metric.key for metric in MEASURED}
+
+
+def test_a_sweeps_pictures_are_judged_as_the_sweep_measured_them(out: Path, tmp_path: Path) -> None:
+    """All but what eight bits lose; and its own figures stand beside them."""
+    rows = read_rows(out)
+    for row in rows:
+        (key,) = [
+            key for key, (_, facts) in truths(out).items() if (facts["scene"], facts["level"]) == (row.scene, row.level)
+        ]
+        shutil.copy(out / "pictures" / row.picture, tmp_path / f"{key}.png")
+    _, scores = judge(tmp_path, out, "copied", HERE)
+    assert len(of(scores, "copied")) == len(of(scores, "bayer")) == 2
+    for copied, own in zip(of(scores, "copied"), of(scores, "bayer"), strict=True):
+        assert own.means["psnr_db"] == pytest.approx(
+            np.mean([row.psnr_db for row in rows if row.level == own.level]), abs=1e-9
+        )
+        for key, bound in (("psnr_db", 0.05), ("ssim", 0.01), ("flip_mean", 0.005), ("delta_e_median", 0.3)):
+            assert copied.means[key] == pytest.approx(own.means[key], abs=bound)
+
+
+@pytest.mark.thorough
+def test_the_closed_form_stands_beside_sensors_of_this_package(tmp_path: Path) -> None:
+    out = made(tmp_path, "low_noise")
+    _, scores = judge(noisy(out, tmp_path / "mine"), out, "mine", HERE)
+    dark, light = of(scores, "expect, D65")
+    # Bayer under D65 at the set's levels, as the command computes it
+    errors = expect(low_noise("bayer"), [1.0, 25.0], "D65")
+    assert [dark.means["psnr_db"], light.means["psnr_db"]] == pytest.approx([error.psnr_db for error in errors])
+    assert np.isnan(dark.means["ssim"])
+    assert dark.scenes == 0
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (decode_srgb, "look linear values; encode them as sRGB"),
+        (encode_srgb, "look encoded twice"),
+        (lambda picture: picture[..., ::-1], "look blue in red's place"),
+        (lambda picture: picture[::-1], "look upside down"),
+        (lambda picture: picture[:, ::-1], "look mirrored"),
+    ],
+)
+def test_a_wrong_encoding_is_recognised(change: Any, words: str, out: Path, tmp_path: Path) -> None:
+    with pytest.raises(InputError, match=words) as told:
+        judge(noisy(out, tmp_path / "mine", change), out, "mine", HERE)
+    assert "\n" not in str(told.value)
+
+
+def test_tiff_of_16_bits_and_arrays_are_read_alike(out: Path, tmp_path: Path) -> None:
+    arrays = noisy(out, tmp_path / "arrays")
+    files = tmp_path / "files"
+    files.mkdir()
+    for path in arrays.glob("*.npy"):
+        write_picture(np.load(path), files / f"{path.stem}.tif", bits=16)
+    (_, first), (_, second) = judge(arrays, out, "mine", HERE), judge(files, out, "mine", HERE)
+    for one, other in zip(of(first, "mine"), of(second, "mine"), strict=True):
+        assert one.means["psnr_db"] == pytest.approx(other.means["psnr_db"], abs=0.01)
+
+
+def _remove(folder: Path, key: str) -> None:
+    (folder / f"{key}.npy").unlink()
+
+
+def _rename(folder: Path, key: str) -> None:
+    (folder / f"{key}.npy").rename(folder / "holiday.npy")
+
+
+def _sixteen(folder: Path, key: str) -> None:
+    write_picture(np.load(folder / f"{key}.npy"), folder / f"{key}.png", bits=16)
+    _remove(folder, key)
+
+
+def _put(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Path, str], None]:
+    return lambda folder, key: np.save(folder / f"{key}.npy", change(np.load(folder / f"{key}.npy")))
+
+
+BAD = {
+    "missing": (_remove, "pictures: 1 are missing, such as"),
+    "unknown": (_rename, "pictures: 'holiday' is no key of the set; allowed: such as 'scene0"),
+    "size": (_put(lambda x: x[:-1]), r"shape \(15, 20, 3\); allowed: \(16, 20, 3\)"),
+    "grey": (_put(lambda x: x[..., 0]), r"shape \(16, 20\); allowed: \(16, 20, 3\)"),
+    "to 255": (_put(lambda x: 255 * x), "values from .* to .*; allowed: 0 to 1, 1 is white"),
+    "NaN": (_put(lambda x: np.where(x > x.mean(), np.nan, x)), "not finite"),
+    "whole numbers": (_put(lambda x: (255 * x).astype(np.int32)), "values of type int32"),
+    "cut": (lambda folder, key: (folder / f"{key}.npy").write_bytes(b"\x93NUMPY"), "it is no picture of this set"),
+    "16 bits": (_sixteen, "16 bits a channel, of which its reader keeps 8; write a TIFF or an array"),
+}
+
+
+@pytest.mark.parametrize("case", BAD)
+def test_bad_pictures_are_told_in_a_line(case: str, out: Path, tmp_path: Path) -> None:
+    spoil, words = BAD[case]
+    folder = noisy(out, tmp_path / "mine")
+    spoil(folder, min(truths(out)))
+    with pytest.raises(InputError, match=words) as told:
+        judge(folder, out, "mine", HERE)
+    assert "\n" not in str(told.value)
+
+
+def test_a_set_that_cannot_judge_is_told_in_a_line(out: Path, tmp_path: Path) -> None:
+    pictures = noisy(out, tmp_path / "mine")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(InputError, match=r"holds none; allowed: \.png"):
+        judge(tmp_path / "empty", out, "mine", HERE)
+    with pytest.raises(InputError, match="no manifest of a set"):
+        judge(pictures, tmp_path, "mine", HERE)
+    copy = tmp_path / "copy"
+    shutil.copytree(out / "set", copy / "set")
+    shard = next((copy / "set").glob("*.tar"))
+    shard.write_bytes(shard.read_bytes()[:-5000])
+    with pytest.raises(InputError, match=f"{shard.name} isn't what was written; run rodcone dataset again"):
+        judge(pictures, copy, "mine", HERE)
+    text = (copy / "set" / "manifest.jsonl").read_text()
+    (copy / "set" / "manifest.jsonl").write_text(text.replace('"planes": ["rgb"]', '"planes": []'))
+    with pytest.raises(InputError, match="was made without rgb"):
+        judge(pictures, copy, "mine", HERE)
+
+
+def test_the_command_writes_table_csv_json_and_page(out: Path, tmp_path: Path) -> None:
+    folder = noisy(out, tmp_path / "mine")
+    words = ("judge", str(folder), "--of", str(out), "--workers", "1")
+    code, table, _ = call([*words, "-o", tmp_path / "scores.csv"])
+    assert code == 0
+    assert "mine" in table
+    assert "bayer" in table
+    rows = list(csv.DictReader((tmp_path / "scores.csv").read_text().splitlines()))
+    told = json.loads(call([*words, "--json", "-o", tmp_path / "page.html"])[1])
+    assert len(told["scores"]) == len(rows) == 2 * 2
+    for row, score in zip(rows, told["scores"], strict=True):
+        assert float(row["psnr_db"]) == pytest.approx(score["means"]["psnr_db"])
+    page = (tmp_path / "page.html").read_text("utf-8")
+    assert "<script" not in page
+    assert f"{told['scores'][0]['means']['psnr_db']:.1f}" in page
