@@ -18,6 +18,11 @@ print("mosaics:", ", ".join(rodcone.mosaics()))
 for mosaic in ("bayer", "rgbw"):
     dark, light = rodcone.expect(rodcone.low_noise(cfa=mosaic), [0.05, 25.0])
     print(f"{mosaic:5}  {dark.psnr_db:.1f} dB to expect at 0.05 cd/m2, {light.psnr_db:.1f} at 25")
+# In bright light W is full first; its sites can be read after a time of their own (`white_apart` by name).
+apart = rodcone.with_channel_readings(rodcone.low_noise(), [rodcone.ChannelReading("W", metered=True)])
+for name, sensor in (("rgbw", rodcone.low_noise()), ("W apart", apart)):
+    luminance_db = rodcone.expect(sensor, [100.0], exposure="auto")[0].luminance_db
+    print(f"{name:7}  {luminance_db:.1f} dB of luminance to expect at 100 cd/m2")
 transport = rodcone.render("still_life", (size, size), spp=256)
 rows = []
 for level_cd_m2 in (0.05, 25.0):

@@ -6,7 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensor.raw import NoiseStep, RawImage
+from sensor.calibration import NoiseStep
+from sensor.cfa import mask
+from sensor.raw import RawImage
 
 # Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
 LEAST_PRNU = 1e-4
@@ -48,11 +50,20 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
     """`stabilise` by the noise of a raw image, with its steps where a pixel was read several times.
 
     From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
-    with PRNU p / k, over k. The pieces join where they meet.
+    with PRNU p / k, over k. The pieces join where they meet. Of a channel that is read apart, e / k electrons are what
+    its sites count, and have the transform of any others.
+
+    Parameters
+    ----------
+    electrons : (h, w) float32 or float64
+        The mosaic of `raw`, or a part of it that begins with a whole tile.
     """
     stable = stabilise(electrons, raw.dark_noise_e, raw.prnu)
     for step, offset in _joined(raw):
         stable = np.where(electrons >= step.from_e, _piece(electrons, step) + offset, stable).astype(electrons.dtype)
+    for noise in raw.channel_noise:
+        at = mask(raw.cfa, noise.channel, electrons.shape)
+        stable[at] = stabilise(electrons[at] / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
     return stable
 
 
@@ -75,7 +86,12 @@ def _piece(electrons: NDArray[Any], step: NoiseStep) -> NDArray[Any]:
 
 def without_prnu(raw: RawImage) -> RawImage:
     """Raw image of which `unstabilise_raw` has the inverse: the same, its PRNU left out."""
-    return replace(raw, prnu=0.0, noise_steps=tuple(replace(step, prnu=0.0) for step in raw.noise_steps))
+    return replace(
+        raw,
+        prnu=0.0,
+        noise_steps=tuple(replace(step, prnu=0.0) for step in raw.noise_steps),
+        channel_noise=tuple(replace(noise, prnu=0.0) for noise in raw.channel_noise),
+    )
 
 
 def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.float64]:
@@ -89,6 +105,9 @@ def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.f
         dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
         bright = unstabilise(step.shot * (stable - offset), dark_e) / step.shot
         electrons = np.where(stable >= _piece(np.array(step.from_e), step) + offset, bright, electrons)
+    for noise in raw.channel_noise:
+        at = mask(raw.cfa, noise.channel, stable.shape)
+        electrons[at] = unstabilise(stable[at], noise.dark_noise_e / noise.shot) * noise.shot
     return electrons
 
 

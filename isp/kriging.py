@@ -7,13 +7,14 @@ chooses among samples that look alike, this is one filter for each pixel of the 
 channel by channel, near lamps.
 """
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.anscombe import stabilise, unstabilise
+from isp.anscombe import stabilise_raw, unstabilise, without_prnu
 from isp.settings import Reconstruction
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
@@ -37,7 +38,8 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
     the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
-    values, names = stabilise(raw.electrons, raw.dark_noise_e, 0.0), channels(raw.cfa)
+    names, plain = channels(raw.cfa), replace(without_prnu(raw), noise_steps=())
+    values = stabilise_raw(raw.electrons, plain)
     sampled = [mask(raw.cfa, name, raw.shape) for name in names]
     low, high = np.array([np.percentile(values[at], (15.9, 84.1)) for at in sampled]).T
     spread = (high - low) / 2
@@ -49,7 +51,11 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
         apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0)
         estimate, noise_gain = np.where(beside, apart[0], estimate), np.where(beside, apart[1], noise_gain)
     # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
-    electrons = unstabilise(estimate, raw.dark_noise_e) - noise_gain / 4
+    # A channel that is read apart counts its own electrons, 1 over its factor of shot noise.
+    electrons = np.empty_like(estimate)
+    for index, noise in enumerate(map(raw.noise_of, names)):
+        counted = unstabilise(estimate[..., index], noise.dark_noise_e / noise.shot) - noise_gain[..., index] / 4
+        electrons[..., index] = counted * noise.shot
     return Reconstruction(electrons, noise_gain, engine="numpy")
 
 

@@ -87,13 +87,15 @@ def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
     names, half, in_noise = channels(raw.cfa), settings.patch // 2, settings.distance == "noise"
-    noise = noise_distances(raw.cfa, settings.patch, settings.reach)
+    distances = noise_distances(raw.cfa, settings.patch, settings.reach)
     mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
     h = np.stack([fill(mosaic, raw.cfa, name) for name in names])
     trust = np.ones(raw.shape)
     if in_noise:
         light_e = fill(raw.electrons, raw.cfa, "W") if "W" in names else raw.electrons
-        trust = np.asarray(reliability(light_e, raw.dark_noise_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
+        noise = raw.noise_of("W")
+        counted_e, dark_e = light_e / noise.shot, noise.dark_noise_e / noise.shot
+        trust = np.asarray(reliability(counted_e, dark_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
     return _Inputs(
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
@@ -101,7 +103,7 @@ def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
         alpha=saturated_fraction(raw, settings.window),
         reliability=trust,
         brightest=brightest_allowed(raw.electrons, raw, settings),
-        noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
+        noise=distances if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in distances],
         white=names.index("W") if "W" in names else None,
     )
 

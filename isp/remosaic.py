@@ -60,6 +60,9 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     dn = raw.dn.copy()
     for index, channel in enumerate(channels(raw.cfa)):
         moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
-        dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, raw.white_dn)).astype(dn.dtype)
+        top_dn = max(raw.white_dn, raw.noise_of(channel).full_well_e / raw.gain_e_per_dn + raw.black_dn)
+        dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, top_dn)).astype(dn.dtype)
     kept = [channels(raw.cfa).index(channel) for channel in channels(tile)]
-    return replace(raw, dn=dn, cfa=tile, colour=None if raw.colour is None else raw.colour.part(kept))
+    colour = None if raw.colour is None else raw.colour.part(kept)
+    apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))
+    return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart)

@@ -39,7 +39,8 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
         Of `isp.interleaved.reconstruct` [e-].
     """
     green = np.asarray(estimate[..., channels(raw.cfa).index("G")], dtype=np.float64)
-    ratio = green / np.sqrt(np.maximum(green, 0.0) + raw.dark_noise_e**2)
+    noise = raw.noise_of("G")
+    ratio = green / np.sqrt(noise.shot * np.maximum(green, 0.0) + noise.dark_noise_e**2)
     kept = ratio[~raw.saturated]
     return float(np.median(kept)) if kept.size else float("nan")
 

@@ -51,9 +51,6 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
     names, size = channels(raw.cfa), (len(raw.cfa), len(raw.cfa[0]))
     shares = neutral / neutral[names.index("W")]
     unseen, filled, reach = np.zeros(raw.shape, np.bool_), raw.dn, tent_radius(raw.cfa, "W")
-    # Where W is 0: S = 4 sqrt(S + s^2), solved for S.
-    first_e = (SIGMAS**2 + SIGMAS * np.sqrt(SIGMAS**2 + 4.0 * raw.dark_noise_e**2)) / 2.0
-    first_dn = raw.black_dn + first_e / raw.gain_e_per_dn
     # Beyond the border, where a pixel's only W may lie, the samples a tile further in.
     rows, columns = (np.arange(-reach, length + reach) for length in raw.shape)
     for line, length, step in zip((rows, columns), raw.shape, size, strict=True):
@@ -61,8 +58,13 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
         line[length + reach :] -= step
     padded = raw.dn[rows[:, None], columns]
     for phase in np.ndindex(size):
-        if raw.cfa[phase[0]][phase[1]] == "W":
+        channel = raw.cfa[phase[0]][phase[1]]
+        if channel == "W":
             continue
+        noise = raw.noise_of(channel)
+        # Where W is 0: S = 4 sqrt(k S + s^2), solved for S; k is 1 but for a channel that is read apart.
+        first_e = noise.shot * SIGMAS**2 + SIGMAS * np.sqrt((noise.shot * SIGMAS) ** 2 + 4.0 * noise.dark_noise_e**2)
+        first_dn = raw.black_dn + first_e / 2.0 / raw.gain_e_per_dn
         at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
         samples, white = raw.dn[at], _brightest_white(padded, raw, phase, reach)
         found = np.nonzero((samples > first_dn) & (samples > white))  # mostly few
@@ -70,9 +72,9 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
             np.maximum(values - float(raw.black_dn), 0.0) * raw.gain_e_per_dn
             for values in (samples[found], white[found], _least_around(samples, found))
         )
-        share = float(shares[names.index(raw.cfa[phase[0]][phase[1]])])
+        share = float(shares[names.index(channel)])
         most_e = np.maximum(max(MOST_SHARE, TIMES_NEUTRAL * share) * white_e, TIMES_LEAST * least_e)
-        over = light_e > most_e + SIGMAS * np.sqrt(light_e + raw.dark_noise_e**2)
+        over = light_e > most_e + SIGMAS * np.sqrt(noise.shot * light_e + noise.dark_noise_e**2)
         if over.any():
             filled, places = filled.copy() if filled is raw.dn else filled, tuple(index[over] for index in found)
             explained = share * white_e[over] / raw.gain_e_per_dn + raw.black_dn

@@ -38,6 +38,7 @@ from sensor.burst import merged_raw as merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import mask as mask
 from sensor.cfa import mosaics as mosaics
+from sensor.chip import ChannelReading as ChannelReading
 from sensor.chip import PixelConfig as PixelConfig
 from sensor.chip import Reading as Reading
 from sensor.config import SensorConfig
@@ -72,6 +73,7 @@ from studies.sweep.run_sweep import Runner, Swept
 from studies.sweep.workers import run_in_processes as run_in_processes
 
 __all__ = [
+    "ChannelReading",
     "InputError",
     "LightGroup",
     "Order",
@@ -137,6 +139,7 @@ __all__ = [
     "sweep",
     "take",
     "to_world",
+    "with_channel_readings",
     "with_readings",
     "write_exr",
     "write_picture",
@@ -212,7 +215,9 @@ def render(
     progress: Callable[[float, float], None] | None = None,
     denoise: bool = False,
 ) -> Transport: ...
-def snr(electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
+def snr(
+    electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = ...
+) -> NDArray[np.float64]: ...
 def sweep(
     study: _Study,
     out: str | Path,
@@ -222,4 +227,5 @@ def sweep(
     *,
     clock: Clock | None = None,
 ) -> Swept: ...
+def with_channel_readings(sensor: _Sensor, readings: Sequence[ChannelReading]) -> SensorConfig: ...
 def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...

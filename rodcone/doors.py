@@ -143,6 +143,9 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalog:load"),
         "write_exr.scene": _TEXT,
         "sensor": _value("sensor.config:SensorConfig", "give a preset's name or file", "sensor.presets:preset"),
+        "with_channel_readings.readings": _each(
+            _value("sensor.chip:ChannelReading", "give rodcone.ChannelReading(...)")
+        ),
         "readings": _each(_value("sensor.chip:Reading", "give rodcone.Reading(...)"), least=1),
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),

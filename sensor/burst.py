@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import sqrt
-from typing import TypeVar
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_range
+from sensor.cfa import mask
 from sensor.chip import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import SensorConfig
 from sensor.raw import RawImage
@@ -17,6 +18,7 @@ from sensor.readings.noise import CLEAR_SIGMAS
 
 BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
 _Dark = TypeVar("_Dark", PixelConfig, Reading)
+_Sites: TypeAlias = float | NDArray[np.float64]
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
 # Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
@@ -84,17 +86,17 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     require_range("dark_current_e_per_s", dark_current_e_per_s, 0.0, 1e12, "give electrons per second, 0 for none")
     groups = _grouped(frames)
     first = frames[0]
-    temporal_e2 = first.read_noise_e**2 + first.rounding_e2
-    full_e = first.full_well_e
-    spread_e = (full_e + first.dark_noise_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
-    clear_e = max(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)  # half, lest a well of a few electrons never count
+    temporal_e2, dsnu_e, shot, full_e = _at_sites(first)
+    spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
+    # Half, lest a well of a few electrons never count.
+    clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
 
-    rate, variance, per_s = _weighted(groups, temporal_e2)
+    rate, variance, per_s = _weighted(groups, temporal_e2, shot)
     full = rate * groups[0].exposure_s >= clear_e
     for start in range(1, len(groups)):
         if not full.any():
             break
-        shorter = _weighted(groups[start:], temporal_e2)
+        shorter = _weighted(groups[start:], temporal_e2, shot)
         rate, variance, per_s = (
             np.where(full, new, old) for new, old in zip(shorter, (rate, variance, per_s), strict=True)
         )
@@ -102,7 +104,7 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     photo_rate = rate - dark_current_e_per_s
     # `prnu` holds the columns' gains too, which act on dark current as well.
     of_columns = first.column_gain_spread**2 * (rate**2 - photo_rate**2)
-    fixed = (first.dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2 + of_columns
+    fixed = (dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2 + of_columns
     return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
@@ -136,11 +138,13 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
             "merge those of equal times"
         )
     whole_s = float(times.sum())
-    full_e = first.full_well_e * whole_s / float(times.min())
-    gain_e = full_e / BURST_WHITE_DN
+    deeper = whole_s / float(times.min())
+    gain_e = first.full_well_e * deeper / BURST_WHITE_DN
     # In the dark a frame's weight goes with the square of its time.
     squares = float((times**2).sum())
     temporal_e2 = (first.read_noise_e**2 + first.rounding_e2) * whole_s**2 / squares
+    offsets = whole_s * float(times.sum()) / squares  # that come with each frame, by the frame's
+    full_e = _at_sites(first)[-1] * deeper
     full = np.all([frame.saturated for frame in frames if frame.exposure_s == times.min()], axis=0)
     electrons = np.where(full, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
     return replace(
@@ -150,7 +154,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         white_dn=BURST_WHITE_DN,
         gain_e_per_dn=gain_e,
         read_noise_e=sqrt(temporal_e2),
-        dsnu_e=first.dsnu_e * whole_s * float(times.sum()) / squares,
+        dsnu_e=first.dsnu_e * offsets,
         exposure_s=whole_s,
         noise_steps=tuple(
             replace(
@@ -160,6 +164,15 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
                 dsnu_e=step.dsnu_e * len(frames),
             )
             for step in first.noise_steps
+        ),
+        channel_noise=tuple(
+            replace(
+                noise,
+                full_well_e=noise.full_well_e * deeper,
+                read_noise_e=noise.read_noise_e * whole_s / sqrt(squares),
+                dsnu_e=noise.dsnu_e * offsets,
+            )
+            for noise in first.channel_noise
         ),
     )
 
@@ -182,7 +195,11 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     readings = tuple(burst_of(reading) for reading in sensor.chip.readings)
     pixel = replace(sensor.pixel, column_offset_e=sensor.pixel.column_offset_e * count)
     pixel = pixel_of_readings(pixel, readings) if readings else burst_of(pixel)
-    return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout))
+    apart = [(x, burst_of(x.pixel_of(sensor.pixel))) for x in sensor.chip.channels]
+    channels = tuple(
+        replace(x, full_well_e=own.full_well_e, read_noise_e=own.read_noise_e, dsnu_e=own.dsnu_e) for x, own in apart
+    )
+    return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout, channels=channels))
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
@@ -204,18 +221,30 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
     return groups
 
 
+def _at_sites(raw: RawImage) -> tuple[_Sites, _Sites, _Sites, _Sites]:
+    """Temporal dark variance, DSNU, shot noise's factor and full well of a frame's samples, each a number or (h, w)."""
+    plain = raw.read_noise_e**2 + raw.rounding_e2, raw.dsnu_e, 1.0, raw.full_well_e
+    if not raw.channel_noise:
+        return plain
+    sites = np.stack([np.full(raw.shape, value) for value in plain])
+    for noise in raw.channel_noise:
+        values = noise.read_noise_e**2, noise.dsnu_e, noise.shot, noise.full_well_e
+        sites[:, mask(raw.cfa, noise.channel, raw.shape)] = np.array(values)[:, None]
+    return sites[0], sites[1], sites[2], sites[3]
+
+
 def _weighted(
-    groups: Sequence[_Group], temporal_e2: float
+    groups: Sequence[_Group], temporal_e2: _Sites, shot: _Sites
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
     """Best rate, its variance, and the mean of 1/exposure under its weights, each (h, w).
 
-    A group's rate has the variance (rate x time + temporal noise) / (frames x time^2). The rate in it is the merged
-    one: a start from shot noise alone, where the weights are the times, and a few rounds.
+    A group's rate has the variance (shot x rate x time + temporal noise) / (frames x time^2). The rate in it is the
+    merged one: a start from shot noise alone, where the weights are the times, and a few rounds.
     """
     whole_s = sum(group.count * group.exposure_s for group in groups)
     rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))
     for _ in range(_ROUNDS):
-        noise_e2 = [np.maximum(rate, 0.0) * group.exposure_s + temporal_e2 for group in groups]
+        noise_e2 = [shot * np.maximum(rate, 0.0) * group.exposure_s + temporal_e2 for group in groups]
         weights = [group.count * group.exposure_s**2 / noise for group, noise in zip(groups, noise_e2, strict=True)]
         total = np.asarray(sum(weights))
         rate = sum(w * group.rate for w, group in zip(weights, groups, strict=True)) / total

@@ -1,15 +1,16 @@
-"""A camera's colour calibration: what its maker measures once, and a raw file carries to whoever develops it."""
+"""A camera's calibration, colour and noise: what its maker measures once, and a raw file carries to its developer."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from math import hypot
+from typing import Annotated, Any
 
 import numpy as np
 
 from render.spectrum import Floats
 from rodcone.brief import brief
 from rodcone.doors import method
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_fields
 
 
 @dataclass(frozen=True)
@@ -80,3 +81,60 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
     if array.shape != shape or not np.all(np.isfinite(array)):
         raise InputError(f"{name}: shape {array.shape} is not allowed; give {shape} of finite numbers")
     return array
+
+
+@dataclass(frozen=True)
+class NoiseStep:
+    """Noise of samples from a level on: shot e + read_noise_e^2 + dsnu_e^2 + (prnu e)^2 at e electrons [e-^2].
+
+    Attributes
+    ----------
+    from_e : float
+        Electrons above black from which it holds.
+    shot : float
+        Variance of a sample's shot noise over its electrons: over 1 where not all charges of a pixel count.
+    read_noise_e, dsnu_e, prnu : float
+        As `RawImage` has them.
+    """
+
+    from_e: Annotated[float, (0.0, 1e12, "give electrons")]
+    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    read_noise_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        require_fields(self, "noise_steps: ")
+
+
+@dataclass(frozen=True)
+class ChannelNoise:
+    """Noise and well of a channel whose sites are read apart, in the raw image's electrons: `NoiseStep`'s form.
+
+    Attributes
+    ----------
+    channel : str
+    full_well_e : float
+        Electrons at which its samples are full.
+    shot, read_noise_e, dsnu_e, prnu : float
+        As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
+    """
+
+    channel: str
+    full_well_e: Annotated[float, (1e-18, 1e20, "give electrons")]
+    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    read_noise_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
+    dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
+    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        require_fields(self, "channel_noise: ")
+
+    @property
+    def dark_noise_e(self) -> float:
+        """Standard deviation of a dark sample [e-]."""
+        return hypot(self.read_noise_e, self.dsnu_e)

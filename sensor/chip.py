@@ -128,6 +128,55 @@ class Reading:
         return self.photodiode, self.time_share
 
 
+@dataclass(frozen=True)
+class ChannelReading:
+    """How the sites of one channel are read, where that is another way than the pixel's.
+
+    What is left out is as the pixel has it.
+
+    Attributes
+    ----------
+    channel : str
+        Of the mosaic.
+    time_share : float
+        Share of the exposure time after which its sites are read; where `metered`, the most.
+    light_share : float
+        Of what a neutral density in front of its filter lets through.
+    metered : bool
+        Whether each frame takes the share of the time that puts the channel's bright end at 80 % of its well.
+    full_well_e, read_noise_e, dsnu_e : float or None
+        Of a conversion gain of its own, in electrons of these sites.
+    """
+
+    channel: str
+    time_share: Annotated[float, (1e-6, 1.0, "give a share of the exposure time")] = 1.0
+    light_share: Annotated[float, (1e-6, 1.0, "give what the density lets through, 1 for none")] = 1.0
+    metered: bool = False
+    full_well_e: Annotated[float | None, (1.0, 1e12, "give electrons")] = None
+    read_noise_e: Annotated[float | None, (0.0, 1e9, "give electrons, 0 for none")] = None
+    dsnu_e: Annotated[float | None, (0.0, 1e9, "give electrons, 0 for none")] = None
+
+    __repr__ = brief
+
+    def __post_init__(self) -> None:
+        require_fields(self, f"channel {self.channel!r}: ")
+
+    @property
+    def share(self) -> float:
+        """Share of what the sites would collect in the whole time without the density."""
+        return self.time_share * self.light_share
+
+    def pixel_of(self, pixel: PixelConfig) -> PixelConfig:
+        """Pixel of the channel's sites, in electrons of their own; the whole time's dark current by its share."""
+        changed = {"full_well_e": self.full_well_e, "read_noise_e": self.read_noise_e, "dsnu_e": self.dsnu_e}
+        return replace(
+            pixel,
+            dark_current_e_per_s=pixel.dark_current_e_per_s * self.time_share,
+            hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * self.time_share,
+            **{name: value for name, value in changed.items() if value is not None},
+        )
+
+
 def check_readings(readings: Sequence[Reading], readout: str) -> None:
     """Raise `InputError` for readings that no pixel has, or a readout that they can't have."""
     if readout not in (MERGED, SWITCHED):
@@ -184,11 +233,14 @@ class Chip:
         Two or more; none for a pixel that is read once.
     readout : str
         ``merged``: all are read, and become one linear raw image; ``switched``: the one whose gain suits the light.
+    channels : tuple of ChannelReading
+        Channels that are read apart, of a pixel that is read once.
     """
 
     binning: Binning | None = None
     readings: tuple[Reading, ...] = ()
     readout: str = MERGED
+    channels: tuple[ChannelReading, ...] = ()
 
     __repr__ = brief
 
@@ -198,6 +250,12 @@ class Chip:
             raise InputError(
                 f"binning: {self.binning.way!r} with several readings; allowed: one of the two; leave one out"
             )
+        names = [x.channel for x in self.channels]
+        if len(set(names)) < len(names):
+            raise InputError(f"channels: {names}; allowed: each once; leave one out")
+        if names and (self.readings or self.binning):
+            other = "several readings" if self.readings else "binning"
+            raise InputError(f"channels: {names} with {other}; allowed: one of the two; leave one out")
 
     @property
     def sites(self) -> int:

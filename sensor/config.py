@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.doors import method
-from rodcone.errors import InputError, require_fields, require_whole
+from rodcone.errors import InputError, require_fields, require_whole, unknown
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
-from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
+from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
 
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
@@ -109,18 +109,25 @@ class SensorConfig:
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
+        for apart in self.chip.channels:
+            if apart.channel not in channels(self.cfa):
+                raise unknown("channels: channel", apart.channel, channels(self.cfa))
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(
                 "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "
                 "with_readings(sensor, readings); change the readings instead"
             )
 
-    @property
-    def metered_well_e(self) -> float:
+    @method
+    def metered_well_e(self, channel: str) -> float:
         """Photo-electrons of the whole pixel that fill its most sensitive photodiode: what an exposure aims at.
 
-        What shorter times and smaller photodiodes hold beyond it is room for lamps.
+        What shorter times and smaller photodiodes hold beyond it is room for lamps. Of a channel that is read apart,
+        what its longest time holds.
         """
+        for apart in self.chip.channels:
+            if apart.channel == channel:
+                return apart.pixel_of(self.pixel).full_well_e / apart.share
         readings = self.chip.readings
         most = max((x.share for x in readings), default=1.0)
         return max((x.full_well_e / most for x in readings if x.share == most), default=self.pixel.full_well_e)
@@ -208,3 +215,22 @@ def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: st
     """
     chip = replace(sensor.chip, readings=tuple(readings), readout=readout)
     return replace(sensor, pixel=pixel_of_readings(sensor.pixel, readings), chip=chip)
+
+
+def with_channel_readings(sensor: SensorConfig, readings: Sequence[ChannelReading]) -> SensorConfig:
+    """Camera some of whose channels are read apart: after a time of their own, behind a density, or at another gain.
+
+    Its raw image holds all channels in one unit: what each would collect in the whole time without the density.
+
+    Raises
+    ------
+    InputError
+        For a channel that the mosaic lacks or that is listed twice, a camera that bins or one of several readings.
+    """
+    return replace(sensor, chip=replace(sensor.chip, channels=tuple(readings)))
+
+
+def with_tile(sensor: SensorConfig, tile: Tile, responses: Responses) -> SensorConfig:
+    """Camera with another mosaic: of its channels that are read apart those that the mosaic has."""
+    kept = tuple(x for x in sensor.chip.channels if x.channel in channels(tile))
+    return replace(sensor, cfa=tile, responses=responses, chip=replace(sensor.chip, channels=kept))

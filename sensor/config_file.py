@@ -10,7 +10,7 @@ from render.spectrum import Spectrum
 from rodcone.errors import InputError, one_line
 from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
-from sensor.chip import MERGED, Chip, PixelConfig, Reading, pixel_of_readings
+from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
 from sensor.photodiodes import binned
@@ -28,9 +28,9 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
         ``window_nm``, ``binning`` ("charge" or "digital"), ``readout`` ("merged" or "switched") with ``[[readings]]``
-        (fields of `Reading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included",
-        "relative", a number, or a CSV) and ``ir_cut`` (nm, or a CSV). Names of CSV files are relative to the TOML's
-        folder.
+        (fields of `Reading`), ``[[channels]]`` (fields of `ChannelReading`), and ``[responses]``: ``csv``, its
+        ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a CSV) and ``ir_cut`` (nm, or a
+        CSV). Names of CSV files are relative to the TOML's folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -90,6 +90,7 @@ class _SensorTable:
     binning: str = ""
     readout: str = MERGED
     readings: tuple[Reading, ...] = ()
+    channels: tuple[ChannelReading, ...] = ()
     responses: _ResponsesTable | None = None
 
 
@@ -107,12 +108,15 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
         responses = _responses(table.responses, folder)
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
+    # Of another mosaic than the file's own, a channel that only that one has falls away.
+    fallen = set(channels(tile_of(table.cfa))) - set(channels(tile)) if table.channels else set()
+    apart = tuple(x for x in table.channels if x.channel not in fallen)
     sensor = SensorConfig(
         pixel_of_readings(table.pixel, table.readings) if table.readings else table.pixel,
         table.lens,
         cfa=tile,
         responses=responses,
-        chip=Chip(readings=table.readings, readout=table.readout),
+        chip=Chip(readings=table.readings, readout=table.readout, channels=apart),
         **{name: value for name in _SETTINGS if (value := getattr(table, name)) is not None},
     )
     return binned(sensor, table.binning) if table.binning else sensor

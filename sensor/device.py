@@ -12,6 +12,7 @@ from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
+from sensor.readings.by_channel import at_sites
 
 _MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
 
@@ -65,7 +66,7 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     pixel, readings = sensor.photosites.pixel, sensor.chip.readings
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
 
-    def drawn(dsnu_e: float, photodiode: int, reading: int) -> Device:
+    def drawn(dsnu_e: float | NDArray[np.float64], photodiode: int, reading: int) -> Device:
         response = np.maximum(1.0 + pixel.prnu * draws(key, NoiseTerm.PRNU, shape, photodiode), 0.0)
         offset_e = dsnu_e * draws(key, NoiseTerm.DSNU, shape, reading)
         offset_e = block_sums(offset_e) if in_charge else offset_e
@@ -79,9 +80,10 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
             hot = normals(key, NoiseTerm.HOT, shape, photodiode) < scipy.special.ndtri(pixel.hot_pixel_share)
         return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
 
+    dsnu_e = at_sites(sensor.photosites, shape, pixel.dsnu_e, lambda x: x.pixel_of(pixel).dsnu_e)
     photodiodes = list(dict.fromkeys(x.photodiode for x in readings))
     of_readings = tuple(drawn(x.dsnu_e, photodiodes.index(x.photodiode), number) for number, x in enumerate(readings))
-    return replace(of_readings[0], readings=of_readings) if of_readings else drawn(pixel.dsnu_e, 0, 0)
+    return replace(of_readings[0], readings=of_readings) if of_readings else drawn(dsnu_e, 0, 0)
 
 
 @lru_cache(maxsize=8)

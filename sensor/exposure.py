@@ -12,6 +12,7 @@ from sensor.cfa import channels, unit_channel
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
+from sensor.readings.by_channel import as_metered, wells_e
 from sensor.readout import noise_variance
 from sensor.response import behind_filters, channel_electrons
 
@@ -67,18 +68,19 @@ def auto_exposure_s(
     if channel not in channels(sensor.cfa):
         raise unknown("exposure: channel", channel, channels(sensor.cfa))
     per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]
-    return _share_of_well_s(per_second_e, sensor, longest_s, percentile, well_share)
+    return _share_of_well_s(per_second_e, sensor, channel, longest_s, percentile, well_share)
 
 
 def _share_of_well_s(
     per_second_e: NDArray[np.float64],
     sensor: SensorConfig,
+    channel: str,
     longest_s: float,
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
     bright = float(np.percentile(sensor.pixel_sums(per_second_e), percentile))
-    return min(longest_s, well_share * sensor.metered_well_e / bright) if bright > 0 else longest_s
+    return min(longest_s, well_share * sensor.metered_well_e(channel) / bright) if bright > 0 else longest_s
 
 
 def exposure_by_rule_s(
@@ -108,10 +110,11 @@ def exposure_of_electrons_s(
         raise unknown("exposure", rule, RULES)
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = channels(sensor.cfa)
-    for_green_s = _share_of_well_s(per_second_e[..., names.index(unit_channel(sensor.cfa))], sensor, longest_s)
+    unit = unit_channel(sensor.cfa)
+    for_green_s = _share_of_well_s(per_second_e[..., names.index(unit)], sensor, unit, longest_s)
     if rule == AUTO or "W" not in names:
         return for_green_s
-    for_white_s = _share_of_well_s(per_second_e[..., names.index("W")], sensor, longest_s)
+    for_white_s = _share_of_well_s(per_second_e[..., names.index("W")], sensor, "W", longest_s)
     if rule == AUTO_W:
         return for_white_s
     return most_informative_s(behind_filters(per_second_e, sensor), sensor, (for_green_s, for_white_s))
@@ -147,9 +150,10 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     expected_e : (h, w) float64
         Photo-electrons, as `sensor.response.expected_electrons`.
     """
+    sensor = as_metered(sensor, expected_e)
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
-    return float(np.where(expected_e < sensor.pixel.full_well_e, bits, 0.0).mean())
+    return float(np.where(expected_e < wells_e(sensor, expected_e.shape), bits, 0.0).mean())
 
 
 def warn_if_full(raw: RawImage) -> None:

@@ -11,7 +11,7 @@ from sensor.config_file import read_sensor
 _FOLDER = Path(__file__).parent / "data"
 _NAMES = (
     *("table1_pixel", "table1_output", "low_noise", "table1_output_6um", "table1_output_3um", "table1_output_2um"),
-    *("dual_gain", "split_pixel", "staggered"),
+    *("dual_gain", "split_pixel", "staggered", "white_apart"),
 )
 
 

@@ -1,6 +1,7 @@
 """The raw image: what a camera's software is given, and nothing of the truth."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 from math import hypot
 from typing import Annotated, Any
 
@@ -12,69 +13,12 @@ from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
 from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
-from sensor.calibration import ColourCalibration
+from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
 from sensor.cfa import Tile, channels, check_covers, check_tile, mask
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 SATURATION_SIGMAS = 4.0
 LARGEST_DN = 2.0**24  # up to which single precision holds every whole number
-
-
-@dataclass(frozen=True)
-class NoiseStep:
-    """Noise of samples from a level on: shot e + read_noise_e^2 + dsnu_e^2 + (prnu e)^2 at e electrons [e-^2].
-
-    Attributes
-    ----------
-    from_e : float
-        Electrons above black from which it holds.
-    shot : float
-        Variance of a sample's shot noise over its electrons: over 1 where not all charges of a pixel count.
-    read_noise_e, dsnu_e, prnu : float
-        As `RawImage` has them.
-    """
-
-    from_e: Annotated[float, (0.0, 1e12, "give electrons")]
-    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
-    read_noise_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
-    dsnu_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
-    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        require_fields(self, "noise_steps: ")
-
-
-@dataclass(frozen=True)
-class ChannelNoise:
-    """Noise and well of a channel whose sites are read apart, in the raw image's electrons: `NoiseStep`'s form.
-
-    Attributes
-    ----------
-    channel : str
-    full_well_e : float
-        Electrons at which its samples are full.
-    shot, read_noise_e, dsnu_e, prnu : float
-        As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
-    """
-
-    channel: str
-    full_well_e: Annotated[float, (1e-18, 1e20, "give electrons")]
-    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
-    read_noise_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
-    dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
-    prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
-
-    __repr__ = brief
-
-    def __post_init__(self) -> None:
-        require_fields(self, "channel_noise: ")
-
-    @property
-    def dark_noise_e(self) -> float:
-        """Standard deviation of a dark sample [e-]."""
-        return hypot(self.read_noise_e, self.dsnu_e)
 
 
 @dataclass(frozen=True)
@@ -208,10 +152,13 @@ class RawImage:
         """Electrons of a pixel that reads the white level."""
         return float((self.white_dn - self.black_dn) * self.gain_e_per_dn)
 
+    @method
     def noise_of(self, channel: str) -> ChannelNoise:
         """Noise and well of a channel's samples; of pixels read several times up to the first of `noise_steps`."""
-        plain = ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
-        return next((noise for noise in self.channel_noise if noise.channel == channel), plain)
+        return next((noise for noise in self.channel_noise if noise.channel == channel), self._plain(channel))
+
+    def _plain(self, channel: str) -> ChannelNoise:
+        return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
 
     @method
     def noise_at_sites(self, electrons: NDArray[Any]) -> NDArray[Any]:
@@ -237,19 +184,18 @@ class RawImage:
             )
         return np.asarray(variance)
 
-    def saturation_of(self, channel: str) -> float:
+    @property
+    def saturation_e(self) -> float:
+        """Level from which a sample of channels that aren't read apart counts as saturated [e-]."""
+        return self._saturation_e(self._plain(""))
+
+    def _saturation_e(self, noise: ChannelNoise) -> float:
         """Level from which a channel's sample counts as saturated [e-]: noise comes after the well clips."""
-        noise = self.noise_of(channel)
         dark_e = noise.dark_noise_e
         if self.noise_steps:
             dark_e = hypot(self.noise_steps[-1].read_noise_e, self.noise_steps[-1].dsnu_e)
         spread_e = hypot(dark_e, self.column_gain_spread * noise.full_well_e)
         return noise.full_well_e - SATURATION_SIGMAS * spread_e - noise.shot * self.gain_e_per_dn / 2
-
-    @property
-    def saturation_e(self) -> float:
-        """`saturation_of` the channels that aren't read apart."""
-        return self.saturation_of("")
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
@@ -262,8 +208,25 @@ class RawImage:
         full = np.asarray(dn >= self.saturation_e / self.gain_e_per_dn + self.black_dn)
         for noise in self.channel_noise:
             at = mask(self.cfa, noise.channel, full.shape)
-            full[at] = dn[at] >= self.saturation_of(noise.channel) / self.gain_e_per_dn + self.black_dn
+            full[at] = dn[at] >= self._saturation_e(noise) / self.gain_e_per_dn + self.black_dn
         return full
+
+
+def channel_variance(raw: RawImage, mean_e: ArrayLike) -> NDArray[np.float64]:
+    """Variance of a sample of each channel at these means, PRNU left out [e-^2], shape (channel,)."""
+    noise = [raw.noise_of(name) for name in channels(raw.cfa)]
+    shot, dark_e = np.array([(x.shot, x.dark_noise_e) for x in noise]).T
+    return np.asarray(shot * mean_e + dark_e**2)
+
+
+def renamed(raw: RawImage, names: Mapping[str, str]) -> RawImage:
+    """Raw image whose channels go by other names; without its colours."""
+    return replace(
+        raw,
+        cfa=tuple("".join(names.get(name, name) for name in row) for row in raw.cfa),
+        colour=None,
+        channel_noise=tuple(replace(x, channel=names.get(x.channel, x.channel)) for x in raw.channel_noise),
+    )
 
 
 def _as_array(values: ArrayLike) -> NDArray[Any]:

@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
-from sensor.cfa import block_sums
+from sensor.cfa import block_sums, mask
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
+from sensor.readings.by_channel import as_metered, dimmed, of_channel, read_by_channel
 from sensor.readings.merge import merge_readings
-from sensor.readings.noise import dark_electrons, merged_variance, merged_variances, of_reading, switched_to
+from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
 # number among those of one charge.
@@ -128,9 +129,15 @@ def read_out(
             f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
             "draw the device with the frame's shape"
         )
+
+    def once(light_e: NDArray[np.floating], camera: SensorConfig) -> RawImage:
+        dn = draw(light_e, camera, device, exposure_s, draw_key(rng), 0)
+        return as_raw(dn, camera, exposure_s, engine, device.hot)
+
+    if sensor.chip.channels:
+        return read_by_channel(expected, as_read(sensor, expected), once)
     if not sensor.chip.readings:
-        dn = draw(expected, sensor, device, exposure_s, draw_key(rng), 0)
-        return as_raw(dn, sensor, exposure_s, engine, device.hot)
+        return once(expected, sensor)
     if sensor.chip.switched:
         index = switched_to(sensor, expected)
         alone, patterns = of_reading(sensor, index), device.readings[index]
@@ -170,7 +177,9 @@ def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[
     return np.asarray((1 - 4 * crosstalk) * expected_e + crosstalk * neighbours)
 
 
-def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
+def noise_variance(
+    expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
+) -> NDArray[np.float64]:
     """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`; clipping left out.
 
     Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
@@ -185,8 +194,12 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     sensor : SensorConfig
     exposure_s : float
         For the dark current [s].
+    channel : str, optional
+        Channel of all of them; left out, they are a mosaic's, (h, w). Cameras that read all channels alike don't ask.
     """
-    sensor = as_switched(sensor, np.asarray(expected_e))
+    sensor = as_read(sensor, np.asarray(expected_e), channel)
+    if sensor.chip.channels:
+        return _variance_by_channel(np.asarray(expected_e), sensor, exposure_s, channel)
     pixel = sensor.pixel
     signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
     if sensor.chip.readings:
@@ -200,12 +213,31 @@ def noise_variance(expected_e: NDArray[np.float64], sensor: SensorConfig, exposu
     return np.asarray(variance + dark)
 
 
-def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
+def _variance_by_channel(
+    expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None
+) -> NDArray[np.float64]:
+    if channel is not None:
+        alone, share = of_channel(sensor, channel)
+        return noise_variance(expected_e * share, alone, exposure_s) / share**2
+    light = dimmed(expected_e, sensor)
+    variance = noise_variance(light, of_channel(sensor, "")[0], exposure_s)
+    for reading in sensor.chip.channels:
+        at, alone = mask(sensor.cfa, reading.channel, light.shape), of_channel(sensor, reading.channel)[0]
+        variance[at] = noise_variance(light * reading.time_share, alone, exposure_s)[at] / reading.share**2
+    return variance
+
+
+def noise_sources(
+    expected_e: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None
+) -> dict[str, float]:
     """Standard deviation of each source of a pixel's noise in an even field [e-], by name.
 
     Their squares sum to `noise_variance`, which says what each of them is.
     """
-    sensor = as_switched(sensor, np.array([expected_e]))
+    sensor = as_read(sensor, np.array([expected_e]), channel)
+    if sensor.chip.channels:
+        alone, share = of_channel(sensor, channel)
+        return {name: noise / share for name, noise in noise_sources(expected_e * share, alone, exposure_s).items()}
     if sensor.chip.readings:
         merged_e2 = merged_variances(np.array([expected_e]), sensor, exposure_s)
         return {name: float(value[0]) ** 0.5 for name, value in merged_e2.items()}
@@ -229,45 +261,11 @@ def noise_sources(expected_e: float, sensor: SensorConfig, exposure_s: float) ->
     return {name: value**0.5 for name, value in variance_e2.items()}
 
 
-def as_switched(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> SensorConfig:
-    """Camera with the gain that it takes for a frame; one that doesn't switch as it is."""
+def as_read(sensor: SensorConfig, expected_e: NDArray[Any], channel: str | None = None) -> SensorConfig:
+    """Camera with the gain and the channels' times that it takes for a frame; `channel` as of `noise_variance`."""
+    if sensor.chip.channels:
+        return as_metered(sensor, expected_e, channel)
     return of_reading(sensor, switched_to(sensor, expected_e)) if sensor.chip.switched else sensor
-
-
-def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
-    """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
-
-    The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
-    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
-    """
-    if sensor.chip.readings:
-        return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
-    scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
-    a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
-    c = (full - 2 * half + a) * 2 / scale_e**2
-    b = (full - a) / scale_e - c * scale_e
-    lead = 1 - snr**2 * c
-    if lead <= 0:
-        return float("inf")
-    electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
-    dark_e = sensor.pixel.dark_current_e_per_s * exposure_s
-    return float(electrons) if electrons + dark_e < sensor.pixel.full_well_e else float("inf")
-
-
-def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
-    """The least light with this SNR; beyond a seam it may be less again for a while."""
-    if sensor.chip.switched:
-        count = len(sensor.chip.readings)
-        light_e = [electrons_at_snr(snr, of_reading(sensor, number), exposure_s) for number in range(count)]
-        fits = (np.isfinite(e) and switched_to(sensor, np.array([e])) == number for number, e in enumerate(light_e))
-        return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
-    levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
-    ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
-    above = np.flatnonzero((ratio >= snr) & (levels + dark_electrons(sensor, exposure_s) < sensor.pixel.full_well_e))
-    if above.size == 0:
-        return float("inf")
-    part = slice(max(above[0] - 1, 0), above[0] + 1)
-    return float(np.interp(snr, ratio[part], levels[part]))
 
 
 def as_raw(

@@ -1,12 +1,11 @@
 """A camera with another mosaic, and where that needs it, other filters in front of its pixels."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from types import MappingProxyType
 
 from rodcone.errors import InputError, unknown
 from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
 CMYW: Tile = ("CM", "YW")  # RGBW with each primary's complement in its place
@@ -59,4 +58,4 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
                 f"as {mosaic.removeprefix('quad_')}; give that, or a sensor that doesn't bin"
             )
         responses = with_channels(sensor.responses, channels(tile))
-    return replace(sensor, cfa=tile, responses=responses)
+    return with_tile(sensor, tile, responses)

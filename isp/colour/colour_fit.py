@@ -21,7 +21,7 @@ from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
 from sensor.cfa import channels, unit_channel
-from sensor.raw import RawImage
+from sensor.raw import RawImage, channel_variance
 
 # Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
 # the same, and without noise any matrix fits; with the same noise in each they count alike.
@@ -263,7 +263,7 @@ def relative_noise(
     rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)
     mean = np.maximum(np.einsum("nc->c", rows) / len(rows), 0.0)
     noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept)[::MEDIAN_STEP].T)
-    variance = (mean + raw.dark_noise_e**2) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
+    variance = channel_variance(raw, mean) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -18,7 +18,7 @@ from render.spectrum import Floats
 from rodcone.toml_file import read_toml
 from sensor.cfa import channels, mask
 from sensor.curves import complementary, rgbw
-from sensor.raw import RawImage
+from sensor.raw import RawImage, channel_variance
 
 TABLE = Path(__file__).with_name("noise_gains.toml")
 
@@ -61,7 +61,7 @@ def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
     sampled = mask(raw.cfa, unit, raw.shape)
     kept = sampled & ~raw.saturated
     mean_e = max(float(raw.electrons[kept if kept.any() else sampled].mean()), 0.0)
-    noise_e = np.sqrt(mean_e + raw.dark_noise_e**2)
+    noise_e = np.sqrt(raw.noise_of(unit).shot * mean_e + raw.noise_of(unit).dark_noise_e ** 2)
     return mean_e, mean_e / float(noise_e) if noise_e > 0 else 0.0
 
 
@@ -84,9 +84,10 @@ def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit:
     neutral = balance.neutral if balance.given is None else balance.given
     if neutral is None:
         neutral = neutral_response(names, complementary(rgbw()) if "C" in names else None)
-    response = neutral[[names.index(name) for name in fit.channels[:3]]] / neutral[names.index(unit)]
+    index = [names.index(name) for name in fit.channels[:3]]
+    response = neutral / neutral[names.index(unit)]
     mean_e, snr = mean_snr(raw, unit)
-    variance = (mean_e * response + raw.dark_noise_e**2) / response**2 * gains.at(snr)
+    variance = (channel_variance(raw, mean_e * response) / response**2)[index] * gains.at(snr)
     white_e = mean_e / fit.mean[fit.channels.index(unit)]
     noise = np.zeros(len(fit.channels))
     # A frame without any signal is all noise.

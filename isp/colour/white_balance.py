@@ -21,7 +21,7 @@ from rodcone.brief import brief
 from rodcone.errors import InputError
 from sensor.cfa import channels, colour_channels, mask, unit_channel
 from sensor.curves import Responses, built_in
-from sensor.raw import RawImage
+from sensor.raw import RawImage, channel_variance
 
 BalanceSource = Literal["gray world", "calibrated", "given"]
 
@@ -99,9 +99,9 @@ class WhiteBalance:
             index = [names.index(channel) for channel in group]
             samples = np.maximum([np.sum(pixels & mask(raw.cfa, channel, raw.shape)) for channel in group], 1)
             rows = np.asarray(rows_at(planes, pixels), dtype=np.float64)
-            means = np.einsum("nc->c", rows)[index] / max(len(rows), 1)
-            errors = np.sqrt((np.maximum(means, 0.0) + raw.dark_noise_e**2) / samples)
-            factors[index], certain = gray_world(means, errors, neutral[index], green=group.index(unit))
+            means = np.einsum("nc->c", rows) / max(len(rows), 1)
+            errors = np.sqrt(channel_variance(raw, np.maximum(means, 0.0))[index] / samples)
+            factors[index], certain = gray_world(means[index], errors, neutral[index], green=group.index(unit))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"
         return factors, sources

@@ -49,17 +49,20 @@ class Noise:
 
     Attributes
     ----------
-    dark_e : float
+    dark_e : float or (sample,) float64
         Standard deviation of what doesn't depend on light [e-]: read noise, fixed offsets, dark current, rounding.
     prnu : float
         Relative standard deviation of the pixels' gain.
-    full_e : float
+    full_e : float or (sample,) float64
         Electrons at which a sample is full; inf for none.
+    shot : float or (sample,) float64
+        Variance of shot noise over the electrons: over 1 where a sample stands for more than it counts.
     """
 
-    dark_e: float
+    dark_e: float | Doubles
     prnu: float
-    full_e: float
+    full_e: float | Doubles
+    shot: float | Doubles = 1.0
 
 
 def pooled(prior: Gaussians) -> Gaussians:
@@ -89,8 +92,8 @@ def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Double
         Mean of the expected electrons, and their variance over the prior.
     """
     mean_e = np.maximum(mean_e, 0.0)
-    variance = mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2
-    if np.isinf(noise.full_e):
+    variance = np.asarray(noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2)
+    if np.isinf(noise.full_e).all():
         return variance
     open_share = ndtr((noise.full_e - mean_e) / np.sqrt(variance + spread_e2))
     return np.asarray(variance / np.maximum(open_share, LEAST_OPEN))

@@ -19,8 +19,8 @@ from isp.design.expected_error import LEAST_OPEN, Doubles, Gaussians, Noise, sam
 def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[Doubles, Doubles]:
     """Slopes of `sample_variance` by the mean and by the spread of expected electrons, where the mean is above 0."""
     mean_e = np.maximum(mean_e, 0.0)
-    variance = mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2
-    by_mean = 1 + 2 * noise.prnu**2 * mean_e
+    variance = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2
+    by_mean = noise.shot + 2 * noise.prnu**2 * mean_e
     if np.all(np.isinf(noise.full_e)):
         return by_mean, np.zeros_like(mean_e)
     width = np.sqrt(variance + spread_e2)

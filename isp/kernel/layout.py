@@ -155,7 +155,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
-    full = raw.full_at_sites(dn)
+    full, noise = raw.full_at_sites(dn), raw.noise_of("W")
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain
@@ -163,7 +163,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
     if settings.distance == "noise":
         light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
-        inverse_variance *= reliability(light_e, raw.dark_noise_e, WINDOW)
+        inverse_variance *= reliability(light_e / noise.shot, noise.dark_noise_e / noise.shot, WINDOW)
         inverse_variance *= certainty(guide, raw.cfa, settings.patch)
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     bounds = brightest_allowed(electrons, raw, settings)

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from isp.ple.estimate import STRIDE, Scale, border, padded
 from isp.ple.prior import LETTERS, PATCH
 from isp.ple.tables import Sampling, Singles, lift
-from sensor.cfa import Tile, channel_map, channels, colour_channels
+from sensor.cfa import Tile, channel_map, channels, colour_channels, mask
 from sensor.raw import RawImage
 
 SIDES = (1, 2, 4)  # of a tile [pixels]
@@ -59,7 +59,7 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     white_e : (4,) array_like
         Electrons of R, G, B and W from white, relative to G.
     electrons : (h, w) float32
-        Of the raw image.
+        `counted_electrons` of the raw image, and so is ``white_e``.
     full : (h, w) bool
         `full_white` of it.
     """
@@ -120,9 +120,23 @@ def _sampling(
     # In six digits: exposures of other times differ in the last bits, and would each have tables of their own.
     gains, dark_e = (
         tuple(float(f"{value:.6g}") for value in values)
-        for values in (np.asarray(white_e) * counts, raw.dark_noise_e * np.sqrt(counts))
+        for values in (np.asarray(white_e) * counts, counted_noise(raw)[1] * np.sqrt(counts))
     )
     return Sampling(size=size, rows=rows, gains=gains, dark_e=dark_e, prnu=raw.prnu)
+
+
+def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Factor of shot noise of R, G, B and W, by which a site counts fewer electrons, and their dark noise in these."""
+    noise = [raw.noise_of(name) for name in LETTERS]
+    return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
+
+
+def counted_electrons(raw: RawImage) -> Singles:
+    """What the sites of a mosaic count, (h, w) float32: of a channel that is read apart less than it stands for."""
+    electrons = raw.electrons.astype(np.float32)
+    for noise in raw.channel_noise:
+        electrons[mask(raw.cfa, noise.channel, raw.shape)] /= np.float32(noise.shot)
+    return electrons
 
 
 def full_white(raw: RawImage) -> NDArray[np.bool_]:
@@ -157,7 +171,11 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
         )
         for top in range(0, lcm(down, STRIDE), STRIDE)
     )
-    samples, full = continued(raw.cfa, lift(electrons, raw.dark_noise_e), full)
+    samples = lift(electrons, raw.dark_noise_e)
+    for noise in raw.channel_noise:
+        at = mask(raw.cfa, noise.channel, raw.shape)
+        samples[at] = lift(electrons[at], noise.dark_noise_e / noise.shot)
+    samples, full = continued(raw.cfa, samples, full)
     return Scale(raw.shape, samples, full, samplings)
 
 

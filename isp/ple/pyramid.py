@@ -11,8 +11,17 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, border, estimate
-from isp.ple.mosaic import CELLS, Cells, full_white, pyramid, scale_of_cells, scale_of_pixels
-from isp.ple.prior import PATCH, Prior
+from isp.ple.mosaic import (
+    CELLS,
+    Cells,
+    counted_electrons,
+    counted_noise,
+    full_white,
+    pyramid,
+    scale_of_cells,
+    scale_of_pixels,
+)
+from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lifted_root, unlift
 from sensor.raw import RawImage
 
@@ -48,7 +57,9 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     (channel,) float64
         Posterior variance of a pixel over a sample's noise, median over the patches.
     """
-    electrons, full = raw.electrons.astype(np.float32), full_white(raw)
+    electrons, full = counted_electrons(raw), full_white(raw)
+    shot, dark_e = counted_noise(raw)
+    white_e = np.asarray(white_e) / shot
     levels = pyramid(raw, white_e, electrons, full)
     coarsest = levels[-1]
     light = _own_light(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
@@ -62,8 +73,13 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     scale = scale_of_pixels(raw, white_e, electrons, full)
     found = estimate(prior, scale, *_told(found, cells.sampling, scale.samplings[0][0], own))
     planes = found.planes[..., cells.index]
+    apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
     for first in range(0, len(planes), TOGETHER):
-        planes[first : first + TOGETHER] = unlift(planes[first : first + TOGETHER], raw.dark_noise_e)
+        rows = planes[first : first + TOGETHER]
+        counted = [unlift(rows[..., c], dark_e[i]) * shot[i] for c, i in apart]
+        rows[...] = unlift(rows, raw.dark_noise_e)
+        for (c, _), plane in zip(apart, counted, strict=True):
+            rows[..., c] = plane
     return planes, found.noise[list(cells.index)]
 
 

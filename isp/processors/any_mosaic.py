@@ -14,7 +14,7 @@ from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.substitution import COLOUR_ERROR
 from render.spectrum import Floats
 from sensor.cfa import channels, tile_of, unit_channel
-from sensor.raw import RawImage
+from sensor.raw import RawImage, renamed
 
 Plane = NDArray[np.float64]
 
@@ -75,7 +75,7 @@ def _guided(raw: RawImage, settings: Settings) -> Reconstruction:
     names, unit = channels(raw.cfa), unit_channel(raw.cfa)
     if {"W", "G"} & set(names):
         return reconstruct_with_noise(raw, settings)
-    renamed = replace(raw, cfa=tuple(row.replace(unit, "W") for row in raw.cfa), colour=None)
-    result = reconstruct_with_noise(renamed, settings)
-    order = [channels(renamed.cfa).index("W" if name == unit else name) for name in names]
+    named = renamed(raw, {unit: "W"})
+    result = reconstruct_with_noise(named, settings)
+    order = [channels(named.cfa).index("W" if name == unit else name) for name in names]
     return replace(result, estimate=result.estimate[..., order], noise_gain=result.noise_gain[..., order])

@@ -32,7 +32,7 @@ from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, mask
 from sensor.curves import complementary, matched_transmittance, rgbw
-from sensor.raw import RawImage
+from sensor.raw import RawImage, renamed
 
 # A tent of 7 over samples 2 apart averages like (8^2 / 24)^2 = 7.1 of them: W gathers 6 to 10 times a colour's light.
 MATCHED_RADIUS = 3
@@ -72,12 +72,12 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
     names = channels(raw.cfa)
     if set(names) != set(_STANDS_FOR):
         raise InputError(f"raw: mosaic {raw.cfa} is not C, M, Y and W; allowed here: these four; use another processor")
-    tile = tuple("".join(_STANDS_FOR[channel] for channel in row) for row in raw.cfa)
+    named = renamed(raw, _STANDS_FOR)
     true = {stand_in: channel for channel, stand_in in _STANDS_FOR.items()}
-    order = [names.index(true[stand_in]) for stand_in in channels(tile)]
+    order = [names.index(true[stand_in]) for stand_in in channels(named.cfa)]
     neutral = neutral_response(names, complementary(rgbw())) if balance.neutral is None else balance.neutral
     reordered = WhiteBalance(neutral[order], None if balance.given is None else balance.given[order])
-    picture = picture_yamagami(replace(raw, cfa=tile, colour=None), colours, balance=reordered)
+    picture = picture_yamagami(named, colours, balance=reordered)
     return replace(picture, balance={true[stand_in]: source for stand_in, source in picture.balance.items()})
 
 

@@ -104,9 +104,10 @@ def is_own(path: Path) -> bool:
 def dng_tags(raw: RawImage) -> Tags:
     """Tags of the first directory, without those that describe the TIFF itself.
 
-    NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels: S is the shot noise,
-    1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is
-    where the well begins to clip (`RawImage.saturation_e`).
+    NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels unless some are read
+    apart: S is the shot noise, 1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the
+    form. LinearResponseLimit is where the well begins to clip (`RawImage.saturation_e`). WhiteLevel is one for all
+    channels: converters clip what one that is read apart holds beyond it.
 
     Raises
     ------
@@ -144,7 +145,7 @@ def dng_tags(raw: RawImage) -> Tags:
         50965: ("2i", rational(colour.camera_to_xyz_d65)),  # ForwardMatrix2
         50734: ("2I", rational(min(max(raw.saturation_e / raw.full_well_e, 0.0), 1.0))),  # LinearResponseLimit
         50829: ("I", (0, 0, height, width)),  # ActiveArea
-        51041: ("d", (1 / raw.full_well_e, (raw.dark_noise_e / raw.full_well_e) ** 2)),  # NoiseProfile
+        51041: ("d", _noise_profile(raw)),  # NoiseProfile
     }
     if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
         tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
@@ -155,6 +156,13 @@ def dng_tags(raw: RawImage) -> Tags:
         tags[OPCODES] = ("U", struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters)
     tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
+
+
+def _noise_profile(raw: RawImage) -> tuple[float, ...]:
+    """S and O of `dng_tags`, of all channels together or of each plane where some are read apart."""
+    noise = [raw.noise_of(name) for name in channels(raw.cfa)[: None if raw.channel_noise else 1]]
+    full_e = raw.full_well_e
+    return tuple(part for x in noise for part in (x.shot / full_e, (x.dark_noise_e / full_e) ** 2))
 
 
 def exif_tags(raw: RawImage) -> Tags:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError, require_keys
-from sensor.calibration import ColourCalibration
-from sensor.raw import ChannelNoise, NoiseStep, RawImage
+from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
+from sensor.raw import RawImage
 
 FORMAT = "rodcone raw image"
 VERSION = 1

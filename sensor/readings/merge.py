@@ -7,8 +7,9 @@ from math import ceil, hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from sensor.calibration import NoiseStep
 from sensor.config import BLACK_SIGMAS, SensorConfig
-from sensor.raw import NoiseStep, RawImage
+from sensor.raw import RawImage
 from sensor.readings.noise import Floats, best_weights, covariances, dark_electrons, seams, shares, whole_share
 
 MERGED_WHITE_DN = 2**24 - 1  # linear words of 24 bits, as chips that merge give them; single precision holds them all

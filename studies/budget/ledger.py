@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from rodcone.brief import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
+from sensor.readings.by_channel import as_metered, wells_e
 from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel
@@ -138,7 +139,8 @@ def weigh(
     scale = level_cd_m2 * exposure_s
     # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
     expected_e = scale * np.maximum(sensor_effects.full.mean(axis=0), 0.0)
-    below = expected_e < sensor.pixel.full_well_e
+    sensor = as_metered(sensor, expected_e)
+    below = expected_e < wells_e(sensor, expected_e.shape)
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
     noise_e2 = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
     blurred, sharp = sensor_effects.blurred**2 * pilot.spp, sensor_effects.sharp**2 * pilot.spp

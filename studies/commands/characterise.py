@@ -6,13 +6,15 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_absent, require_whole
+from rodcone.errors import InputError, require_absent, require_whole, unknown
 from rodcone.files import check_place
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
+from sensor.cfa import channels
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
+from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import of_reading
 from studies.commands.console import Time, print_json, print_table, require_new, require_place, say, write_text
 from studies.pages.plots import transfer_svg
@@ -29,6 +31,7 @@ def characterise(
     flats: Annotated[Files, Parameter(name="--from", consume_multiple=True)] = None,
     dark: Annotated[Files, Parameter(consume_multiple=True)] = None,
     reading: int | None = None,
+    channel: str | None = None,
     window: int | None = None,
     out: Path | None = None,
     json: bool = False,
@@ -49,6 +52,9 @@ def characterise(
         Raw files with the cap on, two or more, at the same exposure index and time.
     reading
         Of a sensor with several readings, which: 1 for the first; it is measured alone.
+    channel
+        Of a sensor that reads channels apart, which, such as W: a chip of such pixels alone, in the electrons that they
+        hold; of a metered one, after its longest time.
     window
         Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
     out
@@ -66,18 +72,29 @@ def characterise(
         Seed of the chip and of its frames.
     """
     if flats or dark:
-        require_absent("beside raw files; allowed: a sensor, or --from and --dark", preset=preset, reading=reading)
+        require_absent(
+            "beside raw files; allowed: a sensor, or --from and --dark", preset=preset, reading=reading, channel=channel
+        )
         _measure_files(flats or [], dark or [], window, out, json)
         return
     if preset is None:
         raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
     require_absent(f"for {preset!r}; allowed: with --from and --dark", window=window)
+    # Which of a sensor's readings or channels
     sensor = sensor_preset(preset)
     if reading is not None:
         if not sensor.chip.readings:
             raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
         require_whole("reading", reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
         sensor = of_reading(sensor, reading - 1)
+    if sensor.chip.channels:
+        if channel not in channels(sensor.cfa):
+            raise unknown(f"channel of {preset!r}, which reads channels apart", str(channel), channels(sensor.cfa))
+        sensor = of_channel(sensor, channel)[0]
+    elif channel is not None:
+        raise InputError(f"channel: {channel!r} of {preset!r}, whose channels are read alike; leave it out")
+
+    # Measure and print
     require_place(out, ".svg")
     chip = measure(sensor, (height, width), seed, exposure)
     if out is not None:

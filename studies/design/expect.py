@@ -18,8 +18,9 @@ from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import camera_equation
+from sensor.readings.by_channel import as_metered, of_channel
 from sensor.readout import spread_charge
-from sensor.response import electrons_per_irradiance
+from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, light_of
 
 MIDDLE = PATCH // 4  # pixels at a patch's sides whose error doesn't count: they lack neighbours
@@ -185,7 +186,10 @@ def expect(
             if isinstance(exposure, str)
             else exposure
         )
-        noise, scales = noise_of(sensor, time_s), spectral.reflectances * white_cd_m2 * time_s
+        frame_e = np.maximum(drawn, 0.0) * (white_cd_m2 * time_s)
+        camera = as_metered(sensor, behind_filters(frame_e, sensor)) if sensor.chip.channels else sensor
+        noise = noise_of(camera, time_s)
+        scales = spectral.reflectances * white_cd_m2 * time_s
         errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
         linear_error = _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
         result.append(
@@ -237,9 +241,21 @@ def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise,
 
 
 def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
-    """Noise of a sample, every source of the sensor in it."""
-    pixel = sensor.pixel
+    """Noise of a sample, every source of the sensor in it; of a patch's samples where channels are read apart."""
+    plain = _noise_of_channel(sensor, exposure_s, "")
+    noise = [_noise_of_channel(sensor, exposure_s, name) for name in channels(sensor.cfa)]
+    if all(x == plain for x in noise):
+        return plain
+    site = np.argmax([mask(sensor.cfa, name, (PATCH, PATCH)).ravel() for name in channels(sensor.cfa)], axis=0)
+    dark_e, full_e, shot = np.array([(x.dark_e, x.full_e, x.shot) for x in noise])[site].T
+    return Noise(dark_e=dark_e, prnu=plain.prnu, full_e=full_e, shot=shot)
+
+
+def _noise_of_channel(sensor: SensorConfig, exposure_s: float, channel: str) -> Noise:
+    alone, share = of_channel(sensor, channel)
+    pixel = alone.pixel
     dark_current_e = pixel.dark_current_e_per_s * exposure_s
-    rounding_e = sensor.gain_e_per_dn / sqrt(12)
+    rounding_e = alone.gain_e_per_dn / sqrt(12)
     dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
-    return Noise(dark_e=dark_e, prnu=pixel.fixed_gain, full_e=pixel.full_well_e - dark_current_e)
+    full_e = pixel.full_well_e - dark_current_e
+    return Noise(dark_e=dark_e / share, prnu=pixel.fixed_gain, full_e=full_e / share, shot=1 / share)

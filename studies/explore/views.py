@@ -16,7 +16,8 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole, unknown
 from sensor.cfa import channel_map, channels, mask
 from sensor.raw import RawImage
-from sensor.readout import as_switched, noise_sources, noise_variance, spread_charge
+from sensor.readings.by_channel import at_sites, dimmed, of_channel
+from sensor.readout import as_read, noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
@@ -40,9 +41,10 @@ _TINTS = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "C": (0, 
 def raw_picture(shot: Shot) -> Bytes:
     """The mosaic, each pixel in its channel's colour, encoded as sRGB; a full well is white."""
     raw = shot.exposed.raw
-    share = np.clip(raw.electrons / raw.full_well_e, 0.0, 1.0)
+    wells_e = np.array([raw.noise_of(channel).full_well_e for channel in channels(raw.cfa)])
     tints = np.array([_TINTS.get(channel, (1, 1, 1)) for channel in channels(raw.cfa)])
     index = np.vectorize(channels(raw.cfa).index)(channel_map(raw.cfa, raw.shape))
+    share = np.clip(raw.electrons / wells_e[index], 0.0, 1.0)
     return _bytes(encode_srgb(share[..., None] * tints[index]))
 
 
@@ -50,7 +52,7 @@ def noise_picture(shot: Shot) -> Bytes:
     """Raw image less the expected electrons: grey is none, black and white are four standard deviations."""
     exposed = shot.exposed
     light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or all that a pixel was read for
-    dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s
+    dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s / _light_share(exposed)
     noise_e = exposed.raw.electrons / light - (_collected_e(exposed) + dark_e)
     return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
@@ -139,13 +141,22 @@ def _variance_e2(exposed: Exposed) -> Image:
     if exposed.shot_noise:
         return variance
     hot_e_per_s = pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
-    counted_e = _collected_e(exposed) + (pixel.dark_current_e_per_s + hot_e_per_s) * exposed.exposure_s
-    return variance - (1 + pixel.column_gain_spread**2) * counted_e
+    dark_e = (pixel.dark_current_e_per_s + hot_e_per_s) * exposed.exposure_s / _light_share(exposed)
+    shot = np.ones(variance.shape)
+    for noise in exposed.raw.channel_noise:
+        shot[mask(exposed.raw.cfa, noise.channel, exposed.raw.shape)] = noise.shot
+    return np.asarray(variance - (1 + pixel.column_gain_spread**2) * shot * (_collected_e(exposed) + dark_e))
 
 
 def _collected_e(exposed: Exposed) -> Image:
     """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
-    return spread_charge(exposed.expected_e, exposed.sensor.pixel.crosstalk)
+    lit_e = dimmed(exposed.expected_e, exposed.sensor)
+    return np.asarray(spread_charge(lit_e, exposed.sensor.pixel.crosstalk) / _light_share(exposed))
+
+
+def _light_share(exposed: Exposed) -> float | Image:
+    """What the densities in front of channels that are read apart let through, over which their samples stand."""
+    return at_sites(exposed.sensor, exposed.expected_e.shape, 1.0, lambda reading: reading.light_share)
 
 
 def _grey(share: Image) -> Bytes:
@@ -181,7 +192,8 @@ def histogram(raw: RawImage) -> dict[str, Any]:
         ``edges_e`` (n + 1,); ``counts`` by channel, (n,), what lies under the first edge or over the last in the first
         and the last bin; ``well_e``; and ``floor_e``, the dark noise of a pixel.
     """
-    edges = np.geomspace(LEAST_E, 1.05 * raw.full_well_e, BINS + 1)
+    deepest_e = max(raw.full_well_e, *(raw.noise_of(channel).full_well_e for channel in channels(raw.cfa)))
+    edges = np.geomspace(LEAST_E, 1.05 * deepest_e, BINS + 1)
     electrons = np.clip(raw.electrons, edges[0], edges[-1])
     counts = {
         channel: np.histogram(electrons[mask(raw.cfa, channel, raw.shape)], edges)[0].tolist()
@@ -221,15 +233,15 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2
     photons = irradiance * photons_per_joule(nm) * width * area_m2 * time_s
     electrons = electrons_per_irradiance(sensor, nm, width, time_s) * irradiance
-    names = channels(sensor.cfa)
+    names, channel = channels(sensor.cfa), str(channel_map(sensor.cfa, raw.shape)[row, column])
     return {
         "row": row,
         "column": column,
-        "channel": str(channel_map(sensor.cfa, raw.shape)[row, column]),
+        "channel": channel,
         "photons": float(photons.sum()),
         "electrons": dict(zip(names, electrons.sum(axis=1).tolist(), strict=True)),
         "read_e": float(raw.electrons[row, column]),
-        "well_e": raw.full_well_e,
+        "well_e": raw.noise_of(channel).full_well_e,
         "noise_e": noise_sources_e(exposed, row, column),
         "wavelength_nm": nm.tolist(),
         "photons_nm": (photons / width).tolist(),
@@ -239,8 +251,9 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
 
 def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
-    pixel, time_s, signal_e = exposed.sensor.pixel, exposed.exposure_s, float(_collected_e(exposed)[row, column])
-    sensor = as_switched(exposed.sensor, exposed.expected_e)
+    channel = str(channel_map(exposed.sensor.cfa, exposed.raw.shape)[row, column])
+    sensor, factor = of_channel(as_read(exposed.sensor, exposed.expected_e), channel)  # in electrons of its own
+    pixel, time_s, signal_e = sensor.pixel, exposed.exposure_s, factor * float(_collected_e(exposed)[row, column])
     sources = noise_sources(signal_e, sensor, time_s)
     if not exposed.shot_noise:
         share, hot_e = pixel.hot_pixel_share, pixel.hot_pixel_dark_current_e_per_s * time_s
@@ -248,4 +261,5 @@ def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]
         gains_e2 = sources["column gains"] ** 2 - pixel.column_gain_spread**2 * counted_e
         sources |= {"shot noise": 0.0, "dark current": 0.0, "hot pixels": (share * (1 - share)) ** 0.5 * hot_e}
         sources["column gains"] = max(gains_e2, 0.0) ** 0.5
+    sources = {name: noise_e / factor for name, noise_e in sources.items()}
     return {**sources, "total": hypot(*sources.values())}

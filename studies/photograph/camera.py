@@ -76,7 +76,7 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e
+    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(unit_channel(sensor.cfa))
 
 
 def _in_bands(spectrum: Spectrum) -> Light:

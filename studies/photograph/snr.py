@@ -8,7 +8,9 @@ import numpy as np
 from render.spectrum import Floats
 from sensor.cfa import channels
 from sensor.config import SensorConfig
-from sensor.readout import electrons_at_snr, noise_variance
+from sensor.readings.by_channel import of_channel
+from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
+from sensor.readout import noise_variance
 from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
 
 
@@ -38,15 +40,16 @@ def channel_e(sensor: SensorConfig, light: Light, luminance_cd_m2: float, exposu
     return neutral_electrons(sensor, light, exposure_s) * luminance_cd_m2
 
 
-def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
+def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> Floats:
     """Expected electrons over the noise of one pixel of one chip, fixed patterns included, shape of `electrons`.
 
-    Crosstalk plays no part: neighbours exchange the same.
+    Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
     """
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
-    # each is a frame of its own, for which a camera may switch its gain
-    fields = electrons.ravel()[:, None] if sensor.chip.switched else electrons[None]
-    variance = np.reshape([noise_variance(field, even, exposure_s) for field in fields], electrons.shape)
+    # each is a frame of its own, for which a camera may switch its gain or meter a channel
+    chosen = sensor.chip.switched or any(x.metered for x in sensor.chip.channels)
+    fields = electrons.ravel()[:, None] if chosen else electrons[None]
+    variance = np.reshape([noise_variance(field, even, exposure_s, channel) for field in fields], electrons.shape)
     return np.asarray(electrons / np.sqrt(variance))
 
 
@@ -58,11 +61,12 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
     ratio : float
         Mean signal over the standard deviation of one pixel of one chip, fixed patterns included.
     """
-    electrons = electrons_at_snr(ratio, sensor, exposure_s)
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
+    names = channels(sensor.cfa)
+    electrons = [electrons_at_snr(ratio, sensor, exposure_s, name) for name in names]
     return [
-        LightForSnr(channel, electrons, electrons / per_cd_m2, electrons / per_cd_m2 * pi / GREY)
-        for channel, per_cd_m2 in zip(channels(sensor.cfa), of.tolist(), strict=True)
+        LightForSnr(channel, e, e / per_cd_m2, e / per_cd_m2 * pi / GREY)
+        for channel, e, per_cd_m2 in zip(names, electrons, of.tolist(), strict=True)
     ]
 
 
@@ -70,5 +74,50 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     """SNR of each channel's pixel over light; NaN where its well is full."""
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
-    full_e = sensor.pixel.full_well_e - sensor.pixel.dark_current_e_per_s * exposure_s
-    return {name: np.where(e < full_e, snr(e, sensor, exposure_s), np.nan) for name, e in electrons.items()}
+    ratios = {}
+    for name, e in electrons.items():
+        alone, share = of_channel(sensor, name)
+        full_e = (alone.pixel.full_well_e - alone.pixel.dark_current_e_per_s * exposure_s) / share
+        metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # in time, before the well is full
+        ratios[name] = np.where(metered | (e < full_e), snr(e, sensor, exposure_s, name), np.nan)
+    return ratios
+
+
+def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> float:
+    """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
+
+    The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
+    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before. A metered channel is seen in its
+    longest time, for light that a shorter one is needed for has more SNR than a full well.
+    """
+    if sensor.chip.channels:
+        alone, share = of_channel(sensor, channel)
+        return electrons_at_snr(snr, alone, exposure_s) / share
+    if sensor.chip.readings:
+        return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
+    scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
+    a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
+    c = (full - 2 * half + a) * 2 / scale_e**2
+    b = (full - a) / scale_e - c * scale_e
+    lead = 1 - snr**2 * c
+    if lead <= 0:
+        return float("inf")
+    electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
+    dark_e = sensor.pixel.dark_current_e_per_s * exposure_s
+    return float(electrons) if electrons + dark_e < sensor.pixel.full_well_e else float("inf")
+
+
+def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
+    """The least light with this SNR; beyond a seam it may be less again for a while."""
+    if sensor.chip.switched:
+        count = len(sensor.chip.readings)
+        light_e = [electrons_at_snr(snr, of_reading(sensor, number), exposure_s) for number in range(count)]
+        fits = (np.isfinite(e) and switched_to(sensor, np.array([e])) == number for number, e in enumerate(light_e))
+        return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
+    levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
+    ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
+    above = np.flatnonzero((ratio >= snr) & (levels + dark_electrons(sensor, exposure_s) < sensor.pixel.full_well_e))
+    if above.size == 0:
+        return float("inf")
+    part = slice(max(above[0] - 1, 0), above[0] + 1)
+    return float(np.interp(snr, ratio[part], levels[part]))

@@ -11,9 +11,11 @@ from render.denoised.relight import measured_error
 from render.engine import render
 from render.scene import Scene
 from render.transport import Transport
+from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
+from sensor.readings.by_channel import as_metered, well_e, wells_e
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
@@ -43,25 +45,35 @@ def monte_carlo_share(
     error_e : (..., h, w) array
         Monte Carlo error [e-]: one draw of it, such as half the difference of its halves, or its standard
         deviation.
-    expected_e : (..., h, w) float64
-        Of the whole render [e-]. Pixels that reach the well are left out.
+    expected_e : (h, w) or (channel, h, w) float64
+        Of the whole render [e-], of the mosaic or behind every filter. Pixels that reach the well are left out.
     sensor : SensorConfig
     exposure_s : float
         For the dark current [s].
     of_pixels : float, optional
         The share that so many of the pixels (0 to 1) stay under; left out, mean variance over mean variance.
     """
-    inside = expected_e < sensor.pixel.full_well_e
+    if expected_e.ndim == 2:
+        variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
+    else:
+        parts = zip(channels(sensor.cfa), expected_e, strict=True)
+        of_channels = [_noise_and_room(plane, sensor, exposure_s, name) for name, plane in parts]
+        variance_e2, inside = (np.stack(arrays) for arrays in zip(*of_channels, strict=True))
     if not inside.any():
         return 0.0
-    monte_carlo = error_e[inside] ** 2
-    planes = expected_e.reshape(-1, *expected_e.shape[-2:])  # the noise of crosstalk needs neighbours of one plane
-    sensor_noise_e2 = np.stack([noise_variance(plane, sensor, exposure_s) for plane in planes]).reshape(
-        expected_e.shape
-    )[inside]
+    monte_carlo, sensor_noise_e2 = error_e[inside] ** 2, variance_e2[inside]
     if of_pixels is None:
         return float(monte_carlo.mean() / sensor_noise_e2.mean())
     return float(np.quantile(monte_carlo / sensor_noise_e2, of_pixels))
+
+
+def _noise_and_room(
+    expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
+) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+    """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
+    sensor = as_metered(sensor, expected_e, channel)
+    full_e = wells_e(sensor, expected_e.shape) if channel is None else well_e(sensor, channel)
+    return noise_variance(expected_e, sensor, exposure_s, channel), np.asarray(expected_e < full_e)
 
 
 def charged_share(
@@ -80,10 +92,10 @@ def charged_share(
     """
     if len(errors_e) == 1:
         return monte_carlo_share(errors_e[0], expected_e, sensor, exposure_s)
-    inside = expected_e < sensor.pixel.full_well_e
+    variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
     if not inside.any():
         return 0.0
-    sensor_noise_e2 = noise_variance(expected_e, sensor, exposure_s)[inside].sum() / inside.size
+    sensor_noise_e2 = variance_e2[inside].sum() / inside.size
     return measured_error(errors_e[0], errors_e[1], inside / sensor_noise_e2).upper
 
 
@@ -127,8 +139,9 @@ def speckle_sizes(
     Where the render's noise is under the sensor's only single bright samples reach so far. Parameters as of
     `monte_carlo_share`, of one frame.
     """
-    size = np.abs(error_e) / np.sqrt(noise_variance(expected_e, sensor, exposure_s))
-    return np.asarray(size[(size > SPECKLE) & (expected_e < sensor.pixel.full_well_e)])
+    variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
+    size = np.abs(error_e) / np.sqrt(variance_e2)
+    return np.asarray(size[(size > SPECKLE) & inside])
 
 
 def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = None) -> str:

@@ -8,10 +8,11 @@ from loop import loop
 from refusal import refusal
 from scipy import stats
 
+from sensor.calibration import ChannelNoise
 from sensor.cfa import RGBW
 from sensor.device import draw_device
 from sensor.presets import low_noise, table1_output, table1_pixel
-from sensor.raw import SATURATION_SIGMAS, ChannelNoise, RawImage
+from sensor.raw import SATURATION_SIGMAS, RawImage
 from sensor.readout import read_out
 
 RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)

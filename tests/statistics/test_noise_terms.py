@@ -22,7 +22,8 @@ from sensor.emva1288.characterise import configured, measure, plan_for
 from sensor.emva1288.photon_transfer import bench
 from sensor.photodiodes import binned
 from sensor.readings.noise import dark_electrons, whole_share
-from sensor.readout import electrons_at_snr, noise_sources, noise_variance, read_out
+from sensor.readout import noise_sources, noise_variance, read_out
+from studies.photograph.snr import electrons_at_snr
 
 LIGHT_E, TIME_S = 1000.0, 0.1
 SHAPE = (32, 2048)

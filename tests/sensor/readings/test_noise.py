@@ -23,8 +23,8 @@ from sensor.readings.noise import (
     switched_to,
     whole_share,
 )
-from sensor.readout import electrons_at_snr, noise_sources, noise_variance
-from studies.photograph.snr import snr
+from sensor.readout import noise_sources, noise_variance
+from studies.photograph.snr import electrons_at_snr, snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
 

@@ -29,9 +29,9 @@ def test_a_file_s_readings_are_the_sensor_s_and_its_pixel_tells_their_ends(tmp_p
     assert sensor.chip.readings == (Reading(2, 1, 2000, 0.9, 1.0, "large"), Reading(6, 3, 9000, 0.1, 1.0, "small"))
     assert sensor.pixel.full_well_e == 90_000
     assert sensor.pixel.read_noise_e == pytest.approx(2 / 0.9)
-    assert sensor.metered_well_e == pytest.approx(2000 / 0.9)
-    assert read(tmp_path, PIXEL + ONE + OTHER + LENS).metered_well_e == 9000
-    assert preset("low_noise").metered_well_e == 15_000
+    assert sensor.metered_well_e("G") == pytest.approx(2000 / 0.9)
+    assert read(tmp_path, PIXEL + ONE + OTHER + LENS).metered_well_e("G") == 9000
+    assert preset("low_noise").metered_well_e("G") == 15_000
     assert preset("low_noise").chip.readings == ()
 
 

@@ -11,10 +11,9 @@ from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, table1_output
-from sensor.readout import electrons_at_snr
 from studies.metrics.truth import light_of
 from studies.paper.setup import shot_noise_alone
-from studies.photograph.snr import channel_e, light_for_snr, snr, snr_at
+from studies.photograph.snr import channel_e, electrons_at_snr, light_for_snr, snr, snr_at
 
 EXPOSURE_S = 0.033
 
