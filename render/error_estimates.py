@@ -185,7 +185,7 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
 def within_band_error(
     lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
 ) -> Floats:
-    """Error of the product of band averages, over the radiance, RMS over pixels; shape (band,).
+    """Error of the product of band averages over each pixel's radiance, RMS over lit pixels; shape (band,).
 
     The mean of transport T times emission S over a band is not the product of their means. With T expanded about the
     band's centre, T + s x + q/2 (x^2 - w^2/12), what is missed is s <S x> + q/2 <S (x^2 - w^2/12)>, x from the centre.
@@ -209,8 +209,9 @@ def within_band_error(
         )
         missed += np.abs(slope * first) + np.abs(curvature * second) / 2
         seen += transport * mean
-    missed_rms, seen_rms = (np.sqrt(np.mean(np.square(x), axis=(1, 2))) for x in (missed, seen))
-    return np.asarray(np.divide(missed_rms, seen_rms, out=np.zeros_like(seen_rms), where=seen_rms > 0))
+    relative = np.divide(missed, seen, out=np.zeros_like(seen), where=seen > 0)  # a lamp in view doesn't hide the rest
+    lit = np.maximum((seen > 0).sum(axis=(1, 2)), 1)
+    return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
 
 
 def _spread(shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

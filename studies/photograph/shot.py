@@ -33,6 +33,7 @@ from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra
+from studies.study.render_facts import bands_note
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
     LIGHT,
@@ -196,6 +197,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
         frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
+        notes += filter(None, [bands_note(transport, radiance, spectra)])
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:

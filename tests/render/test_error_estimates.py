@@ -191,5 +191,12 @@ def test_a_few_bands_are_enough_for_an_estimate(bands):
     assert error[0] == pytest.approx(0.25 if bands > 1 else 0.0, rel=0.05)  # a slope of 1 per 100 nm, over a mean of 1
 
 
+def test_a_lamp_in_view_does_not_hide_the_error_of_what_it_lights():
+    curve = 0.1 + 0.01 * (NM - 500.0)
+    planes = np.stack([np.full_like(NM, 1e4), curve], axis=1)[None, :, :, None].astype(np.float32)
+    line = within_band_error({"lamp": LightGroup(("lamp",), line_spectrum([548.0], [2.0]))}, planes, NM, WIDTH_NM)
+    assert line[4] == pytest.approx(0.01 * 3.0 / curve[4] / np.sqrt(2), rel=0.05)  # RMS of the two pixels
+
+
 def test_a_dark_band_has_no_error():
     assert missed(np.zeros(NM.size), line_spectrum([545.0], [2.0])).tolist() == [0.0] * NM.size

@@ -1,6 +1,7 @@
 """`rodcone render`: the file it writes, its facts, and one line with exit code 2 for bad input."""
 
 import json
+import re
 import warnings
 from dataclasses import replace
 from pathlib import Path
@@ -59,6 +60,16 @@ def test_facts_are_one_json_object(scene: Path, tmp_path: Path) -> None:
     assert facts["mean_luminance_cd_m2"] == pytest.approx(25.0, rel=1e-5)
     assert err == f"rodcone: {facts['notes'][0]}\n"
     assert "integrator 'path': the engine brings its own, with paths of any length" in err
+
+
+def test_bands_too_wide_for_the_light_are_told_with_a_width_that_does(tmp_path: Path) -> None:
+    arguments = ["render", "cornell_box", "-o", str(tmp_path / "box.exr"), "--width", "8", "--spp", "64", "--bands"]
+    code, _, err = call([*arguments, "380:780:50", "--light", "F11"])
+    assert code == 0
+    width_nm = re.search(r"^rodcone: bands: the one at \d+ nm is off by about .*; bands of (\d+) nm would do", err)
+    assert width_nm is not None
+    assert 2 <= int(width_nm[1]) <= 20
+    assert call([*arguments, "400:700:10", "--light", "D65"])[2] == ""
 
 
 def test_another_illuminant_comes_at_the_same_luminance(scene: Path, tmp_path: Path) -> None:
