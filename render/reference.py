@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
+from zipfile import ZipFile, is_zipfile
 
 import numpy as np
 from scipy.special import gammaincc
@@ -21,7 +22,8 @@ from render.error_estimates import Halves
 from render.level import SceneMeans
 from render.loader import Film
 from render.runs import Means, errors_of
-from render.scene import Scene
+from render.scene import LightGroup, Scene
+from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_inputs
 from rodcone.errors import InputError
@@ -31,6 +33,7 @@ SHIPPED = Path(__file__).parent / "data" / "references"
 FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
 BLOCK = 16  # pixels a side, within which errors are pooled: a variance from 256 differences is right to 9 %
 FALSE_ALARM = 1e-3  # chance, at most, that an agreeing render is called another
+MOST_PACKED = 32  # times that a file unpacks into; half floats of light come to 2 or 3
 _LEVELS = ("radiance", "uncovered", "covariance")
 
 
@@ -81,8 +84,37 @@ def find_reference(scene: Scene, film: Film) -> Reference | None:
         path = reference_path(folder, scene, film)
         if (arrays := read_arrays(path)) is not None:
             certificate = json.loads(str(arrays["certificate"]))
-            return Reference(path, _unpacked(arrays, certificate, scene, film), certificate)
+            groups, bands = dict(scene.groups), (film.wavelength_nm, film.width_nm)
+            return Reference(path, _unpacked(arrays, certificate, groups, *bands), certificate)
     return None
+
+
+def open_reference(path: str | Path) -> Reference:
+    """Reference of a file, whatever scene it is of: its lights stand in it.
+
+    Raises
+    ------
+    InputError
+        For a file that isn't there or isn't what `rodcone reference` wrote.
+    """
+    file = Path(path)
+    arrays = read_arrays(file) if file.is_file() and is_zipfile(file) and _unpacks(file) else None
+    if arrays is None or "groups" not in (certificate := json.loads(str(arrays.get("certificate", "{}")))):
+        raise InputError(f"{path}: there is no intact reference light; allowed: a file of rodcone reference; make it")
+    groups = {
+        name: LightGroup(
+            tuple(group["emitters"]), Spectrum(*map(np.array, group["spectrum"])), group["power"], group["coloured"]
+        )
+        for name, group in certificate["groups"].items()
+    }
+    bands = np.array(certificate["wavelength_nm"]), np.array(certificate["width_nm"])
+    return Reference(file, _unpacked(arrays, certificate, groups, *bands), certificate)
+
+
+def _unpacks(file: Path) -> bool:
+    """Whether a file says that it unpacks into no more than half floats pack into."""
+    with ZipFile(file) as packed:
+        return sum(part.file_size for part in packed.infolist()) <= MOST_PACKED * file.stat().st_size
 
 
 def save_reference(path: Path, transport: Transport, certificate: Mapping[str, Any]) -> None:
@@ -101,7 +133,17 @@ def save_reference(path: Path, transport: Transport, certificate: Mapping[str, A
         **{f"seen_{group}": np.stack([seen.mean, seen.difference]) for group, seen in enumerate(transport.seen)},
     }
     made_by = {name: getattr(transport, name) for name in ("seconds", "integrator", "variant")}
-    facts = {**made_by, "engine": ENGINE_VERSION, **certificate}
+    groups = {
+        name: {
+            "emitters": group.emitters,
+            "spectrum": [group.spectrum.wavelength_nm.tolist(), group.spectrum.values.tolist()],
+            "power": group.power,
+            "coloured": group.coloured,
+        }
+        for name, group in transport.groups.items()
+    }
+    bands = {"wavelength_nm": transport.wavelength_nm.tolist(), "width_nm": transport.width_nm.tolist()}
+    facts = {**made_by, "engine": ENGINE_VERSION, "groups": groups, **bands, **certificate}
     write_arrays(path, arrays | {"certificate": np.array(json.dumps(facts))}, packed=True)
 
 
@@ -124,7 +166,13 @@ def _error_plane(light: Halves, error: Planes) -> Planes:
     return np.asarray(plane * np.sqrt(np.maximum(lost, 1.0))[:, None, None], np.float32)
 
 
-def _unpacked(arrays: Mapping[str, Any], certificate: Mapping[str, Any], scene: Scene, film: Film) -> Transport:
+def _unpacked(
+    arrays: Mapping[str, Any],
+    certificate: Mapping[str, Any],
+    groups: Mapping[str, LightGroup],
+    wavelength_nm: Floats,
+    width_nm: Floats,
+) -> Transport:
     """Transport of a file; variances are pooled from the error plane as a render's from its difference."""
     light = arrays["light"] * arrays["scale"]
     rates = arrays["rates"]
@@ -132,7 +180,7 @@ def _unpacked(arrays: Mapping[str, Any], certificate: Mapping[str, Any], scene: 
         count=int(arrays["points"]),
         rates=rates,
         light=Halves(light, arrays["error"][:, None] * light),
-        seen=[Halves(*arrays[f"seen_{group}"]) for group in range(len(scene.groups))],
+        seen=[Halves(*arrays[f"seen_{group}"]) for group in range(len(groups))],
         coverage=Halves(*arrays["coverage"]),
         shared=tuple(arrays["shared"].tolist()) or None,
     )
@@ -140,11 +188,11 @@ def _unpacked(arrays: Mapping[str, Any], certificate: Mapping[str, Any], scene: 
         light=means.light,
         coverage=means.coverage,
         seen=tuple(means.seen),
-        **errors_of(emission(scene.groups, film.wavelength_nm, film.width_nm), means),
+        **errors_of(emission(groups, wavelength_nm, width_nm), means),
         scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _LEVELS}),
-        groups=dict(scene.groups),
-        wavelength_nm=film.wavelength_nm,
-        width_nm=film.width_nm,
+        groups=groups,
+        wavelength_nm=wavelength_nm,
+        width_nm=width_nm,
         counts=2 * means.count * rates,
         stopped_by="samples",
         seconds=certificate["seconds"],

@@ -14,6 +14,7 @@ from render.radiance_files.cube import REFLECTANCE, cube_holds, description, rea
 from render.radiance_files.envi import data_file
 from render.radiance_files.exr import read_exr
 from render.radiance_files.iset import read_iset_scene
+from render.reference import open_reference
 from render.scene import LightGroup
 from render.spectrum import DEFAULT_WAVELENGTH_NM, LONGEST_NM, SHORTEST_NM, Spectrum
 from render.transport import Transport
@@ -27,12 +28,18 @@ _READERS = {
     **dict.fromkeys((".npy", ".hdr"), read_cube),
     **dict.fromkeys(photo.EXTENSIONS, photo.read_photo),
 }
-ENDINGS = tuple(_READERS)
+REFERENCE = ".npz"  # of `rodcone reference`
+ENDINGS = (*_READERS, REFERENCE)
 
 
 def is_radiance_file(name: str | Path) -> bool:
     """Whether a name ends as a file that `load_radiance` reads."""
-    return Path(name).suffix.lower() in _READERS
+    return Path(name).suffix.lower() in ENDINGS
+
+
+def is_reference(path: str | Path) -> bool:
+    """Whether a file is named as reference light, whose lamps any light can replace."""
+    return Path(path).suffix.lower() == REFERENCE
 
 
 def is_reflectance(path: str | Path) -> bool:
@@ -61,12 +68,15 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
     if Path(path).suffix.lower() in photo.EXTENSIONS:
         height, width = photo.photo_size(path)
         return height * width, DEFAULT_WAVELENGTH_NM.size, 1
+    if is_reference(path):
+        groups, bands, height, width = open_reference(path).transport.radiance.shape
+        return height * width, bands, groups
     pixels, bands, groups = zip(*(file_extent(file) for file in files_of(path)), strict=True)
     return sum(pixels), bands[0], groups[0]
 
 
 def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
-    """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube or a photograph.
+    """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube, a photograph, reference light (``.npz``).
 
     Parameters
     ----------
@@ -82,7 +92,8 @@ def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
     InputError
         For another ending, and as `read_exr`, `read_iset_scene`, `read_cube` and `read_photo`.
     """
-    return load_picture(path, illuminant(light)).relight() if is_reflectance(path) else _read(path)
+    lit = is_reflectance(path) or is_reference(path)
+    return load_picture(path, illuminant(light)).relight() if lit else _read(path)
 
 
 def load_picture(path: str | Path, light: Spectrum) -> Transport:
@@ -91,8 +102,10 @@ def load_picture(path: str | Path, light: Spectrum) -> Transport:
     Parameters
     ----------
     light : Spectrum
-        Of 1 cd/m^2; for reflectances alone.
+        Of 1 cd/m^2; for reflectances alone. Reference light has lights of its own.
     """
+    if is_reference(path):
+        return open_reference(path).transport
     transport = as_transport(_read(path))
     if not is_reflectance(path):
         return transport
@@ -102,7 +115,7 @@ def load_picture(path: str | Path, light: Spectrum) -> Transport:
 def _read(path: str | Path) -> SpectralRadiance:
     suffix = Path(path).suffix.lower()
     if suffix not in _READERS:
-        raise unknown(f"{path}: ending", suffix, _READERS)
+        raise unknown(f"{path}: ending", suffix, ENDINGS)
     return _READERS[suffix](path)
 
 

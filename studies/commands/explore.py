@@ -31,7 +31,8 @@ def explore(
     ----------
     source
         Scene by name such as still_life, a Mitsuba scene (.xml), a file of spectral radiance (.exr, .mat), a cube
-        described by a .toml beside it (.npy, ENVI's .hdr, .mat), or a photograph (.jpg, .png).
+        described by a .toml beside it (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png), or
+        reference light (.npz of rodcone reference).
     port
         Port of the page's address; a free one by default.
     no_browser

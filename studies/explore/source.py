@@ -9,7 +9,13 @@ import numpy as np
 
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance, load_picture
+from render.radiance_files.radiance_source import (
+    extent_of,
+    is_radiance_file,
+    is_reference,
+    is_reflectance,
+    load_picture,
+)
 from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
@@ -147,7 +153,7 @@ def load_transport(path: str | Path, light: str = LIGHT) -> Transport:
 
 def _with_its_light(transport: Transport, path: str | Path) -> Transport:
     """A file's transport, of which radiance's light group is marked to have colours of its own."""
-    if is_reflectance(path):
+    if is_reflectance(path) or is_reference(path):
         return transport
     groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
     return replace(transport, groups=groups)

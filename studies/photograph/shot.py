@@ -12,7 +12,7 @@ from isp.remosaic import remosaic
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reflectance
+from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import Scene, film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
@@ -32,7 +32,7 @@ from sensor.response import expected_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
-from studies.study.lit_scene import asked_spectra
+from studies.study.lit_scene import asked_spectra, under
 from studies.study.render_facts import bands_note
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
@@ -57,7 +57,8 @@ class Order:
     ----------
     source : str or Path
         Scene by name such as color_checker, a Mitsuba scene (.xml), a file of spectral radiance (.exr, or .mat of
-        ISETCam), a cube described by a .toml beside it (.npy, ENVI's .hdr, .mat), or a photograph (.jpg, .png).
+        ISETCam), a cube described by a .toml beside it (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png),
+        or reference light (.npz of rodcone reference).
     out : str or Path
         Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
         with a .json beside it for any mosaic.
@@ -158,6 +159,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         light_name = order.light[0] if order.light else None
         known = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         transport, light, notes = open_radiance_file(order.source, known)
+        transport = under(transport, light_name) if light_name and is_reference(order.source) else transport
         spectra: dict[str, Spectrum] = {}
         level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
     else:

@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.loader import Film
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import files_of, is_radiance_file
+from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference
 from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
@@ -68,6 +68,11 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         For a scene that is unknown or can't be read, a level in lux without a reference plane, another spectrum for
         lights that have colours of their own, or a size for a sensor that bins or has more.
     """
+    if is_reference(choice.source):
+        raise InputError(
+            f"scene: {choice.source!r} is reference light, which a study finds by itself; give the scene's name and "
+            "render.reference = true"
+        )
     if is_radiance_file(choice.source):
         require_absent(f"for {choice.source}, a picture without surfaces", extend=choice.extend, chart=choice.chart)
         check_radiance_file(choice.source, study.levels)

@@ -8,7 +8,7 @@ from pathlib import Path
 from render.illuminants import illuminant
 from render.radiance_files.file_checks import require_file
 from render.radiance_files.photo import EXTENSIONS
-from render.radiance_files.radiance_source import ENDINGS, is_reflectance, load_picture
+from render.radiance_files.radiance_source import ENDINGS, REFERENCE, is_reference, is_reflectance, load_picture
 from render.scene import Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
@@ -21,6 +21,7 @@ from studies.study.levels import parse_level
 _OTHER_FILES = {
     **dict.fromkeys((".dng", ".tif", ".tiff", ".nef", ".cr2", ".cr3", ".arw"), "a raw file, for rodcone develop"),
     **dict.fromkeys(ENDINGS, "a picture, for rodcone capture or a study"),
+    REFERENCE: "reference light, for rodcone capture and explore; a study has render.reference = true",
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
 
@@ -114,6 +115,10 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
     assumed = [f"{name}: {warning.message}" for warning in caught]
+    if is_reference(path):
+        first = next(iter(transport.groups.values()))
+        assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")
+        return transport, spectrum if light or first.coloured else first.spectrum, assumed
     if light is None:
         use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
         assumed.append(f"{name}: {use} {LIGHT}; give another light where that isn't so")

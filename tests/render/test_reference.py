@@ -1,11 +1,14 @@
 """Reference light: the file gives back light and error, and chi-square tells another light from noise."""
 
 from dataclasses import replace
+from hashlib import sha256
+from io import BytesIO
 
 import numpy as np
 import pytest
 from scipy.stats import binom
 
+import rodcone
 from render.engine import render
 from render.error_estimates import Halves
 from render.loader import Film
@@ -15,12 +18,16 @@ from render.reference import (
     agreement,
     find_reference,
     halves_agree,
+    open_reference,
     reference_path,
     require_agreement,
     save_reference,
 )
 from rodcone.errors import InputError
 from scenes.catalog import load
+from studies.photograph.shot import Order, take
+from studies.study.lit_scene import open_choice
+from studies.study.study import SceneChoice, Study
 
 SIZE = (64, 64)
 BANDS_NM, WIDTH_NM = np.array([450.0, 550.0, 650.0]), np.full(3, 100.0)
@@ -173,3 +180,45 @@ def test_a_render_of_other_paths_agrees_and_a_scaled_one_is_refused_in_one_line(
     stated = sum(x.light.difference.sum(axis=(0, 1), dtype=np.float64) ** 2 for x in (other, stored.transport))
     ratios = gap**2 / stated.mean()
     assert np.mean(np.minimum(ratios, 9)) == pytest.approx(np.mean(np.minimum(stated / stated.mean(), 9)), rel=0.5)
+
+
+def test_a_file_gives_its_light_without_the_scene_and_its_lamps_can_be_replaced(small, tmp_path, monkeypatch):
+    scene, film, made = small
+    path = reference_path(tmp_path, scene, film)
+    save_reference(path, made, {})
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    by_scene = find_reference(scene, film).transport
+    transport = rodcone.load_transport(path)
+    assert list(transport.groups) == list(scene.groups)
+    name = next(iter(scene.groups))
+    for change in ({}, {name: "A"}):
+        np.testing.assert_array_equal(transport.relight(change).values, by_scene.relight(change).values)
+    np.testing.assert_array_equal(rodcone.load_radiance(path).values, by_scene.relight().values)
+    assert not transport.groups[name].coloured  # so the explorer's lamps replace it
+    with pytest.warns(UserWarning, match="don't fill the camera's window"):
+        taken = take(Order(str(path), tmp_path / "shot.dng", exposure="20ms", light=("A",)))
+    assert taken.facts["size"] == list(film.size)
+    assert any("reference light, 64 samples a pixel" in note for note in taken.notes)
+
+
+def test_what_is_no_reference_is_refused_in_a_line(small, tmp_path):
+    made = small[2]
+    path = tmp_path / "light.npz"
+    save_reference(path, made, {})
+    whole = path.read_bytes()
+    np.savez(tmp_path / "other.npz", light=np.zeros(4))
+    (tmp_path / "bomb.npz").write_bytes(_zeros_in_a_zip(1 << 26))
+    (tmp_path / "cut.npz").write_bytes(whole[:-100])
+    (tmp_path / "flipped.npz").write_bytes(whole[:500] + bytes([whole[500] ^ 1]) + whole[501:])
+    for name in ("other", "bomb", "cut", "flipped", "missing"):
+        with pytest.raises(InputError, match=f"{name}.npz: there is no intact reference light"):
+            open_reference(tmp_path / f"{name}.npz")
+    with pytest.raises(InputError, match=r"is reference light, which a study finds by itself"):
+        open_choice(SceneChoice(str(path)), Study((SceneChoice(str(path)),), ("25cd/m2",)))
+
+
+def _zeros_in_a_zip(size):
+    """A small file that unpacks into many bytes, behind its right digest."""
+    file = BytesIO()
+    np.savez_compressed(file, light=np.zeros(size, np.uint8))
+    return sha256(file.getvalue()).digest() + file.getvalue()
