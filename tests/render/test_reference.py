@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from scipy.stats import binom
 
-import rodcone
 from render.engine import render
 from render.error_estimates import Halves
 from render.loader import Film
@@ -23,6 +22,7 @@ from render.reference import (
     require_agreement,
     save_reference,
 )
+from rodcone import load_radiance, load_transport
 from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.photograph.shot import Order, take
@@ -188,12 +188,12 @@ def test_a_file_gives_its_light_without_the_scene_and_its_lamps_can_be_replaced(
     save_reference(path, made, {})
     monkeypatch.setenv(FOLDER, str(tmp_path))
     by_scene = find_reference(scene, film).transport
-    transport = rodcone.load_transport(path)
+    transport = load_transport(path)
     assert list(transport.groups) == list(scene.groups)
     name = next(iter(scene.groups))
     for change in ({}, {name: "A"}):
         np.testing.assert_array_equal(transport.relight(change).values, by_scene.relight(change).values)
-    np.testing.assert_array_equal(rodcone.load_radiance(path).values, by_scene.relight().values)
+    np.testing.assert_array_equal(load_radiance(path).values, by_scene.relight().values)
     assert not transport.groups[name].coloured  # so the explorer's lamps replace it
     with pytest.warns(UserWarning, match="don't fill the camera's window"):
         taken = take(Order(str(path), tmp_path / "shot.dng", exposure="20ms", light=("A",)))
