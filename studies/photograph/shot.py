@@ -185,8 +185,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         step("exposure", 0.9)
     radiance = transport.relight(spectra, **level)
     image = form_image(radiance, sensor)
-    if exposure_s is None:
-        exposure_s = exposure_by_rule_s(order.exposure, image, sensor)
+    exposure_s = exposure_by_rule_s(order.exposure, image, sensor) if exposure_s is None else exposure_s
     seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
@@ -199,8 +198,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
         frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
-        notes += filter(None, [bands_note(transport, radiance, spectra)])
-        notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
+        noise = noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))
+        notes += filter(None, [bands_note(transport, radiance, spectra), noise])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
