@@ -4,6 +4,7 @@ import json
 from typing import Any
 
 import numpy as np
+import pytest
 from loop import loop
 from outside_truth import colour_science
 
@@ -47,7 +48,8 @@ def test_the_tables_are_those_of_colour_science() -> None:
         assert list(ours) == list(tables)
         for name, (nm, values) in tables.items():
             assert np.array_equal(ours[name][0], nm), name
-            assert np.array_equal(ours[name][1], values), name
+            # means of the sun are computed here, and the processor rounds them; the rest is read
+            np.testing.assert_allclose(ours[name][1], values, rtol=1e-12 if collection == "sun" else 0, err_msg=name)
 
 
 @loop("cct_k", [4000.0, 6504.0, 7000.0, 7000.1, 8300.0, 25_000.0])
@@ -56,7 +58,7 @@ def test_daylight_is_that_of_colour_science(cct_k: float) -> None:
     theirs = colour.sd_CIE_illuminant_D_series(colour.temperature.CCT_to_xy_CIE_D(cct_k), M1_M2_rounding=False)
     expected = unit_luminance(Spectrum(theirs.wavelengths, theirs.values))
     assert np.array_equal(daylight(cct_k).wavelength_nm, expected.wavelength_nm)
-    assert np.array_equal(daylight(cct_k).values, expected.values)
+    assert daylight(cct_k).values == pytest.approx(expected.values, rel=1e-12)  # computed twice
 
 
 def write() -> None:
