@@ -13,8 +13,6 @@ from refusal import refusal
 
 from render.engine import render
 from render.geometry import look_at, to_world
-from render.illuminants import illuminant
-from render.illuminants import names as illuminants
 from render.scene import LightGroup, Node, Scene, spectrum_node, uniform_node
 from render.scene_range import check_range, warn_of_coloured_lights, warn_of_dark_ends
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
@@ -128,32 +126,6 @@ def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
     assert found * np.pi == pytest.approx([0.2, *inside, 0.4], rel=2e-3)  # wavelengths jittered within 10 nm
 
 
-def test_a_held_metal_goes_on_at_its_last_index() -> None:
-    held = replace(wall({"type": "conductor", "material": "Li"}), extend="hold").geometry["wall"]["bsdf"]
-    assert set(held) == {"type", "eta", "k"}
-    for part in ("eta", "k"):
-        first, *_, before, last = held[part]["values"].split(",")
-        assert last == before
-        assert held[part]["wavelengths"].startswith("100.0,306.12")
-        assert first == held[part]["values"].split(",")[1]
-
-
-def test_holding_leaves_the_scene_and_its_lights_as_they_were() -> None:
-    lamp = {"type": "rectangle", "emitter": {"type": "area", "radiance": EVEN}}
-    geometry = wall(matte(EVEN)).geometry | {"lamp": lamp}
-    groups = {"sun": LightGroup(("sun",), flat()), "lamp": LightGroup(("lamp/emitter",), flat(), coloured=True)}
-    held = Scene("wall", geometry, groups, extend="hold")
-    assert held.geometry["lamp"] == lamp
-    assert geometry["wall"]["bsdf"]["bsdf"]["reflectance"] == EVEN
-    again = replace(held, name="again")
-    assert again.geometry["wall"] == held.geometry["wall"]
-
-
-def test_another_word_for_extend_is_refused_and_the_one_meant_is_named() -> None:
-    with pytest.raises(InputError, match="extend: 'hol' is unknown; allowed: hold; did you mean 'hold'"):
-        replace(wall(matte(EVEN)), extend="hol")
-
-
 XML = """<scene version="3.0.0">
 <sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4"/>
 <integer name="height" value="4"/></film>
@@ -264,8 +236,3 @@ def test_every_scene_of_the_catalogue_covers_the_default_bands_exactly(name: str
     if name != "color_checker":
         refusal(check_range, scene, 380.0, 785.0, match="known over 380-780 nm alone")
         check_range(replace(scene, extend="hold"), 300.0, 1100.0)
-
-
-def test_every_illuminant_covers_the_default_bands() -> None:
-    for name in (*illuminants(), "2856K", "D7000K"):
-        assert told(illuminant(name), 380.0, 780.0) == [], name

@@ -47,13 +47,6 @@ POWERS_OF_TWO = [2.0**-20, 0.5, 2.0, 2.0**15]
 
 
 @loop("factor", POWERS_OF_TWO)
-def test_lights_brighter_by_a_power_of_two_give_bit_equal_radiance(factor):
-    made = transport()
-    powers = {"sky": 100.0 * factor, "lamp": 0.3 * factor}
-    assert np.array_equal(made.relight(powers=powers).values, made.relight().values * np.float32(factor))
-
-
-@loop("factor", POWERS_OF_TWO)
 def test_a_level_higher_by_a_power_of_two_gives_bit_equal_radiance(factor):
     made = transport()
     one = made.relight(luminance_cd_m2=3.7).values
@@ -146,11 +139,6 @@ def test_illuminance_of_a_mean_luminance_is_the_one_that_gives_it():
     lux = made.illuminance_lux(25.0)
     assert made.relight(illuminance_lux=lux).luminance().mean() == pytest.approx(25.0, rel=1e-6)
     assert transport(irradiance=None).illuminance_lux(25.0) is None
-
-
-def test_level_zero_is_dark():
-    assert not transport().relight(luminance_cd_m2=0.0).values.any()
-    assert not transport().relight(powers={"sky": 0.0, "lamp": 0.0}).values.any()
 
 
 def test_luminance_is_refused_where_every_pixel_sees_a_light():

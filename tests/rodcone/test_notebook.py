@@ -9,7 +9,7 @@ from PIL import Image
 
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import WHITE_AT
-from rodcone.notebook import LEAST_SHOWN, SIDE, preview_png
+from rodcone.notebook import preview_png
 
 
 def pixels(png: bytes) -> np.ndarray:
@@ -24,11 +24,6 @@ def test_a_preview_is_srgb_in_its_own_scale() -> None:
         assert np.array_equal(pixels(preview_png(np.full((4, 6, 3), value))), np.full((256, 384, 3), encoded))
     assert pixels(preview_png(np.full((4, 6), 3.0))).shape == (256, 384)
     assert not pixels(preview_png(np.zeros((4, 6, 3)))).any()
-
-
-def test_a_large_picture_is_shown_small() -> None:
-    shown = pixels(preview_png(np.ones((2 * SIDE + 1, 3 * LEAST_SHOWN))))
-    assert max(shown.shape) <= SIDE
 
 
 def test_a_small_picture_is_shown_by_whole_multiples() -> None:
@@ -67,18 +62,6 @@ def test_a_transport_shows_its_own_lights() -> None:
 
     made = render(load("flat_field"), (8, 8), wavelength_nm=np.arange(405.0, 780.0, 50.0), spp=2)
     assert np.array_equal(pixels(made._repr_png_()), pixels(made.relight()._repr_png_()))
-
-
-def test_a_plan_shows_its_ledger() -> None:
-    for empty in [True, False]:
-        from studies.budget.ledger import Ledger, Plan, Term
-        from studies.study.study import Condition, SceneChoice
-
-        condition = Condition(SceneChoice("still_life"), "own", "<25cd/m2", "auto", "low_noise")
-        row = Ledger(condition, "rgbw", 0.01, 10.0, (Term("diffraction", 5.0, 0.25, modelled=True),), 1.0, 0.01)
-        page = Plan({}, {}, {}, () if empty else (row,))._repr_html_()
-        assert ("(25%)" in page) is not empty, empty
-        assert ("&lt;25cd/m2" in page) is not empty, empty
 
 
 def test_nothing_is_drawn_before_it_is_shown(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -147,11 +147,6 @@ def test_the_floating_diffusion_clips_the_sum_in_charge_and_nothing_else():
     assert digital.electrons.mean() == pytest.approx(28_000.0, rel=1e-3)
 
 
-@BOTH
-def test_all_full_reads_white(binning):
-    np.testing.assert_array_equal(even_frame(camera(binning), 1e7).dn, 4 * 16_383 if binning == "digital" else 16_383)
-
-
 # Noise
 
 
@@ -182,26 +177,6 @@ def test_each_term_alone_in_closed_form(pixel, charge, digital):
         assert sum(x**2 for x in noise_sources(400.0, sensor, 0.1).values()) == pytest.approx(found[0, 0], rel=1e-12)
 
 
-@pytest.mark.sample(1)
-@BOTH
-@pytest.mark.parametrize("exact", [True, False])
-@pytest.mark.parametrize("photo_e", [0.0, 5.0, 100.0, 5000.0])
-def test_chips_drawn_at_random_have_the_stated_snr(binning, exact, photo_e):
-    if not exact and backend() == "numpy":
-        pytest.skip("Dr.Jit has no backend here")
-    sensor = camera(binning, black_level_dn=None, **EVERY_TERM)
-    raw = even_frame(sensor, photo_e, (128, 8192), exact=exact)
-    stated = noise_variance(np.full((1, 1), 4 * photo_e), sensor, 0.1)[0, 0]
-    # Standard error of the mean over columns of (value - mean)^2, as of `test_readout_variance`; raw columns share no
-    # amplifier with their neighbours. Within 4 of it, 16 cases: false-alarm rate 1e-3.
-    squares = ((raw.electrons - raw.electrons.mean()) ** 2).mean(axis=0)
-    error = squares.std() / np.sqrt(squares.size)
-    assert error < 0.03 * stated
-    assert abs(squares.mean() - stated) < 4 * error
-    mean_e = 4 * (photo_e + 20.0 + 0.05 * 50.0)
-    assert abs(raw.electrons.mean() - mean_e) < 4 * raw.electrons.mean(axis=0).std() / np.sqrt(squares.size)
-
-
 @loop(("binning", "bits"), [("charge", 12), ("digital", 10)])  # roundings of 6 % and 19 % of it
 def test_the_raw_image_states_its_own_dark_noise(binning, bits):
     """Read noise, DSNU and all roundings: what weighs frames, finds saturation and goes into a negative's profile."""
@@ -215,12 +190,6 @@ def test_light_for_an_snr_is_of_the_sum(binning):
     sensor = camera(binning, **{name: EVERY_TERM[name] for name in ("read_noise_e", "dsnu_e", "prnu")})
     electrons = electrons_at_snr(10.0, sensor, 0.1)
     assert electrons / np.sqrt(noise_variance(np.full((1, 1), electrons), sensor, 0.1)[0, 0]) == pytest.approx(10.0)
-
-
-@BOTH
-def test_photodiodes_by_themselves_are_what_was_binned(binning):
-    one = camera("", **EVERY_TERM)
-    assert binned(one, binning).photosites == one
 
 
 @BOTH

@@ -112,7 +112,6 @@ def test_a_few_photons_below_zero_become_zero_and_are_told_in_every_form(
     assert read.values == pytest.approx(np.maximum(photons, 0) * JOULE, rel=6e-7)
 
 
-@pytest.mark.thorough
 @loop("form", ["struct", "photons"])
 def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form: str, tmp_path: Path) -> None:
     photons = PHOTONS.copy()

@@ -533,6 +533,38 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
     assert str(tmp_path / "mine") in loaded_libraries()
 
 
+def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:
+    """Mesh, bitmap, spectrum, include: each in a folder beside the scene; the last <path> goes first."""
+    for name, height in (("models", 1), ("later", 2), ("a", 9)):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "quad.obj").write_text(QUAD.replace(" 0\n", f" {height}\n"))
+    Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "models" / "p.png")
+    (tmp_path / "later" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    write(tmp_path / "models", SUN, name="lights/sun.xml")
+    cloth = '<texture name="reflectance" type="bitmap"><string name="filename" value="p.png"/></texture>'
+    parts = (
+        '<default name="place" value="../later"/><path value="../models"/><path value="$place"/>',
+        '<include filename="lights/sun.xml"/>',
+        CAMERA,
+        '<bsdf type="diffuse" id="grey"><spectrum name="reflectance" filename="r.spd"/></bsdf>',
+        f'<bsdf type="diffuse" id="red">{cloth}</bsdf>',
+        '<shape type="obj" id="quad"><string name="filename" value="quad.obj"/><ref id="red"/></shape>',
+    )
+    scene = load_scene_file(write(tmp_path / "a", *parts), trust=True).scene
+    assert Path(scene.geometry["quad"]["filename"]).resolve() == tmp_path.resolve() / "later" / "quad.obj"
+    assert Path(scene.geometry["red"]["reflectance"]["filename"]).resolve() == tmp_path.resolve() / "models" / "p.png"
+    assert scene.geometry["grey"]["reflectance"]["values"] == "0.25,0.75"
+    mi = mitsuba_module()
+    ours, stock = mi.load_dict(scene.description), mi.load_file(str(tmp_path / "a" / "scene.xml"))
+    assert ours.shapes()[0].bbox().min.z == stock.shapes()[0].bbox().min.z == 2
+    refusal(
+        load_scene_file,
+        write(tmp_path / "a", '<path value="../none"/>', CAMERA, SUN),
+        trust=True,
+        words=("<path> folder '../none' is missing",),
+    )
+
+
 def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Mitsuba looks for plugins/NAME.so on its search path, in which the working directory comes first.
     monkeypatch.chdir(tmp_path)

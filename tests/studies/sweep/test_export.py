@@ -5,12 +5,10 @@ from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 
-import pytest
 from sweep_sample import ROW
 
-from rodcone.errors import InputError
 from studies.sweep.database import COLUMNS, add, open_results, want
-from studies.sweep.export import read_rows, to_csv, write_csv
+from studies.sweep.export import read_rows, to_csv
 
 
 def test_a_text_that_a_spreadsheet_would_run_is_quoted() -> None:
@@ -35,13 +33,3 @@ def test_rows_come_from_the_ledger_in_the_studys_order_or_all(tmp_path: Path) ->
         want(base, ["c", "a"])
     assert [row.key for row in read_rows(tmp_path)] == ["c", "a"]
     assert read_rows(tmp_path, everything=True) == [replace(ROW, key=key) for key in "abc"]
-
-
-def test_wrong_places_are_told_and_nothing_is_left(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"holds no ledger.sqlite"):
-        read_rows(tmp_path)
-    with pytest.raises(InputError, match=r"'.txt' is unknown; allowed: .csv"):
-        write_csv([ROW], tmp_path / "t.txt")
-    with pytest.raises(OSError, match="absent"):
-        write_csv([ROW], tmp_path / "absent" / "t.csv")
-    assert list(tmp_path.iterdir()) == []
