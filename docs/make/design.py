@@ -48,9 +48,6 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
     **{rows: {} for rows in ("RBWB/GRGR/RWBB/BGRG", "WRWG/GWBW", "GRGB/GBGR")},
     "rccb": {"C": "W"},
     "ryyb": {"Y": "G"},
-    "cyym": {"C": "R", "Y": "G", "M": "B"},
-    "cmyw": {"C": "R", "Y": "G", "M": "B"},
-    "cygm": {"C": "R", "Y": "G", "M": "B", "G": "W"},
 }
 FIGURES = ("psnr_db", "luminance_db", "colour")
 
@@ -75,49 +72,49 @@ def prior_of(mosaic: str) -> Prior:
     """`ple`'s prior for a mosaic's curves."""
     if set(MOSAICS[mosaic]) <= {"C"}:
         return own_prior()
-    path = FOLDER / f"{mosaic.replace('cyym', 'cmyw')}.npz"
+    path = FOLDER / f"{mosaic}.npz"
     if not path.exists():
         sensor = in_places(camera(SENSORS[0], mosaic), MOSAICS[mosaic])
         save_prior(train_prior(replace(sensor, cfa=("RG", "BW")), f"{mosaic}.toml", 1), path)
     return load_prior(path)
 
 
-def scene_rows(name: str, transport: Transport) -> Iterator[dict[str, str | float]]:
-    """Errors of each sensor, level and mosaic in one scene."""
+def scene_rows(name: str, transport: Transport, mosaic: str) -> Iterator[dict[str, str | float]]:
+    """Errors of each sensor and level of a mosaic in one scene."""
     for sensor_name in SENSORS:
+        sensor = in_places(camera(sensor_name, mosaic), MOSAICS[mosaic])
+        processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior_of(mosaic)))
         for level, luminance_cd_m2 in LEVELS.items():
             radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
             light = light_in_bands(illuminant("D65"), radiance.wavelength_nm, radiance.widths_nm)
             white_cd_m2 = shown_white_cd_m2(transport, luminance_cd_m2)
             truth = encode_srgb(true_srgb(radiance, light, white_cd_m2))
-            for number, mosaic in enumerate(MOSAICS):
-                sensor = in_places(camera(sensor_name, mosaic), MOSAICS[mosaic])
-                rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, number])
-                raw = capture(radiance, sensor, rng=rng)
-                processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior_of(mosaic)))
-                fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
-                linear, _ = develop_to_scale(raw, processor, fit, sensor, light, white_cd_m2, balance=neutral)
-                shown = encode_srgb(linear)
-                off = rgb2lab(shown) - rgb2lab(truth)
-                yield {
-                    "scene": name, "sensor": sensor_name, "level": level, "mosaic": mosaic,
-                    "psnr_db": -10 * log10(np.mean((shown - truth) ** 2)),
-                    "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
-                    "colour": sqrt(np.mean(off[..., 1:] ** 2) * 2),
-                }  # fmt: skip
+            rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic)])
+            raw = capture(radiance, sensor, rng=rng)
+            fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
+            linear, _ = develop_to_scale(raw, processor, fit, sensor, light, white_cd_m2, balance=neutral)
+            shown = encode_srgb(linear)
+            off = rgb2lab(shown) - rgb2lab(truth)
+            yield {
+                "scene": name, "sensor": sensor_name, "level": level, "mosaic": mosaic,
+                "psnr_db": -10 * log10(np.mean((shown - truth) ** 2)),
+                "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
+                "colour": sqrt(np.mean(off[..., 1:] ** 2) * 2),
+            }  # fmt: skip
 
 
 def simulated(commit: str) -> list[dict[str, str | float]]:
     """Rows of all scenes drawn from a commit's hash; those of finished scenes are read."""
     rows = []
-    for number in range(SCENES):
-        name = f"generated-{int(commit, 16) + number:x}"
-        path = FOLDER / f"{name}.json"
-        if not path.exists():
-            transport = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
-            path.write_text(json.dumps(list(scene_rows(name, transport))))
-        rows += json.loads(path.read_text())
-        print(name, file=sys.stderr)
+    for mosaic in MOSAICS:
+        for number in range(SCENES):
+            name = f"generated-{int(commit, 16) + number:x}"
+            path = FOLDER / f"{name}-{mosaic.replace('/', '_')}.json"
+            if not path.exists():
+                transport = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
+                path.write_text(json.dumps(list(scene_rows(name, transport, mosaic))))
+            rows += json.loads(path.read_text())
+        print(mosaic, file=sys.stderr)
     return rows
 
 

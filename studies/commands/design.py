@@ -38,6 +38,7 @@ def design(
     weights: Annotated[list[float] | None, Parameter(negative_iterable=())] = None,
     never_worse_than: str = "bayer",
     behind: float = 0.1,
+    behind_in_luminance: float = 0.5,
     light: str = "D65",
     prior: str = "drawn",
     steps: int = 500,
@@ -68,7 +69,9 @@ def design(
     never_worse_than
         Mosaic that gains are over, by name or by rows.
     behind
-        Decibels by which the design may fall behind it at any level, in PSNR, luminance, a* and b*.
+        Decibels by which the design may fall behind it at any level, in PSNR, and in a* and b*.
+    behind_in_luminance
+        The same in luminance; half a decibel is the least that a person sees.
     light
         Illuminant; the camera knows it.
     prior
@@ -85,7 +88,8 @@ def design(
         raise InputError(
             f"weights: {weights} for {len(levels)} levels; allowed: a number for each, 0 or more; see over"
         )
-    require_range("behind", behind, 0.0, 100.0, "give decibels, such as 0.1")
+    for name, bound in (("behind", behind), ("behind_in_luminance", behind_in_luminance)):
+        require_range(name, bound, 0.0, 100.0, "give decibels, such as 0.1")
     base = preset(sensor)
     reference = tile_of(never_worse_than.split("/") if "/" in never_worse_than else never_worse_than)
     for letter in letters + "".join(reference):
@@ -94,7 +98,7 @@ def design(
     share = np.array(weights or [1.0] * len(levels))
     goal = Goal(
         sensor=base, levels_cd_m2=np.array(list(levels.values())), weights=share / share.sum(), reference=reference,
-        behind_db=behind, letters=letters, light=light, prior=prior,
+        behind_db=np.array([behind, behind_in_luminance, behind]), letters=letters, light=light, prior=prior,
     )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.

@@ -85,8 +85,9 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         gains_db -= reference_db
         weights = np.zeros_like(gains_db)
         weights[0] = goal.weights
-        if gains_db.min() < -goal.behind_db:
-            weights[np.unravel_index(gains_db.argmin(), gains_db.shape)] += BEHIND
+        over_db = gains_db + goal.behind_db[:, None]
+        if over_db.min() < 0:
+            weights[np.unravel_index(over_db.argmin(), over_db.shape)] += BEHIND
         by_sample = np.tensordot(weights, by_sample, 2)
         by_pixel = np.einsum("sp,spc->pc", spread, by_sample)
         by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])

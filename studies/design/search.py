@@ -45,7 +45,7 @@ class Goal:
         Of the levels in the mean gain; sum 1.
     reference : tuple of str
         Tile that gains are over.
-    behind_db : float
+    behind_db : (3,) float64
         How far a design may fall behind the reference at any level in PSNR, in luminance, and in a* and b*.
     letters : str
         Channels to choose from.
@@ -57,7 +57,7 @@ class Goal:
     levels_cd_m2: Floats
     weights: Floats
     reference: Tile
-    behind_db: float = 0.1
+    behind_db: Floats
     letters: str = "RGBW"
     light: str = "D65"
     exposure: str = AUTO_INFORMATION
@@ -65,7 +65,7 @@ class Goal:
 
     def score(self, gains_db: Floats) -> float:
         """Mean gain in PSNR, less what lies behind the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
-        return float(self.weights @ gains_db[0] + BEHIND * min(0.0, gains_db.min() + self.behind_db))
+        return float(self.weights @ gains_db[0] + BEHIND * min(0.0, (gains_db + self.behind_db[:, None]).min()))
 
 
 @dataclass(frozen=True, eq=False)

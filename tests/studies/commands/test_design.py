@@ -16,7 +16,7 @@ FEW = ["design", "low_noise", "--tile", "2x2", "--letters", "RGB", "--over", "cl
 
 @pytest.mark.thorough
 def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) -> None:
-    code, out, _ = call([*FEW, "-o", tmp_path / "found", "--behind", "9"])
+    code, out, _ = call([*FEW, "-o", tmp_path / "found", "--behind", "9", "--behind-in-luminance", "9"])
     assert code == 0
     tile = tuple(out.splitlines()[0].split("/"))
     camera = preset(tmp_path / "found" / "sensor.toml")
@@ -34,7 +34,7 @@ def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) 
 
 @pytest.mark.slow
 def test_filters_are_written_as_curves_that_read_back(tmp_path: Path) -> None:
-    assert call([*FEW, "--filters", "-o", tmp_path / "found", "--behind", "9"])[0] == 0
+    assert call([*FEW, "--filters", "-o", tmp_path / "found", "--behind", "9", "--behind-in-luminance", "9"])[0] == 0
     camera = preset(tmp_path / "found" / "sensor.toml")
     given = preset("low_noise").responses.curves["G"]
     green = camera.responses.curves["G"]

@@ -19,7 +19,7 @@ BAYER: Tile = ("RG", "GB")
 
 def goal(**changes: object) -> Goal:
     """Two levels of equal weight, Bayer as the reference."""
-    return replace(Goal(preset("low_noise"), LEVELS, np.array([0.5, 0.5]), BAYER), **changes)
+    return replace(Goal(preset("low_noise"), LEVELS, np.array([0.5, 0.5]), BAYER, np.full(3, 0.1)), **changes)
 
 
 @pytest.mark.parametrize("crosstalk", [0.0, pytest.param(0.03, marks=pytest.mark.thorough)])
@@ -71,7 +71,7 @@ def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
 
 @pytest.mark.thorough
 def test_filters_get_better_and_stay_filters() -> None:
-    wanted = goal(levels_cd_m2=LEVELS[1:], weights=np.ones(1), behind_db=100.0)
+    wanted = goal(levels_cd_m2=LEVELS[1:], weights=np.ones(1), behind_db=np.full(3, 100.0))
     before = tile_db(search_for(wanted), BAYER)
     camera = best_filters(wanted, BAYER, 1, lambda *_: None)
     after = tile_db(search_for(replace(wanted, sensor=camera, letters="RGB")), BAYER)
