@@ -186,9 +186,7 @@ def expect(
             if isinstance(exposure, str)
             else exposure
         )
-        frame_e = np.maximum(drawn, 0.0) * (white_cd_m2 * time_s)
-        camera = as_metered(sensor, behind_filters(frame_e, sensor)) if sensor.chip.channels else sensor
-        noise = noise_of(camera, time_s)
+        noise = noise_at(sensor, time_s, np.maximum(drawn, 0.0) * (white_cd_m2 * time_s))
         scales = spectral.reflectances * white_cd_m2 * time_s
         errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
         linear_error = _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
@@ -238,6 +236,12 @@ def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise,
     ones = np.ones(samples.means.shape[1])
     errors = [expected_error(weights, samples, s * ones, noise, form) for s, form in zip(scales, forms, strict=True)]
     return [float(error) for error in np.mean(errors, axis=0)]
+
+
+def noise_at(sensor: SensorConfig, exposure_s: float, frame_e: Floats) -> Noise:
+    """Noise of a sample in a frame of given electrons behind every filter, by which channels may be read apart."""
+    camera = as_metered(sensor, behind_filters(frame_e, sensor)) if sensor.chip.channels else sensor
+    return noise_of(camera, exposure_s)
 
 
 def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize
 
+from isp.design.expected_error import Noise
 from isp.design.slope import Case, error_slopes
 from isp.design.spectral_prior import PATCH
 from render.spectrum import Floats, Spectrum
@@ -12,8 +13,8 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig
 from sensor.curves import Responses
-from studies.design.expect import middle_pixels, noise_of, spread_of, unit_response_e, view_of
-from studies.design.search import BEHIND, Goal, Progress, lights, rows_of, search_for, tile_db
+from studies.design.expect import middle_pixels, spread_of, unit_response_e, view_of
+from studies.design.search import BEHIND, Goal, Progress, moments, rows_of, search_for, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
 
@@ -65,23 +66,21 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         responses = {name: Spectrum(nm, values) for name, values in zip(names, passed, strict=True)}
         return replace(goal.sensor, cfa=tile, responses=Responses(responses, goal.sensor.responses.relative))
 
-    def cost(logits: Floats, moments: list[tuple[float, float]]) -> tuple[float, Floats]:
+    def cost(logits: Floats, at: list[tuple[float, Noise]]) -> tuple[float, Floats]:
         """Score with the other sign, and its slope."""
-        shares, sensor = transmittances(logits), sensor_of(logits)
+        shares = transmittances(logits)
         sampling = spread[:, :, None] * (shares @ clear_e)[places]
         gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
-        for index, (light, time_s) in enumerate(moments):
-            if same := [before for before in range(index) if moments[before][0] == light]:
+        for index, (light, noise) in enumerate(at):
+            if same := [before for before in range(index) if at[before][0] == light]:
                 gains_db[:, index], by_sample[:, index] = gains_db[:, same[0]], by_sample[:, same[0]]
                 continue
-            cases = [Case(mean * light, noise_of(sensor, time_s), row) for mean, row in scenes]
+            cases = [Case(mean * light, noise, row) for mean, row in scenes]
             errors, slopes = error_slopes(prior.patches, sampling, middle, cases)
             for metric in range(3):  # cases of sRGB, luminance and colour take turns
                 error, slope = errors[metric::3].mean(), slopes[metric::3].mean(axis=0)
-                gains_db[metric, index], by_sample[metric, index] = (
-                    -10 * np.log10(error),
-                    -10 / np.log(10) * slope / error,
-                )
+                gains_db[metric, index] = -10 * np.log10(error)
+                by_sample[metric, index] = -10 / np.log(10) * slope / error
         gains_db -= reference_db
         weights = np.zeros_like(gains_db)
         weights[0] = goal.weights
@@ -99,12 +98,10 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     logits = np.linalg.lstsq(bumps, np.log(start / (1 - start)).T, rcond=1e-6)[0].T.ravel()
     best = (np.inf, logits)
     for number in range(rounds + 1):
-        sensor = sensor_of(logits)
-        moments = [
-            (round(light, 9), time_s) for light, time_s in lights(goal, prior, sensor, transmittances(logits) @ clear_e)
-        ]
-        best = min(best, (cost(logits, moments)[0], logits), key=lambda pair: pair[0])
+        at = [(round(light, 9), noise) for light, noise in
+              moments(goal, sensor_of(logits), transmittances(logits) @ clear_e)]  # fmt: skip
+        best = min(best, (cost(logits, at)[0], logits), key=lambda pair: pair[0])
         progress(f"filters {-best[0]:+.2f} dB", number / (rounds + 1))
         if number < rounds:
-            logits = minimize(cost, logits, (moments,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
+            logits = minimize(cost, logits, (at,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
     return sensor_of(best[1])

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 
 from isp.design.choice import Projected, every_channel, picked, projected
-from isp.design.expected_error import expected_error
+from isp.design.expected_error import Noise, expected_error
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.spectrum import Floats
 from rodcone.errors import unknown
@@ -19,7 +19,7 @@ from studies.design.expect import (
     drawn_pixels,
     metric_rows,
     middle_pixels,
-    noise_of,
+    noise_at,
     responses_e,
     spread_of,
     view_of,
@@ -117,15 +117,18 @@ def rows_of(prior: SpectralPrior, seen: LitPrior, reflectance: float) -> tuple[F
     return srgb, luminance, colour
 
 
-def lights(goal: Goal, prior: SpectralPrior, sensor: SensorConfig, responses: Floats) -> list[tuple[float, float]]:
-    """Luminance times exposure of reflectance 1 [cd s m^-2], and exposure [s], at each level by the goal's rule.
+def moments(goal: Goal, sensor: SensorConfig, responses: Floats) -> list[tuple[float, Noise]]:
+    """Luminance times exposure of reflectance 1 [cd s m^-2], and the noise, at each level by the goal's rule.
 
     `responses` are those of the sensor's channels, shape (channel, coefficient).
     """
     per_second_e = np.maximum(drawn_pixels(goal.prior) @ responses.T, 0.0)
-    whites = goal.levels_cd_m2 / prior.reflectances.mean()
-    times_s = [exposure_of_electrons_s(goal.exposure, per_second_e * white, sensor) for white in whites]
-    return [(float(white * time_s), time_s) for white, time_s in zip(whites, times_s, strict=True)]
+    result = []
+    for white_cd_m2 in goal.levels_cd_m2 / load_prior(goal.prior).reflectances.mean():
+        time_s = exposure_of_electrons_s(goal.exposure, per_second_e * white_cd_m2, sensor)
+        light = float(white_cd_m2 * time_s)
+        result.append((light, noise_at(sensor, time_s, per_second_e * light)))
+    return result
 
 
 def tile_db(search: Search, tile: Tile) -> Floats:
@@ -141,8 +144,7 @@ def tile_db(search: Search, tile: Tile) -> Floats:
     samples = [picked(one.samples, np.array(places), spread) for one in search.every]
     errors: dict[str, Floats] = {}
     result = []
-    for light, time_s in lights(goal, prior, sensor, responses):
-        noise = noise_of(sensor, time_s)
+    for light, noise in moments(goal, sensor, responses):
         key = f"{light:.9g} {noise}"  # at full exposure more light changes nothing
         if key not in errors:
             by_reflectance = [
