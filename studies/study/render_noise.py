@@ -161,7 +161,8 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
         what = f"the render's noise has {times} times the sensor's variance: it shows in pictures and reference"
         factor = share
     elif speckles is not None and speckles.size:
-        what = f"{speckles.size} pixels are speckles: the render's noise there is over {SPECKLE:g} times the sensor's"
+        spots = f"{speckles.size} pixels are speckles" if speckles.size > 1 else "1 pixel is a speckle"
+        what = f"{spots}: the render's noise there is over {SPECKLE:g} times the sensor's"
         factor = float(speckles.max()) / SPECKLE  # a sample's part of a pixel falls as their number grows
     else:
         return ""
