@@ -62,7 +62,8 @@ def llvm(target: str, *needs: str) -> Configuration:
 
 CONFIGURATIONS = {
     "haswell": blas("Haswell", "AVX2", "FMA3"),
-    "zen": blas("(Zen|Haswell)", "AVX2", "FMA3"),
+    # OpenBLAS's wheels give a Zen Haswell's kernels
+    "zen": Configuration({"OPENBLAS_CORETYPE": "Zen"}, r"BLAS: (Zen|Haswell) \d+\n", {"AVX2", "FMA3"}),
     "skylakex": blas("SkylakeX", "AVX512_SKX"),
     "nehalem": blas("Nehalem", "SSE42"),
     "numpy-baseline": Configuration({"NPY_DISABLE_CPU_FEATURES": " ".join(ABOVE_BASELINE)}, r"NumPy:\n"),
