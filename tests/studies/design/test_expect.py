@@ -14,7 +14,7 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
 from sensor.presets import low_noise, preset
-from studies.design.expect import expect, metric_forms, middle_pixels, responses_e, sampling_of, view_of
+from studies.design.expect import expect, metric_rows, middle_pixels, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate
 
@@ -44,7 +44,6 @@ def test_forms_are_the_squares_of_the_slopes_of_srgb_and_lab() -> None:
 
     prior, seen = load_prior("drawn"), view_of("drawn", "D65")
     component, reflectance, step = int(np.argmax(prior.patches.weights)), 0.3, 1e-5
-    forms = metric_forms(prior, seen, reflectance)[:, component, 0]
     mean = prior.patches.means[component, 18]  # the first of the middle pixels: row 2, column 2
     direction = np.random.default_rng(1).standard_normal(len(mean))
     white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
@@ -55,7 +54,8 @@ def test_forms_are_the_squares_of_the_slopes_of_srgb_and_lab() -> None:
         return np.concatenate([srgb, colour.XYZ_to_Lab(xyz, white)])
 
     slopes = (srgb_and_lab(mean + step * direction) - srgb_and_lab(mean - step * direction)) / (2 * step)
-    squares = np.einsum("c,mcd,d->m", direction, forms, direction)
+    rows = metric_rows(prior, seen, reflectance)
+    squares = np.array([np.sum((row[component, 0] @ direction) ** 2) for row in rows])
     assert_allclose(squares[0], (slopes[:3] ** 2).mean(), rtol=2e-3)  # published matrices have four digits
     assert_allclose(squares[2:], [slopes[3] ** 2, (slopes[4:] ** 2).sum()], rtol=2e-3)
 
