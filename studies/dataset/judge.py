@@ -16,7 +16,7 @@ from rodcone.errors import InputError, one_line
 from rodcone.optional import quietly_imported
 from sensor.presets import names, preset
 from studies.dataset.make_set import Runner
-from studies.dataset.shards import Lines, read_manifest, read_shard, shards_of, stands
+from studies.dataset.shards import Lines, LinesMade, read_manifest, read_shard, shards_of, stands
 from studies.design.expect import expect
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.confidence import half_width
@@ -58,14 +58,6 @@ class Judging:
     def kind(self) -> tuple[object, ...]:
         """Each shard is of a kind of its own."""
         return (self.key,)
-
-
-@dataclass(frozen=True)
-class Judged:
-    """Figures of a task's pictures."""
-
-    key: str
-    rows: list[Row]
 
 
 @dataclass(frozen=True)
@@ -125,7 +117,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
         here = {line["key"]: found[line["key"]] for line in made.lines[1:] if line["key"] in found}
         name = made.lines[0]["name"]
         tasks += [Judging(name, (out / SET / name).resolve(), here)] if here else []
-    rows = [row for judged in runner(tasks, make=judge_shard) for row in judged.rows]
+    rows = [row for judged in runner(tasks, make=judge_shard) for row in judged.lines]
     _check_encoding(rows)
     result = scores(rows, developer)
     at = {(score.camera, score.level) for score in result}
@@ -161,7 +153,7 @@ def expected(samples: Lines) -> list[Score]:
     return result
 
 
-def judge_shard(task: Judging, most_threads: int | None = None) -> Judged:
+def judge_shard(task: Judging, most_threads: int | None = None) -> LinesMade:
     """Measure the pictures of a shard's samples."""
     if most_threads is not None:
         limit_threads(most_threads)
@@ -175,7 +167,7 @@ def judge_shard(task: Judging, most_threads: int | None = None) -> Judged:
             mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}
             place = {name: facts[name] for name in ("scene", "luminance_cd_m2", *_PLACE)}
             rows.append({**place, **figures, "mistakes": mistakes})
-    return Judged(task.key, rows)
+    return LinesMade(task.key, rows)
 
 
 def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -220,7 +212,8 @@ def scores(rows: Sequence[Row], developer: str) -> list[Score]:
         figures = {key: np.array([np.mean([row[key] for row in x]) for x in by_scene.values()]) for key in keys}
         luminance = float(figures.pop("luminance_cd_m2").mean())
         means = {key: float(values.mean()) for key, values in figures.items()}
-        halves = {key: float(half_width(values)) for key, values in figures.items()}
+        with np.errstate(invalid="ignore"):  # the truth itself has an infinite PSNR
+            halves = {key: float(half_width(values)) for key, values in figures.items()}
         result.append(Score(camera, level, developer, luminance, len(by_scene), means, halves))
     return result
 

@@ -5,11 +5,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from render.radiance_files.radiance_source import extent_of
 from rodcone.digests import digest
-from rodcone.errors import InputError, require_absent, require_whole, unknown
+from rodcone.errors import InputError, require_absent, require_fields, require_whole, unknown
 from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.presets import preset
@@ -18,7 +18,7 @@ from studies.dataset.sample import PLANES
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, mosaics
 
-MOST_GENERATED, MOST_SHARDS, LEAST_CROP = 100_000, 100_000, 16
+MOST_GENERATED = 100_000
 _BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # a pixel; others by channel, group
 _SAMPLE_BYTES = 20_000  # heads of its files, and its facts
 GB = 1e9
@@ -40,16 +40,14 @@ class SetOrder:
     """
 
     planes: tuple[str, ...] = tuple(PLANES)
-    shards: int = 64
-    crop: int | None = None
+    shards: Annotated[int, (1, 100_000, "give a number of files")] = 64
+    crop: Annotated[int | None, (16, 8192, "give the side of a part in pixels")] = None
 
     def __post_init__(self) -> None:
         for name in self.planes:
             if name not in PLANES:
                 raise unknown("truth", name, PLANES)
-        require_whole("shards", self.shards, 1, MOST_SHARDS, "give a number of files")
-        if self.crop is not None:
-            require_whole("crop", self.crop, LEAST_CROP, 8192, "give the side of a part in pixels")
+        require_fields(self)
 
 
 def generated_scenes(count: int, seed: int) -> tuple[SceneChoice, ...]:

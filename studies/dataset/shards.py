@@ -47,14 +47,14 @@ class Shard:
 
 
 @dataclass(frozen=True)
-class ShardMade:
-    """A shard that stands: its key, and its lines in the manifest, the first its own and one a sample."""
+class LinesMade:
+    """What a worker gives: a task's key, and lines; of a shard those in the manifest, its own and one a sample."""
 
     key: str
     lines: Lines
 
 
-def make_shard(shard: Shard, most_threads: int | None = None) -> ShardMade:
+def make_shard(shard: Shard, most_threads: int | None = None) -> LinesMade:
     """Write a shard, whole or not at all; the same samples give the same bytes, whoever writes them and when.
 
     Raises
@@ -79,7 +79,7 @@ def make_shard(shard: Shard, most_threads: int | None = None) -> ShardMade:
         size, made = place.stat().st_size, digest_file(place)
     first = shard.samples[0]
     head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.samples)}
-    return ShardMade(shard.key, [head | {"bytes": size, "digest": made, "made_from": shard.key}, *lines])
+    return LinesMade(shard.key, [head | {"bytes": size, "digest": made, "made_from": shard.key}, *lines])
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
@@ -88,7 +88,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
     tar.addfile(member, BytesIO(content))
 
 
-def write_manifest(folder: Path, head: Lines, shards: Sequence[ShardMade]) -> None:
+def write_manifest(folder: Path, head: Lines, shards: Sequence[LinesMade]) -> None:
     """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
     lines = head + [line for made in sorted(shards, key=lambda made: made.lines[0]["name"]) for line in made.lines]
     with replacing(folder / MANIFEST) as (place,):
@@ -115,18 +115,18 @@ def read_manifest(folder: Path) -> Lines:
     return lines
 
 
-def shards_of(lines: Lines) -> list[ShardMade]:
+def shards_of(lines: Lines) -> list[LinesMade]:
     """Shards that a manifest lists, each with its samples' lines."""
-    made: list[ShardMade] = []
+    made: list[LinesMade] = []
     for line in lines:
         if line["kind"] == "shard":
-            made.append(ShardMade(line["made_from"], [line]))
+            made.append(LinesMade(line["made_from"], [line]))
         elif line["kind"] == "sample":
             made[-1].lines.append(line)
     return made
 
 
-def stands(folder: Path, made: ShardMade) -> bool:
+def stands(folder: Path, made: LinesMade) -> bool:
     """Whether a shard's file is what was written."""
     head = made.lines[0]
     path = inside(folder, head["name"])

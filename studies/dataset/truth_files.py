@@ -72,9 +72,9 @@ def _frame_name(cell: Cell) -> str:
     return f"{cell.electrons.stem} {'/'.join(cell.sensor.cfa)}"
 
 
-def code_digests() -> dict[str, str]:
-    """Digest of each module of this package: with other code a set is made anew."""
-    return {path.name: digest_file(path) for path in Path(__file__).parent.glob("*.py")}
+def code_digests() -> list[str]:
+    """Digests of the modules of this package that decide a sample's bytes: with other code a set is made anew."""
+    return [digest_file(Path(__file__).with_name(f"{name}.py")) for name in ("sample", "shards", "truth_files")]
 
 
 def _made(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: Transport) -> dict[str, Any]:

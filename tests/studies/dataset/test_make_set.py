@@ -23,7 +23,7 @@ from studies.dataset import order as order_module
 from studies.dataset.card import CARD
 from studies.dataset.make_set import make_set, split_of
 from studies.dataset.order import SetOrder, generated_scenes
-from studies.dataset.shards import MANIFEST, Shard, ShardMade, read_manifest, read_shard
+from studies.dataset.shards import MANIFEST, LinesMade, Shard, read_manifest, read_shard
 from studies.study.lit_scene import open_all
 from studies.sweep.cluster import on_cluster
 from studies.sweep.run_sweep import sweep
@@ -136,7 +136,7 @@ def test_the_same_bits_over_a_cluster(stored: Path, tmp_path: Path, monkeypatch:
 def test_a_set_goes_on_where_it_was_stopped_and_mends_a_shard_cut_in_half(stored: Path, tmp_path: Path) -> None:
     calls: list[str] = []
 
-    def stopped(shards: Sequence[Shard], make: Any, most: int = 1) -> Generator[ShardMade, None, None]:
+    def stopped(shards: Sequence[Shard], make: Any, most: int = 1) -> Generator[LinesMade, None, None]:
         for count, shard in enumerate(shards):
             if count == most:
                 raise KeyboardInterrupt

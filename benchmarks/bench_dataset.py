@@ -1,0 +1,58 @@
+"""How quickly `rodcone dataset` makes samples: crops of 128x128 with RGB truth from drawn scenes, render included.
+
+The command runs three times, on the clock and in processor time of all its processes: whole; then, with its shards
+taken away, from the scenes' files, by one worker and by as many as there are cores. Run it on a quiet machine.
+
+    python benchmarks/bench_dataset.py            (minutes)
+    python benchmarks/bench_dataset.py --scenes 1 --spp 32
+"""
+
+import argparse
+import os
+import tempfile
+from pathlib import Path
+
+from bench_sweep import seconds_of_command
+from environment import print_environment
+
+STUDY = """
+scenes = ["generated"]
+levels = ["0.036cd/m2", "0.1cd/m2", "0.5cd/m2", "2cd/m2", "6cd/m2", "25cd/m2", "100cd/m2"]
+sensors = ["low_noise", "table1_output"]
+processors = ["bayer", "interleaved"]
+seeds = {seeds}
+render = {{ size = 256, spp = {spp} }}
+"""
+
+
+def main() -> None:
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--scenes", type=int, default=4)
+    options.add_argument("--seeds", type=int, default=4)
+    options.add_argument("--spp", type=int, default=256)
+    given = options.parse_args()
+    print_environment()
+    cores = os.cpu_count() or 1
+    with tempfile.TemporaryDirectory() as folder:
+        study, out = Path(folder) / "study.toml", Path(folder) / "out"
+        study.write_text(STUDY.format(**vars(given)))
+        command = ("dataset", str(study), "-o", str(out), "--truth", "rgb", "--crop", "128", "--shards", "16")
+        command += ("--generated", str(given.scenes - 1))
+        seconds = {"all, render included": seconds_of_command(*command)}
+        shards = list((out / "set").glob("*.tar"))
+        size = sum(path.stat().st_size for path in shards) / 1e9
+        for workers in (1, cores):
+            for path in shards:
+                path.unlink()
+            again = seconds_of_command(*command, "--workers", str(workers))
+            seconds[f"shards alone, {workers} workers, start-up included"] = again
+    samples = given.scenes * 4 * 7 * 2 * 2 * given.seeds
+    print(f"{samples} crops of 128x128, {size:.2f} GB, {given.scenes} scenes of 256x256, {given.spp} samples a pixel")
+    for words, (wall, processor) in seconds.items():
+        print(f"{words:48} {wall:7.1f} s, processor {processor:7.1f} s")
+        rates = f"{samples / wall:.1f} a second, {size / wall * 3600:.2f} GB an hour"
+        print(f"{'':48} {rates}, {samples / processor:.1f} a second of a core")
+
+
+if __name__ == "__main__":
+    main()
