@@ -8,7 +8,7 @@ import pytest
 from command_line import call, check_refusals
 
 from sensor.presets import low_noise
-from sensor.readout import electrons_at_snr
+from studies.photograph.snr import electrons_at_snr
 
 
 def test_a_faster_lens_needs_less_light_as_the_camera_equation_has_it() -> None:
