@@ -60,12 +60,15 @@ def test_a_sweep_its_workers_a_mat_file_and_a_slow_processor_run_no_file_beside_
     assert (done.returncode, done.stdout, ran) == (0, "out/ledger.sqlite\n", ""), done.stderr
 
 
+STARTS = r"^ *(import|from) .*\b(subprocess|multiprocessing|ProcessPoolExecutor)\b|\bos\.(system|popen|spawn|exec|fork)"
+
+
 def test_every_module_that_starts_a_process_gives_it_a_safe_path() -> None:
     packages = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
     starting = {}
     for path in (path for name in packages for path in (ROOT / name).rglob("*.py")):
         text = path.read_text("utf-8")
-        if re.search(r"^ *(import|from) .*\b(subprocess|multiprocessing)\b", text, re.MULTILINE):
+        if re.search(STARTS, text, re.MULTILINE):
             starting[path.relative_to(ROOT).as_posix()] = "rodcone.child_process" in text
     assert len(starting) >= 3
     assert all(starting.values()), starting
