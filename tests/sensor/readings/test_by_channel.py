@@ -66,9 +66,9 @@ def own_variance(reading: ChannelReading, mean_e: float) -> float:
 
 @loop("reading", WAYS)
 def test_mean_and_variance_of_each_channel_are_the_closed_form(reading):
-    """24 chips, 24 576 samples of W: 1e-5 for each of 8 figures; what columns share is counted by columns."""
-    sensor = camera(reading)
-    samples = np.stack([shot(sensor, scene(), seed).electrons for seed in range(24)])
+    """8 chips, 8192 samples of W: 1e-5 for each of 16 figures; what columns share is counted by columns."""
+    sensor, chips = camera(reading), 8
+    samples = np.stack([shot(sensor, scene(), seed).electrons for seed in range(chips)])
     for channel, light_e, apart in (("W", WHITE_E, reading), ("G", GREEN_E, ChannelReading("G"))):
         at = mask(RGBW, channel, SHAPE)
         variance = own_variance(apart, light_e)
@@ -78,13 +78,26 @@ def test_mean_and_variance_of_each_channel_are_the_closed_form(reading):
             variance, rel=1e-9
         )
         values = samples[:, at]
-        columns = 24 * 32  # independent columns of one chip each
+        columns = chips * 32
         common = 0.01**2 * light_e**2 + (2 / apart.share) ** 2
         mean_error = np.sqrt(variance / values.size + common / columns)
         mean_e = light_e + 2000 * TIME_S / apart.light_share
         assert abs(values.mean() - mean_e) < stats.norm.isf(5e-6) * mean_error, channel
         spread = variance * np.sqrt(2 / values.size) + common * np.sqrt(2 / columns)
         assert abs(values.var() - variance) < stats.norm.isf(5e-6) * spread, channel
+
+
+@loop("reading", WAYS)
+def test_dark_frames_of_each_channel_have_its_read_noise_and_dsnu(reading):
+    """8 chips: 1e-5 for each of 8 figures."""
+    sensor = camera(reading, dark_current_e_per_s=0.0, column_gain_spread=0.0, column_offset_e=0.0)
+    dark = np.stack([shot(sensor, np.zeros(SHAPE), seed).electrons for seed in range(8)])
+    for channel, apart in (("W", reading), ("G", ChannelReading("G"))):
+        read_e, dsnu_e = apart.read_noise_e or 1.5, apart.dsnu_e or 1.0
+        alone = of_channel(sensor, channel)[0]
+        variance = (read_e**2 + dsnu_e**2 + alone.gain_e_per_dn**2 / 12) / apart.share**2
+        values = dark[:, mask(RGBW, channel, SHAPE)]
+        assert values.var() == pytest.approx(variance, rel=stats.norm.isf(5e-6) * np.sqrt(2 / values.size)), channel
 
 
 @loop("reading", WAYS)
@@ -175,7 +188,6 @@ def test_light_for_an_snr_is_that_of_the_site_over_its_share():
         assert electrons / np.sqrt(variance) == pytest.approx(10.0, rel=1e-6), reading
 
 
-@pytest.mark.thorough
 def test_emva_1288_gives_the_channel_s_numbers_back():
     sensor = camera(
         replace(WAYS[1], full_well_e=9000.0), column_gain_spread=0.0, dark_current_e_per_s=0.0, column_offset_e=0.0
