@@ -8,7 +8,7 @@ import numpy as np
 
 from render.cache import load_irradiance, save_irradiance
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, bands_apart, seed_of, traced
+from render.integrator.wavefront import Span, seed_of, traced
 from render.level import Irradiance
 from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups, mitsuba_module
 from render.runs import let_go
@@ -83,5 +83,5 @@ def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
         tracer = Tracer(mitsuba_module(), loaded, bands, seed)
         alike, span = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1)
         image = traced(tracer.meter, alike, span, HALF_SPP * METER_PIXELS**2, seed)
-        parts.append(bands_apart(image, len(loaded.groups), part.size)[0][0])
+        parts.append(image["scattered"].reshape(len(loaded.groups), part.size, *film.size))
     return np.concatenate(parts, axis=1)

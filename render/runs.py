@@ -18,7 +18,7 @@ from threadpoolctl import ThreadpoolController
 from render.error_estimates import Halves, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, bands_apart, seed_of, traced
+from render.integrator.wavefront import Span, seed_of, traced
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
@@ -201,23 +201,21 @@ def _drawn(
     loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, apart: bool = False
 ) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
-    halves = []
+    halves, groups = [], len(loaded.groups)
     for half in range(2):
         own_seed, parts = seed_of(seed, loaded.groups[0], half), []
         for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
             bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
             tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
-            image = traced(partial(tracer.camera, film.size), rates, span, threads, own_seed)
-            scattered, others = bands_apart(image, len(loaded.groups) * (1 + apart), part.size)
-            shares, own = np.split(others, [len(loaded.groups)], axis=1)
-            parts.append((scattered, shares, own[:, : part.size]))
-        # All parts of the bands see the same paths: what knows no band is taken from the first.
-        scattered = parts[0][0] if len(parts) == 1 else np.concatenate([part[0] for part in parts], axis=2)
-        scattered, indirect = np.split(scattered, [len(loaded.groups)], axis=1)
-        shares = parts[0][1]
-        seen = [shares[:, slot, None] for slot in range(len(loaded.groups))]
+            parts.append(traced(partial(tracer.camera, film.size), rates, span, threads, own_seed))
+        scattered, indirect = (
+            np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
+            for name, count in (("scattered", groups), ("indirect", groups * apart))
+        )
+        shares = parts[0]["shares"]  # of all parts of the bands: they see the same paths
+        seen = [shares[:, slot, None] for slot in range(groups)]
         if loaded.coloured:
-            seen[0] = np.concatenate([part[2] for part in parts], axis=1)
+            seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
         for slot, planes in enumerate(seen):
             scattered[:, slot] += planes
         halves.append((scattered, seen, shares.sum(axis=1), indirect))
@@ -228,6 +226,12 @@ def _drawn(
         coverage=(even[2], odd[2]),
         indirect=(even[3], odd[3]),
     )
+
+
+def _grouped(channels: Planes, groups: int, film: Film) -> Planes:
+    """Bands of several groups one after the other as (chunk, group, band, h, w)."""
+    chunks, count = channels.shape[:2]
+    return channels.reshape(chunks, groups, count // max(groups, 1), *film.size)
 
 
 def let_go(error: BaseException) -> None:

@@ -12,7 +12,7 @@ import numpy as np
 
 from render.error_estimates import Halves
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, bands_apart, seed_of, traced
+from render.integrator.wavefront import Span, seed_of, traced
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
 from rodcone.brief import brief
 from rodcone.optional import optional_library
@@ -73,9 +73,8 @@ def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Plane
         tracer = Tracer(mitsuba_module(), loaded, of_part, own_seed)
         span = Span(0, SURFACE_POINTS, 1)
         image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, own_seed)
-        values, others = bands_apart(image, 1, part.size)
-        albedo.append(values[0, 0])
-        normal.append(others[0])
+        albedo.append(image["albedo"][0])
+        normal.append(image["normal"][0])
     return np.concatenate(albedo), normal[0]
 
 

@@ -19,6 +19,7 @@ SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
 # lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
 PDF_TOLERANCE = 1e-3
+CHOSEN = "chosen"  # the channel that counts such paths
 
 
 class Tracer:
@@ -46,7 +47,7 @@ class Tracer:
         self.mi, self.scene, self.apart = mi, loaded.mi_scene, apart
         self.max_depth, self.rr_depth = film.max_depth, film.rr_depth
         self.coloured, self.sample_lights = loaded.coloured, loaded.sample_lights
-        self.environment = len(loaded.groups) > 1
+        self.environment, self.bands = len(loaded.groups) > 1, film.wavelength_nm.size
         filled = np.append(np.arange(film.wavelength_nm.size), [film.wavelength_nm.size - 1] * 3)
         filled = filled[: -(-film.wavelength_nm.size // SPECTRUM_SIZE) * SPECTRUM_SIZE]
         self.centres, self.widths = film.wavelength_nm[filled], film.width_nm[filled]
@@ -58,44 +59,48 @@ class Tracer:
             nm = self.centres + self.widths * offsets[:, None]
             self.table = TableReader(mi, reflectance_table(loaded.curves, nm))
 
-    def camera(self, size: tuple[int, int], pixel: Any, points: Points) -> list[Any]:
+    def camera(self, size: tuple[int, int], pixel: Any, points: Points) -> dict[str, list[Any]]:
         """Trace paths from the camera, one a thread.
 
         Returns
         -------
-        list of Float
-            Bands without the light that is seen directly, then the environment's; with ``apart`` as many of indirect
-            light; the share of paths that meet a light first, which is that light at unit emission; the share that meet
-            the environment; with ``coloured`` the light's bands; the share of paths whose BSDF chose by wavelength.
+        dict of lists of Float
+            ``scattered``: bands without the light that is seen directly, then the environment's; with ``apart``
+            ``indirect``: as many of indirect light; ``shares`` of paths that meet a light first, which is that light
+            at unit emission, and that meet the environment; with ``coloured`` ``lamps``: the light's bands; ``chosen``:
+            the share of paths whose BSDF chose by wavelength.
         """
-        mi = self.mi
         wavelengths, step = self._wavelengths(points)
         ray = self._camera_ray(size, pixel, points)
-        dark = [mi.Spectrum(0.0) for _ in wavelengths]
-        start = mi.Ray3f(ray), dr.zeros(mi.SurfaceInteraction3f), mi.Float(1.0), mi.Bool(True), dark
-        result, (lamp, sky, first), chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
-        shares = [lamp, sky] if self.environment else [lamp]
-        return [*_flat(result), *map(self.mi.Float, shares), *_flat(first), self.mi.Float(chosen)]
+        dark = [self.mi.Spectrum(0.0) for _ in wavelengths]
+        start = self.mi.Ray3f(ray), dr.zeros(self.mi.SurfaceInteraction3f), self.mi.Float(1.0), self.mi.Bool(True), dark
+        scattered, indirect, (lamp, sky, first), chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
+        return {
+            "scattered": self._flat(*scattered),
+            "indirect": self._flat(*indirect),
+            "shares": [self.mi.Float(share) for share in ([lamp, sky] if self.environment else [lamp])],
+            "lamps": self._flat(first),
+            CHOSEN: [self.mi.Float(chosen)],
+        }
 
-    def meter(self, _: Any, points: Points) -> list[Any]:
-        """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as the bands of `camera`.
+    def meter(self, _: Any, points: Points) -> dict[str, list[Any]]:
+        """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as `camera`'s ``scattered``.
 
         The pixel isn't asked for: each path starts anywhere on the shape.
         """
         wavelengths, step = self._wavelengths(points)
         start = self._start_on_meter(points, wavelengths)
-        result, _, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
-        return [*_flat(result), self.mi.Float(chosen)]
+        scattered, _, _, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
+        return {"scattered": self._flat(*scattered), CHOSEN: [self.mi.Float(chosen)]}
 
     @dr.syntax
-    def first_surface(self, size: tuple[int, int], pixel: Any, points: Points) -> list[Any]:
+    def first_surface(self, size: tuple[int, int], pixel: Any, points: Points) -> dict[str, list[Any]]:
         """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
 
         Returns
         -------
-        list of Float
-            Bands of its albedo, through all that lies before it; its normal; the share of paths whose BSDF chose by
-            wavelength.
+        dict of lists of Float
+            ``albedo``: bands of it, through all that lies before it; ``normal``; ``chosen`` as of `camera`.
         """
         mi = self.mi
         wavelengths, step = self._wavelengths(points)
@@ -121,7 +126,12 @@ class Tracer:
             ray.wavelengths = wavelengths[0]
             depth += 1
             active = go_on & delta
-        return [*_flat(albedo), normal.x, normal.y, normal.z, self.mi.Float(chosen)]
+        normals = [normal.x, normal.y, normal.z]
+        return {"albedo": self._flat(albedo), "normal": normals, CHOSEN: [self.mi.Float(chosen)]}
+
+    def _flat(self, *spectra: list[Any]) -> list[Any]:
+        """Bands one by one, of each spectrum in turn, without those that fill up the last four."""
+        return [value for spectrum in spectra for value in _flat(spectrum)[: self.bands]]
 
     def _camera_ray(self, size: tuple[int, int], pixel: Any, points: Points) -> Any:
         """Ray through a point of each thread's pixel."""
@@ -180,7 +190,7 @@ class Tracer:
     @dr.syntax
     def _trace(
         self, scene: Any, points: Points, start: tuple[Any, ...], wavelengths: list[Any], step: Any, bounced: int
-    ) -> tuple[list[Any], tuple[Any, Any, list[Any]], Any]:
+    ) -> tuple[list[list[Any]], list[list[Any]], tuple[Any, Any, list[Any]], Any]:
         """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
 
         A path that starts on the meter has `bounced` once.
@@ -240,9 +250,9 @@ class Tracer:
         # Environment of the paths that escaped
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         sky, indirect_sky = _either(escaped, throughput, dark), _either(escaped & ~direct, throughput, dark)
-        every = [*result, *(sky if self.environment else [])]
-        every = [*every, *indirect, *(indirect_sky if self.environment and self.apart else [])]
-        return every, (lamp_first, sky_first, first), chosen
+        scattered = [result, sky] if self.environment else [result]
+        indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.apart else []
+        return scattered, indirects, (lamp_first, sky_first, first), chosen
 
     def _indirect(self, indirect: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
         """Add indirect light where it is asked for by itself."""

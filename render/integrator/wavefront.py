@@ -8,13 +8,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.integrator.dense import SPECTRUM_SIZE
+from render.integrator.dense import CHOSEN
 from render.integrator.points import Points, pixel_keys
 from render.loader import mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
 
+Channels = dict[str, list[Any]]  # of a tracer, by name: one Float a channel
 _COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
 
@@ -33,16 +34,21 @@ def seed_of(*coordinates: int) -> int:
 
 
 def traced(
-    trace: Callable[[Any, Points], list[Any]], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
-) -> Planes:
-    """Means over each chunk of the channels that a tracer gives, shape (chunk, channel, h, w).
+    trace: Callable[[Any, Points], Channels], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
+) -> dict[str, Planes]:
+    """Means over each chunk of the channels that a tracer gives, by name, each (chunk, channel, h, w).
 
     Of a pixel at rate r the points are r times as many: a chunk of it has r times the span's points.
+
+    Raises
+    ------
+    InputError
+        Where a material chose by wavelength.
     """
     mi, flat = mitsuba_module(), rates.ravel()
     order = np.argsort(flat, kind="stable")
     ends = np.cumsum(flat[order].astype(np.int64) * span.chunk * span.chunks)
-    means: Planes | None = None
+    means: dict[str, Planes] = {}
     for few in np.split(order, np.flatnonzero(np.diff(ends // threads)) + 1):
         # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
         # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
@@ -52,19 +58,29 @@ def traced(
         pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
         dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code
         channels = _launched(trace, pixel_of, first_of, span.chunk, seed)
-        if means is None:
-            means = np.empty((span.chunks, len(channels), rates.size), np.float32)
+        if not means:
+            shape = span.chunks, rates.size
+            means = {name: np.empty((len(values), *shape), np.float32) for name, values in channels.items()}
         start = 0
         for rate, pixels in parts:
-            count = pixels.size * rate * span.chunk * span.chunks
+            length = rate * span.chunk
+            count = pixels.size * length * span.chunks
             index = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
-            for slot, channel in enumerate(channels):
-                own = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
-                total = dr.block_sum(own, rate * span.chunk) if rate * span.chunk > 1 else own
-                means[:, slot, pixels] = total.numpy().reshape(span.chunks, -1) * np.float32(1 / (rate * span.chunk))
+            totals = []
+            for channel in (x for values in channels.values() for x in values):
+                part = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
+                totals.append(dr.block_sum(part, length) if length > 1 else part)
+            sums = iter(dr.concat(totals).numpy().reshape(len(totals), span.chunks, -1))  # one copy for all
+            for planes in means.values():
+                for plane in planes:
+                    plane[:, pixels] = next(sums) * np.float32(1 / length)
             start += count
-    assert means is not None
-    return means.reshape(span.chunks, -1, *rates.shape)
+    if means.pop(CHOSEN).any():
+        raise InputError(
+            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
+            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
+        )
+    return {name: np.moveaxis(x.reshape(*x.shape[:2], *rates.shape), 0, 1) for name, x in means.items()}
 
 
 def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint32]:
@@ -75,8 +91,8 @@ def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint3
 
 
 def _launched(
-    trace: Callable[[Any, Points], list[Any]], pixel_of: Any, first_of: Any, chunk: int, seed: int
-) -> list[Any]:
+    trace: Callable[[Any, Points], Channels], pixel_of: Any, first_of: Any, chunk: int, seed: int
+) -> Channels:
     """Channels of all points of blocks, each `chunk` points long, evaluated."""
     mi = mitsuba_module()
     thread, length = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk), dr.opaque(mi.UInt32, chunk)
@@ -103,24 +119,6 @@ def _refusal(error: RuntimeError) -> InputError:
             'allowed: a grey bitmap, or its luminance as stored: add <boolean name="raw" value="true"/> to it'
         )
     return InputError(f"scene: Mitsuba can't render it: {words}; correct the description")
-
-
-def bands_apart(image: Planes, groups: int, bands: int) -> tuple[Planes, Planes]:
-    """Channels of a tracer apart: bands (chunk, group, band, h, w), and those after them (chunk, channel, h, w).
-
-    Raises
-    ------
-    InputError
-        Where a material chose by wavelength.
-    """
-    if image[:, -1].any():
-        raise InputError(
-            "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
-            "allowed: materials whose sampling doesn't depend on wavelength; replace it"
-        )
-    filled = bands + -bands % SPECTRUM_SIZE
-    scattered, others = np.split(image[:, :-1], [groups * filled], axis=1)
-    return scattered.reshape(len(image), groups, filled, *image.shape[2:])[:, :, :bands], others
 
 
 def _root_cause(error: BaseException) -> BaseException:
