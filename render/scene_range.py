@@ -39,6 +39,14 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
             raise InputError(f"{prefix} {path} is known over {low:g}-{high:g} nm alone; give bands within{extend}")
 
 
+def known_range(scene: Scene) -> tuple[float, float] | None:
+    """Wavelengths that all tables of the surfaces cover; None without one, and where a table's ends can't be held."""
+    tables = [(range_nm, extends) for _, range_nm, extends in _surfaces(scene.geometry, emitter_paths(scene.geometry))]
+    if not tables or not all(extends for _, extends in tables):
+        return None
+    return max(low for (low, _), _ in tables), min(high for (_, high), _ in tables)
+
+
 def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
     """Warn (`UserWarning`) where data of a coloured light end within the bands."""
     for path in (path for group in scene.groups.values() if group.coloured for path in group.emitters):

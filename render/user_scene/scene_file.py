@@ -4,6 +4,7 @@ import os
 import re
 from collections import Counter
 from collections.abc import Mapping
+from dataclasses import replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -13,7 +14,8 @@ import numpy as np
 from render.geometry import to_world
 from render.loader import as_guest, mitsuba_module, mitsuba_words
 from render.scene import Node, spectrum_node, uniform_node
-from render.spectrum import Spectrum
+from render.scene_range import known_range
+from render.spectrum import VISIBLE_NM, Spectrum
 from render.user_scene.allowed_plugins import require_allowed
 from render.user_scene.mesh_files import check_mesh_file
 from render.user_scene.scene_parts import SceneFile, assemble
@@ -32,13 +34,16 @@ _SIGNED = {
     "timezone",
 }
 _SIGNED_OF = {("bumpmap", "scale")}
+HELD_NM = 400.0, 700.0  # tables that reach as far are held beyond
 _LISTS = {"wavelengths", "values"}  # of regular and irregular spectra, as texts
 _NUMBER = re.compile(r"[-+]?(?:[\d.]+(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
 _RESERVED = re.compile(r"[./\s]")  # Mitsuba's and our own separators in paths of a scene's dict
 
 
 @as_guest()
-def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None = None) -> SceneFile:
+def load_scene_file(
+    path: str | Path, *, trust: bool = False, extend: str | None = None, define: Mapping[str, str] | None = None
+) -> SceneFile:
     """Read a Mitsuba XML scene.
 
     A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
@@ -52,7 +57,10 @@ def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None
     trust : bool
         Lets the scene name folders, plug-ins of its own and files anywhere. Its native code then runs.
     extend : "hold", optional
-        As of `Scene`: surfaces go on at their end values outside their tables.
+        As of `Scene`: surfaces go on at their end values outside their tables. So they do, with a note, where all of
+        them are known over 400 to 700 nm at least.
+    define : mapping of str to str, optional
+        Values of the file's ``$parameters``, as Mitsuba's ``-D name=value``.
 
     Returns
     -------
@@ -68,20 +76,32 @@ def load_scene_file(path: str | Path, *, trust: bool = False, extend: str | None
     if not file.is_file():
         raise InputError(f"scene file: {str(path)!r} is missing or no file; give the path of a Mitsuba .xml scene")
     folder = None if trust else file.parent
-    screen(file, folder)
+    screen(file, folder, define or {})
     mi = mitsuba_module()
-    state = _parse(mi, file, trust)
+    state = _parse(mi, file, trust, define or {})
     # A trusted scene's <path> folders are on Mitsuba's search path by now.
     searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
-    return assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
+    read = assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
+    return read if extend else _with_held_ends(read)
 
 
-def _parse(mi: Any, file: Path, trust: bool) -> Any:
+def _with_held_ends(read: SceneFile) -> SceneFile:
+    """Hold the ends of tables that cover 400 to 700 nm: beyond lies less than 0.1 % of luminance."""
+    known = known_range(read.scene)
+    if known is None or known[0] > HELD_NM[0] or known[1] < HELD_NM[1]:
+        return read
+    if known[0] <= VISIBLE_NM[0] and known[1] >= VISIBLE_NM[1]:
+        return read
+    note = f"surfaces known over {known[0]:g}-{known[1]:g} nm go on at their end values beyond"
+    return replace(read, scene=replace(read.scene, extend="hold"), notes=(*read.notes, note))
+
+
+def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     """Mitsuba's parser state. The scene's folder is on the search path only while no plug-in is loaded."""
     kept, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
     mi.set_file_resolver(search_path(mi, file.parent))
     try:
-        state = mi.parser.parse_file(config, str(file))
+        state = mi.parser.parse_file(config, str(file), **define)
         mi.parser.transform_upgrade(config, state)
     except RuntimeError as error:
         raise InputError(f"{mitsuba_words(error)}; correct the file") from None

@@ -75,7 +75,7 @@ class _Spent:
     parameters: dict[str, str] = field(default_factory=dict)
 
 
-def screen(path: Path, folder: Path | None) -> None:
+def screen(path: Path, folder: Path | None, define: Mapping[str, str]) -> None:
     """Read a scene file and what it includes, and raise `InputError` for what Mitsuba's parser shouldn't see.
 
     Parameters
@@ -85,8 +85,10 @@ def screen(path: Path, folder: Path | None) -> None:
     folder : Path or None
         Where included files and spectra have to lie; None lets files anywhere and ``<path>`` through, in whose folders
         they are then looked for.
+    define : mapping of str to str
+        Values of $parameters, before those of <default>.
     """
-    _screen(path, [path.parent], folder, 0, _Spent())
+    _screen(path, [path.parent], folder, 0, _Spent(parameters=dict(define)))
 
 
 def _screen(path: Path, searched: list[Path], folder: Path | None, level: int, spent: _Spent) -> None:

@@ -70,12 +70,15 @@ app.register_install_completion_command(help="Let this shell complete rodcone's 
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with ``-o`` written out, and numbers below 0 and units put to what stands before them.
+    """Arguments with ``-o`` and ``-D`` written out, and numbers below 0 and units put to what stands before them.
 
     Such as ``--level -5lux`` and ``--exposure 20 ms``.
     """
     result: list[str] = []
-    for text in (f"--out{text[2:]}" if text == "-o" or text.startswith("-o=") else text for text in arguments):
+    short = {"-o": "--out", "-D": "--define"}
+    for text in (
+        short[text[:2]] + text[2:] if text in short or text[:3] in ("-o=", "-D=") else text for text in arguments
+    ):
         before = result[-1] if result else ""
         if before.startswith("--") and "=" not in before and _BELOW_ZERO.match(text):
             result[-1] += f"={text}"

@@ -25,6 +25,7 @@ from studies.study.render_facts import bands_note, render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
 MOST_BANDS = 1000
+READING = "reading the scene"  # 100 000 shapes take a minute
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -67,6 +68,8 @@ class RenderOrder:
         Folder of finished renders, to use and to add to.
     trust_scene : bool
         Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
+    define : tuple of str
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     extend : str, optional
         hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     denoise : bool
@@ -91,6 +94,7 @@ class RenderOrder:
     seed: int = 0
     cache: Path | None = None
     trust_scene: bool = False
+    define: tuple[str, ...] = ()
     extend: str | None = None
     denoise: bool = False
     force: bool = False
@@ -110,7 +114,9 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     # Check what can be checked before the render
     require_ending(order.out, ".exr")
     wavelength_nm, width_nm = _bands(order.bands)
-    opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart)
+    with progress(sys.stderr) as step:
+        step(READING, 0.0)
+        opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart, define=order.define)
     scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
     spectra = asked_spectra(scene, order.light)
     lit_at: dict[str, Any] = asked_level(scene, order.level)

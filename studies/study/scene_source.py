@@ -1,7 +1,7 @@
 """What a study looks at: a scene by name, a Mitsuba scene of the user's own, or a spectral picture file."""
 
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -27,7 +27,12 @@ _OTHER_FILES = {
 
 
 def open_scene(
-    source: str, trust: bool = False, extend: str | None = None, light: str | None = None, chart: str | None = None
+    source: str,
+    trust: bool = False,
+    extend: str | None = None,
+    light: str | None = None,
+    chart: str | None = None,
+    define: Sequence[str] = (),
 ) -> SceneFile:
     """Scene, the size of its film and notes.
 
@@ -39,6 +44,8 @@ def open_scene(
         As of `load_scene_file`.
     light, chart : str, optional
         Options of a catalogue scene's builder: its light, and a CSV file of reflectances for color_checker's patches.
+    define : sequence of str
+        ``NAME=VALUE`` of a scene file's $parameters.
 
     Raises
     ------
@@ -48,8 +55,8 @@ def open_scene(
     """
     if Path(source).suffix.lower() == ".xml":
         require_absent(f"for {source}, a file that has its own", light=light, chart=chart)
-        return load_scene_file(source, trust=trust, extend=extend)
-    require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust)
+        return load_scene_file(source, trust=trust, extend=extend, define=_defined(define))
+    require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust, define=define or None)
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
         read = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
@@ -57,6 +64,13 @@ def open_scene(
     options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
     scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())
+
+
+def _defined(texts: Sequence[str]) -> dict[str, str]:
+    for text in texts:
+        if "=" not in text[1:]:
+            raise InputError(f"define: {text!r} is not allowed; write NAME=VALUE, as -D depth=4")
+    return {name: value for name, _, value in (text.partition("=") for text in texts)}
 
 
 def asked_size(size: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:

@@ -13,10 +13,12 @@ from refusal import refusal
 
 from render.engine import render
 from render.loader import as_guest, mitsuba_module
+from render.scene_range import check_range
 from render.user_scene.scene_file import load_scene_file
-from render.user_scene.scene_parts import LONGEST_CHAIN
+from render.user_scene.scene_parts import LONGEST_CHAIN, SceneFile
 from render.user_scene.scene_paths import MOST_NESTED
 from rodcone.errors import InputError
+from studies.study.scene_source import open_scene
 
 CAMERA = """
 <sensor type="perspective" id="camera">
@@ -156,7 +158,7 @@ def test_a_file_is_checked_where_mitsuba_opens_it(tmp_path: Path) -> None:
     home = tmp_path / "home"
     (tmp_path / "secret.spd").write_text("400 1\n700 1\n")
     write(home, '<bsdf type="diffuse"><spectrum name="reflectance" filename="r.spd"/></bsdf>', name="in/real.xml")
-    (home / "in" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    (home / "in" / "r.spd").write_text("380 0.25\n780 0.75\n")
     (home / "r.spd").symlink_to(tmp_path / "secret.spd")  # Mitsuba takes this one, beside the including file
     (home / "link.xml").symlink_to(home / "in" / "real.xml")
     for included in ("in/real.xml", "link.xml"):
@@ -174,7 +176,7 @@ def test_includes_defaults_aliases_and_spectrum_files_are_followed(tmp_path: Pat
         '<alias id="a" as="b"/>',
         name="parts/materials.xml",
     )
-    (tmp_path / "parts" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    (tmp_path / "parts" / "r.spd").write_text("380 0.25\n780 0.75\n")
     (tmp_path / "parts" / "parts").mkdir()  # not there: Mitsuba looks beside the including file
     (tmp_path / "parts" / "parts" / "r.spd").write_text("400 1\n700 1\n")
     path = write(
@@ -202,6 +204,37 @@ def test_an_included_files_name_may_hold_parameters(tmp_path: Path) -> None:
     )
     path = write(tmp_path, stated, '<include filename="$folder/$light2.xml"/>', CAMERA)
     assert load_scene_file(path).scene.groups["lamp"].spectrum.values[0] == 2
+
+
+def test_parameters_can_be_given_as_mitsuba_takes_them(tmp_path: Path) -> None:
+    light = '<emitter type="point" id="lamp"><spectrum name="intensity" value="$power"/></emitter>'
+    path = write(tmp_path, '<default name="power" value="1"/>', light, CAMERA, WALL)
+    assert load_scene_file(path).scene.groups["lamp"].spectrum.values[0] == 1
+    assert load_scene_file(path, define={"power": "7"}).scene.groups["lamp"].spectrum.values[0] == 7
+    assert open_scene(str(path), define=["power=7"]).scene.groups["lamp"].spectrum.values[0] == 7
+    with pytest.raises(InputError, match="other"):
+        load_scene_file(path, define={"other": "7"})
+    with pytest.raises(InputError, match=r"define: 'power' is not allowed; write NAME=VALUE"):
+        open_scene(str(path), define=["power"])
+    with pytest.raises(InputError, match="define"):
+        open_scene("flat_field", define=["power=7"])
+
+
+def test_tables_over_400_to_700_nm_are_held_with_a_note_shorter_ones_refused(tmp_path: Path) -> None:
+    def read(first: int, last: int) -> SceneFile:
+        table = f'<spectrum name="reflectance" value="{first}:0.2, {last}:0.6"/>'
+        wall = f'<shape type="rectangle" id="wall"><bsdf type="diffuse">{table}</bsdf></shape>'
+        return load_scene_file(write(tmp_path, wall, SUN, CAMERA))
+
+    held = read(400, 700)
+    assert held.notes == ("surfaces known over 400-700 nm go on at their end values beyond",)
+    ends = render(held.scene, (2, 2), wavelength_nm=[385.0, 395.0, 705.0], width_nm=[10.0] * 3, spp=4).radiance[
+        0, :, 0, 0
+    ]
+    np.testing.assert_allclose(ends / ends[0], [1.0, 1.0, 3.0], rtol=1e-5)
+    assert read(380, 780).notes == ()
+    with pytest.raises(InputError, match="wall/_arg_0/reflectance is known over 420-700 nm alone"):
+        check_range(read(420, 700).scene, 380.0, 780.0)
 
 
 def test_names_of_exporters_with_dots_and_blanks_are_kept_apart(tmp_path: Path) -> None:
