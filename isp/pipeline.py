@@ -3,7 +3,7 @@
 from numpy.typing import ArrayLike
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.edges import even_edges
+from isp.colour.edges import sharpen
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
@@ -73,7 +73,7 @@ def picture_interleaved(
     snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
-    planes = even_edges(raw, result.estimate, gains, alpha) if ours else result.estimate
+    planes = sharpen(raw, result.estimate, gains) if ours else result.estimate
     balanced = clip_highlights(raw, planes * gains)
     if ours:
         draw_unseen(everything, unseen, gains, balanced)

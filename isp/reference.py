@@ -11,9 +11,9 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.planes import Plane, fill, guide_mosaic
-from isp.settings import DEFAULTS, WINDOW, Reconstruction, Settings
+from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.similarity.brightest import brightest_allowed
-from isp.similarity.guide import reliability, saturated_fraction
+from isp.similarity.guide import saturated_fraction
 from isp.similarity.interpolation import certainty
 from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import channels, mask
@@ -26,7 +26,7 @@ LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the fi
 class _Inputs:
     """What eqs. (1)-(6) read.
 
-    Electrons, the channel sampled at each pixel, padded planes, alpha, reliability of similarity, up to where samples
+    Electrons, the channel sampled at each pixel, padded planes, alpha, certainty of similarity, up to where samples
     count, noise distances, W.
     """
 
@@ -34,7 +34,7 @@ class _Inputs:
     channel: NDArray[np.intp]
     h: Plane
     alpha: Plane
-    reliability: Plane
+    certainty: Plane
     brightest: Plane
     noise: list[Plane]
     white: int | None
@@ -87,23 +87,17 @@ def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
     names, half, in_noise = channels(raw.cfa), settings.patch // 2, settings.distance == "noise"
-    distances = noise_distances(raw.cfa, settings.patch, settings.reach)
+    noise = noise_distances(raw.cfa, settings.patch, settings.reach)
     mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
     h = np.stack([fill(mosaic, raw.cfa, name) for name in names])
-    trust = np.ones(raw.shape)
-    if in_noise:
-        light_e = fill(raw.electrons, raw.cfa, "W") if "W" in names else raw.electrons
-        noise = raw.noise_of("W")
-        counted_e, dark_e = light_e / noise.shot, noise.dark_noise_e / noise.shot
-        trust = np.asarray(reliability(counted_e, dark_e, WINDOW) * certainty(mosaic, raw.cfa, settings.patch))
     return _Inputs(
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
         h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
         alpha=saturated_fraction(raw, settings.window),
-        reliability=trust,
+        certainty=certainty(mosaic, raw.cfa, settings.patch) if in_noise else np.ones(raw.shape),
         brightest=brightest_allowed(raw.electrons, raw, settings),
-        noise=distances if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in distances],
+        noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
         white=names.index("W") if "W" in names else None,
     )
 
@@ -115,7 +109,7 @@ def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset
     y = tuple(line + d for line, d in zip(x, offset, strict=True))
     distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
     log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
-    trust = inputs.reliability[np.ix_(*x)]
+    trust = inputs.certainty[np.ix_(*x)]
     phase = tuple(d % size for d, size in zip(offset, inputs.brightest.shape[:2], strict=True))
     bound = inputs.brightest[phase][np.ix_(*x)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))

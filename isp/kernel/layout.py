@@ -38,7 +38,7 @@ from isp.kernel.schedule import Guide, Pattern, list_offsets
 from isp.planes import fill, guide_mosaic
 from isp.settings import WINDOW, Settings
 from isp.similarity.brightest import brightest_allowed
-from isp.similarity.guide import fraction_of_full, reliability
+from isp.similarity.guide import fraction_of_full
 from isp.similarity.interpolation import certainty
 from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
@@ -65,7 +65,7 @@ class Strip:
     guide : (h, w) float32
         Mosaic as patches are read from it (`isp.planes.guide_mosaic`).
     inverse_variance : (h, w) float32
-        log2(e) r(x) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5): `reliability` and `certainty` included.
+        log2(e) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5) with `certainty`.
     alpha : (h, w) float64 or None
         Eq. (6); None where it is 0 everywhere, or without W.
     brightest : (th, tw, h, w) float32
@@ -155,15 +155,13 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
-    full, noise = raw.full_at_sites(dn), raw.noise_of("W")
+    full = raw.full_at_sites(dn)
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain
     guide = guide_mosaic(electrons, raw, settings.distance)
     inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
     if settings.distance == "noise":
-        light_e = ((dn if pattern.white is None else fill(dn, raw.cfa, "W")) - black) * gain
-        inverse_variance *= reliability(light_e / noise.shot, noise.dark_noise_e / noise.shot, WINDOW)
         inverse_variance *= certainty(guide, raw.cfa, settings.patch)
     np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     bounds = brightest_allowed(electrons, raw, settings)

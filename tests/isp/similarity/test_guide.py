@@ -6,7 +6,7 @@ from builders import RGBW_4X4, raw_image
 
 from isp.planes import fill
 from isp.settings import WINDOW
-from isp.similarity.guide import reliability, reliability_of_mean, saturated_fraction
+from isp.similarity.guide import saturated_fraction
 from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import BAYER, RGBW
 
@@ -46,32 +46,6 @@ def test_a_filled_pixel_beside_a_full_sample_counts_though_its_value_is_under_sa
 
 def test_alpha_is_1_without_w():
     assert np.array_equal(saturated_fraction(exposure(np.zeros((4, 6)), BAYER)), np.ones((4, 6)))
-
-
-def test_similarity_is_trusted_by_the_fourth_power_of_snr() -> None:
-    dark = 3.0
-    means = np.array([-5.0, 0.0, 1.0, 3.54138127, 10.0, 1e4])  # 3.541 e- over sqrt(3.541 + 9): an SNR of 1
-    snr = np.maximum(means, 0.0) / np.sqrt(np.maximum(means, 0.0) + dark**2)
-    assert reliability_of_mean(means, dark) == pytest.approx(snr**4 / (1 + snr**4), rel=1e-9, abs=1e-15)
-    assert reliability_of_mean(means, dark)[3] == pytest.approx(0.5, abs=1e-6)
-    assert reliability_of_mean(np.array([0.0, 4.0]), 0.0) == pytest.approx([0.0, 16 / 17], rel=1e-9)
-
-
-def test_the_mean_is_that_of_the_patch_reflected_at_the_border():
-    plane = np.arange(30.0).reshape(5, 6)
-    got = reliability(plane, 2.0, 3)
-    assert got[2, 3] == pytest.approx(reliability_of_mean(plane[1:4, 2:5].mean(), 2.0))
-    corner = (plane[0, 0] + 2 * plane[0, 1] + 2 * plane[1, 0] + 4 * plane[1, 1]) / 9
-    assert got[0, 0] == pytest.approx(reliability_of_mean(corner, 2.0))
-
-
-def test_the_mean_is_that_of_w_around_each_pixel() -> None:
-    electrons = np.zeros((24, 24))
-    electrons[1::2, 1::2] = 50.0  # W's sites alone
-    light = fill(electrons, RGBW, "W")
-    assert reliability(light, 3.0, WINDOW) == pytest.approx(
-        reliability_of_mean(np.full((24, 24), 50.0), 3.0), rel=1e-12
-    )
 
 
 def test_a_single_plane_of_independent_pixels_has_twice_the_patch_area():
