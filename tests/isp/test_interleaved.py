@@ -99,9 +99,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     window = list(product(range(-(WINDOW // 2), WINDOW // 2 + 1), repeat=2))
 
     def trust(x):
-        mean = sum(white[reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)] for a in window) / WINDOW**2
-        squared = max(mean, 0.0) ** 2 / (max(mean, 0.0) + raw.dark_noise_e**2)
-        return squared**2 / (1 + squared**2) / (1 + spread(x) / 9)
+        return 1 / (1 + spread(x) / 9)
 
     def spread(x):
         """Half differences of opposite samples, squared, less their noise; the four letters of the tile in turn."""
