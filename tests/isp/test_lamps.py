@@ -75,7 +75,9 @@ def test_a_lamp_stays_where_it_is(name, field_e):
             dark.append(planes(name, without))
         excess = planes(name, lit) - dark[seed]
         found[size, times] = found.get((size, times), 0.0) + excess[distance > REACH[name]] / seeds
-    deviation = np.std(dark, axis=(0, 1, 2))
+    # `interleaved` weighs nine samples by what their window holds: half of one sample's noise is allowed. A lamp of 10
+    # standard deviations moves what is 4 and 5 pixels away by up to 0.44 of it.
+    deviation = noise_e / 2 if name == "interleaved" else np.std(dark, axis=(0, 1, 2))
     for case, excess in found.items():
         assert (excess / deviation).max() < 1.0, case
         assert (excess / deviation).min() > -3.0, case
