@@ -48,6 +48,7 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
     **{rows: {} for rows in ("RBWB/GRGR/RWBB/BGRG", "WRWG/GWBW", "GRGB/GBGR")},
     "rccb": {"C": "W"},
     "ryyb": {"Y": "G"},
+    "BRBR/RGRG/BRBR/RGWG": {},  # found by `rodcone design low_noise`
 }
 FIGURES = ("psnr_db", "luminance_db", "colour")
 
@@ -120,7 +121,7 @@ def simulated(commit: str) -> list[dict[str, str | float]]:
 
 def gains(rows: Sequence[Mapping[str, str | float]]) -> list[dict[str, str | float]]:
     """Expected and simulated gains over Bayer of each sensor, mosaic and level, with twice the standard error."""
-    found = {(row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
+    by_picture = {(row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
     scenes, result = sorted({str(row["scene"]) for row in rows}), []
     for sensor in SENSORS:
         expected = {mosaic: expect(camera(sensor, mosaic), list(LEVELS.values())) for mosaic in MOSAICS}
@@ -130,7 +131,7 @@ def gains(rows: Sequence[Mapping[str, str | float]]) -> list[dict[str, str | flo
                 for figure in FIGURES:
                     of, beside = (_decibels(figure, getattr(expected[m][index], figure)) for m in (mosaic, BAYER))
                     gain = np.array([
-                        np.subtract(*(_decibels(figure, float(found[scene, sensor, m, level][figure]))
+                        np.subtract(*(_decibels(figure, float(by_picture[scene, sensor, m, level][figure]))
                                       for m in (mosaic, BAYER)))
                         for scene in scenes
                     ])  # fmt: skip
@@ -155,12 +156,12 @@ def main(commit: str) -> None:
     agreement = ["| sensor | figure | RMS difference [dB] | sign alike over 0.3 dB |", "|---|---|---|---|"]
     for sensor in SENSORS:
         for figure in FIGURES:
-            of = [line for line in lines if line["sensor"] == sensor]
-            foretold, seen = (np.array([line[f"{figure}_{kind}"] for line in of], dtype=float)
+            of_sensor = [line for line in lines if line["sensor"] == sensor]
+            expected_db, simulated_db = (np.array([line[f"{figure}_{kind}"] for line in of_sensor], dtype=float)
                               for kind in ("expected", "simulated"))  # fmt: skip
-            clear = np.abs(seen) > 0.3
-            alike = (np.sign(foretold[clear]) == np.sign(seen[clear])).sum()
-            rms = sqrt(np.mean((foretold - seen) ** 2))
+            clear = np.abs(simulated_db) > 0.3
+            alike = (np.sign(expected_db[clear]) == np.sign(simulated_db[clear])).sum()
+            rms = sqrt(np.mean((expected_db - simulated_db) ** 2))
             agreement.append(f"| `{sensor}` | {figure} | {rms:.2f} | {alike} of {clear.sum()} |")
     table = [
         "| PSNR over Bayer, expected / simulated [dB] | " + " | ".join(LEVELS) + " |",

@@ -72,8 +72,8 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         sampling = spread[:, :, None] * (shares @ clear_e)[places]
         gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
         for index, (light, noise) in enumerate(at):
-            if same := [before for before in range(index) if at[before][0] == light]:
-                gains_db[:, index], by_sample[:, index] = gains_db[:, same[0]], by_sample[:, same[0]]
+            if earlier := [before for before in range(index) if at[before][0] == light]:
+                gains_db[:, index], by_sample[:, index] = gains_db[:, earlier[0]], by_sample[:, earlier[0]]
                 continue
             cases = [Case(mean * light, noise, row) for mean, row in scenes]
             errors, slopes = error_slopes(prior.patches, sampling, middle, cases)

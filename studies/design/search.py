@@ -198,6 +198,9 @@ def best_tile(search: Search, side: int, steps: int, seed: int, known: Known, pr
         progress(f"{'/'.join(best)} {best_score:+.2f} dB", share)
         return value
 
+    for tile in [tuple(key.split("/")) for key in known]:
+        if len(tile) == side:
+            look_at(tile, 0.0)
     if side == 2:
         tiles = sorted({standing_for(("".join(t[:2]), "".join(t[2:]))) for t in product(search.goal.letters, repeat=4)})
         for index, tile in enumerate(tiles):
@@ -207,14 +210,14 @@ def best_tile(search: Search, side: int, steps: int, seed: int, known: Known, pr
         tile for tile in MOSAICS.values() if len(tile) in (2, 4) and set("".join(tile)) <= set(search.goal.letters)
     ]
     starts = sorted({standing_for(_whole(tile, side)) for tile in starts}, key=score, reverse=True)[:4]
-    each = steps // len(starts)
+    steps_per_start = steps // len(starts)
     for number, start in enumerate(starts):
         rng = np.random.default_rng([seed, number])
         tile, value = start, look_at(start, number / len(starts))
-        for step in range(each):
+        for step in range(steps_per_start):
             changed = standing_for(_changed(tile, search.goal.letters, rng))
-            new = look_at(changed, (number * each + step + 1) / (each * len(starts)))
-            if new > value or rng.random() < np.exp((new - value) / (COOLING_DB * (1 - step / each))):
+            new = look_at(changed, (number * steps_per_start + step + 1) / (steps_per_start * len(starts)))
+            if new > value or rng.random() < np.exp((new - value) / (COOLING_DB * (1 - step / steps_per_start))):
                 tile, value = changed, new
     return best
 
