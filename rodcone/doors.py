@@ -201,6 +201,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("Picture.encode.white", "row"), lambda _, value: value),  # checked where they are used
         "axes": _value("matplotlib.axes:Axes", "give axes of Matplotlib, or leave it out"),
         "emission": _plain(Mapping, "a dict by light group"),
+        "define": _plain(Mapping, "a dict of texts by name"),
         "index": _each(_WHOLE),
         "SensorConfig.check_frame.shape": lambda name, value: tuple(_each(_WHOLE)(name, value)),
         "values": _value("numpy:ndarray", "give an array (..., h, w)"),
