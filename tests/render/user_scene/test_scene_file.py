@@ -572,7 +572,7 @@ def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp
         (tmp_path / name).mkdir()
         (tmp_path / name / "quad.obj").write_text(QUAD.replace(" 0\n", f" {height}\n"))
     Image.new("RGB", (2, 2), (255, 0, 0)).save(tmp_path / "models" / "p.png")
-    (tmp_path / "later" / "r.spd").write_text("400 0.25\n700 0.75\n")
+    (tmp_path / "later" / "r.spd").write_text("380 0.25\n780 0.75\n")
     write(tmp_path / "models", SUN, name="lights/sun.xml")
     cloth = '<texture name="reflectance" type="bitmap"><string name="filename" value="p.png"/></texture>'
     parts = (
