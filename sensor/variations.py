@@ -4,7 +4,7 @@ from collections.abc import Callable, Mapping
 from types import MappingProxyType
 
 from rodcone.errors import InputError, unknown
-from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain
+from sensor.cfa import MOSAICS, OWN, RGBW, Tile, channels, plain, tile_of
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses, complementary, neutral_density, with_channels
 
@@ -34,24 +34,25 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     sensor : SensorConfig
         With curves of R, G, B and W.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS`; ``own``, the camera's own with its own curves; or ``rgbw_nd`` (W behind a
+        A name of `sensor.cfa.MOSAICS`, or rows such as ``RG/BW``; ``own``, the camera's own with its own curves; or
+        ``rgbw_nd`` (W behind a
         neutral density that gives it G's sensitivity), ``cmyw`` (cyan, magenta, yellow and W), ``cyym`` or ``cygm``;
         `sensor.curves` states what is assumed of these filters.
 
     Raises
     ------
     InputError
-        For an unknown name, curves that are missing, or a quad for a camera that bins.
+        For an unknown name, rows that differ in length, curves that are missing, or a quad for a camera that bins.
     """
     if mosaic == OWN:
         return sensor
-    if mosaic not in (*VARIATIONS, *MOSAICS):
+    if "/" not in mosaic and mosaic not in (*VARIATIONS, *MOSAICS):
         raise unknown("cfa", mosaic, (*MOSAICS, *VARIATIONS, OWN))
     if mosaic in VARIATIONS:
         tile, change = VARIATIONS[mosaic]
         responses = change(sensor.responses)
     else:
-        tile = MOSAICS[mosaic]
+        tile = tile_of(mosaic.split("/") if "/" in mosaic else mosaic)
         if sensor.chip.sites > 1 and plain(tile) != tile:
             raise InputError(
                 f"cfa: {mosaic!r} for a sensor that bins, whose raw images hold no quad; allowed: what they hold, such "

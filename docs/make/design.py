@@ -26,7 +26,7 @@ from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS
-from sensor.cfa import channels, tile_of
+from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.presets import preset
@@ -55,8 +55,7 @@ FIGURES = ("psnr_db", "luminance_db", "colour")
 
 def camera(name: str, mosaic: str) -> SensorConfig:
     """Sensor with a mosaic, as it is."""
-    sensor = preset(name)
-    return replace(sensor, cfa=tile_of(mosaic.split("/"))) if "/" in mosaic else vary(sensor, mosaic)
+    return vary(preset(name), mosaic)
 
 
 def in_places(sensor: SensorConfig, places: Mapping[str, str]) -> SensorConfig:

@@ -194,15 +194,19 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
 def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
     """Responses as CSV: curves, or a source's one wavelength; empty without either."""
     if shape is not None:
-        nm = next(iter(shape.curves.values())).wavelength_nm
-        columns = {name: curve.values for name, curve in shape.curves.items()}
-    elif numbers.efficiency is not None:
+        return responses_csv(shape.curves)
+    if numbers.efficiency is not None:
         value, at_nm = numbers.efficiency
-        nm, columns = np.array([at_nm - 1, at_nm + 1]), {"W": np.array([value, value])}
-    else:
-        return ""
-    rows = [[f"{x:g}", *(f"{column[index]:.6f}" for column in columns.values())] for index, x in enumerate(nm)]
-    return "\n".join(",".join(row) for row in [["wavelength_nm", *columns], *rows]) + "\n"
+        return responses_csv({"W": Spectrum(np.array([at_nm - 1, at_nm + 1]), np.array([value, value]))})
+    return ""
+
+
+def responses_csv(curves: Mapping[str, Spectrum]) -> str:
+    """Curves by channel as CSV, at the first one's wavelengths."""
+    nm = next(iter(curves.values())).wavelength_nm
+    columns = [np.interp(nm, curve.wavelength_nm, curve.values) for curve in curves.values()]
+    rows = [[f"{x:g}", *(f"{column[index]:.6f}" for column in columns)] for index, x in enumerate(nm)]
+    return "\n".join(",".join(row) for row in [["wavelength_nm", *curves], *rows]) + "\n"
 
 
 def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:

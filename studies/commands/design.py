@@ -1,21 +1,25 @@
 """The command `rodcone design`."""
 
 import json
+import re
 import sys
-from dataclasses import replace
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_range, unknown
-from rodcone.files import check_place, read_bounded, replacing
+from rodcone.errors import InputError, one_line, require_range, unknown
+from rodcone.files import read_bounded, replacing
 from rodcone.progress import progress
+from rodcone.toml_file import read_toml
 from scenes.levels import DEMO_LEVELS
-from sensor.cfa import MOSAICS, tile_of
-from sensor.config import SensorConfig
+from sensor.cameras.numbers import responses_csv
+from sensor.cfa import MOSAICS, channels
+from sensor.config import SensorConfig, with_tile
 from sensor.presets import preset, preset_file
+from sensor.variations import VARIATIONS, vary
+from studies.commands.console import write_text
 from studies.commands.expect import levels_between
 from studies.design.expect import expect
 from studies.design.filters import best_filters
@@ -91,7 +95,7 @@ def design(
     for name, bound in (("behind", behind), ("behind_in_luminance", behind_in_luminance)):
         require_range(name, bound, 0.0, 100.0, "give decibels, such as 0.1")
     base = preset(sensor)
-    reference = tile_of(never_worse_than.split("/") if "/" in never_worse_than else never_worse_than)
+    reference = vary(base, never_worse_than).cfa
     for letter in letters + "".join(reference):
         if letter not in base.responses.curves:
             raise unknown("letters", letter, base.responses.curves)
@@ -102,14 +106,8 @@ def design(
     )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
-    tried, question = out / "tried.json", {"sensor": repr(base), "reference": reference, "light": light,
-                                           "prior": prior, "levels": levels}  # fmt: skip
-    question = json.loads(json.dumps(question))
-    known: Known = {}
-    if tried.exists():
-        check_place(tried)
-        held = json.loads(read_bounded(tried, MOST_BYTES))
-        known = held["gains_db"] if held.get("question") == question else {}
+    tried, question = out / "tried.json", [repr(base), list(reference), light, prior, levels]
+    known = _known(tried, question)
 
     def keep() -> None:
         with replacing(tried) as (place,):
@@ -121,44 +119,64 @@ def design(
             found = best_tile(search, SIDES[tile], steps, seed, known, step)
         finally:
             keep()
-        camera = replace(base, cfa=found)
+        camera = with_tile(base, found, base.responses)
         if filters:
             camera = best_filters(goal, found, 4, step)
-    # Beside the design: mosaics by name that the sensor has the curves for.
-    mosaics = {name: rows for name, rows in MOSAICS.items() if set("".join(rows)) <= set(base.responses.curves)}
-    mosaics = {name: rows for name, rows in mosaics.items() if not name.startswith("bayer_")}
-    cameras = {never_worse_than: replace(base, cfa=reference), "design": camera}
-    cameras |= {name: replace(base, cfa=rows) for name, rows in mosaics.items() if name != never_worse_than}
+    # Beside the design: mosaics of three channels or more that the sensor can have, Bayer's in one phase.
+    tiles = {**MOSAICS, **{name: rows for name, (rows, _) in VARIATIONS.items()}}
+    curves = set(base.responses.curves)
+    names = [
+        name
+        for name, rows in tiles.items()
+        if len(channels(rows)) > 2
+        and not name.startswith("bayer_")
+        and (curves >= set("RGBW") or curves >= {*"".join(rows)})
+    ]
+    cameras = {never_worse_than: vary(base, never_worse_than), "design": camera}
+    cameras |= {name: vary(base, name) for name in names if name != never_worse_than}
     by_camera = {name: expect(one, list(levels.values()), light, prior=prior) for name, one in cameras.items()}
     _write(out, sensor, camera, filters)
-    (out / "design.html").write_text(design_page(goal, camera, levels, by_camera, len(known)), "utf-8")
+    write_text(out / "design.html", design_page(goal, camera, levels, by_camera, len(known)))
     print(f"{tile_text(found)}\n{out}")
 
 
+def _known(tried: Path, question: list[Any]) -> Known:
+    """Gains of tiles that an earlier run tried for the same question."""
+    if not tried.exists():
+        return {}
+    try:
+        held = json.loads(read_bounded(tried, MOST_BYTES))
+        known: Known = held["gains_db"] if held["question"] == json.loads(json.dumps(question)) else {}
+        if any(np.shape(gains) != (3, len(question[-1])) for gains in known.values()):
+            raise ValueError("gains of another shape")
+    except (ValueError, LookupError, TypeError, AttributeError) as error:
+        raise InputError(
+            f"out: {str(tried)!r} isn't what rodcone design wrote ({one_line(error)}); allowed: that, or no such file; "
+            "move it away"
+        ) from error
+    return known
+
+
 def _write(out: Path, sensor: str, camera: SensorConfig, filters: bool) -> None:
-    """Write the preset file of the camera found, its curves, and the study that checks it."""
+    """Write the preset file of the camera found, its curves where the file names some, and the study that checks it."""
     source = Path(sensor) if sensor.endswith(".toml") else preset_file(sensor)
-    lines = source.read_text("utf-8").splitlines()
-    rows = f"cfa = [{', '.join(json.dumps(row) for row in camera.cfa)}]"
-    lines = [line for line in lines if not line.startswith("cfa")]
-    first = next((index for index, line in enumerate(lines) if line.startswith("[")), len(lines))
-    lines.insert(first, rows)
-    if filters:
-        start = next((index for index, line in enumerate(lines) if line.startswith("[responses]")), None)
-        if start is not None:
-            end = next((i for i in range(start + 1, len(lines)) if lines[i].startswith("[")), len(lines))
-            del lines[start:end]
-        names = list(camera.responses.curves)
-        nm = camera.responses.curves[names[-1]].wavelength_nm
-        lines += ["", "[responses]", 'csv = "curves.csv"', f"range_nm = [{nm[0]}, {nm[-1]}]",
-                  'quantum_efficiency = "included"']  # fmt: skip
-        table = [",".join(["wavelength_nm", *names])]
-        for wavelength in nm:
-            values = [np.interp(wavelength, c.wavelength_nm, c.values) for c in camera.responses.curves.values()]
-            table.append(",".join([f"{wavelength:g}", *(f"{value:.6f}" for value in values)]))
-        (out / "curves.csv").write_text("\n".join(table) + "\n", "utf-8")
-    (out / "sensor.toml").write_text("\n".join(lines) + "\n", "utf-8")
-    (out / "study.toml").write_text(_STUDY, "utf-8")
+    content = read_toml(source)
+    text = source.read_text("utf-8")
+    # Keys stand before the first table; a table ends where the next one begins.
+    head, *tables = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
+    head = re.sub(r"^cfa\s*=\s*(\[[^\]]*\]|[^\n]*)\n?", "", head, flags=re.MULTILINE)
+    parts = [f"cfa = {json.dumps(list(camera.cfa))}\n{head}"]
+    parts += [table for table in tables if not table.startswith("[responses]")]
+    if filters or "responses" in content:
+        curves = camera.responses.curves
+        nm = next(iter(curves.values())).wavelength_nm
+        kind = "relative" if camera.responses.relative else "included"
+        parts.append(
+            f'\n[responses]\ncsv = "curves.csv"\nrange_nm = [{nm[0]}, {nm[-1]}]\nquantum_efficiency = "{kind}"\n'
+        )
+        write_text(out / "curves.csv", responses_csv(curves))
+    write_text(out / "sensor.toml", "".join(parts))
+    write_text(out / "study.toml", _STUDY)
 
 
 _STUDY = """# The design beside Bayer by simulation: rodcone sweep study.toml -o out, then rodcone report out

@@ -66,11 +66,7 @@ def expect(
     time_s = parse_exposure(exposure, "exposure")
     by_camera = {
         f"{name} {tile}".strip(): expect_errors(
-            preset(name, tile.split("/")) if "/" in tile else vary(preset(name), tile or OWN),
-            list(levels.values()),
-            light,
-            exposure if time_s is None else time_s,
-            prior,
+            vary(preset(name), tile or OWN), list(levels.values()), light, exposure if time_s is None else time_s, prior
         )
         for name in sensors
         for tile in mosaic or [""]

@@ -6,6 +6,7 @@ from functools import cache
 from math import hypot, log10, sqrt
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
@@ -13,7 +14,7 @@ from render.photometry import tristimulus
 from render.spectrum import Floats, Spectrum
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, luminance_of_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import unknown
-from sensor.cfa import channels, mask
+from sensor.cfa import Tile, channels, mask
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
@@ -131,10 +132,14 @@ def middle_pixels() -> np.ndarray[tuple[int], np.dtype[np.intp]]:
 
 def sampling_of(sensor: SensorConfig, responses: Floats) -> Floats:
     """H of a patch: electrons of each sample from each pixel's coefficients, crosstalk included."""
-    shape = (PATCH, PATCH)
-    site = sum(index * mask(sensor.cfa, name, shape) for index, name in enumerate(channels(sensor.cfa)))
+    site = sites_of(sensor.cfa, channels(sensor.cfa))
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
-    return np.asarray(spread_of(sensor.pixel.crosstalk)[:, :, None] * responses[np.ravel(site)][None])
+    return np.asarray(spread_of(sensor.pixel.crosstalk)[:, :, None] * responses[site][None])
+
+
+def sites_of(tile: Tile, names: Sequence[str]) -> NDArray[np.intp]:
+    """Number among some channels of that of each pixel of a patch, shape (pixel,)."""
+    return np.asarray(np.argmax([mask(tile, name, (PATCH, PATCH)).ravel() for name in names], axis=0))
 
 
 def spread_of(crosstalk: float) -> Floats:
@@ -250,8 +255,8 @@ def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
     noise = [_noise_of_channel(sensor, exposure_s, name) for name in channels(sensor.cfa)]
     if all(x == plain for x in noise):
         return plain
-    site = np.argmax([mask(sensor.cfa, name, (PATCH, PATCH)).ravel() for name in channels(sensor.cfa)], axis=0)
-    dark_e, full_e, shot = np.array([(x.dark_e, x.full_e, x.shot) for x in noise])[site].T
+    by_channel = np.array([(x.dark_e, x.full_e, x.shot) for x in noise])
+    dark_e, full_e, shot = by_channel[sites_of(sensor.cfa, channels(sensor.cfa))].T
     return Noise(dark_e=dark_e, prnu=plain.prnu, full_e=full_e, shot=shot)
 
 

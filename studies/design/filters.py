@@ -7,13 +7,12 @@ from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
 from isp.design.slope import Case, error_slopes
-from isp.design.spectral_prior import PATCH
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from studies.design.expect import middle_pixels, spread_of, unit_response_e, view_of
+from studies.design.expect import middle_pixels, sites_of, spread_of, unit_response_e, view_of
 from studies.design.search import BEHIND, Goal, Progress, moments, rows_of, search_for, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
@@ -44,7 +43,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     search = search_for(replace(goal, letters=goal.letters + "W"))
     prior, seen, names = search.prior, view_of(goal.prior, goal.light), channels(tile)
     reference_db = tile_db(search, goal.reference)
-    places = np.array([names.index(tile[y % len(tile)][x % len(tile[0])]) for y, x in np.ndindex(PATCH, PATCH)])
+    places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
     scenes = [(mean, row) for mean in prior.reflectances for row in rows_of(prior, seen, mean)]
     # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
@@ -64,7 +63,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     def sensor_of(logits: Floats) -> SensorConfig:
         passed = transmittances(logits) * curves["W"]
         responses = {name: Spectrum(nm, values) for name, values in zip(names, passed, strict=True)}
-        return replace(goal.sensor, cfa=tile, responses=Responses(responses, goal.sensor.responses.relative))
+        return with_tile(goal.sensor, tile, Responses(responses, goal.sensor.responses.relative))
 
     def cost(logits: Floats, at: list[tuple[float, Noise]]) -> tuple[float, Floats]:
         """Score with the other sign, and its slope."""

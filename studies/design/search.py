@@ -1,7 +1,7 @@
 """Search for the tile of the least expected error over several levels of light."""
 
 from collections.abc import Callable, MutableMapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -12,7 +12,7 @@ from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.spectrum import Floats
 from rodcone.errors import unknown
 from sensor.cfa import MOSAICS, Tile, channels
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, with_tile
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from studies.design.expect import (
     LitPrior,
@@ -21,6 +21,7 @@ from studies.design.expect import (
     middle_pixels,
     noise_at,
     responses_e,
+    sites_of,
     spread_of,
     view_of,
 )
@@ -104,7 +105,7 @@ def search_for(goal: Goal) -> Search:
     prior, seen = load_prior(goal.prior), view_of(goal.prior, goal.light)
     letters = "".join(dict.fromkeys(goal.letters + "".join(goal.reference)))
     # A tile of one row lists its channels in an order of its own.
-    sensor = replace(goal.sensor, cfa=(letters,))
+    sensor = with_tile(goal.sensor, (letters,), goal.sensor.responses)
     responses = responses_e(sensor, seen)[[channels(sensor.cfa).index(letter) for letter in letters]]
     samples = every_channel(prior.patches, responses, middle_pixels())
     scenes = [rows_of(prior, seen, reflectance) for reflectance in prior.reflectances]
@@ -137,11 +138,10 @@ def tile_db(search: Search, tile: Tile) -> Floats:
     Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab.
     """
     goal, prior = search.goal, search.prior
-    sensor = replace(goal.sensor, cfa=tile)
+    sensor = with_tile(goal.sensor, tile, goal.sensor.responses)
     responses = search.responses[[search.letters.index(name) for name in channels(tile)]]
-    places = [search.letters.index(tile[y % len(tile)][x % len(tile[0])]) for y, x in np.ndindex(PATCH, PATCH)]
     spread = spread_of(sensor.pixel.crosstalk) if sensor.pixel.crosstalk else None
-    samples = [picked(one.samples, np.array(places), spread) for one in search.every]
+    samples = [picked(one.samples, sites_of(tile, search.letters), spread) for one in search.every]
     errors: dict[str, Floats] = {}
     result = []
     for light, noise in moments(goal, sensor, responses):

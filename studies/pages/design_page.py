@@ -1,6 +1,7 @@
 """A design as one self-contained page: its tile and filters, gains over light, and what it gives up."""
 
 from collections.abc import Mapping, Sequence
+from importlib import metadata
 
 from matplotlib import rc_context
 
@@ -53,6 +54,7 @@ def design_page(
         given_up=given_up,
         tried=tried,
         pictures=[address("svg+xml", svg.encode()) for svg in (_drawn(camera), gain_svg(by_camera))],
+        version=metadata.version("rodcone"),
         style=own_file("report.css"),
     )
 
@@ -66,7 +68,7 @@ def _drawn(camera: SensorConfig) -> str:
         for x, letter in enumerate(row):
             colour = "#eeeeee" if letter == "W" else CHANNEL_COLOURS.get(letter, INK)
             tile.fill((x, x + 1, x + 1, x), (-y, -y, -y - 1, -y - 1), color=colour, ec=INK)
-            tile.text(x + 0.5, -y - 0.5, letter, ha="center", va="center")
+            tile.text(x + 0.5, -y - 0.5, letter, ha="center", va="center", color=INK if letter == "W" else "white")
     tile.set(aspect="equal", title="tile")
     tile.axis("off")
     for letter in dict.fromkeys("".join(camera.cfa)):

@@ -8,6 +8,7 @@ from numpy.testing import assert_allclose
 
 from sensor.cfa import Tile
 from sensor.presets import preset
+from sensor.variations import vary
 from studies.design import search as searching
 from studies.design.expect import expect
 from studies.design.filters import best_filters
@@ -31,6 +32,16 @@ def test_a_tiles_figures_are_those_of_expect(crosstalk: float) -> None:
     assert_allclose(psnr_db, [row.psnr_db for row in rows], atol=1e-9)
     assert_allclose(luminance_db, [row.luminance_db for row in rows], atol=1e-9)
     assert_allclose(colour_db, [-20 * np.log10(row.colour) for row in rows], atol=1e-9)
+
+
+@pytest.mark.thorough
+def test_a_camera_that_reads_w_apart_is_compared_with_a_tile_without_w() -> None:
+    sensor = preset("white_apart")
+    search = search_for(goal(sensor=sensor))
+    for mosaic in ("rgbw", "bayer"):
+        camera = vary(sensor, mosaic)
+        rows = expect(camera, LEVELS)
+        assert_allclose(tile_db(search, camera.cfa)[0], [row.psnr_db for row in rows], atol=1e-9)
 
 
 def test_turned_mirrored_and_shifted_tiles_are_one() -> None:
