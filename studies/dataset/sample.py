@@ -16,7 +16,8 @@ from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.raw import RawImage
-from sensor.readout import noise_sources, noise_variance
+from sensor.readings.by_channel import of_channel, well_e
+from sensor.readout import as_read, noise_sources, noise_variance
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
@@ -98,12 +99,14 @@ class Sample:
 
 def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     """Arrays of a sample by name, the raw frame first, and its facts as JSON holds them."""
-    cell, sensor = sample.cell, sample.cell.sensor
+    cell = sample.cell
     row, column, height, width = sample.window
     place = np.s_[row : row + height, column : column + width]
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_opened(cell.electrons)[place], dtype=np.float64) * light
-    raw = _exposed(sample, expected_e)
+    # a channel's metered time is the frame's, in its parts too
+    sensor = as_read(cell.sensor, _opened(cell.electrons) * light) if cell.sensor.chip.channels else cell.sensor
+    raw = _exposed(sample, sensor, expected_e)
     arrays: Arrays = {"raw": raw.dn}
     made: dict[str, Callable[[], NDArray[Any]]] = {
         "mosaic_e": lambda: expected_e,
@@ -121,13 +124,13 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     return arrays, _facts(sample, sensor, raw, expected_e)
 
 
-def _exposed(sample: Sample, expected_e: NDArray[np.float64]) -> RawImage:
+def _exposed(sample: Sample, sensor: SensorConfig, expected_e: NDArray[np.float64]) -> RawImage:
     cell, shape = sample.cell, (expected_e.shape[0], expected_e.shape[1])
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.parts > 1:
         stream = stream.spawn(sample.part + 1)[-1]
-    device = draw_device(cell.sensor, shape, device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
-    return expose(expected_e, cell.sensor, cell.exposure_s, device, stream, exact=True)
+    device = draw_device(sensor, shape, device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
+    return expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
 
 
 def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDArray[np.float64]) -> dict[str, Any]:
@@ -139,6 +142,8 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
     # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
     shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
+    alone = {name: of_channel(sensor, name) for name in mean_e}
+    dark_e = {name: x.pixel.dark_current_e_per_s / share * cell.exposure_s for name, (x, share) in alone.items()}
     return {
         "key": sample.key,
         "split": sample.split,
@@ -156,9 +161,10 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
         "white_dn": raw.white_dn,
         "gain_e_per_dn": raw.gain_e_per_dn,
         "noise": noise_coefficients(sensor, cell.exposure_s),
-        "sources_e": {name: noise_sources(value, sensor, cell.exposure_s) for name, value in mean_e.items()},
+        "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
         "mean_e": mean_e,
-        "dark_current_e": sensor.pixel.dark_current_e_per_s * cell.exposure_s,
+        "dark_current_e": dark_e,
+        "full_well_e": {name: well_e(sensor, name) for name in mean_e},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
         "render_noise": {

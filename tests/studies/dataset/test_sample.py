@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 
-from sensor.config import SensorConfig
+from sensor.chip import ChannelReading
+from sensor.config import SensorConfig, with_channel_readings
 from sensor.presets import low_noise
 from studies.dataset.sample import Arrays, Sample, TruthFiles, make_sample, noise_coefficients
 
@@ -58,13 +59,13 @@ def squares(samples: list[Made]) -> np.ndarray:
     """Squared difference of raw and truth over the stated variance, a frame of each place in the tile."""
     found = []
     for arrays, facts in samples:
-        mean_dn = (arrays["mosaic_e"].astype(float) + facts["dark_current_e"]) / facts["gain_e_per_dn"]
-        off_dn = arrays["raw"].astype(float) - facts["black_dn"] - mean_dn
         for row, column in np.ndindex(2, 2):
-            noise = facts["noise"][facts["tile"][row][column]]
-            x = arrays["mosaic_e"][row::2, column::2] / facts["gain_e_per_dn"]
-            variance = noise["a"] * x + noise["b"] + noise["c"] * x**2
-            found.append(off_dn[row::2, column::2] ** 2 / variance)
+            name, gain = facts["tile"][row][column], facts["gain_e_per_dn"]
+            x = arrays["mosaic_e"][row::2, column::2] / gain
+            dark_dn = facts["black_dn"] + facts["dark_current_e"][name] / gain
+            off_dn = arrays["raw"][row::2, column::2].astype(float) - dark_dn - x
+            noise = facts["noise"][name]
+            found.append(off_dn**2 / (noise["a"] * x + noise["b"] + noise["c"] * x**2))
     return np.array(found)
 
 
@@ -83,6 +84,21 @@ def z_of(samples: list[Made]) -> float:
 @pytest.mark.parametrize("source", SOURCES)
 def test_raw_minus_truth_has_the_stated_variance(source: str, level_cd_m2: float, tmp_path: Path) -> None:
     assert abs(z_of(taken(tmp_path, with_pixel(**SOURCES[source]), level_cd_m2))) < 4.5
+
+
+# 4 conditions; in the brightest G's metered time is shorter than the frame's, and the density costs it light in all.
+@pytest.mark.parametrize("level_cd_m2", [1.0, 150.0])
+@pytest.mark.parametrize("reading", [ChannelReading("G", metered=True), ChannelReading("G", light_share=0.3)], ids=str)
+def test_channels_read_apart_have_the_stated_variance_and_well(
+    reading: ChannelReading, level_cd_m2: float, tmp_path: Path
+) -> None:
+    sensor = with_channel_readings(with_pixel(**SOURCES["all"]), [reading])
+    samples = taken(tmp_path, sensor, level_cd_m2)
+    assert abs(z_of(samples)) < 4.5
+    wells_e = samples[0][1]["full_well_e"]
+    assert wells_e["R"] == sensor.pixel.full_well_e
+    deeper = max(1.0, level_cd_m2 * 90 / (0.8 * wells_e["R"])) if reading.metered else 1 / 0.3
+    assert wells_e["G"] / wells_e["R"] == pytest.approx(deeper, rel=0.05)  # steps of a sixteenth of an octave
 
 
 def test_a_set_whose_prnu_is_twice_what_it_states_is_found(tmp_path: Path) -> None:
