@@ -3,6 +3,7 @@
 Both are estimated from pixels spread evenly over the picture, and cost little beside relighting.
 """
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -16,6 +17,8 @@ from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
 LEAST_UNCOVERED = 1e-6  # of a pixel: less is rounding
+MOST_BAND_ERROR = 0.01  # of a band's light: a larger error of wide bands is said
+LEAST_LIGHT = 0.01  # of the picture's light, in a band whose error counts
 SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
@@ -212,6 +215,25 @@ def within_band_error(
     relative = np.divide(missed, seen, out=np.zeros_like(seen), where=seen > 0)  # a lamp in view doesn't hide the rest
     lit = np.maximum((seen > 0).sum(axis=(1, 2)), 1)
     return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
+
+
+def warn_of_wide_bands(error: Floats, values: Planes, wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Warn (`UserWarning`) where `within_band_error` is large in a band of a picture (band, h, w), with what would do.
+
+    For smooth light the error falls with the square of the width.
+    """
+    light = values.mean(axis=(1, 2), dtype=np.float64) * width_nm
+    error = np.where(light >= LEAST_LIGHT * light.sum(), error, 0.0)
+    worst = int(error.argmax())
+    if error[worst] > MOST_BAND_ERROR:
+        enough_nm = width_nm[worst] * (MOST_BAND_ERROR / error[worst]) ** 0.5
+        warnings.warn(
+            f"bands: the one at {wavelength_nm[worst]:g} nm is off by about {error[worst]:.1%}, for light and surfaces "
+            f"vary together within its {width_nm[worst]:g} nm; bands of {int(enough_nm) or enough_nm:.3g} nm would do, "
+            "or for a lamp's lines rodcone.line_bands",
+            UserWarning,
+            stacklevel=3,
+        )
 
 
 def _spread(shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:

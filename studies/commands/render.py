@@ -21,7 +21,7 @@ from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
 from studies.commands.console import INTERRUPTED, Seconds, print_result, require_ending, say
 from studies.study.lit_scene import asked_spectra
-from studies.study.render_facts import bands_note, render_facts
+from studies.study.render_facts import render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
 MOST_BANDS = 1000
@@ -145,7 +145,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     )
     write_exr(radiance, order.out, scene=scene.name)
     # Say what was done
-    say(*opened.notes, *filter(None, [bands_note(transport, radiance, spectra)]))
+    say(*opened.notes)
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:
         say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")

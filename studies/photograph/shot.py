@@ -33,7 +33,6 @@ from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
-from studies.study.render_facts import bands_note
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
     LIGHT,
@@ -199,7 +198,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
         frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
         noise = noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))
-        notes += filter(None, [bands_note(transport, radiance, spectra), noise])
+        notes += [noise] if noise else []
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [

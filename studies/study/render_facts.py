@@ -1,16 +1,9 @@
 """How a render was made, and the error that it reached."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 
-import numpy as np
-
 from render.radiance import SpectralRadiance
-from render.spectrum import Spectrum
 from render.transport import Transport
-
-MOST_BAND_ERROR = 0.01  # of a band's light: a larger error of wide bands is said
-LEAST_LIGHT = 0.01  # of the picture's light, in a band whose error counts
 
 
 @dataclass(frozen=True)
@@ -57,25 +50,4 @@ def render_facts(transport: Transport, radiance: SpectralRadiance) -> RenderFact
         first_nm=float(transport.wavelength_nm[0]),
         last_nm=float(transport.wavelength_nm[-1]),
         width_nm=float(transport.width_nm[0]),
-    )
-
-
-def bands_note(transport: Transport, radiance: SpectralRadiance, spectra: Mapping[str, Spectrum]) -> str | None:
-    """Line that says where bands are too wide for the lights, and which would do; None where they aren't.
-
-    What light and transport vary together within a band is missed (`Transport.band_error`); for smooth light it falls
-    with the square of the width.
-    """
-    error = transport.band_error(spectra)
-    light = radiance.values.mean(axis=(0, 1)) * transport.width_nm
-    error = np.where(light >= LEAST_LIGHT * light.sum(), error, 0.0)
-    worst = int(error.argmax())
-    if error[worst] <= MOST_BAND_ERROR:
-        return None
-    width_nm, off = float(transport.width_nm[worst]), float(error[worst])
-    enough_nm = max(1, int(width_nm * (MOST_BAND_ERROR / off) ** 0.5))
-    return (
-        f"bands: the one at {transport.wavelength_nm[worst]:g} nm is off by about {off:.1%}, for light and surfaces "
-        f"vary together within its {width_nm:g} nm; bands of {enough_nm} nm would do, or for a lamp's lines "
-        "rodcone.line_bands"
     )

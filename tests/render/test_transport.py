@@ -1,5 +1,7 @@
 """Relighting, on small transports written by hand: linearity to the bit, levels, errors. Nothing is rendered."""
 
+import re
+import warnings
 from dataclasses import replace
 
 import numpy as np
@@ -235,3 +237,22 @@ def test_relit_radiance_keeps_the_bands_and_lies_band_by_band_in_memory():
     assert np.array_equal(values.wavelength_nm, NM)
     assert np.array_equal(values.widths_nm, WIDTH_NM)
     assert np.moveaxis(values.values, -1, 0).flags.c_contiguous
+
+
+@loop(("slope", "off"), [(0.0009, None), (0.0022, "2.2%, .* its 50 nm; bands of 33 nm")])
+def test_a_light_that_varies_with_the_surfaces_within_a_band_is_warned_of_with_a_width(slope, off):
+    """A line 10 nm off the centre of a band, on a transport of 1 there that rises evenly."""
+    rising = np.broadcast_to((1.0 + slope * (NM - 550.0))[None, :, None, None], (2, NM.size, *SIZE))
+    made = transport(rising, seen=None)
+    line = Spectrum(np.array([559.0, 560.0, 561.0]), np.array([0.0, 50.0, 0.0]))
+    only_blue = Spectrum(np.array([375.0, 376.0, 424.0, 425.0]), np.array([0.0, 1.0, 1.0, 0.0]))
+    with warnings.catch_warnings(record=True) as caught:
+        warnings.simplefilter("always")
+        made.relight({"lamp": line}, powers={"sky": 0.0})
+        made.relight({"lamp": line, "sky": only_blue}, powers={"lamp": 1e-9})  # light is elsewhere
+    if off is None:
+        assert not caught
+    else:
+        (warning,) = caught
+        assert re.match(f"bands: the one at 550 nm is off by about {off}", str(warning.message))
+        assert warning.filename == __file__

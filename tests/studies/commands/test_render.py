@@ -62,6 +62,7 @@ def test_facts_are_one_json_object(scene: Path, tmp_path: Path) -> None:
     assert "integrator 'path': the engine brings its own, with paths of any length" in err
 
 
+@pytest.mark.filterwarnings("default:bands")
 def test_bands_too_wide_for_the_light_are_told_with_a_width_that_does(tmp_path: Path) -> None:
     arguments = ["render", "cornell_box", "-o", str(tmp_path / "box.exr"), "--width", "8", "--spp", "64", "--bands"]
     code, _, err = call([*arguments, "380:780:50", "--light", "F11"])
