@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, read_errors
 from rodcone.files import read_bounded
 from rodcone.types import Floats
 
@@ -32,13 +32,11 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
     InputError
         For a file that can't be read, a cell that is no number, another header, or wavelengths that aren't nm.
     """
-    try:
+    fix = "give a CSV of numbers with a header"
+    with read_errors(f"{what}: {str(path)!r} can't be read", fix, (OSError, ValueError, csv.Error)):
         content = read_bounded(Path(path), MOST_BYTES)
         header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
-    except (OSError, ValueError, csv.Error) as error:
-        fault = f"{str(path)!r} can't be read ({error})"
-        raise InputError(f"{what}: {fault}; give a CSV of numbers with a header") from error
     names = [name.strip() for name in header]
     if _NOT_LETTERS.sub("", names[0].lower()) in _WAVELENGTH:
         names[0] = NM

@@ -1,6 +1,7 @@
 """The one exception for bad input: a single line with the name, the value, what is allowed and the likely fix."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import cache
 from math import isfinite, nan
@@ -9,6 +10,7 @@ from types import UnionType
 from typing import Annotated, Any, Literal, get_args, get_origin, get_type_hints
 
 MOST_TOLD = 2000  # characters; a quoted file may fill megabytes
+Kinds = type[Exception] | tuple[type[Exception], ...]
 
 
 class InputError(ValueError):
@@ -32,6 +34,29 @@ def cut(text: str) -> str:
 def one_line(error: BaseException) -> str:
     """Give the words of an error on one line."""
     return " ".join(str(error).split())
+
+
+@contextmanager
+def read_errors(what: str, fix: str, kinds: Kinds = (OSError, ValueError)) -> Iterator[None]:
+    """Turn errors within into an `InputError`, ``what (the error's words); fix``.
+
+    One that is an `InputError` already goes on as it is.
+    """
+    try:
+        yield
+    except InputError:
+        raise
+    except kinds as error:
+        raise InputError(f"{what} ({one_line(error)}); {fix}") from error
+
+
+@contextmanager
+def in_place(place: str) -> Iterator[None]:
+    """Put a place, such as a file's path, before the words of an `InputError` within."""
+    try:
+        yield
+    except InputError as error:
+        raise InputError(f"{place}: {error}") from error
 
 
 def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:

@@ -8,7 +8,7 @@ import numpy as np
 from render.published_spectra import published_spectra
 from render.spectrum import Floats, Spectrum
 from rodcone.csv_file import read_columns
-from rodcone.errors import InputError
+from rodcone.errors import InputError, in_place
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile
@@ -37,10 +37,8 @@ def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
                 f"chart: {str(path)!r}: {name} has values of {values.min():g} to {values.max():g}; allowed: "
                 "reflectances from 0 to 1; divide per cent by 100"
             )
-    try:
+    with in_place(f"chart: {str(path)!r}"):
         return tuple((name, Spectrum(nm, values)) for name, values in columns.items())
-    except InputError as error:
-        raise InputError(f"chart: {str(path)!r}: {error}") from None
 
 
 def held(curve: Spectrum) -> Spectrum:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from render.spectrum import Spectrum
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, in_place, read_errors
 from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
@@ -45,17 +45,10 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         Where the responses are relative.
     """
     tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
-    try:
+    with read_errors(f"sensor file: {str(path)!r} can't be read", "copy a preset: rodcone new preset NAME -o FILE"):
         content = read_toml(Path(path))
-    except (OSError, ValueError) as error:
-        reason = one_line(error)
-        raise InputError(
-            f"sensor file: {str(path)!r} can't be read ({reason}); copy a preset: rodcone new preset NAME -o FILE"
-        ) from error
-    try:
+    with in_place(f"sensor file {str(path)!r}"):
         sensor = _sensor(content, Path(path).parent, tile)
-    except InputError as error:
-        raise InputError(f"sensor file {str(path)!r}: {error}") from error
     if sensor.responses.relative:
         warnings.warn(
             f"sensor file {str(path)!r}: its responses are relative, so its electrons, and the light and SNR that "

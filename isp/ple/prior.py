@@ -13,7 +13,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, read_errors
 from rodcone.files import replacing
 
 PATCH = 8  # pixels a side
@@ -112,7 +112,8 @@ def load_prior(path: Path) -> Prior:
     InputError
         For a file that isn't one, holds over 64 MiB, other shapes, or values that are no finite numbers.
     """
-    try:
+    # NumPy parses headers as Python's literals, which fail in many ways
+    with read_errors(f"prior: {str(path)!r} can't be read", "give a file of `rodcone train`", Exception):
         if not path.is_file():
             raise ValueError("it is a folder or a device, or isn't there")
         with ZipFile(path) as archive:
@@ -124,10 +125,6 @@ def load_prior(path: Path) -> Prior:
             source = str(file["source"])
         if not all(np.issubdtype(array.dtype, np.floating) and np.all(np.isfinite(array)) for array in held.values()):
             raise ValueError("it holds values that are no finite numbers")
-    except Exception as error:  # NumPy parses headers as Python's literals, which fail in many ways
-        raise InputError(
-            f"prior: {str(path)!r} can't be read: {one_line(error)}; give a file of `rodcone train`"
-        ) from error
     rows, (components, directions) = 4 * PATCH**2, (*held["centres"].shape, 0, 0)[:2]
     lower = directions * (directions + 1) // 2
     shapes = {

@@ -19,7 +19,7 @@ import numpy as np
 from isp.picture import Picture
 from isp.processors.catalogue import NAMED, PROCESSORS, Processor
 from rodcone.digests import digest_bytes
-from rodcone.errors import InputError, one_line, unknown
+from rodcone.errors import InputError, one_line, read_errors, unknown
 from rodcone.files import read_bounded
 from sensor.cfa import OWN
 from sensor.raw import RawImage
@@ -105,12 +105,8 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
 
 
 def _read(path: Path) -> bytes:
-    try:
+    with read_errors(f"processors: {str(path)!r} can't be read", "allowed: FILE.py:FUNCTION; correct the path"):
         return read_bounded(path, MOST_BYTES)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"processors: {str(path)!r} can't be read ({one_line(error)}); allowed: FILE.py:FUNCTION; correct the path"
-        ) from error
 
 
 @cache

@@ -13,7 +13,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.envi import open_envi
 from render.radiance_files.file_checks import bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from rodcone.errors import InputError, one_line, require_range, unknown
+from rodcone.errors import InputError, in_place, read_errors, require_range, unknown
 from rodcone.toml_file import read_toml, strict_converter, structured
 from rodcone.types import Floats
 
@@ -84,7 +84,7 @@ def read_cube(path: str | Path) -> SpectralRadiance:
     """
     path = Path(path)
     described = _described(path)
-    try:
+    with in_place(str(path)):
         stored = _READERS[path.suffix.lower()](path, described)
         if sorted(stored.axes) != sorted(AXES):
             raise InputError(f"axes: {list(stored.axes)!r} are not allowed; give {list(AXES)} in the array's own order")
@@ -105,8 +105,6 @@ def read_cube(path: str | Path) -> SpectralRadiance:
                 f"{over:.0%} of its reflectances exceed 1; allowed: {MOST_OVER_ONE:.0%}, of highlights; give scale, "
                 "such as 0.01 for per cent"
             )
-    except InputError as refused:
-        raise InputError(f"{path}: {refused}") from None
     return cube
 
 
@@ -119,12 +117,9 @@ def _described(path: Path) -> Description:
             f'{path}: nothing says what it holds; allowed: {beside.name} beside it; write there holds = "reflectance" '
             '(or "radiance"), and wavelength_nm = [400, 700], the first and the last band'
         )
-    try:
-        return structured(read_toml(beside), Description, _CONVERTER, "give holds and wavelength_nm")
-    except InputError as refused:
-        raise InputError(f"{beside}: {refused}") from None
-    except (OSError, ValueError) as error:
-        raise InputError(f"{beside}: can't be read ({one_line(error)}); give holds and wavelength_nm") from None
+    fix = "give holds and wavelength_nm"
+    with in_place(str(beside)), read_errors("can't be read", fix):
+        return structured(read_toml(beside), Description, _CONVERTER, fix)
 
 
 def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
@@ -146,10 +141,9 @@ def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
 
 
 def _read_npy(path: Path, described: Description) -> Stored:
-    try:
+    # its header is parsed as Python's literals, which fail in many ways
+    with read_errors("NumPy can't read it", "give an array saved by numpy.save", Exception):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
-    except Exception as error:  # its header is parsed as Python's literals, which fail in many ways
-        raise InputError(f"NumPy can't read it ({one_line(error)}); give an array saved by numpy.save") from None
     if not isinstance(values, np.ndarray):
         raise InputError("it is no array; give one saved by numpy.save")
     return Stored(values, described.axes or AXES)

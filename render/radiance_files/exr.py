@@ -27,7 +27,7 @@ from render.radiance_files.exr_layout import (
 )
 from render.radiance_files.file_checks import MOST_EXPANSION, require_extent, require_file
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, in_place, one_line, read_errors
 from rodcone.files import replacing
 
 ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
@@ -126,7 +126,8 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     """
     path = Path(path)
     size = require_file(path)
-    try:
+    damage = (KeyError, TypeError, ValueError, OverflowError)
+    with in_place(str(path)), read_errors("its header is damaged", "save it again", damage):
         header = _part(path, header_only=True).header
         bands = radiance_channels(channel.name for channel in header["channels"])
         check_units(header, bands)
@@ -136,10 +137,6 @@ def read_exr(path: str | Path) -> SpectralRadiance:
         planes = _planes(path, list(bands), (height, width))
         values = np.moveaxis(planes, 0, -1)
         return SpectralRadiance(values, wavelength_nm=centres, relative_mc_error=error, width_nm=widths)
-    except InputError as refused:
-        raise InputError(f"{path}: {refused}") from None
-    except (KeyError, TypeError, ValueError, OverflowError) as wrong:
-        raise InputError(f"{path}: its header is damaged: {wrong}; save it again") from wrong
 
 
 def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
@@ -181,14 +178,12 @@ def _part(path: Path, *, header_only: bool) -> Any:
         if file.read(4) != _MAGIC:
             raise InputError("it is no OpenEXR file; allowed: spectral OpenEXR; convert it")
     said = io.StringIO()
-    try:
-        with contextlib.redirect_stdout(said):
-            parts = OpenEXR.File(str(path), separate_channels=True, header_only=header_only).parts
-    except Exception as error:
-        raise InputError(f"OpenEXR can't read it: {one_line(error)}; save it again") from error
+    failure = read_errors("OpenEXR can't read it", "save it again", Exception)
+    with failure, contextlib.redirect_stdout(said):
+        parts = OpenEXR.File(str(path), separate_channels=True, header_only=header_only).parts
     if not parts:  # printed as "Warning: ... for part 0 - reason"
         reason = " ".join(said.getvalue().rpartition(" - ")[2].split())
-        raise InputError(f"OpenEXR can't read it: {reason}; save it again")
+        raise InputError(f"OpenEXR can't read it ({reason}); save it again")
     if len(parts) > 1:
         raise InputError(f"it has {len(parts)} parts; allowed: one; save the spectral one by itself")
     return parts[0]

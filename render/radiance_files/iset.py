@@ -16,7 +16,7 @@ from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from rodcone.errors import InputError
+from rodcone.errors import InputError, in_place
 from rodcone.types import Floats
 
 MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
@@ -54,7 +54,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     """
     path = Path(path)
     numbers = read_numbers(path, _KEYS)
-    try:
+    with in_place(str(path)):
         from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
         nm, shape, photons = _from_basis(numbers) if from_basis else _stored(numbers)
         centres, widths = bands_between(nm)
@@ -69,8 +69,6 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
                 plane[:] = band / per_joule
         _clip_negative(planes, 1.0 if from_basis else MOST_NEGATIVE)
         return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
-    except InputError as refused:
-        raise InputError(f"{path}: {refused}") from None
 
 
 def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:

@@ -14,7 +14,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import require_file
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.colour_spaces import decode_srgb
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
 from rodcone.types import Floats
 
@@ -42,13 +42,12 @@ def read_photo(path: str | Path) -> SpectralRadiance:
     InputError
         For a file that isn't a JPEG or PNG of at most 4096 pixels a side, or is damaged.
     """
-    with _opened(Path(path)) as image:
-        try:
-            upright = ImageOps.exif_transpose(image)
-            deep = upright.mode.startswith("I")
-            pixels = np.asarray(upright if deep else upright.convert("RGB"), dtype=np.float64)
-        except Exception as error:  # damaged streams and Exif fail in many ways within Pillow
-            raise InputError(f"{path}: its pixels can't be read ({one_line(error)}); save it again") from None
+    # damaged streams and Exif fail in many ways within Pillow
+    damage = read_errors(f"{path}: its pixels can't be read", "save it again", Exception)
+    with _opened(Path(path)) as image, damage:
+        upright = ImageOps.exif_transpose(image)
+        deep = upright.mode.startswith("I")
+        pixels = np.asarray(upright if deep else upright.convert("RGB"), dtype=np.float64)
     encoded = np.clip(pixels / (65535.0 if deep else 255.0), 0.0, 1.0)
     encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=-1)
     reflectance = decode_srgb(encoded) @ srgb_basis(DEFAULT_WAVELENGTH_NM)
@@ -57,10 +56,8 @@ def read_photo(path: str | Path) -> SpectralRadiance:
 
 def _opened(path: Path) -> Image.Image:
     require_file(path)
-    try:
+    with read_errors(f"{path}: it is no JPEG or PNG", "save it as one", Exception):  # of Pillow's many
         image = Image.open(path, formats=("JPEG", "PNG"))
-    except Exception as error:  # of Pillow's many
-        raise InputError(f"{path}: it is no JPEG or PNG ({one_line(error)}); save it as one") from None
     if max(image.size) > MOST_SIDE:
         image.close()
         raise InputError(f"{path}: {image.width} x {image.height} pixels; allowed: {MOST_SIDE} a side; scale it down")

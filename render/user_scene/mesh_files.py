@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, read_errors
 
 # Scalar types of PLY, after Greg Turk, "The PLY polygon file format" (1994), and their later names.
 _PLY_TYPES = {
@@ -39,15 +39,12 @@ def check_mesh_file(kind: str, path: Path) -> None:
         Plug-in that reads the file; others than ``ply`` and ``serialized`` pass.
     path : Path
     """
-    try:
+    damage = (ValueError, KeyError, struct.error, zlib.error)
+    with read_errors(f"{path}: it can't be read as a {kind} mesh", "export the mesh anew", damage):
         if kind == "ply":
             _check_ply(path)
         elif kind == "serialized":
             _check_serialized(path)
-    except InputError:
-        raise
-    except (ValueError, KeyError, struct.error, zlib.error) as error:
-        raise InputError(f"{path}: it can't be read as a {kind} mesh ({error}); export the mesh anew") from None
 
 
 def _check_indices(path: Path, indices: np.ndarray, vertices: int) -> None:

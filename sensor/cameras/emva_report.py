@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from rodcone.errors import InputError, one_line, require_keys, require_range, require_whole
+from rodcone.errors import InputError, in_place, read_errors, require_keys, require_range, require_whole
 from rodcone.toml_file import read_toml
 from sensor.cameras.numbers import PixelNumbers, Sourced
 
@@ -81,15 +81,10 @@ def read_report(path: Path) -> EmvaReport:
     InputError
         For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
     """
-    try:
+    with read_errors(f"EMVA report: {str(path)!r} can't be read", "give a TOML file with a table [report]"):
         content = read_toml(path)
+    with in_place(f"EMVA report {str(path)!r}"):
         return _report(content)
-    except InputError as error:
-        raise InputError(f"EMVA report {str(path)!r}: {error}") from error
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"EMVA report: {str(path)!r} can't be read ({one_line(error)}); give a TOML file with a table [report]"
-        ) from error
 
 
 def numbers_of(report: EmvaReport) -> PixelNumbers:

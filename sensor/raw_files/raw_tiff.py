@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, read_errors
 from rodcone.files import read_bounded, replacing
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import MOST_BYTES, parse_json, raw_image, to_json
@@ -55,12 +55,8 @@ def read_tiff(path: Path) -> RawImage:
 
 
 def _text(sidecar: Path, picture: Path) -> bytes:
-    try:
+    with read_errors(f"{sidecar}: can't be read", f"keep the sidecar beside {picture.name}"):
         return read_bounded(sidecar, MOST_BYTES)
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"{sidecar}: can't be read ({one_line(error)}); keep the sidecar beside {picture.name}"
-        ) from error
 
 
 def _digest(dn: NDArray[Any]) -> str:

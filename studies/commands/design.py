@@ -9,7 +9,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, one_line, require_range, unknown
+from rodcone.errors import InputError, read_errors, require_range, unknown
 from rodcone.files import read_bounded, replacing
 from rodcone.progress import progress
 from rodcone.toml_file import read_toml
@@ -144,16 +144,13 @@ def _known(tried: Path, question: list[Any]) -> Known:
     """Gains of tiles that an earlier run tried for the same question."""
     if not tried.exists():
         return {}
-    try:
+    damage = (ValueError, LookupError, TypeError, AttributeError)
+    fix = "allowed: that, or no such file; move it away"
+    with read_errors(f"out: {str(tried)!r} isn't what rodcone design wrote", fix, damage):
         held = json.loads(read_bounded(tried, MOST_BYTES))
         known: Known = held["gains_db"] if held["question"] == json.loads(json.dumps(question)) else {}
         if any(np.shape(gains) != (3, len(question[-1])) for gains in known.values()):
             raise ValueError("gains of another shape")
-    except (ValueError, LookupError, TypeError, AttributeError) as error:
-        raise InputError(
-            f"out: {str(tried)!r} isn't what rodcone design wrote ({one_line(error)}); allowed: that, or no such file; "
-            "move it away"
-        ) from error
     return known
 
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from rodcone.digests import digest_file
-from rodcone.errors import InputError, one_line
+from rodcone.errors import read_errors
 from rodcone.files import inside, replacing
 from studies.dataset.sample import Arrays, Sample, make_sample
 from studies.sweep.run_cell import limit_threads
@@ -104,14 +104,11 @@ def read_manifest(folder: Path) -> Lines:
         Where there is none, or it is damaged.
     """
     path = folder / MANIFEST
-    try:
+    fix = "allowed: what rodcone dataset wrote; run it again"
+    with read_errors(f"{path}: it is no manifest of a set", fix, (OSError, ValueError, LookupError, TypeError)):
         lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
         if not lines or lines[0]["kind"] != "set" or not all("kind" in line for line in lines):
             raise ValueError("its first line is not a set's")
-    except (OSError, ValueError, LookupError, TypeError) as error:
-        raise InputError(
-            f"{path}: it is no manifest of a set ({one_line(error)}); allowed: what rodcone dataset wrote; run it again"
-        ) from error
     return lines
 
 
@@ -142,18 +139,15 @@ def read_shard(path: Path) -> Iterator[tuple[Arrays, dict[str, Any]]]:
         For a file that is cut or damaged.
     """
     arrays: Arrays = {}
-    try:
-        with tarfile.open(path) as tar:
-            for member in tar:
-                file = tar.extractfile(member)
-                assert file is not None
-                name = member.name.split(".", 1)[1]
-                if name == "json":
-                    yield arrays, json.loads(file.read())
-                    arrays = {}
-                else:
-                    arrays[name.removesuffix(".npy")] = np.load(BytesIO(file.read()), allow_pickle=False)
-    except (tarfile.TarError, EOFError, ValueError, LookupError) as error:
-        raise InputError(
-            f"{path}: it is no whole shard ({one_line(error)}); run rodcone dataset again, which makes it"
-        ) from error
+    damage = (tarfile.TarError, EOFError, ValueError, LookupError)
+    fix = "run rodcone dataset again, which makes it"
+    with read_errors(f"{path}: it is no whole shard", fix, damage), tarfile.open(path) as tar:
+        for member in tar:
+            file = tar.extractfile(member)
+            assert file is not None
+            name = member.name.split(".", 1)[1]
+            if name == "json":
+                yield arrays, json.loads(file.read())
+                arrays = {}
+            else:
+                arrays[name.removesuffix(".npy")] = np.load(BytesIO(file.read()), allow_pickle=False)

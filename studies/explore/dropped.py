@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, read_errors
 from rodcone.toml_file import parse_toml
 from sensor.config import SensorConfig
 from sensor.presets import preset
@@ -46,10 +46,8 @@ def write_dropped(files: Any, drops: Path) -> tuple[Path, SensorConfig]:
 
 def _check_tables(name: str, files: Mapping[str, str]) -> None:
     """Refuse a sensor that names files which did not come with it: a message may not make the program read others."""
-    try:
+    with read_errors(f"sensor: {name!r} is no TOML", "correct it"):
         responses = parse_toml(files[name]).get("responses", {})
-    except ValueError as error:
-        raise InputError(f"sensor: {name!r} is no TOML ({error}); correct it") from None
     named = responses.values() if isinstance(responses, dict) else ()
     missing = [table for table in named if isinstance(table, str) and table not in (*files, "included", "relative")]
     if missing:

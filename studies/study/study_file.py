@@ -7,7 +7,7 @@ from typing import Any, get_args
 from cattrs.gen import make_dict_structure_fn
 
 from isp.processors.own import user_file
-from rodcone.errors import InputError, one_line, require_whole
+from rodcone.errors import InputError, read_errors, require_whole
 from rodcone.toml_file import is_tuple, parse_toml, read_toml, strict_converter, structured
 from studies.study.study import FILES, SceneChoice, Study
 
@@ -37,12 +37,8 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
     example = EXAMPLES / f"{path}.toml"
     if not Path(path).exists() and example.parent == EXAMPLES and example.is_file():
         path = example
-    try:
+    with read_errors(f"study: {str(path)!r} can't be read", "start from one of: rodcone new study -o FILE"):
         content = read_toml(Path(path))
-    except (OSError, ValueError) as error:
-        raise InputError(
-            f"study: {str(path)!r} can't be read ({one_line(error)}); start from one of: rodcone new study -o FILE"
-        ) from error
     if "pixel" in content:
         raise InputError(
             f"study {str(path)!r}: it is a sensor; allowed: a study (rodcone new study -o FILE), in which it stands as "

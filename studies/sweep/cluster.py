@@ -13,7 +13,7 @@ from ipaddress import ip_address
 from typing import Any
 from urllib.parse import urlsplit
 
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, one_line, read_errors
 from rodcone.jit import backend
 from studies.sweep.provenance import versions
 from studies.sweep.run_cell import run_cell
@@ -107,13 +107,9 @@ def _client(address: str, patience_s: float) -> Any:
     from distributed import Client
 
     _check_encryption(address)
-    try:
+    silence = f"cluster: {address} doesn't answer within {patience_s:g} s"
+    with read_errors(silence, "start it: dask scheduler --host 127.0.0.1", OSError):
         return Client(address, timeout=patience_s, set_as_default=False)
-    except OSError as error:
-        raise InputError(
-            f"cluster: {address} doesn't answer within {patience_s:g} s ({one_line(error)}); start it: "
-            "dask scheduler --host 127.0.0.1"
-        ) from error
 
 
 def _check_encryption(address: str) -> None:
@@ -147,10 +143,8 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
     for worker, count in client.nthreads().items():
         if count != 1:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
-    try:
+    with read_errors("cluster: a worker lacks rodcone", "install it there", ImportError):
         workers = client.run(_facts)
-    except ImportError as error:
-        raise InputError(f"cluster: a worker lacks rodcone ({one_line(error)}); install it there") from error
     here, (theirs, cores_of, safe_paths) = _facts()[0], zip(*workers.values(), strict=True)
     for worker, its in zip(workers, theirs, strict=True):
         other = [name for name, version in here.items() if its.get(name) != version]

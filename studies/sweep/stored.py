@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.digests import digest, digest_bytes, digest_file
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, read_errors
 from rodcone.files import inside, replacing
 
 
@@ -75,12 +75,8 @@ def read_whole(folder: Path, name: str) -> bytes:
         Where it lies outside the folder, can't be read, or isn't what was written.
     """
     path = inside(folder, name)
-    try:
+    with read_errors(f"{path}: can't be read", "run rodcone sweep again, which makes it", OSError):
         content = path.read_bytes()
-    except OSError as error:
-        raise InputError(
-            f"{path}: can't be read ({one_line(error)}); run rodcone sweep again, which makes it"
-        ) from error
     if digest_bytes(content) != path.stem:
         raise InputError(f"{path}: it isn't what was written (damaged); run rodcone sweep again, which makes it")
     return content

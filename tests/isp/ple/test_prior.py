@@ -79,7 +79,7 @@ def test_a_hostile_prior_is_refused_in_one_line(tmp_path):
     path = tmp_path / "prior.npz"
     for content in (b"", b"no zip", b"PK\x03\x04"):
         path.write_bytes(content)
-        with pytest.raises(InputError, match=r"\Aprior: .*prior.npz.* can't be read: .*rodcone train.*\Z"):
+        with pytest.raises(InputError, match=r"\Aprior: .*prior.npz.* can't be read \(.*rodcone train.*\Z"):
             load_prior(path)
     for write in HOSTILE.values():
         write(path)
