@@ -188,7 +188,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
             _TEXT,
         ),
         "shake": _TEXT,
-        **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything"), _FLAG),
+        **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything", "blur"), _FLAG),
         **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
         **dict.fromkeys(("progress", "step", "runner", "make"), _CALL),
         "develop_file.path": _paths,

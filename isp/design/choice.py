@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from isp.design.expected_error import Doubles, Gaussians, Samples, sampled
 
 
-def every_channel(patches: Gaussians, responses: Doubles, middle: NDArray[np.intp]) -> Samples:
+def every_channel(patches: Gaussians, responses: Doubles, middle: NDArray[np.intp], lens: Doubles) -> Samples:
     """Samples of each channel at each pixel, in the order (channel, pixel).
 
     Parameters
@@ -18,10 +18,11 @@ def every_channel(patches: Gaussians, responses: Doubles, middle: NDArray[np.int
         Electrons of a channel from a coefficient of 1.
     middle : (pixel,) intp
         Pixels whose error counts.
+    lens : (pixel, pixel) float64
+        Share of one pixel's light (second axis) that falls on another (first axis).
     """
-    pixels = patches.means.shape[1]
-    sampling = np.einsum("nc,sp->nspc", responses, np.eye(pixels)).reshape(-1, pixels, responses.shape[1])
-    return sampled(patches, sampling, middle)
+    sampling = np.einsum("nc,sp->nspc", responses, lens)
+    return sampled(patches, sampling.reshape(-1, *sampling.shape[2:]), middle)
 
 
 @dataclass(frozen=True, eq=False)

@@ -45,6 +45,7 @@ def design(
     behind_in_luminance: float = 0.5,
     light: str = "D65",
     prior: str = "drawn",
+    blur: bool = False,
     steps: int = 500,
     seed: int = 0,
 ) -> None:
@@ -80,6 +81,8 @@ def design(
         Illuminant; the camera knows it.
     prior
         Prior over patches: drawn or photographs.
+    blur
+        Count what the lens spreads: its diffraction and defocus, at 550 nm.
     steps
         Tiles of 4x4 to look at.
     seed
@@ -103,10 +106,11 @@ def design(
     goal = Goal(
         sensor=base, levels_cd_m2=np.array(list(levels.values())), weights=share / share.sum(), reference=reference,
         behind_db=np.array([behind, behind_in_luminance, behind]), letters=letters, light=light, prior=prior,
+        blur=blur,
     )  # fmt: skip
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
-    tried, question = out / "tried.json", [repr(base), list(reference), light, prior, levels]
+    tried, question = out / "tried.json", [repr(base), list(reference), light, prior, levels, blur]
     known = _known(tried, question)
 
     def keep() -> None:
@@ -134,7 +138,9 @@ def design(
     ]
     cameras = {never_worse_than: vary(base, never_worse_than), "design": camera}
     cameras |= {name: vary(base, name) for name in names if name != never_worse_than}
-    by_camera = {name: expect(one, list(levels.values()), light, prior=prior) for name, one in cameras.items()}
+    by_camera = {
+        name: expect(one, list(levels.values()), light, prior=prior, blur=blur) for name, one in cameras.items()
+    }
     _write(out, sensor, camera, filters)
     write_text(out / "design.html", design_page(goal, camera, levels, by_camera, len(known)))
     print(f"{tile_text(found)}\n{out}")

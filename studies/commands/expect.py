@@ -32,6 +32,7 @@ def expect(
     light: str = "D65",
     exposure: str = AUTO_INFORMATION,
     prior: str = "drawn",
+    blur: bool = False,
     out: Path | None = None,
     json: bool = False,
 ) -> None:
@@ -56,6 +57,8 @@ def expect(
         Rule of exposure, or a time such as 20ms.
     prior
         Prior over patches: drawn (shapes and photographs) or photographs (alone).
+    blur
+        Count what the lens spreads: its diffraction and defocus, at 550 nm.
     out
         Table with every figure (.csv), or plot of the gain over the first camera (.svg).
     json
@@ -64,10 +67,9 @@ def expect(
     require_place(out, ".csv", ".svg")
     levels = {text: _luminance(text) for text in level} if level else levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
+    choices = (list(levels.values()), light, exposure if time_s is None else time_s, prior, blur)
     by_camera = {
-        f"{name} {tile}".strip(): expect_errors(
-            vary(preset(name), tile or OWN), list(levels.values()), light, exposure if time_s is None else time_s, prior
-        )
+        f"{name} {tile}".strip(): expect_errors(vary(preset(name), tile or OWN), *choices)
         for name in sensors
         for tile in mosaic or [""]
     }

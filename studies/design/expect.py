@@ -6,6 +6,7 @@ from functools import cache
 from math import hypot, log10, sqrt
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
@@ -17,8 +18,9 @@ from rodcone.errors import unknown
 from sensor.cfa import Tile, channels, mask
 from sensor.config import SensorConfig
 from sensor.curves import Responses
+from sensor.diffraction import sampled_otf
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
-from sensor.optics import camera_equation
+from sensor.optics import WAVELENGTH_NM, camera_equation
 from sensor.readings.by_channel import as_metered, of_channel
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
@@ -130,11 +132,21 @@ def middle_pixels() -> np.ndarray[tuple[int], np.dtype[np.intp]]:
     return np.flatnonzero(inside)
 
 
-def sampling_of(sensor: SensorConfig, responses: Floats) -> Floats:
-    """H of a patch: electrons of each sample from each pixel's coefficients, crosstalk included."""
+def sampling_of(sensor: SensorConfig, responses: Floats, blur: bool = False) -> Floats:
+    """H of a patch: electrons of each sample from each pixel's coefficients, through lens, filters and crosstalk."""
     site = sites_of(sensor.cfa, channels(sensor.cfa))
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
-    return np.asarray(spread_of(sensor.pixel.crosstalk)[:, :, None] * responses[site][None])
+    lens, spread = lens_of(sensor, blur), spread_of(sensor.pixel.crosstalk)
+    return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, responses[site], optimize=True))
+
+
+def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
+    """Share of each pixel's light (second axis) on each pixel of a patch: the unit matrix, or the lens's at 550 nm."""
+    points = np.eye(PATCH**2).reshape(-1, PATCH, PATCH)
+    if blur:  # as `sensor.optics.form_image` has diffraction and defocus
+        otf = sampled_otf((PATCH, PATCH), sensor.pixel.pitch_um, sensor.lens, folded=False)(WAVELENGTH_NM)
+        points = scipy.fft.idctn(otf * scipy.fft.dctn(points, axes=(1, 2)), axes=(1, 2))
+    return points.reshape(PATCH**2, -1).T
 
 
 def sites_of(tile: Tile, names: Sequence[str]) -> NDArray[np.intp]:
@@ -154,6 +166,7 @@ def expect(
     light: str = "D65",
     exposure: str | float = AUTO_INFORMATION,
     prior: str = "drawn",
+    blur: bool = False,
 ) -> list[ExpectedError]:
     """Expected error of a sensor's pictures at each level, in closed form.
 
@@ -168,6 +181,8 @@ def expect(
         A rule of `sensor.exposure.RULES`, or a time [s].
     prior : str
         One of `isp.design.spectral_prior.PRIORS`.
+    blur : bool
+        Whether diffraction and defocus of the sensor's lens spread the light, at 550 nm.
 
     Raises
     ------
@@ -179,7 +194,7 @@ def expect(
     spectral, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     responses = responses_e(sensor, seen)
-    sampling, drawn = sampling_of(sensor, responses), drawn_pixels(prior) @ responses.T
+    sampling, drawn = sampling_of(sensor, responses, blur), drawn_pixels(prior) @ responses.T
     known, linear = (
         sampled(patches, sampling, middle_pixels()) for patches in (spectral.patches, pooled_patches(prior))
     )

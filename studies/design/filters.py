@@ -7,12 +7,13 @@ from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
 from isp.design.slope import Case, error_slopes
+from isp.design.spectral_prior import load_prior
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from studies.design.expect import middle_pixels, sites_of, spread_of, unit_response_e, view_of
+from studies.design.expect import lens_of, middle_pixels, sites_of, spread_of, unit_response_e, view_of
 from studies.design.search import BEHIND, Goal, Progress, moments, rows_of, search_for, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
@@ -41,10 +42,11 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         raise InputError("curves: the sensor has no W, what a pixel without a filter collects; add W to its responses")
     # What all rounds share.
     search = search_for(replace(goal, letters=goal.letters + "W"))
-    prior, seen, names = search.prior, view_of(goal.prior, goal.light), channels(tile)
+    prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
     reference_db = tile_db(search, goal.reference)
     places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
+    lens = lens_of(goal.sensor, goal.blur)
     scenes = [(mean, row) for mean in prior.reflectances for row in rows_of(prior, seen, mean)]
     # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
     nm = seen.light.wavelength_nm
@@ -68,7 +70,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     def cost(logits: Floats, at: list[tuple[float, Noise]]) -> tuple[float, Floats]:
         """Score with the other sign, and its slope."""
         shares = transmittances(logits)
-        sampling = spread[:, :, None] * (shares @ clear_e)[places]
+        sampling = np.einsum("st,tp,tc->spc", spread, lens, (shares @ clear_e)[places])
         gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
         for index, (light, noise) in enumerate(at):
             if earlier := [before for before in range(index) if at[before][0] == light]:
@@ -87,7 +89,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         if over_db.min() < 0:
             weights[np.unravel_index(over_db.argmin(), over_db.shape)] += BEHIND
         by_sample = np.tensordot(weights, by_sample, 2)
-        by_pixel = np.einsum("sp,spc->pc", spread, by_sample)
+        by_pixel = np.einsum("st,tp,spc->tc", spread, lens, by_sample, optimize=True)
         by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])
         by_logit = (by_response @ clear_e.T * shares * (1 - shares))[free] @ bumps
         return -goal.score(gains_db), -by_logit.ravel()

@@ -17,6 +17,7 @@ from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from studies.design.expect import (
     LitPrior,
     drawn_pixels,
+    lens_of,
     metric_rows,
     middle_pixels,
     noise_at,
@@ -50,7 +51,7 @@ class Goal:
         How far a design may fall behind the reference at any level in PSNR, in luminance, and in a* and b*.
     letters : str
         Channels to choose from.
-    light, exposure, prior : str
+    light, exposure, prior, blur
         As `studies.design.expect.expect` takes them.
     """
 
@@ -63,6 +64,7 @@ class Goal:
     light: str = "D65"
     exposure: str = AUTO_INFORMATION
     prior: str = "drawn"
+    blur: bool = False
 
     def score(self, gains_db: Floats) -> float:
         """Mean gain in PSNR, less what lies behind the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
@@ -76,7 +78,6 @@ class Search:
     Attributes
     ----------
     goal : Goal
-    prior : SpectralPrior
     letters : str
         Channels to choose from, and the reference's.
     responses : (letter, coefficient) float64
@@ -86,7 +87,6 @@ class Search:
     """
 
     goal: Goal
-    prior: SpectralPrior
     letters: str
     responses: Floats
     every: tuple[Projected, ...]
@@ -107,9 +107,9 @@ def search_for(goal: Goal) -> Search:
     # A tile of one row lists its channels in an order of its own.
     sensor = with_tile(goal.sensor, (letters,), goal.sensor.responses)
     responses = responses_e(sensor, seen)[[channels(sensor.cfa).index(letter) for letter in letters]]
-    samples = every_channel(prior.patches, responses, middle_pixels())
+    samples = every_channel(prior.patches, responses, middle_pixels(), lens_of(sensor, goal.blur))
     scenes = [rows_of(prior, seen, reflectance) for reflectance in prior.reflectances]
-    return Search(goal, prior, letters, responses, tuple(projected(samples, *rows) for rows in scenes))
+    return Search(goal, letters, responses, tuple(projected(samples, *rows) for rows in scenes))
 
 
 def rows_of(prior: SpectralPrior, seen: LitPrior, reflectance: float) -> tuple[Floats, ...]:
@@ -137,7 +137,7 @@ def tile_db(search: Search, tile: Tile) -> Floats:
 
     Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab.
     """
-    goal, prior = search.goal, search.prior
+    goal, prior = search.goal, load_prior(search.goal.prior)
     sensor = with_tile(goal.sensor, tile, goal.sensor.responses)
     responses = search.responses[[search.letters.index(name) for name in channels(tile)]]
     spread = spread_of(sensor.pixel.crosstalk) if sensor.pixel.crosstalk else None

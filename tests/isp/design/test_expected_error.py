@@ -151,7 +151,7 @@ def test_a_tile_picks_its_samples() -> None:
     more = rng.standard_normal((2, len(MIDDLE), 1, COEFFICIENTS))
     forms = np.stack([row.swapaxes(-1, -2) @ row for row in (rows, more)])
     plain = expected_error(prior.weights, sampled(prior, sampling, MIDDLE), np.full(PIXELS, 30.0), noise, forms)
-    chosen = projected(every_channel(prior, responses, MIDDLE), rows, more)
+    chosen = projected(every_channel(prior, responses, MIDDLE, np.eye(PIXELS)), rows, more)
     samples = picked(chosen.samples, channel, spread)
     assert_allclose(
         expected_error(prior.weights, samples, np.full(PIXELS, 30.0), noise, chosen.forms), plain, rtol=1e-10

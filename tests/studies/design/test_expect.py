@@ -10,11 +10,13 @@ from isp.design.expected_error import Noise, expected_error, sampled
 from isp.design.spectral_prior import PRIORS, load_prior
 from isp.ple.prior import mixture, own_prior
 from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
+from sensor.optics import form_image
 from sensor.presets import low_noise, preset
-from studies.design.expect import expect, metric_rows, middle_pixels, responses_e, sampling_of, view_of
+from studies.design.expect import expect, lens_of, metric_rows, middle_pixels, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate
 
@@ -80,6 +82,24 @@ def test_error_falls_with_light_and_rises_with_noise_a_smaller_well_and_crosstal
     assert db(changed(prnu=0.1)) < db(RGBW)
     assert db(changed(dark_current_e_per_s=1e4)) < db(RGBW)
     assert db(changed(full_well_e=1000.0), 100.0) < db(RGBW, 100.0)
+
+
+def test_a_lens_that_spreads_light_raises_the_error_under_noise_and_one_that_does_not_leaves_it() -> None:
+    def db(**terms: float) -> float:
+        return expect(replace(RGBW, lens=replace(RGBW.lens, **terms)), [25.0], exposure=0.01, blur=True)[0].psnr_db
+
+    still = expect(RGBW, [25.0], exposure=0.01)[0].psnr_db
+    assert db(diffraction=0.0) == pytest.approx(still, abs=1e-9)
+    sharp = db(diffraction=1.0)
+    for by_width in ([still, sharp, db(diffraction=2.0)], [sharp, db(defocus_um=4.0), db(defocus_um=8.0)]):
+        assert all(np.diff(by_width) < -0.1), by_width
+
+
+def test_blur_is_that_of_a_point_in_an_image() -> None:
+    matrix, radiance = lens_of(RGBW, True), np.zeros((8, 8, 1))
+    radiance[3, 4] = 1.0
+    image = form_image(SpectralRadiance(radiance, np.array([550.0]), width_nm=np.ones(1)), RGBW).values[..., 0]
+    assert_allclose(matrix[:, 28].reshape(8, 8), image / image.sum(), atol=1e-9)
 
 
 def test_component_known_is_ahead_of_a_linear_estimate() -> None:

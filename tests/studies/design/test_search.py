@@ -23,12 +23,12 @@ def goal(**changes: object) -> Goal:
     return replace(Goal(preset("low_noise"), LEVELS, np.array([0.5, 0.5]), BAYER, np.full(3, 0.1)), **changes)
 
 
-@pytest.mark.parametrize("crosstalk", [0.0, pytest.param(0.03, marks=pytest.mark.thorough)])
-def test_a_tiles_figures_are_those_of_expect(crosstalk: float) -> None:
+@pytest.mark.parametrize(("crosstalk", "blur"), [(0.0, False), pytest.param(0.03, True, marks=pytest.mark.thorough)])
+def test_a_tiles_figures_are_those_of_expect(crosstalk: float, blur: bool) -> None:
     sensor = preset("low_noise", ("RBWB", "GRGR", "RWBB", "BGRG"))
     sensor = replace(sensor, pixel=replace(sensor.pixel, crosstalk=crosstalk))
-    rows = expect(sensor, LEVELS)
-    psnr_db, luminance_db, colour_db = tile_db(search_for(goal(sensor=sensor)), sensor.cfa)
+    rows = expect(sensor, LEVELS, blur=blur)
+    psnr_db, luminance_db, colour_db = tile_db(search_for(goal(sensor=sensor, blur=blur)), sensor.cfa)
     assert_allclose(psnr_db, [row.psnr_db for row in rows], atol=1e-9)
     assert_allclose(luminance_db, [row.luminance_db for row in rows], atol=1e-9)
     assert_allclose(colour_db, [-20 * np.log10(row.colour) for row in rows], atol=1e-9)
