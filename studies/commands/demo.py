@@ -49,6 +49,8 @@ class DemoOrder:
         Seed of the render, and the first of three of the chips and the exposures.
     light : str, optional
         Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
+    define : tuple of str
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     denoise : bool
         Photograph denoised light; the report's Monte Carlo share is then its measured error. Needs rodcone[denoise].
     render : bool
@@ -66,6 +68,7 @@ class DemoOrder:
     max_seconds: Seconds | None = None
     seed: int = 0
     light: str | None = None
+    define: tuple[str, ...] = ()
     denoise: bool = False
     render: bool = False
 
@@ -82,7 +85,7 @@ class DemoOrder:
         longest_s = study.longest_exposure_s if self.longest_exposure is None else self.longest_exposure
         return replace(
             study,
-            scenes=(SceneChoice(self.scene or study.scenes[0].source, self.light),),
+            scenes=(SceneChoice(self.scene or study.scenes[0].source, self.light, define=self.define),),
             sensors=self.sensor or study.sensors,
             levels=self.level or study.levels,
             processors=self.processor or study.processors,

@@ -1,6 +1,7 @@
 """The command `rodcone explore`."""
 
 import webbrowser
+from dataclasses import replace
 from functools import partial
 from typing import Annotated
 
@@ -39,7 +40,8 @@ def explore(
         Print the address, and open no browser.
     """
     opened = open_source(source, options)
-    scenes = {name: partial(open_source, name, options) for name in names()} | {opened.title: lambda: opened}
+    by_name = replace(options, trust_scene=False, define=())  # a scene of the catalogue takes neither
+    scenes = {name: partial(open_source, name, by_name) for name in names()} | {opened.title: lambda: opened}
     say(*opened.notes)
     with listen(port) as listener:
         session = Session(opened, scenes)

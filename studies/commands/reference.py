@@ -32,6 +32,7 @@ def reference(
     size: int | None = None,
     until: float = 0.03,
     max_seconds: Seconds | None = None,
+    define: tuple[str, ...] = (),
     out: Path | None = None,
 ) -> int:
     """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
@@ -49,18 +50,22 @@ def reference(
         of the demo.
     max_seconds
         Longest time for the render, earlier calls included.
+    define
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     out
         Folder of references; by default that of the variable RODCONE_REFERENCES, or the one in your home.
     """
+    # What to render, as the demo would
     require_range("until", until, 1e-4, 1e3, "give a share of the sensor's noise variance: 0.03")
     study = read_study(STUDY)
-    choice = SceneChoice(scene)
+    choice = SceneChoice(scene, define=define)
     study = replace(study, scenes=(choice,), render=replace(study.render, size=size or study.render.size))
     opened, model = open_choice(choice, study), as_stated(study).renders[choice]
     film, folder = film_of(opened, model), out or next(reference_folders())
     assert opened.scene is not None
     path, wanted = reference_path(folder, opened.scene, film), STEP_SPP
     transport: Transport | None = None
+    # Go on until the noise is low enough, and keep the file after each step
     with progress(sys.stderr) as step:
         while True:
             samples = transport.spp if transport else 0.0

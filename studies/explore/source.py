@@ -21,7 +21,7 @@ from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
 from rodcone.errors import require_fields
 from rodcone.memory import memory, require_memory
-from studies.study.scene_source import LIGHT, check_radiance_file, open_radiance_file, open_scene
+from studies.study.scene_source import LIGHT, check_radiance_file, defined, open_radiance_file, open_scene
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
@@ -74,6 +74,8 @@ class RenderOptions:
         Seed of the render.
     trust_scene : bool
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
+    define : tuple of str
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     force : bool
         Run even where more memory is needed than is free.
     """
@@ -83,6 +85,7 @@ class RenderOptions:
     band_nm: Annotated[float, (1.0, 100.0, "give nanometres")] = 20.0
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
+    define: tuple[str, ...] = ()
     force: bool = False
 
     def __post_init__(self) -> None:
@@ -114,12 +117,12 @@ def open_source(source: str, options: RenderOptions) -> Source:
             _coloured(transport.groups),
             notes=tuple(notes),
         )
-    opened = open_scene(source, options.trust_scene)
+    opened = open_scene(source, options.trust_scene, define=options.define)
     size, bands = film_size(opened.size, options.size), _bands(options)
     require_memory(memory(size[0] * size[1], bands[0].size, len(opened.scene.groups)), options.force)
-    trusted = ", trust=True" if options.trust_scene else ""
+    extras = ", trust=True" * options.trust_scene + f", define={defined(options.define)!r}" * bool(options.define)
     file = Path(source).suffix.lower() == ".xml"
-    scene = f"rodcone.load_scene_file({source!r}{trusted}).scene" if file else f"rodcone.load({source!r})"
+    scene = f"rodcone.load_scene_file({source!r}{extras}).scene" if file else f"rodcone.load({source!r})"
     first, last = VISIBLE_NM
     code = (
         f"import numpy as np\n\nscene = {scene}\n"

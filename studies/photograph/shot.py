@@ -55,9 +55,8 @@ class Order:
     Attributes
     ----------
     source : str or Path
-        Scene by name such as color_checker, a Mitsuba scene (.xml), a file of spectral radiance (.exr, or .mat of
-        ISETCam), a cube described by a .toml beside it (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png),
-        or reference light (.npz of rodcone reference).
+        Scene by name such as color_checker, a Mitsuba scene (.xml), spectral radiance (.exr, or ISETCam's .mat), a cube
+        described by a .toml (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png), or .npz of rodcone reference.
     out : str or Path
         Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
         with a .json beside it for any mosaic.
@@ -95,6 +94,8 @@ class Order:
         Seed of the render, the chip and the exposure.
     trust_scene : bool
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
+    define : tuple of str
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     extend : str, optional
         hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     force : bool
@@ -118,6 +119,7 @@ class Order:
     shake: str | None = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
+    define: tuple[str, ...] = ()
     extend: str | None = None
     force: bool = False
 
@@ -197,8 +199,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
         frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
-        noise = noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))
-        notes += [noise] if noise else []
+        notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [
@@ -254,7 +255,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
         )
     exposure_s = _asked_exposure_s(order, channels(sensor.cfa))
     if is_radiance_file(order.source):
-        scene_options = ("trust_scene", "chart", "extend", "size", "height", "width")
+        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width")
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
         require_absent(place, **{name: getattr(order, name) for name in scene_options})
         if len(order.light) > 1 or "=" in "".join(order.light):
@@ -265,7 +266,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         require_memory(memory(*extent_of(order.source)), order.force)
         return sensor, None, exposure_s
-    opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart)
+    opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
     sensor.check_frame((height, width))

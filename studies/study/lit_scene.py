@@ -74,7 +74,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             "render.reference = true"
         )
     if is_radiance_file(choice.source):
-        require_absent(f"for {choice.source}, a picture without surfaces", extend=choice.extend, chart=choice.chart)
+        place = f"for {choice.source}, a picture without surfaces"
+        require_absent(place, extend=choice.extend, chart=choice.chart, define=choice.define)
         check_radiance_file(choice.source, study.levels)
         identity = digest_inputs(
             [
@@ -83,7 +84,9 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             ]
         )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
-    opened = open_scene(choice.source, extend=choice.extend, light=choice.light, chart=choice.chart)
+    opened = open_scene(
+        choice.source, extend=choice.extend, light=choice.light, chart=choice.chart, define=choice.define
+    )
     scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)

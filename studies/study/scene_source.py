@@ -55,8 +55,8 @@ def open_scene(
     """
     if Path(source).suffix.lower() == ".xml":
         require_absent(f"for {source}, a file that has its own", light=light, chart=chart)
-        return load_scene_file(source, trust=trust, extend=extend, define=_defined(define))
-    require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust, define=define or None)
+        return load_scene_file(source, trust=trust, extend=extend, define=defined(define))
+    require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust, define=tuple(define))
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
         read = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
@@ -66,7 +66,8 @@ def open_scene(
     return SceneFile(replace(scene, extend=extend), scene.size, ())
 
 
-def _defined(texts: Sequence[str]) -> dict[str, str]:
+def defined(texts: Sequence[str]) -> dict[str, str]:
+    """Values of a scene file's $parameters by name."""
     for text in texts:
         if "=" not in text[1:]:
             raise InputError(f"define: {text!r} is not allowed; write NAME=VALUE, as -D depth=4")

@@ -45,12 +45,15 @@ class SceneChoice:
         ``hold``: surfaces go on at their end values outside their tables.
     chart : str, optional
         CSV file with the reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
+    define : tuple of str
+        ``NAME=VALUE`` of a Mitsuba scene's $parameters.
     """
 
     source: str
     light: str | None = None
     extend: str | None = None
     chart: str | None = None
+    define: tuple[str, ...] = ()
 
     @property
     def label(self) -> str:

@@ -73,6 +73,12 @@ def test_bands_too_wide_for_the_light_are_told_with_a_width_that_does(tmp_path: 
     assert call([*arguments, "400:700:10", "--light", "D65"])[2] == ""
 
 
+def test_every_command_hands_a_scene_files_parameters_on(scene: Path, tmp_path: Path) -> None:
+    for command in ("render", "capture", "explore --no-browser", "reference", "demo --scene"):
+        rows = [(f"{scene} -D depth", "write NAME=VALUE"), (f"{scene} -D no_such_parameter=4", "no_such_parameter")]
+        check_refusals(command, rows, tmp_path)
+
+
 def test_another_illuminant_comes_at_the_same_luminance(scene: Path, tmp_path: Path) -> None:
     fine = ["--spp", "8", "--bands", "380:780:25", "-o"]
     call(["render", str(scene), *fine, str(tmp_path / "own.exr")])

@@ -20,7 +20,7 @@ from studies.explore.views import VIEWS, histogram, pixel
 
 ROOM = """<scene version="3.0.0">
   <sensor type="perspective"/><shape type="sphere"><transform name="to_world"><translate z="4"/></transform></shape>
-  <emitter type="constant"><spectrum name="radiance" filename="../lamp.spd"/></emitter>
+  <emitter type="constant"><spectrum name="radiance" filename="../$lamp.spd"/></emitter>
 </scene>
 """
 
@@ -68,7 +68,8 @@ def test_the_python_of_a_file_opens_it_with_what_it_names_anywhere(tmp_path: Pat
     path.parent.mkdir()
     path.write_text(ROOM, "utf-8")
     (tmp_path / "lamp.spd").write_text("300 1\n900 2\n", "utf-8")
-    (state,) = open_source(str(path), RenderOptions(size=16, spp=1, band_nm=100.0, trust_scene=True)).states(go_on)
+    options = RenderOptions(size=16, spp=1, band_nm=100.0, trust_scene=True, define=("lamp=lamp",))
+    (state,) = open_source(str(path), options).states(go_on)
     names = ran(python_of(state.code, Controls()))
     lit, wanted = (each.relight().values for each in (names["transport"], state.transport))  # type: ignore[attr-defined]
     assert np.array_equal(lit, wanted)

@@ -128,5 +128,7 @@ def test_lamps_and_charts_are_files_beside_the_study(tmp_path: Path) -> None:
     assert study.scenes[0].light == str(tmp_path / "led.csv")
     assert study.scenes[0].chart == str(tmp_path / "mine.csv")
     assert study.scenes[0].label == "mine.csv"
+    (room,) = read_study(written(tmp_path), ['scenes={source="room.xml", define=["side=8"]}']).scenes
+    assert (room.source, room.define) == (str(tmp_path / "room.xml"), ("side=8",))
     with pytest.raises(InputError, match=r"illuminant: '.*absent.csv' can't be read"):
         read_study(written(tmp_path), ['spectra=["absent.csv"]'])
