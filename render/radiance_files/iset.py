@@ -122,7 +122,10 @@ def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
 def _numbers(numbers: Numbers, name: str) -> NDArray[Any]:
     if name not in numbers or not numbers[name].size:
         stated = name.replace("/", ".")
-        raise InputError(f"it has no numbers {stated!r}; allowed: an ISETCam scene; save it with sceneToFile")
+        raise InputError(
+            f"it has no numbers {stated!r}; allowed: an ISETCam scene, as sceneToFile saves it, or any cube that a "
+            ".toml of the same name describes; write that file"
+        )
     return numbers[name]
 
 

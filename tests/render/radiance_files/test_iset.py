@@ -133,7 +133,7 @@ def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
     ("variables", "told"),
     [
         ({"photons": PHOTONS}, "wavelength"),
-        ({"rgb": PHOTONS}, "sceneToFile"),
+        ({"rgb": PHOTONS}, r"sceneToFile saves it, or any cube that a \.toml of the same name"),
         ({"photons": PHOTONS, "wave": NM[:-1]}, r"\(5, 6, 31\) is not \(h, w, 30\)"),
         ({"photons": -PHOTONS, "wave": NM}, "at row 0, column 0, band 0"),
         ({"photons": PHOTONS * 1e60, "wave": NM}, "inf"),
