@@ -1,6 +1,7 @@
 """Expected errors of cameras: electrons and gains counted another way, symmetry, light, refusals."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -14,12 +15,14 @@ from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
+from sensor.config_file import read_sensor
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset
 from studies.design.expect import expect, lens_of, metric_rows, middle_pixels, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate
 
+ROOT = Path(__file__).resolve().parents[3]
 LEVELS = (0.036, 2.0, 25.0)
 BAYER, RGBW = low_noise("bayer"), low_noise("rgbw")
 
@@ -153,6 +156,15 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
     for white_e in green_e:
         gains = [10 * np.log10(error(BAYER.cfa, white_e) / error(RGBW.cfa, white_e)) for error in (ours, theirs)]
         assert abs(gains[0] - gains[1]) < 0.25
+
+
+def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
+    tiles = (("V",), ("VLVM", "LVLV", "VMVS", "LVLV"), ("VVLL", "VVLM", "LMVV", "LSVV"))
+    cameras = [read_sensor(ROOT / "docs/eye/eye.toml", tile) for tile in tiles]
+    rods, interleaved, clumped = ([row.psnr_db for row in expect(x, [0.01, 10.0], exposure=0.1)] for x in cameras)
+    assert np.sign(np.subtract(interleaved, rods)).tolist() == [-1.0, 1.0]
+    assert interleaved[0] > clumped[0]
+    assert interleaved[1] > clumped[1] + 0.1
 
 
 @pytest.mark.thorough
