@@ -19,6 +19,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.catalogue import PROCESSORS, Processor
+from isp.processors.own import processor_of
 from render.spectrum import Floats
 from rodcone.colour_spaces import encode_srgb
 from rodcone.toml_file import read_toml
@@ -124,7 +125,7 @@ def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float,
 
 def measure_at(name: str, snr_db: float) -> tuple[list[float], float]:
     """Error of one processor's planes at one SNR, and the factor on it."""
-    processor = PROCESSORS[name]
+    processor = processor_of(name)
     shots = [take(processor, index, sensor, snr_db) for index in range(TRAINING) for sensor in SENSORS]
     error = np.mean([plane_error(processor, shot) for shot in shots], axis=0)
     found = []
@@ -147,12 +148,12 @@ def measure_at(name: str, snr_db: float) -> tuple[list[float], float]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("names", nargs="*", choices=list(PROCESSORS))
+    parser.add_argument("names", nargs="*", help="as a study names them; FILE.whl:bayer_net too")
     names = parser.parse_args().names
     rows = read_toml(TABLE)["processors"]
-    for name in names or list(rows):
+    for name in names or [name for name in rows if name in PROCESSORS]:
         errors, factors = zip(*(measure_at(name, snr_db) for snr_db in SNR_DB), strict=True)
-        rows[name] = {"errors": errors, "factors": factors}
+        rows[name.rpartition(":")[2]] = {"errors": errors, "factors": factors}
     lines = [
         "# What is left of noise, with blur, in each processor's planes, over the noise variance of one sample.",
         "#   python benchmarks/measure_noise_gains.py",

@@ -5,7 +5,7 @@ of an old dilemma: demosaicking first, or denoising first?", CVPR Workshops 2020
 is denoised as if its noise were white and stronger, 1.5 times with them. Ours: 1.75, in units of noise from before.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -22,10 +22,11 @@ from sensor.cfa import Tile, channel_map, channels
 from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
+Denoise = Callable[[Image, Sequence[float]], Image]  # planes and the standard deviation of each one's noise
 # Noise that BM3D is told after demosaicking, in units of the mosaic's (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.75
 # Mean and two differences of R, G and B: orthonormal rows, the mean first.
-_OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
+OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 
 
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
@@ -48,9 +49,9 @@ def picture_denoised_first(
 
 
 def picture_demosaicked_first(
-    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, demosaic: Demosaic
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, demosaic: Demosaic, denoise: Denoise | None = bm3d
 ) -> Picture:
-    """Develop a Bayer raw image by demosaicking its noisy mosaic, then BM3D on R, G and B.
+    """Develop a Bayer raw image by demosaicking its noisy mosaic, then BM3D, or another denoiser or none.
 
     A balanced channel of gain g has sqrt(g) times the noise: so scaled, stabilised samples of a neutral agree between
     channels but for the dark noise, as demosaicking supposes.
@@ -61,7 +62,9 @@ def picture_demosaicked_first(
     names, sites = channels(raw.cfa), channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
     stable = stabilise(mosaic / gain, raw.dark_noise_e, 0.0) * np.sqrt(gain)
-    mixed = demosaic(stable, raw.cfa) @ _OPPONENT.T
-    sigma = NOISE_AFTER_DEMOSAICKING * np.sqrt(_OPPONENT**2 @ gains)
-    quiet = bm3d(mixed, sigma.tolist()) @ _OPPONENT / np.sqrt(gains)
-    return Picture(to_rgb(raw, unstabilise(quiet, raw.dark_noise_e) * gains, colours, MALVAR_REACH), sources)
+    planes = demosaic(stable, raw.cfa)
+    if denoise is not None:
+        sigma = NOISE_AFTER_DEMOSAICKING * np.sqrt(OPPONENT**2 @ gains)
+        planes = denoise(planes @ OPPONENT.T, sigma.tolist()) @ OPPONENT
+    electrons = unstabilise(planes / np.sqrt(gains), raw.dark_noise_e)
+    return Picture(to_rgb(raw, electrons * gains, colours, MALVAR_REACH), sources)

@@ -148,7 +148,10 @@ PROCESSORS: Mapping[str, Processor] = MappingProxyType(
 )
 # What a study may name: of a processor with measured gains also NAME_published, with the plain matrix of its source.
 NAMED: Mapping[str, Processor] = MappingProxyType(
-    {**PROCESSORS, **{f"{name}_published": _PLAIN[name] for name in _GAINS if name != "bayer_bilinear"}}
+    {
+        **PROCESSORS,
+        **{f"{name}_published": _PLAIN[name] for name in _PLAIN if name in _GAINS and name != "bayer_bilinear"},
+    }
 )
 
 

@@ -1,7 +1,8 @@
-"""Processors by name: of the catalogue, or from a Python file of the user's own, ``mine.py:develop``.
+"""Processors by name: of the catalogue, from a Python file of the user's own, ``mine.py:develop``, or from a wheel.
 
-Such a file is code that runs with all that its user may do. The doors (studies, `develop`) ask for consent before
-anything here loads one; a worker of a sweep loads it only where its bytes are those that the sweep began with.
+A wheel holds weights (`isp.processors.network`), read as arrays. A Python file is code that runs with all that its user
+may do. The doors (studies, `develop`) ask for consent before anything here loads one; a worker of a sweep loads a file
+only where its bytes are those that the sweep began with.
 """
 
 import platform
@@ -17,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from isp.picture import Picture
+from isp.processors import network
 from isp.processors.catalogue import NAMED, PROCESSORS, Processor
 from rodcone.digests import digest_bytes
 from rodcone.errors import InputError, one_line, read_errors, unknown
@@ -25,12 +27,12 @@ from sensor.cfa import OWN
 from sensor.raw import RawImage
 
 MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
-_NAME = re.compile(r"(.+\.py):([A-Za-z_]\w*)")
+_NAME = re.compile(r"(.+\.(?:py|whl)):([A-Za-z_]\w*)")
 _RENAMED = {"bayer_fair": "bayer_bilinear", "kriging": "ple or any_mosaic"}  # others resemble their new names
 
 
 def user_file(name: str) -> tuple[Path, str] | None:
-    """File and function of a name such as ``mine.py:develop``; None for any other name."""
+    """File and function of a name such as ``mine.py:develop`` or ``FILE.whl:bayer_net``; None for any other name."""
     match = _NAME.fullmatch(name)
     return None if match is None else (Path(match[1]), match[2])
 
@@ -44,7 +46,7 @@ def require_consent(what: str, name: str, trust_code: bool) -> None:
         )
     if user_code is None and name not in NAMED:
         raise unknown(what, name, PROCESSORS)
-    if user_code is not None and not trust_code:
+    if user_code is not None and user_code[0].suffix == ".py" and not trust_code:
         raise InputError(
             f"{what}: {name!r} is Python code, which may do all that you may; allowed with consent: read "
             f"{user_code[0]}, then add --trust-code (in Python trust_code=True)"
@@ -71,6 +73,7 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     name : str
         Of `NAMED`, or ``FILE.py:NAME`` with a function ``develop(raw, matrix, *, balance)`` that gives a `Picture`
         or linear sRGB (h, w, 3), or with a `Processor`, which states more. A function develops the sensor's own mosaic.
+        Or ``FILE.whl:bayer_net``, as `isp.processors.network.network_processor`.
         The file's folder is not searched for what it imports.
     expected : mapping of str to str, optional
         `own_version` that the file has to have; other bytes are refused before they run.
@@ -90,6 +93,10 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
             f"processors: {str(path)!r} on {platform.node()} isn't the file that the sweep began with; allowed: the "
             "same bytes; run rodcone sweep again, or give the workers the same file"
         )
+    if path.suffix == ".whl":
+        fix = "allowed: the wheel of demosaicnet with :bayer_net or :bayer_net_bm3d; pip download --no-deps demosaicnet"
+        with read_errors(f"processors: {str(path)!r} can't be used", fix):
+            return network.network_processor(attribute, content)
     value = getattr(_module(path, content), attribute, None)
     processor = value if isinstance(value, Processor) else Processor(OWN, value, path.name, colours=(), unit="")  # type: ignore[arg-type]
     if not callable(processor.picture) or isinstance(value, type):
@@ -105,8 +112,9 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
 
 
 def _read(path: Path) -> bytes:
-    with read_errors(f"processors: {str(path)!r} can't be read", "allowed: FILE.py:FUNCTION; correct the path"):
-        return read_bounded(path, MOST_BYTES)
+    allowed = "FILE.py:FUNCTION, or a wheel that pip download --no-deps demosaicnet fetched"
+    with read_errors(f"processors: {str(path)!r} can't be read", f"allowed: {allowed}; correct the path"):
+        return read_bounded(path, network.MOST_BYTES if path.suffix == ".whl" else MOST_BYTES)
 
 
 @cache

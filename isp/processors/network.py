@@ -1,0 +1,162 @@
+"""Demosaicking by a learned network on Bayer: the opponent that is no closed form.
+
+M. Gharbi, G. Chaurasia, S. Paris, F. Durand, "Deep joint demosaicking and denoising", ACM Trans. Graph. 35(6), 2016, in
+the form that its authors released as the package `demosaicnet` (MIT License). Its weights stay in the wheel that a user
+fetched, ``pip download --no-deps demosaicnet``, and named as a processor: ``FILE.whl:bayer_net``.
+
+Ours: weights are read as arrays, and nothing is unpickled; reflection about the outermost pixels; what reads as 1.
+"""
+
+import io
+import math
+import pickletools
+import zlib
+from collections.abc import Mapping
+from functools import cache, partial
+from itertools import product
+from zipfile import BadZipFile, ZipFile
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.colour.noise_gains import measured
+from isp.picture import Image
+from isp.planes import Plane
+from isp.processors.bayer_denoised import picture_demosaicked_first
+from isp.processors.catalogue import Processor
+from isp.processors.demosaic import require_bayer
+from isp.processors.sub_images import EXTRA as BM3D
+from isp.processors.sub_images import bm3d
+from rodcone.errors import one_line
+from sensor.cfa import Tile
+
+MEMBER = "demosaicnet/data/bayer.pth"
+LAYERS = {  # shape of each layer's weights: out, in, height, width
+    "main_processor.pack_mosaic": (4, 3, 2, 2),
+    "main_processor.conv1": (64, 4, 3, 3),
+    **{f"main_processor.conv{n}": (64, 64, 3, 3) for n in range(2, 15)},
+    "main_processor.conv15": (128, 64, 3, 3),
+    "residual_predictor": (12, 64, 1, 1),
+    "upsampler": (12, 1, 2, 2),
+    "fullres_processor.post_conv": (64, 6, 3, 3),
+    "fullres_processor.output": (3, 64, 1, 1),
+}
+REACH = 32  # pixels that a value depends on along one axis: fifteen 3x3 filters of 2x2 tiles, and one of pixels
+WHITE = 0.999  # share of a frame's samples under what the network is given as 1
+MOST_BYTES = 1 << 24  # of a wheel: demosaicnet's has 3.7 MB
+_LEAST = 1e-6  # units of noise, to divide by
+NAMES = ("bayer_net", "bayer_net_bm3d")
+SOURCE = "Gharbi, Chaurasia, Paris & Durand 2016, learned"
+Weights = Mapping[str, NDArray[np.float32]]
+
+
+@cache
+def network_processor(name: str, wheel: bytes) -> Processor:
+    """Processor ``bayer_net``, or ``bayer_net_bm3d``, which denoises its pictures by colour BM3D.
+
+    Raises
+    ------
+    ValueError
+        For another name, or a wheel without the weights.
+    """
+    if name not in NAMES:
+        raise ValueError(f"it has no {name!r}, only {' and '.join(NAMES)}")
+    denoise, extra, gains = (None, None, name) if name == NAMES[0] else (bm3d, BM3D, "bayer_residual_bm3d")
+    network = partial(demosaic, weights=read_weights(wheel))
+    picture = partial(picture_demosaicked_first, demosaic=network, denoise=denoise)
+    # What BM3D leaves hardly depends on what demosaicked.
+    return Processor("bayer", picture, SOURCE, extra=extra, noise_gains=measured()[gains])
+
+
+def read_weights(wheel: bytes) -> Weights:
+    """Arrays by name out of a wheel of demosaicnet; `ValueError` for anything else."""
+    shapes: dict[str, tuple[int, ...]] = {f"{name}.weight": shape for name, shape in LAYERS.items()}
+    shapes |= {f"{name}.bias": (3 if name == "upsampler" else shape[0],) for name, shape in LAYERS.items()}
+    most = 8 * sum(math.prod(shape) for shape in shapes.values())  # bytes: twice what they take
+    try:
+        with ZipFile(io.BytesIO(wheel)) as members, members.open(MEMBER) as member:
+            content = member.read(most)
+    except (BadZipFile, EOFError, KeyError, RuntimeError, zlib.error) as error:
+        raise ValueError(f"it is no wheel of demosaicnet ({one_line(error)})") from error
+    return read_arrays(content, shapes)
+
+
+def read_arrays(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weights:
+    """Arrays of 32-bit floats by name out of a file of torch's first format.
+
+    The pickle that names them is walked for its texts; nothing that it would call is looked at.
+
+    Parameters
+    ----------
+    content : bytes
+    shapes : mapping of str to tuple of int
+        Of the arrays to read, which the reader knows.
+
+    Raises
+    ------
+    ValueError
+        For a file without one of them.
+    """
+    file = io.BytesIO(content)
+    try:
+        texts = [[text for code, text, _ in pickletools.genops(file) if code.name == "BINUNICODE"] for _ in range(5)]
+        words = [word for word in texts[3] if word != "storage"]  # a name, its array's key, and so on
+        arrays = {}
+        for key in texts[4]:
+            count = int.from_bytes(file.read(8), "little")
+            arrays[key] = np.frombuffer(file.read(4 * count), "<f4", count)
+        weights = {name: arrays[words[words.index(name) + 1]].reshape(shape) for name, shape in shapes.items()}
+    except (ArithmeticError, LookupError) as error:
+        raise ValueError(f"its arrays can't be read ({one_line(error)})") from error
+    if not all(np.isfinite(weight).all() for weight in weights.values()):
+        raise ValueError("its arrays hold what is no number")
+    return weights
+
+
+def demosaic(mosaic: Plane, cfa: Tile, weights: Weights) -> Image:
+    """Planes of R, G and B, shape (h, w, 3).
+
+    Parameters
+    ----------
+    mosaic : (h, w) float64
+        Balanced, encoded as pictures are: roots of light, or sRGB. The network knows 0 to 1; `WHITE` says what is 1.
+    """
+    require_bayer(cfa)
+    # Phase: the network's tile begins with G in a row of R.
+    phase = ["".join(cfa).index("R") // 2, 1 - "".join(cfa).index("R") % 2]
+    before = [REACH + offset for offset in phase]
+    after = [REACH + (size + offset) % 2 for size, offset in zip(mosaic.shape, phase, strict=True)]
+    white = max(float(np.quantile(mosaic, WHITE)), _LEAST)
+    padded = np.pad((mosaic / white).astype(np.float32), tuple(zip(before, after, strict=True)), mode="reflect")
+    sites = np.zeros((*padded.shape, 3), np.float32)
+    for row, column, colour in ((0, 0, 1), (0, 1, 0), (1, 0, 2), (1, 1, 1)):
+        sites[row::2, column::2, colour] = padded[row::2, column::2]
+    # Two by two pixels to four features, fifteen filters, the product of two halves, and back to pixels.
+    features = _convolve(sites, weights, "main_processor.pack_mosaic", step=2)
+    for n in range(1, 16):
+        features = np.maximum(_convolve(features, weights, f"main_processor.conv{n}"), 0.0)
+    residual = _convolve(features[..., :64] * features[..., 64:], weights, "residual_predictor")
+    high, wide = residual.shape[:2]
+    blocks = np.einsum(
+        "hwck,ckt->hwct", residual.reshape(high, wide, 3, 4), weights["upsampler.weight"].reshape(3, 4, 4)
+    )
+    finer = blocks.reshape(high, wide, 3, 2, 2).transpose(0, 3, 1, 4, 2).reshape(2 * high, 2 * wide, 3)
+    finer = finer + weights["upsampler.bias"]
+    # The mosaic beside it, one filter of pixels, and the picture.
+    both = np.concatenate([sites[30:-30, 30:-30], finer], axis=-1)
+    features = np.maximum(_convolve(both, weights, "fullres_processor.post_conv"), 0.0)
+    planes = _convolve(features, weights, "fullres_processor.output").astype(np.float64)
+    inside = tuple(slice(1 + offset, 1 + offset + size) for offset, size in zip(phase, mosaic.shape, strict=True))
+    return planes[inside] * white
+
+
+def _convolve(values: NDArray[np.float32], weights: Weights, layer: str, step: int = 1) -> NDArray[np.float32]:
+    """Correlate (h, w, in) with a layer's filters, only where they fit in."""
+    filters = np.ascontiguousarray(weights[f"{layer}.weight"].transpose(2, 3, 1, 0))
+    side = len(filters)
+    high, wide = ((size - side) // step + 1 for size in values.shape[:2])
+    total = np.tile(weights[f"{layer}.bias"], (high, wide, 1))
+    for row, column in product(range(side), repeat=2):
+        seen = values[row : row + step * high : step, column : column + step * wide : step]
+        total += seen @ filters[row, column]
+    return total
