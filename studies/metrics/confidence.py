@@ -23,5 +23,5 @@ def half_width(samples: Floats, confidence: float = 0.95) -> Floats:
     count = samples.shape[-1]
     if count == 1:
         return np.full(samples.shape[:-1], np.nan)
-    quantile = float(scipy.stats.t.isf((1 - confidence) / 2, count - 1))
+    quantile = -float(scipy.special.stdtrit(count - 1, (1 - confidence) / 2))
     return np.asarray(quantile * samples.std(axis=-1, ddof=1) / np.sqrt(count))
