@@ -37,7 +37,7 @@ PARALLEL := OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest -n auto --maxprocesse
 # Asserts as they stand save a tenth of the time; a failed test runs once more with what it compared.
 QUICK := -m "not thorough and not slow"
 test: lint
-	@$(PARALLEL) $(QUICK) --assert=plain || { $(BIN)/python -m pytest $(QUICK) --last-failed; exit 1; }
+	@$(PARALLEL) $(QUICK) --assert=plain || { $(BIN)/python -m pytest $(QUICK) --last-failed --lfnf=none; exit 1; }
 
 test-all: $(VENV)/installed-dev
 	@$(PARALLEL) -m "not slow"

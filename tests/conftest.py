@@ -1,5 +1,6 @@
-"""What holds for all tests: one Dr.Jit thread in each of several workers, and which cases `make test` runs."""
+"""What holds for all tests: one thread in each of several workers, and which cases `make test` runs."""
 
+import gc
 import os
 from collections import defaultdict
 from collections.abc import Iterator
@@ -12,9 +13,18 @@ from rodcone.jit import backend, dr
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Give each worker of pytest-xdist one thread of Dr.Jit, where `make test-any-cpu` asks for no other number."""
+    """Give each worker of pytest-xdist one thread of OpenMP and of Dr.Jit, if `make test-any-cpu` asks for no other."""
+    gc.disable()  # until all items are there, none of which goes
+    if "PYTEST_XDIST_WORKER" in os.environ:
+        os.environ.setdefault("OMP_NUM_THREADS", "1")  # threads that wait for each other spin: FLIP five times as long
     if "PYTEST_XDIST_WORKER" in os.environ and "ANY_CPU_DRJIT_THREADS" not in os.environ and backend() == "llvm":
         dr.set_thread_count(1)
+
+
+def pytest_collection_finish() -> None:
+    """Have the garbage collector pass over all that the collection made."""
+    gc.freeze()
+    gc.enable()
 
 
 @pytest.fixture(scope="module")

@@ -60,6 +60,7 @@ def test_every_channel_s_samples_have_one_unit_of_noise_and_come_back(reading):
         assert back == pytest.approx(mean, abs=4.5 * sample_e), name
 
 
+@pytest.mark.thorough
 @loop("reading", WAYS)
 def test_a_flat_field_comes_out_at_its_level_in_every_channel(reading):
     """Within 4.5 standard errors of a channel's samples, and 0.2 % for what a prior or a bound adds."""

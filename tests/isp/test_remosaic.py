@@ -35,7 +35,7 @@ def test_the_tile_is_bayer_with_red_where_it_was() -> None:
         assert "".join(tile).index("R") == "".join(cfa).index("R"), cfa
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
     made = remosaic(raw(cfa, flat()))
@@ -55,7 +55,7 @@ def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:
     np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("axis", [0, 1])
 @pytest.mark.parametrize("cfa", PHASES)
 def test_a_ramp_is_sampled_where_the_new_pixel_lies(cfa: Tile, axis: int) -> None:

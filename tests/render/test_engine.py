@@ -345,8 +345,8 @@ def test_a_ceiling_of_samples_ends_a_render():
     assert text == "spp and max_spp: 8 and 16 are both given; allowed: one; leave spp out"
 
 
-@pytest.mark.sample(2)
-@pytest.mark.parametrize("stops", [[2], [8, 10], [16, 18, 36], [36, 40, 80, 144]])
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("stops", [[8, 10], [2], [16, 18, 36], [36, 40, 80, 144]])
 def test_a_render_that_is_gone_on_from_has_the_bits_of_one_that_was_not_interrupted(stops):
     """Stopped anywhere, with another number of threads each time, and by another rule at the end."""
     whole, part, seconds = small(5, spp=160), None, 0.0

@@ -78,7 +78,7 @@ def test_without_llvm_a_flat_field_is_reconstructed_by_numpy_and_stays_flat(fall
     assert fallback["flat"] < 1e-6
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize(
     "before", ["import mitsuba", "import drjit", "import mitsuba; mitsuba.set_variant('scalar_rgb')"]
 )

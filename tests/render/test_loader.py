@@ -32,7 +32,7 @@ def test_groups_hold_the_same_shapes_and_surfaces() -> None:
     assert all(own == surfaces[0] for own in surfaces)
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize("group", ["moon", "led"])
 def test_a_group_is_the_same_picture_as_a_scene_of_it_alone(group: str) -> None:
     """To the bit for the first group, whose seed is the same; shapes, surfaces and rows of the table are its own."""

@@ -71,6 +71,7 @@ def test_a_beam_from_behind_and_a_beam_behind_a_shade_give_nothing():
     assert not metered(down, shade=shade).any()
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("height_m", [0.1, 3.0])
 def test_a_point_light_gives_the_plates_solid_angle_over_its_area(height_m):
     half = SIDE_M / 2
@@ -97,6 +98,7 @@ def under_a_disk(centre, facing, radius_m):
     return np.pi * radius_m**2 * np.mean(way[..., 1] * -(way @ facing) / distance**4)
 
 
+@pytest.mark.thorough
 @loop("degrees", [70.0])
 def test_a_small_sun_gives_its_solid_angle_times_the_cosine(degrees):
     distance_m, radius_m = 100.0, 0.4653  # the sun's own radius, 0.2666 degrees

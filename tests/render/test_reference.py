@@ -64,6 +64,7 @@ def changed(transport, factor):
     return replace(transport, light=Halves(transport.light.mean * np.float32(factor), transport.light.difference))
 
 
+@pytest.mark.thorough
 def test_no_alarm_beyond_the_stated_rate_over_200_seeds(small):
     chances, ratios = [], []
     for seed in range(SEEDS):

@@ -48,6 +48,7 @@ def test_a_short_command_prints_nothing() -> None:
     assert file.getvalue() == ""
 
 
+@pytest.mark.thorough
 def test_the_time_left_is_by_the_pace_since_the_first_share(often: None) -> None:
     """A second of compilation before it, a tenth of the work in 0.1 s: 0.8 s for the eight tenths left, not 4.4 s."""
     file = StringIO()

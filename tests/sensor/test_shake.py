@@ -63,6 +63,7 @@ def test_short_times_are_straight_lines_and_long_ones_hold_all_of_the_variance()
     assert blur_variance(edge_s * 0.9999) == pytest.approx(blur_variance(edge_s * 1.0001), rel=1e-3)
 
 
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("time_s", TIMES_S)
 def test_second_moment_of_the_paths_is_that_of_the_spectrum(time_s):
     squares = np.array([(path(time_s, key) ** 2).mean(axis=1) for key in range(500)])

@@ -65,6 +65,7 @@ def by_hand(raw, planes, gains, row, column):
     return sharp + unknown * ((gains * sharp).max() / gains - sharp)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("tile", [*RGBW_PHASES, RGBW_4X4, quad(RGBW)])
 def test_the_estimate_is_the_formula_s(tile):
     """On edges, noise, a lamp and full samples, each 1e-3 of the pixel's light and more off without its part."""

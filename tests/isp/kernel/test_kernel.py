@@ -129,6 +129,7 @@ def test_hard_frames_give_finite_results_within_the_range_of_the_samples(name, d
         assert (result.noise_gain <= 1.0 + 2e-4).all()
 
 
+@pytest.mark.sample(3)
 @needs_kernel
 @pytest.mark.parametrize("patch", [1, 5])
 @pytest.mark.parametrize("tile", RGBW_PHASES)

@@ -96,6 +96,7 @@ def test_threads_change_nothing(monkeypatch):
     assert np.array_equal(*found)
 
 
+@pytest.mark.sample(5)
 @pytest.mark.parametrize("shape", [(2, 2), (3, 5), (9, 16), (16, 9), (31, 33)])
 @pytest.mark.parametrize("tile", [RGBW, RGBW_4X4, QUAD_RGBW])
 def test_any_size_of_frame_will_do(tile, shape):

@@ -44,7 +44,7 @@ def vars_of(light):
     return light.wavelength_nm, light.width_nm
 
 
-@pytest.mark.sample(16)
+@pytest.mark.sample(6)
 @pytest.mark.parametrize("number", [0, 8, 12, 13, 14, 15, 20])
 @pytest.mark.parametrize("mosaic", MOSAICS)
 def test_an_even_colour_is_what_the_fit_of_its_channels_says(mosaic: str, number: int) -> None:

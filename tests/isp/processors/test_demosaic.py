@@ -1,5 +1,6 @@
 """Malvar and Menon: the library's own result inside, no border effect, and what carries detail between colours."""
 
+from importlib.util import find_spec
 from itertools import product
 
 import numpy as np
@@ -12,7 +13,7 @@ from isp.processors.mosaic import balance_mosaic
 from rodcone.optional import optional_library
 from sensor.cfa import BAYER
 
-pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
+pytestmark = pytest.mark.skipif(find_spec("colour_demosaicing") is None, reason="rodcone[opponents] is not installed")
 
 NAMES = {malvar: "demosaicing_CFA_Bayer_Malvar2004", menon: "demosaicing_CFA_Bayer_Menon2007"}
 

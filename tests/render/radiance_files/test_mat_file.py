@@ -89,7 +89,7 @@ def test_a_reader_that_ends_or_hangs_is_an_error_here(
     script = tmp_path / "reader.py"
     script.write_text(end)
     monkeypatch.setattr(mat_reader, "__file__", str(script))
-    monkeypatch.setattr(mat_file, "_SECONDS", 1 if "sleep" in end else 60)
+    monkeypatch.setattr(mat_file, "_SECONDS", 0.6 if "sleep" in end else 60)
     path = tmp_path / "a.mat"
     scipy.io.savemat(path, {"x": 1.0})
     refusal(read_numbers, path, ["x"], match=told)

@@ -37,6 +37,7 @@ def test_the_package_runs_as_the_command() -> None:
 
 def test_demo_prints_the_report_alone_on_stdout(tmp_path: Path) -> None:
     arguments = ["demo", "-o", str(tmp_path / "o"), "--size", "32", "--spp", "8", "--scene", "flat_field"]
+    arguments += ["--processor", "interleaved", "--processor", "bayer"]
     code, out, _ = call([*arguments, "--level", "10cd/m2", "--sensor", "low_noise"])
     assert (code, out.strip()) == (0, str(tmp_path / "o" / "report.html"))
     assert (tmp_path / "o" / "report.html").stat().st_size > 10_000

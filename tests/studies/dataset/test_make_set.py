@@ -118,6 +118,7 @@ def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
         assert per_nm.shape == SAMPLE.NM.shape == np.array(light["wavelength_nm"]).shape
 
 
+@pytest.mark.thorough
 def test_the_same_bits_over_workers(stored: Path, tmp_path: Path) -> None:
     assert content(made(tmp_path, runner=partial(run_in_processes, workers=2))) == content(stored)
 
@@ -175,6 +176,7 @@ def test_the_same_bits_after_a_kill(stored: Path, tmp_path: Path) -> None:
     assert {x: found[x] for x in whole if x.endswith(".tar")} == {x: whole[x] for x in whole if x.endswith(".tar")}
 
 
+@pytest.mark.thorough
 def test_the_whole_frame_is_that_of_the_sweep(tmp_path: Path) -> None:
     """The same study swept in the same folder develops the frames that the set holds: nothing is rendered twice."""
     folder = made(tmp_path, order=SetOrder(planes=("rgb",), shards=1))

@@ -72,6 +72,7 @@ def test_a_turned_or_mirrored_tile_has_the_same_error() -> None:
     assert np.ptp(db, axis=0).max() < 0.05  # patches were turned at random: the prior is symmetric up to chance
 
 
+@pytest.mark.thorough
 def test_error_falls_with_light_and_rises_with_noise_a_smaller_well_and_crosstalk() -> None:
     def db(sensor: SensorConfig, level: float = 2.0) -> float:
         return expect(sensor, [level], exposure=0.02)[0].psnr_db

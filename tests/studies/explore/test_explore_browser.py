@@ -81,7 +81,7 @@ def test_the_page_asks_no_other_host(browser, address):
     assert CHROME.complaints(page) == []
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough
 @pytest.mark.parametrize(("width", "dark"), MODES)
 def test_the_page_fits_and_is_readable(browser, address, width, dark):
     page = CHROME.open_page(browser, address, width=width, dark=dark)
@@ -166,6 +166,7 @@ def answered(page, views, script):
     )
 
 
+@pytest.mark.thorough
 def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_old_one_comes_back(browser, address):
     """The page's module with a program that answers every third change, and an old question once more."""
     levels, painted = answered(
@@ -190,6 +191,7 @@ def test_one_picture_is_asked_at_a_time_the_next_with_the_newest_values_and_no_o
     assert painted == [0, 0, 3, 3, 3, 6, 6, 6, 9, 9]
 
 
+@pytest.mark.thorough
 def test_a_slider_that_moves_slowly_ends_no_two_pictures_in_a_row(browser, address):
     """A change each 200 ms, and a program that takes longer: the first picture ends, the second one is waited for."""
     asked = answered(
@@ -207,6 +209,7 @@ def test_a_slider_that_moves_slowly_ends_no_two_pictures_in_a_row(browser, addre
     assert asked == [25.0, float(f"{1e-4 * 1e9**0.001:.4g}")]
 
 
+@pytest.mark.thorough
 def test_pictures_are_painted_while_a_slider_is_dragged(browser, address):
     """A mouse's events, one each 16 ms, for 2 s: without them a picture waited until the slider came to rest."""
     page = CHROME.open_page(browser, address)
@@ -241,6 +244,7 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
     assert not np.array_equal(EXPLORE.picture(page), before)
 
 
+@pytest.mark.thorough
 def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
     seen = answered(
         CHROME.open_page(browser, address),

@@ -165,6 +165,7 @@ def test_hostile_messages_get_one_line_and_the_next_is_answered(served, tmp_path
         assert (header["kind"], header["number"], header["size"]) == ("show", 5, [40, 48])
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize(("text", "most"), [("{", MOST_A_SECOND), ("{" * 150_000, MOST_CHARACTERS_A_SECOND / 150_000)])
 def test_a_page_that_floods_is_read_at_its_pace(served, text, most):
     port, token = served

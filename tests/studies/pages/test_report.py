@@ -4,6 +4,7 @@ import json
 import re
 from base64 import b64decode, b64encode
 from dataclasses import fields, is_dataclass, replace
+from functools import cache
 from hashlib import sha256
 from html import unescape
 from pathlib import Path
@@ -35,6 +36,11 @@ def page_of(of: ReportData) -> str:
     return render_report(of, stubs(of))
 
 
+@cache
+def sample_page() -> str:
+    return page_of(SAMPLE.sample_report())
+
+
 def cell_at(of: ReportData, level: int, sensor: str, camera: str) -> ReportCell:
     group = of.by_group[[each.name for each in of.sensors].index(sensor)]
     return next(c for c in group if (c.level, c.camera) == (level, camera))
@@ -63,7 +69,7 @@ def rows_of(page: str) -> list[list[str]]:
 
 @pytest.mark.thorough
 def test_page_refers_to_nothing_outside() -> None:
-    page = page_of(SAMPLE.sample_report())
+    page = sample_page()
     address = re.compile(r"\b(?:src|href|srcset|action|data|poster|xlink:href)=[\"'](?!data:|#)")
     assert [tag for tag in tags(page) if address.search(tag[1])] == []
     page = re.sub(r"data:image/[^\"]*", "", page)
@@ -73,7 +79,7 @@ def test_page_refers_to_nothing_outside() -> None:
 
 
 def test_policy_holds_the_scripts_hash() -> None:
-    page = page_of(SAMPLE.sample_report())
+    page = sample_page()
     data, script = scripts(page)
     digest = b64encode(sha256(script.encode()).digest()).decode()
     policy = f"default-src 'none'; img-src data:; style-src 'unsafe-inline'; script-src 'sha256-{digest}'"
@@ -120,8 +126,7 @@ def test_hostile_text_stays_text_everywhere() -> None:
 
 
 def test_every_cell_stands_in_the_table() -> None:
-    of = SAMPLE.sample_report()
-    rows = rows_of(page_of(of))
+    of, rows = SAMPLE.sample_report(), rows_of(sample_page())
     per_table = 1 + 7 * len(of.cameras)
     assert len(rows) == per_table * len(of.sensors)
     for start, sensor in zip(range(0, len(rows), per_table), of.sensors, strict=True):
@@ -243,7 +248,7 @@ def test_seeds_and_exposures_stand_in_the_page() -> None:
 
 
 def test_one_seed_calls_nothing_ahead_and_says_so() -> None:
-    page = page_of(SAMPLE.sample_report())
+    page = sample_page()
     assert "±" not in page.split("<main>")[1].split("<script")[0]
     assert "One seed (0)" in page
 
@@ -269,7 +274,7 @@ def test_a_camera_without_an_infrared_filter_has_a_page() -> None:
 @pytest.mark.thorough
 def test_every_metric_is_explained() -> None:
     assert set(figures.MEANINGS) == {metric.key for metric in figures.METRICS}
-    page = unescape(page_of(SAMPLE.sample_report()))
+    page = unescape(sample_page())
     assert "by moonlight it sees so little that even a picture full of noise gets some 45 dB" in page
 
 

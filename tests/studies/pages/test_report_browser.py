@@ -232,6 +232,7 @@ def test_the_tables_hold_the_leads_and_signs_turn_with_a_and_b(browser: Any, fou
         assert after == (turned if before[1][0] != "n" else before)
 
 
+@pytest.mark.thorough
 def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: Any, four: Path) -> None:
     page, report = CHROME.open_page(browser, four), compared()
     found = comparisons(report)[CAMERA]
@@ -255,6 +256,7 @@ def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: A
                     assert row[8] == " / ".join(map(str, counted if a < other else counted[::-1]))
 
 
+@pytest.mark.thorough
 def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Path) -> None:
     page, answers = CHROME.open_page(browser, four), comparisons(compared())
     said = "['place', 'said', 'light', 'elsewhere', 'times'].map((id) => byId(id).textContent)"
@@ -299,6 +301,7 @@ def mean_and_half(samples: list[float]) -> tuple[float, float]:
     return float(np.mean(samples)), 4.30265 * float(np.std(samples, ddof=1)) / 3**0.5
 
 
+@pytest.mark.thorough
 def test_marks_and_bands_of_the_charts_lie_where_the_rows_say(browser: Any, four: Path) -> None:
     """Heights by the ticks' own labels, places by the logarithm of the light: leads, their sign, figures, intervals."""
     page, report = CHROME.open_page(browser, four), compared()
@@ -454,6 +457,7 @@ def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> Non
     assert page.evaluate("document.querySelector('#table table').scrollWidth") <= (297 - 2 * 10) / 25.4 * 96
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("dark", [False, True])
 def test_screen_is_not_blank(browser: Any, axes: Path, dark: bool) -> None:
     page = CHROME.open_page(browser, axes, dark=dark)

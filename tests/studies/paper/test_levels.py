@@ -30,6 +30,7 @@ def test_a_frame_without_white_has_alpha_1_and_its_colours() -> None:
     np.testing.assert_array_equal(bare.dn[~sites], raw.dn[~sites])
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("mosaic", ["rgbw", "rgbw_nd", "cmyw"])
 def test_dynamic_range_read_out_is_that_of_the_closed_form(mosaic: str) -> None:
     closed, measured = range_db(sensor_of("table1_output", mosaic))

@@ -66,7 +66,7 @@ def require_library(name: str) -> None:
         pytest.importorskip("colour_demosaicing", reason=f"rodcone[{NAMED[name].extra}] is not installed")
 
 
-@pytest.mark.sample(8)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", QUICK)
 def test_every_camera_shows_greys_at_their_own_level(name: str) -> None:
     require_library(name)
@@ -89,7 +89,7 @@ def test_the_falloff_that_a_lens_is_known_to_have_is_corrected() -> None:
 
 
 # A matrix that knows its noise shows them paler where the planes' error is large, by intent.
-@pytest.mark.sample(11)
+@pytest.mark.sample(4)
 @pytest.mark.parametrize("name", [name for name in QUICK if NAMED[name].noise_gains is None])
 def test_every_camera_shows_the_colour_checkers_colours(name: str) -> None:
     require_library(name)

@@ -108,6 +108,7 @@ def test_workers_with_many_threads_are_refused(tmp_path: Path) -> None:
         assert "\n" not in str(told.value)
 
 
+@pytest.mark.thorough
 def test_a_cluster_that_does_not_answer_is_told_in_time() -> None:
     pytest.importorskip("distributed", reason="rodcone[cluster] is not installed")
     began = time.monotonic()

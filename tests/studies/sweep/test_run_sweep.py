@@ -180,6 +180,7 @@ def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> N
     assert content(out) == before
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("year", [1970, 2106])
 def test_a_clock_that_jumps_makes_no_cell_anew_and_the_last_run_stays_the_last(
     year: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -214,6 +215,7 @@ def test_a_folder_with_other_files_is_refused_and_left_as_it_was(tmp_path: Path)
     assert swept(small_study(tmp_path), tmp_path / "new").made == 4
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("damage", ["{", '{"light": 1, "auto_s": [], "white_cd_m2": "x"}'])
 def test_shared_files_that_are_damaged_or_gone_are_made_again(damage: str, tmp_path: Path) -> None:
     study = small_study(tmp_path)

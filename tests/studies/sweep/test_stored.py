@@ -48,7 +48,7 @@ def flip(path: Path, place: int) -> None:
     path.write_bytes(bytes(content))
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", ["electrons", "errors", "truth"])
 def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp_path: Path) -> None:
     """In the exponent of the last number: 16 binary orders, which no file format notices."""
@@ -69,7 +69,7 @@ def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp
     assert np.array_equal(np.load(path), right)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
 @pytest.mark.parametrize("cut", [0, 1, -1])
 def test_a_picture_that_is_cut_is_made_again(column: str, cells: int, cut: int, tmp_path: Path) -> None:
