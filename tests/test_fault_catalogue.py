@@ -39,10 +39,9 @@ def test_the_files_and_the_tests_of_the_mutants_are_there() -> None:
     table = next(
         node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node).startswith("TESTS")
     )
-    named = [node.value for node in ast.walk(table) if isinstance(node, ast.Constant)]
-    paths = [ROOT / name if name.endswith(".py") else ROOT / "tests" / f"{name}.py" for name in named]
-    assert len(paths) > 20
-    assert [path for path in paths if not path.is_file()] == []
+    paths = {ROOT / file: ROOT / "tests" / tests for file, tests in ast.literal_eval(table).items()}
+    assert len(paths) == 10
+    assert [path for pair in paths.items() for path in pair if not path.exists()] == []
 
 
 def test_a_fault_whose_text_is_gone_is_told() -> None:

@@ -1,10 +1,13 @@
-"""Mutants drawn by a seed from the code that numbers come from, and whether the nearest tests notice each.
+"""Mutants drawn by a seed from the code that numbers come from, and whether the tests of its package notice each.
 
-python tests/faults/mutants.py --count 300 --seed 1    results are kept in out/mutants.json, so it can go on
+python tests/faults/mutants.py --count 300    results are kept in out/mutants.json, so it can go on
 
-The operators are cosmic-ray's (``pip install cosmic-ray``). A place in a file is drawn first, then what stands there
-instead; arithmetic becomes other arithmetic, since bits of floats fail at once. Annotations are left alone, and a
-mutant that can't be imported counts for nothing: another is drawn. Prints the survivors and a table.
+Code and tests are the last commit's, and so is the seed, if none is given: its first eight digits. The operators are
+cosmic-ray's (``pip install cosmic-ray coverage``). A place in a file is drawn first, then what stands there instead;
+arithmetic becomes other arithmetic, since bits of floats fail at once. Annotations are left alone, and a mutant that
+can't be imported counts for nothing: another is drawn. A package's tests run once, line by line under coverage; of a
+mutant only those that reach its lines run, the fastest first, and after them the rest of their files, which may share a
+fixture with them. Prints the survivors and a table.
 """
 
 import argparse
@@ -16,6 +19,7 @@ import multiprocessing
 import os
 import random
 import re
+import subprocess
 import sys
 import tempfile
 import time
@@ -30,34 +34,20 @@ import pytest
 from cosmic_ray.ast import Visitor, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.provider import OperatorProvider
-from plant_faults import ALL, MINUTES, ROOT, copy_project
+from coverage import Coverage
+from plant_faults import MAKE_TEST, ROOT
 
-TESTS = {  # below tests/, the likeliest first
-    "sensor/readout.py": [
-        *(
-            "sensor/test_readout",
-            "sensor/test_readout_variance",
-            "sensor/test_readout_crosstalk",
-            "sensor/test_capture",
-        ),
-        *("studies/photograph/test_snr", "sensor/test_photodiodes", "sensor/readings/test_noise"),
-    ],
-    "isp/reference.py": ["isp/kernel/test_kernel", "isp/test_interleaved"],
-    "render/transport.py": [
-        *("render/test_transport", "render/test_error_estimates", "render/test_scene_range", "rodcone/test_notebook")
-    ],
-    "render/meter.py": ["render/test_meter", "render/test_cache", "render/test_fallback"],
-    "studies/pages/verdict.py": ["studies/pages/test_verdict", "studies/pages/test_headline"],
-    "studies/pages/report_compare.py": [
-        *("studies/pages/test_verdict", "studies/pages/test_headline", "studies/pages/test_report_sweep")
-    ],
-    "studies/photograph/snr.py": ["studies/photograph/test_snr"],
-    "studies/sweep/database.py": [
-        "studies/sweep/test_database",
-        "studies/sweep/test_stored",
-        "studies/sweep/test_export",
-    ],
-    "studies/sweep/stored.py": ["studies/sweep/test_database", "studies/sweep/test_stored"],
+TESTS = {  # below tests/
+    "sensor/readout.py": "sensor",
+    "isp/reference.py": "isp",
+    "render/transport.py": "render",
+    "render/meter.py": "render",
+    "studies/pages/verdict.py": "studies/pages",
+    "studies/pages/report_compare.py": "studies/pages",
+    "studies/photograph/snr.py": "studies/photograph",
+    "studies/sweep/database.py": "studies/sweep",
+    "studies/sweep/stored.py": "studies/sweep",
+    "docs/make/white_pixel.py": "docs/test_white_pixel.py",
 }
 LEFT_OUT = re.compile(r".*_(RShift|LShift|BitOr|BitAnd|BitXor)_.*|.*_(RShift|LShift|BitOr|BitAnd|BitXor)")
 # Loaded once; Dr.Jit and Mitsuba not, whose threads a fork would lose.
@@ -67,10 +57,11 @@ NEEDS_ARGUMENTS = ("VariableInserter", "VariableReplacer")
 
 @dataclass(frozen=True)
 class Mutant:
-    """A file with one change: its code, and the lines that changed."""
+    """A file with one change: its code, the first line that changed, and the change as text."""
 
     file: str
     code: str
+    line: int
     change: str
 
 
@@ -89,7 +80,7 @@ class _Places(Visitor):
         return node
 
 
-def drawn(seed: int) -> Iterator[Mutant]:
+def drawn(seed: int, copy: Path) -> Iterator[Mutant]:
     """All mutants in an order of the seed, no place twice."""
     provider = OperatorProvider()
     names = [name for name in provider if name not in NEEDS_ARGUMENTS and not LEFT_OUT.fullmatch(name)]
@@ -98,15 +89,16 @@ def drawn(seed: int) -> Iterator[Mutant]:
     places = []
     for file in TESTS:
         found = _Places(operators)
-        found.walk(get_ast((ROOT / file).read_text("utf-8")))
+        found.walk(get_ast((copy / file).read_text("utf-8")))
         places += [(file, changes) for changes in found.changes.values()]
     for file, changes in source.sample(places, len(places)):
-        text = (ROOT / file).read_text("utf-8")
+        text = (copy / file).read_text("utf-8")
         name, number = source.choice(changes)
         code = mutate_code(text, operators[name], number)
         with suppress(SyntaxError):
             if without_annotations(code) != without_annotations(text):
-                yield Mutant(file, code, difference(text, code))
+                change = difference(text, code)
+                yield Mutant(file, code, int(change.split()[1].rstrip(":")), change)
 
 
 def without_annotations(code: str) -> str:
@@ -124,77 +116,167 @@ def difference(text: str, code: str) -> str:
     return " ".join(re.sub(r"^@@ -(\d+).*", r"line \1:", line) for line in lines)
 
 
-def tried(mutant: Mutant, copy: Path) -> dict[str, Any]:
-    """What the nearest tests make of a mutant; the copy is as before afterwards."""
+class Reach:
+    """Pytest's plugin: the tests that reach each line of some files, and the seconds of each test that passes."""
+
+    def __init__(self, files: list[str]) -> None:
+        self.coverage, self.seconds = Coverage(data_file=None, include=files), dict[str, float]()
+
+    @pytest.hookimpl(tryfirst=True)
+    def pytest_runtest_protocol(self, item: pytest.Item) -> None:
+        self.coverage.switch_context(item.nodeid)
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        if report.when == "call" and report.passed:
+            self.seconds[report.nodeid] = report.duration
+
+    def pytest_sessionfinish(self) -> None:
+        self.coverage.stop()
+        data = self.coverage.get_data()
+        lines = {file: data.contexts_by_lineno(file) for file in data.measured_files()}
+        Path("reach.json").write_text(json.dumps([self.seconds, lines]))
+
+
+class Order:
+    """Pytest's plugin: the tests that reach a mutant's lines, the quickest first, then the rest of their files."""
+
+    def __init__(self, reaching: set[str], seconds: dict[str, float]) -> None:
+        self.reaching, self.seconds = reaching, seconds
+
+    @pytest.hookimpl(trylast=True)
+    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
+        files = Counter[str]()
+        for test in self.reaching:
+            files[test.partition("::")[0]] += self.seconds[test]  # type: ignore[assignment]
+        keys = {
+            item.nodeid: (
+                item.nodeid not in self.reaching,
+                files[item.nodeid.partition("::")[0]],
+                self.seconds[item.nodeid],
+            )
+            for item in items
+            if item.nodeid in self.seconds
+        }
+        items[:] = sorted((item for item in items if item.nodeid in keys), key=lambda item: keys[item.nodeid])
+
+
+def reached(copy: Path, commit: str, known: dict[str, Any]) -> dict[str, tuple[dict[str, float], dict[int, set[str]]]]:
+    """Of each file: the seconds of its package's tests, and the tests that reach each line; kept in `known`."""
+    result = {}
+    for tests in dict.fromkeys(TESTS.values()):
+        files = [file for file in TESTS if TESTS[file] == tests]
+        kept = " ".join(git("rev-parse", *(f"{commit}:{path}" for path in (f"tests/{tests}", *files))).decode().split())
+        if kept not in known:
+            plugin = Reach([str(copy / file) for file in files])
+            log = run_tests(copy, ["-q", "-m", MAKE_TEST, f"tests/{tests}"], plugin, seconds=3600)[1]
+            print(
+                tests,
+                *re.findall("^(?:FAILED|ERROR) .*", log, re.MULTILINE),
+                log.splitlines()[-1],
+                sep="\n",
+                flush=True,
+            )
+            known[kept] = json.loads((copy / "reach.json").read_text())
+        seconds, lines = known[kept]
+        for file in files:
+            of_file = next((x for path, x in lines.items() if path.endswith(file)), {})
+            result[file] = seconds, {int(number): set(names) for number, names in of_file.items()}
+    return result
+
+
+def git(*words: str) -> bytes:
+    return subprocess.check_output(["git", *words], cwd=ROOT)
+
+
+def reaching(mutant: Mutant, text: str, lines: dict[int, set[str]]) -> set[str]:
+    """The tests that reach a mutant's statement; of code that runs at import, all that reach the file."""
+    around = [
+        node
+        for node in ast.walk(ast.parse(text))
+        if isinstance(node, ast.stmt) and node.lineno <= mutant.line <= (node.end_lineno or 0)
+    ]
+    *outer, inner = sorted(around, key=lambda node: (node.lineno, -(node.end_lineno or 0)))
+    in_function = any(isinstance(node, ast.FunctionDef) for node in outer)
+    numbers = range(inner.lineno, (inner.end_lineno or 0) + 1) if in_function else lines
+    return {test for number in numbers for test in lines.get(number, ())}
+
+
+def tried(mutant: Mutant, copy: Path, seconds: dict[str, float], lines: dict[int, set[str]]) -> dict[str, Any]:
+    """What its tests make of a mutant; the copy is as before afterwards."""
     file, text, start = copy / mutant.file, (copy / mutant.file).read_text("utf-8"), time.perf_counter()
+    order = Order(reaching(mutant, text, lines) & seconds.keys(), seconds)
+    files = sorted({test.partition("::")[0] for test in order.reaching})
+    expected = sum(seconds[test] for test in seconds if test.partition("::")[0] in files)
     try:
         file.write_text(mutant.code, "utf-8")
-        code, test = run_tests(copy, TESTS[mutant.file])
+        code, log = run_tests(copy, ["-x", "-q", *files], order, 120 + 4 * expected) if files else (0, "not reached")
     finally:
         file.write_text(text, "utf-8")
+    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", log, re.MULTILINE)
+    test = failed[1] if failed else log[-400:]
     result = "survived" if code == 0 else "caught" if code == 1 and "::" in test else "not importable"
     return {"file": mutant.file, "result": result, "by": test, "seconds": round(time.perf_counter() - start, 1)}
 
 
-def run_tests(copy: Path, tests: list[str], keep_bytecode: bool = False) -> tuple[int, str]:
-    """Exit code of pytest at the first failure, and the test that failed; in a fork, which has the libraries loaded."""
+def run_tests(copy: Path, arguments: list[str], plugin: Reach | Order, seconds: float) -> tuple[int, str]:
+    """Exit code of pytest and what it printed; in a fork, which has the libraries loaded."""
     log = copy / "log"
-    child = multiprocessing.get_context("fork").Process(target=_pytest, args=(copy, tests, log, keep_bytecode))
+    child = multiprocessing.get_context("fork").Process(target=_pytest, args=(copy, arguments, plugin, log))
     child.start()
-    child.join(60 * MINUTES)
+    child.join(seconds)
     if child.is_alive():
         child.kill()
-        return 1, "::it never ends"
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", log.read_text(), re.MULTILINE)
-    return child.exitcode or 0, failed[1] if failed else log.read_text()[-400:]
+        return 1, "FAILED ::it never ends"
+    return child.exitcode or 0, log.read_text()
 
 
-def _pytest(copy: Path, tests: list[str], log: Path, keep_bytecode: bool) -> None:
+def _pytest(copy: Path, arguments: list[str], plugin: Reach | Order, log: Path) -> None:
     os.chdir(copy)
     os.environ["PYTHONPATH"] = str(copy)
     sys.path.insert(0, str(copy))
-    sys.dont_write_bytecode = not keep_bytecode
+    sys.dont_write_bytecode = isinstance(plugin, Order)
     with log.open("w") as out:
         os.dup2(out.fileno(), 1)
         os.dup2(out.fileno(), 2)
-    arguments = ["-x", "-q", "-m", ALL, "-p", "no:cacheprovider", *(f"tests/{test}.py" for test in tests)]
-    os._exit(int(pytest.main(arguments)))
+    if isinstance(plugin, Reach):
+        plugin.coverage.start()
+    os._exit(int(pytest.main(["-p", "no:cacheprovider", *arguments], plugins=[plugin])))
 
 
 def main() -> int:
     """Draw, try, and print the survivors and a table by file."""
+    commit = git("rev-parse", "HEAD").decode().strip()
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--count", type=int, default=300)
-    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--seed", type=int, default=int(commit[:8], 16))
     parser.add_argument("--results", type=Path, metavar="FILE", default=ROOT / "out" / "mutants.json")
     options = parser.parse_args()
+    options.results.parent.mkdir(parents=True, exist_ok=True)
     known: dict[str, Any] = json.loads(options.results.read_text()) if options.results.exists() else {}
+    results = known.setdefault(commit, {})
     counted: list[dict[str, Any]] = []
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
-        copy_project(Path(folder))
+        copy = Path(folder)
+        subprocess.run(["tar", "-x", "-C", folder], input=git("archive", commit), check=True)
         for library in LIBRARIES:
             importlib.import_module(library)
-        for file, tests in TESTS.items():
-            if (code := run_tests(Path(folder), tests, keep_bytecode=True)[0]) != 0:
-                raise SystemExit(f"{file}: its tests fail without a mutant, exit code {code}")
-        for mutant in drawn(options.seed):
+        reach = reached(copy, commit, known.setdefault("reach", {}))
+        for mutant in drawn(options.seed, copy):
             key = f"{mutant.file} {mutant.change}"
-            if key not in known:
-                known[key] = tried(mutant, Path(folder))
-                options.results.parent.mkdir(parents=True, exist_ok=True)
-                options.results.write_text(json.dumps(known, indent=1))
-            if known[key]["result"] != "not importable":
-                counted.append(known[key])
-            if known[key]["result"] == "survived":
+            if key not in results:
+                results[key] = tried(mutant, copy, *reach[mutant.file])
+                options.results.write_text(json.dumps(known))
+            if results[key]["result"] != "not importable":
+                counted.append(results[key])
+            if results[key]["result"] == "survived":
                 print(key, flush=True)
             if len(counted) == options.count:
                 break
-    print("\n| file | mutants | caught | survived |\n| --- | ---: | ---: | ---: |")
-    for file in TESTS:
-        results = Counter(mutant["result"] for mutant in counted if mutant["file"] == file)
-        print(f"| {file} | {results.total()} | {results['caught']} | {results['survived']} |")
-    results = Counter(mutant["result"] for mutant in counted)
-    print(f"| together | {results.total()} | {results['caught']} | {results['survived']} |")
+    print(f"\ncommit {commit}, seed {options.seed}\n")
+    print("| file | mutants | caught | survived |\n| --- | ---: | ---: | ---: |")
+    for file in [*TESTS, "together"]:
+        found = Counter(mutant["result"] for mutant in counted if file in (mutant["file"], "together"))
+        print(f"| {file} | {found.total()} | {found['caught']} | {found['survived']} |")
     return 0
 
 

@@ -265,6 +265,71 @@ def test_a_picture_without_bytes_is_the_last_one_sent(browser, address):
     assert seen == [[10, 20], [30, 20]]
 
 
+FIGURES = {
+    "histogram": {
+        "edges_e": [1.0, 10.0, 100.0, 1e3, 1e4], "counts": {"G": [4, 16, 100, 0]}, "well_e": 5000.0, "floor_e": 3.0,
+    },
+    "pixel": {
+        "row": 1, "column": 0, "channel": "G", "photons": 1234.5, "electrons": {"R": 100.25, "G": 400.5},
+        "read_e": 390.0, "well_e": 5000.0, "noise_e": {"shot": 20.0, "total": 25.5},
+        "wavelength_nm": [400.0, 500.0, 600.0], "photons_nm": [2.0, 8.0, 4.0], "electrons_nm": {"G": [1.0, 6.0, 0.0]},
+    },
+}  # fmt: skip
+
+
+def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, address):
+    """Places by the ticks' own labels: electrons on a scale of factors, samples by their roots, spectra evenly."""
+    said = answered(
+        CHROME.open_page(browser, address),
+        [[0, "picture"], [0, "truth"]],
+        f"""
+          const figures = {json.dumps(FIGURES)}, wait = kind => new Promise(done => (function look() {{
+            const one = asked.find(each => each.kind === kind); one ? done(one.number) : setTimeout(look, 10); }})());
+          const colour = new DataView(new Uint8Array([10, 20, 30, 10, 20, 30]).buffer);
+          const facts = [{{ exposure_s: 0.0125, saturated: 0.0123, snr_db: 17.36 }}];
+          tell({{ ...answer, number: 2, size: [2, 1], facts }}, [colour, colour]);
+          el.querySelector("canvas").dispatchEvent(new KeyboardEvent("keydown", {{ key: "ArrowUp" }}));
+          for (const kind of ["histogram", "pixel"])
+            tell({{ kind, number: await wait(kind), python: "", noise_note: "", [kind]: figures[kind] }}, []);
+          const all = (each, what) => [...each.querySelectorAll(what)];
+          const named = one => [+one.getAttribute("x1"), one.nextSibling.textContent];
+          const points = one => one.getAttribute("points").split(" ").map(point => point.split(",").map(Number));
+          const svg = each => ({{ ticks: all(each, ".grid").map(named), marks: all(each, ".mark").map(named),
+            lines: all(each, "polyline").map(points), note: all(each, "text").at(-1).textContent }});
+          return {{ captions: all(el, "figcaption").map(one => one.textContent),
+            pixel: [...el.querySelector("canvas").getContext("2d").getImageData(0, 0, 1, 1).data],
+            rows: all(el, ".budget tr").map(one => [...one.children].map(cell => cell.textContent)),
+            of: [asked.find(each => each.kind === "pixel").row, el.querySelector(".budget p").textContent],
+            figures: all(el, ".figures svg").map(svg) }};
+        """,
+    )
+    assert said["captions"][0].endswith(": interleaved, 12.5 ms, 1.2 % full, green's SNR 17.4 dB")
+    assert said["captions"][1] == "Reference, 4 samples, render noise 10 %: without the sensor's noise"
+    assert said["pixel"] == [10, 20, 30, 255]
+    assert said["rows"] == [
+        *(["Photons on the pixel", "1235"], ["Electrons behind R", "100.3"], ["Electrons behind G, its own", "400.5"]),
+        *(["Read out", "390 of 5000"], ["σ of shot", "20 e⁻"], ["All noise", "25.5 e⁻"]),
+    ]
+    assert said["of"] == [0, "Row 1, column 0, channel G"]
+    histogram, spectrum = said["figures"]
+    at, decades = np.array([(x, float(text.replace("k", "e3"))) for x, text in histogram["ticks"]]).T
+    place = np.polyfit(np.log(decades), at, 1)
+    assert place[0] > 0
+    assert at == pytest.approx(np.polyval(place, np.log([1, 10, 100, 1e3, 1e4])), abs=0.1)
+    for x, text in histogram["marks"]:
+        assert x == pytest.approx(np.polyval(place, np.log(float(text.split()[-1]))), abs=0.1), text
+    assert [text for _, text in histogram["marks"]] == ["well 5000", "noise floor 3"]
+    x, y = np.array(histogram["lines"][0]).T
+    assert x == pytest.approx(np.polyval(place, np.log([1, 10, 10, 100, 100, 1e3, 1e3, 1e4])), abs=0.1)
+    assert (y[-1] - y[:6]) ** 2 == pytest.approx((y[-1] - y[4]) ** 2 * np.repeat([0.04, 0.16, 1], 2), rel=0.02)
+    photons, electrons = np.array(spectrum["lines"])
+    assert photons[:, 0] == pytest.approx([x for x, _ in spectrum["ticks"]], abs=0.1)
+    assert [text for _, text in spectrum["ticks"]] == ["400", "500", "600"]
+    up = electrons[2, 1] - np.stack([photons[:, 1], electrons[:, 1]])
+    assert up / up[0, 1] == pytest.approx(np.array([[0.25, 1, 0.5], [0.125, 0.75, 0]]), abs=0.01)
+    assert "dashed: photons, at most 8 a nm" in spectrum["note"]
+
+
 @pytest.mark.thorough
 def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_sliders_rest(browser, address, one_render):
     page = CHROME.open_page(browser, address)

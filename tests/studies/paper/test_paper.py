@@ -4,6 +4,7 @@ import csv
 import json
 import re
 from collections.abc import Iterator
+from html import unescape
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,70 @@ def test_table_has_a_row_for_each_check_under_its_claims_number(paper: Paper, fo
     for row, (number, claim, check) in zip(rows, numbered, strict=True):
         assert (row["number"], row["claim"], row["verdict"]) == (number, claim.text, claim.verdict)
         assert (row["condition"], row["check"]) == (check.condition, "holds" if check.holds else "fails")
+
+
+def number(words: str) -> float:
+    """The first number of a text as pages write it."""
+    return float(
+        re.sub(r"[\N{NARROW NO-BREAK SPACE}]", "", words).replace("\N{MINUS SIGN}", "-").replace("∞", "inf").split()[0]
+    )
+
+
+def test_every_number_of_the_page_and_the_table_is_recounted_from_the_checks(paper: Paper, folder: Path) -> None:
+    page = (folder / "paper.html").read_text("utf-8")
+    cells = r'<tr><th scope="row">([^<]*)</th><td class="n">([^<]*)(?:<span class="note">([^<]*)</span>)?</td>'
+    cells += r'<td class="range">([^<]*)</td><td class="sign \w+">([^<]*)</td></tr>'
+    rows = [[unescape(cell) for cell in row] for row in re.findall(cells, page)]
+    checks = [check for claim in paper.claims for check in claim.checks]
+    for (condition, value, default, span, sign), check in zip(rows, checks, strict=True):
+        shown, margin = f"{value} ".split("±") if "±" in value else (value, "0")
+        assert condition == check.condition
+        assert number(shown) == pytest.approx(check.value, rel=5.1e-3), condition
+        assert number(margin) == pytest.approx(check.margin, rel=0.051), condition
+        assert value.endswith(check.unit), condition
+        assert (number(default.removeprefix("default: ")) if default else None) == (
+            check.default if check.default is None else pytest.approx(check.default, rel=5.1e-3)
+        ), condition
+        ends = [float("-inf"), float("inf")]
+        for word, places in (("at least", [0]), ("at most", [1]), ("exactly", [0, 1])):
+            if span.startswith(word):
+                for place in places:
+                    ends[place] = number(span.removeprefix(word))
+        if " to " in span:
+            ends = [number(end) for end in span.split(" to ")]
+        assert ends == pytest.approx([check.low, check.high], rel=5.1e-4), condition
+        inside = check.low <= check.value - check.margin and check.value + check.margin <= check.high
+        assert sign == ("✓ holds" if inside and np.isfinite(check.value) else "✗ fails"), condition
+    held = [[check.holds for check in claim.checks] for claim in paper.claims]
+    counts = [sum(map(all, held)), sum(any(one) and not all(one) for one in held), sum(not any(one) for one in held)]
+    words = "{} reproduced, {} reproduced under a condition, {} not reproduced.".format(*counts)
+    assert f"Of {len(held)} claims: {words}" in page
+
+
+def test_the_lines_of_the_figures_are_recounted_from_the_claims(paper: Paper) -> None:
+    axes = {
+        (figure.name, one.get_title("left")): [line.get_ydata() for line in one.lines]
+        for figure in paper.figures
+        for one in figure.drawing.axes
+    }
+    checks = {claim.text: [check.value for check in claim.checks] for claim in paper.claims}
+    notes = {claim.text: claim.note for claim in paper.claims}
+    with_white, without_white, _ = axes["A", "PSNR, dB"]
+    for gain in checks["W makes the picture better, at no level worse"]:
+        assert np.abs(with_white - without_white - gain).min() < 1e-9
+    similarity, _, full = axes["A", "W's part, share"]
+    assert [similarity[0], similarity[-1]] == pytest.approx(
+        checks["W's part in the picture falls smoothly as light grows"][2:]
+    )
+    assert full[0] == 0 < full[-1]
+    bayer_ms, ours_ms, _ = axes["B", "Best time by hand, ms"]
+    shorter = "By hand, W's light allows a shorter exposure than Bayer's"
+    told = re.findall(r"([\d.]+) and ([\d.]+) ms", notes[shorter])
+    assert np.transpose([bayer_ms, ours_ms]) == pytest.approx(np.array(told, float), rel=5.1e-3)
+    assert np.log2(np.divide(bayer_ms, ours_ms)) == pytest.approx(checks[shorter], abs=0.1)
+    bayer_db, ours_db, _ = axes["B", "PSNR at the best time, dB"]
+    better = checks["By hand, the picture at the best time is better than Bayer's at its own"]
+    assert np.subtract(ours_db, bayer_db) == pytest.approx(better)
 
 
 def test_json_holds_what_the_page_says(paper: Paper, folder: Path) -> None:
