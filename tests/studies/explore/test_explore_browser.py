@@ -321,11 +321,13 @@ def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, 
     assert [text for _, text in histogram["marks"]] == ["well 5000", "noise floor 3"]
     x, y = np.array(histogram["lines"][0]).T
     assert x == pytest.approx(np.polyval(place, np.log([1, 10, 10, 100, 100, 1e3, 1e3, 1e4])), abs=0.1)
+    assert y[-1] > y[4], "more is higher"
     assert (y[-1] - y[:6]) ** 2 == pytest.approx((y[-1] - y[4]) ** 2 * np.repeat([0.04, 0.16, 1], 2), rel=0.02)
     photons, electrons = np.array(spectrum["lines"])
     assert photons[:, 0] == pytest.approx([x for x, _ in spectrum["ticks"]], abs=0.1)
     assert [text for _, text in spectrum["ticks"]] == ["400", "500", "600"]
     up = electrons[2, 1] - np.stack([photons[:, 1], electrons[:, 1]])
+    assert up[0, 1] > 0, "more is higher"
     assert up / up[0, 1] == pytest.approx(np.array([[0.25, 1, 0.5], [0.125, 0.75, 0]]), abs=0.01)
     assert "dashed: photons, at most 8 a nm" in spectrum["note"]
 
