@@ -283,3 +283,27 @@ def test_the_largest_share_of_the_renders_noise_is_told_once() -> None:
     page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
     assert page.count("at most 5.2 % (office, table1_output, Interleaved)") == 1
     assert "Up to 3 % it doesn't show" in page
+
+
+def test_numbers_in_sentences_are_recounted_from_the_rows() -> None:
+    """Of rows whose render has more noise than the sensor, by a plan; of a study in which nothing competes."""
+    shares = {"office": (1.5, 0.004), "daylight": (3.25, 0.021)}
+
+    def noisy(row: Row) -> Row:
+        mc_share, budget_share = shares.get(row.level, (0.5, 0.002))
+        return replace(row, mc_share=mc_share, budget_share=budget_share, spp=64)
+
+    of = SAMPLE.sample_report(noisy)
+    page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
+    over = sum(row.mc_share >= 1 for cell in of.cells for row in cell.rows if row)
+    assert re.search(
+        rf"The render's noise has 3\.2 times .*\(daylight, .*; above the sensor's in {over} of 28 pictures\)", page
+    )
+    assert "The plan of this sweep expects at most 2.1 % of all approximations together." in page
+    for metric in (figures.PSNR, figures.FLIP):
+        assert f"Seen from {metric.seen}{' dB' if metric.unit else ''} on." in page
+    alone = SAMPLE.sample_report(levels=3, cameras=("bayer",), sensors=SAMPLE.SENSORS[:1])
+    dark, bright = (alone.cells[place].rows[0].psnr_db for place in (0, 2))  # type: ignore[union-attr]
+    names = [level.name for level in alone.levels]
+    said = f"PSNR {dark:.1f} dB at {names[0]} to {bright:.1f} dB at {names[-1]}."
+    assert said in unescape(page_of(alone)).replace("\N{NO-BREAK SPACE}", " ")

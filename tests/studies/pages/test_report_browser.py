@@ -287,6 +287,50 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
     assert page.evaluate(said)[1] == "", "light levels are no rivals"
 
 
+# Metrics of which less is better, said once more by hand.
+LOWER = {"delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "flip_mean", "chart_delta_e_mean"}
+
+
+def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows(browser: Any, four: Path) -> None:
+    page, report, level = CHROME.open_page(browser, four), compared(), 4
+    for control, value in (("a", 3), ("b", 0), ("level", level)):
+        pick(page, f"byId('{control}')", value)
+    pick(page, "document.querySelector('[data-axis=\"2\"]')", 1)
+    ours, theirs = (report.by_group[1][4 * level + camera] for camera in (3, 0))
+    read = (
+        "[...document.querySelectorAll('#numbers tr')].map((row) => [...row.children].map((cell) => cell.textContent))"
+    )
+    rows = {row[0]: row[1:] for row in page.evaluate(read)}
+    for metric in figures.METRICS[:8]:
+        written = rows[f"{metric.name} {metric.unit}" if metric.unit else metric.name]
+        a, b, lead = (float(words.split(" ±")[0].split()[-1].replace("−", "-")) for words in written)
+        of_a, of_b = (np.mean([getattr(row, metric.key) for row in cell.rows]) for cell in (ours, theirs))
+        gain = (of_b - of_a) if metric.key in LOWER else (of_a - of_b)
+        assert (a, b, lead) == pytest.approx((of_a, of_b, gain), abs=0.51 * 10**-metric.digits), metric.key
+    times = [text.duration(cell.first.exposure_s) for cell in (ours, theirs) if cell.first]
+    assert rows["Exposure"][:2] == times
+    assert rows["Saturated"][:2] == [text.percent(cell.mean("saturated")) for cell in (ours, theirs)]
+    said = page.evaluate("byId('status').textContent")
+    for cell, name in ((ours, "PLE, Bayer"), (theirs, "Interleaved")):
+        assert f"{name} PSNR {cell.mean('psnr_db'):.1f} ± " in said
+    better = "[...document.querySelectorAll('#drawn figure')].map((one) => [one.dataset.metric, one.querySelector('small').textContent])"  # noqa: E501
+    for key, words in page.evaluate(better):
+        assert words == ("lower is better" if key in LOWER else "higher is better"), key
+    heights = page.evaluate(
+        "['A better', 'B better'].map((words) => Number([...document.querySelectorAll('#lead-chart text')].find("
+        "(one) => one.textContent === words).getAttribute('y')))"
+    )
+    assert heights[0] < heights[1], "a lead of A is higher"
+    for percent, words in ((100, "Show B"), (0, "Show A")):
+        pick(page, "byId('wiper')", percent)
+        assert page.evaluate("byId('flip').textContent").startswith(words)
+        told = page.evaluate("byId('wiper').getAttribute('aria-valuetext')")
+        assert told == f"{percent} % PLE, Bayer, {100 - percent} % Interleaved"
+    for kind, words in (("delta_e", "20 and more"), ("flip", "0.5 and more")):
+        page.evaluate(f"document.querySelector('[name=show][value={kind}]').click()")
+        assert page.evaluate("byId('key-top').textContent") == words
+
+
 CHART = """(chart => ({
   ticks: [...chart.querySelectorAll(".grid")].map(line => [+line.getAttribute("y1"),
     Number(line.nextSibling.textContent.replace("−", "-"))]),
