@@ -1,8 +1,10 @@
 """The page of the white pixel: means over named and drawn scenes apart, positive where RGBW is better."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
+import white_pixel
 from report_sample import SENSORS, sample_report
 from white_pixel import PAGE, main, parts
 
@@ -45,5 +47,21 @@ def test_the_page_has_a_place_for_every_part() -> None:
 def test_another_study_is_refused() -> None:
     with pytest.raises(InputError, match="ple_bayer"):
         parts(swept("ple_rgbw", "bayer"))
-    with pytest.raises(SystemExit, match="give the sweep's folder"):
-        main([])
+    for folders in ([], ["one", "other"]):
+        with pytest.raises(SystemExit, match="give the sweep's folder"):
+            main(folders)
+
+
+def test_the_command_writes_page_figure_and_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """All three hold what `parts` gives, in the places that the page has for it."""
+    report = swept("ple_bayer", "ple_rgbw")
+    monkeypatch.setattr(white_pixel, "sweep_report", lambda folder, pictures: {tmp_path: (report, pictures)}[folder])
+    page = tmp_path / "white_pixel.md"
+    page.write_text(PAGE.read_text("utf-8"), "utf-8")
+    monkeypatch.setattr(white_pixel, "PAGE", page)
+    monkeypatch.setattr(white_pixel, "RESULTS", tmp_path)
+    main([str(tmp_path)])
+    content, figure, table = parts(report)
+    assert page.with_suffix(".svg").read_text("utf-8") == figure
+    assert (tmp_path / "white_pixel.csv").read_text("utf-8") == table
+    assert all(part in page.read_text("utf-8") for part in content.values())

@@ -10,7 +10,8 @@ from five_cameras import even_field
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.photodiodes import binned
-from sensor.presets import low_noise, table1_output
+from sensor.presets import low_noise, preset, table1_output
+from sensor.readings.noise import of_reading
 from studies.metrics.truth import light_of
 from studies.paper.setup import shot_noise_alone
 from studies.photograph.snr import channel_e, electrons_at_snr, light_for_snr, snr, snr_at
@@ -97,3 +98,13 @@ def test_four_pixels_that_bin_take_a_quarter_of_the_light_and_their_read_noise_o
         read.append(expose(light_e, quad, EXPOSURE_S, device, np.random.default_rng([chip, 1]), exact=True).electrons)
     # 24 000 sums: a deviation's standard error is 0.46 %; within 4.5, false-alarm rate 7e-6
     assert four.electrons / np.std(read) == pytest.approx(5.0, rel=4.5 * 0.0046)
+
+
+def test_a_camera_that_switches_its_gain_takes_each_light_as_a_frame_of_its_own() -> None:
+    """Dim and bright light, of one frame read with one gain: the dim one's noise would be the low gain's."""
+    sensor = preset("dual_gain")
+    sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
+    light_e = np.array([[10.0, 8e3]])
+    for number, (index, together) in enumerate(zip((0, 1), snr(light_e, sensor, EXPOSURE_S)[0], strict=True)):
+        alone = of_reading(sensor, index)
+        assert together == pytest.approx(float(snr(light_e[:, [number]], alone, EXPOSURE_S)[0, 0]), rel=1e-12)

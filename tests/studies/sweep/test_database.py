@@ -68,6 +68,14 @@ def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Pa
         assert [row.key for row in rows(base)] == ["c", "b"]
 
 
+def test_the_file_is_named_by_four_letters_in_sqlites_header(tmp_path: Path) -> None:
+    """Bytes 60 to 72, SQLite's "Database file format", 1.3: the tables' version, that of VACUUM, the program."""
+    with open_results(tmp_path):
+        pass
+    header = (tmp_path / FILE).read_bytes()[60:72]
+    assert (int.from_bytes(header[:4]), header[8:]) == (VERSION, b"rodc")
+
+
 def test_renders_and_runs_are_noted(tmp_path: Path) -> None:
     facts = RenderFacts("dense", "llvm_ad_spectral", 1.5, 64, "samples", 0.01, None, 20, 390.0, 770.0, 20.0)
     record = RenderRecord("content", facts, 0.02, ("assumed",))
