@@ -105,6 +105,12 @@ def line_spectrum(lines_nm: ArrayLike, powers: ArrayLike) -> Spectrum:
     return Spectrum(nm, (heights[:, None] * np.array([0.0, 1.0, 0.0])).ravel())
 
 
+def even_bands(range_nm: tuple[float, float], count: int) -> tuple[Floats, Floats]:
+    """Centres and widths of bands of one width that fill a range, shape (band,) each."""
+    edges = np.linspace(*range_nm, count + 1)
+    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
 def line_bands(
     lines_nm: ArrayLike, range_nm: tuple[float, float] = VISIBLE_NM, width_nm: float = 10.0
 ) -> tuple[Floats, Floats]:

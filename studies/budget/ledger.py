@@ -7,6 +7,7 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
+from render.spectrum import even_bands
 from rodcone.brief import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
@@ -260,8 +261,7 @@ class Plan:
 def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
     low, high = study.render.range_nm
-    edges = np.linspace(low, high, max(1, round((high - low) / study.render.band_nm)) + 1)
-    centres, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    centres, widths = even_bands((low, high), max(1, round((high - low) / study.render.band_nm)))
     render = RenderModel(tuple(centres.tolist()), tuple(widths.tolist()), study.render.spp, study.render.denoise)
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}

@@ -12,7 +12,7 @@ from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
@@ -169,8 +169,7 @@ def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
             f"bands: {text!r} is not allowed; give FIRST_EDGE:LAST_EDGE:WIDTH [nm] with 1 to {MOST_BANDS} whole bands, "
             f"such as {VISIBLE_NM[0]:g}:{VISIBLE_NM[1]:g}:10"
         )
-    edges = np.linspace(first, last, count + 1)
-    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    return even_bands((first, last), count)
 
 
 def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated
 
-import numpy as np
-
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import (
@@ -17,7 +15,7 @@ from render.radiance_files.radiance_source import (
     load_picture,
 )
 from render.scene import LightGroup, Scene, film_size
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
 from rodcone.memory import memory, require_memory
@@ -199,5 +197,4 @@ def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:
 def _bands(options: RenderOptions) -> tuple[Floats, Floats]:
     """Centres and widths of even bands, as near the asked width as whole ones come."""
     first, last = VISIBLE_NM
-    edges = np.linspace(first, last, max(_LEAST_BANDS, round((last - first) / options.band_nm)) + 1)
-    return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    return even_bands(VISIBLE_NM, max(_LEAST_BANDS, round((last - first) / options.band_nm)))

@@ -13,7 +13,7 @@ from isp.settings import Settings
 from render.engine import render
 from render.radiance import SpectralRadiance
 from render.scene import Scene
-from render.spectrum import Floats
+from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
 from sensor.capture import capture
@@ -117,8 +117,7 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
 
 def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     """Render with ever more samples, against two references whose own noise falls out of the mean."""
-    edges = np.linspace(380.0, 780.0, 9)
-    call = partial(_render, bench, scene, (edges[1:] + edges[:-1]) / 2, np.diff(edges))
+    call = partial(_render, bench, scene, *even_bands(VISIBLE_NM, 8))
     made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
     most = 2 * bench.samples[-1]
     (one, reference_times), (other, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
