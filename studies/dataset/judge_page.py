@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from studies.dataset.judge import MEASURED, Score
 from studies.pages import report_text as text
-from studies.pages.page import address, own_file, write_out
+from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, COLOURS, STYLE, blank, name_at_ends, plain_ticks, svg_text
 
 
@@ -18,11 +18,8 @@ def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
     by_camera = dict[str, list[Score]]()
     for score in scores:
         by_camera.setdefault(score.camera, []).append(score)
-    charts = {camera: address("svg+xml", svg_text(psnr_chart(x)).encode()) for camera, x in by_camera.items()}
-    style = own_file("report.css")
-    return write_out(
-        "judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text, style=style
-    )
+    charts = {camera: svg_address(svg_text(psnr_chart(x))) for camera, x in by_camera.items()}
+    return write_out("judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text)
 
 
 @rc_context(STYLE)

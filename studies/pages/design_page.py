@@ -11,7 +11,7 @@ from sensor.config import SensorConfig
 from studies.design.expect import ExpectedError
 from studies.design.search import Goal
 from studies.pages.expect_chart import gain_svg
-from studies.pages.page import address, own_file, write_out
+from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, INK, STYLE, blank, plain_ticks, svg_text
 
 
@@ -53,9 +53,8 @@ def design_page(
         rows=rows,
         given_up=given_up,
         tried=tried,
-        pictures=[address("svg+xml", svg.encode()) for svg in (_drawn(camera), gain_svg(by_camera))],
+        pictures=[svg_address(svg) for svg in (_drawn(camera), gain_svg(by_camera))],
         version=metadata.version("rodcone"),
-        style=own_file("report.css"),
     )
 
 

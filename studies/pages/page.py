@@ -15,13 +15,18 @@ def address(kind: str, picture: bytes) -> str:
     return f"data:image/{kind};base64,{b64encode(picture).decode('ascii')}"
 
 
+def svg_address(svg: str) -> str:
+    """Return a drawing as a ``data:`` address."""
+    return address("svg+xml", svg.encode())
+
+
 def own_file(name: str) -> Markup:
     """Return a style or script of this package, which is never input and goes into a page as it is."""
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
 def write_out(name: str, **values: Any) -> str:
-    """Return a template with its values put in; a name that has none is an error."""
+    """Return a template with its values put in, and the style of all pages; a name that has none is an error."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),
         autoescape=True,
@@ -29,4 +34,4 @@ def write_out(name: str, **values: Any) -> str:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    return environment.get_template(name).render(**values)
+    return environment.get_template(name).render(**{"style": own_file("report.css"), **values})

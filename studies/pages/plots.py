@@ -7,7 +7,7 @@ from math import ceil
 from typing import Any
 
 import numpy as np
-from matplotlib import rc_context
+from matplotlib import rc_context, rc_params_from_file
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
@@ -22,6 +22,7 @@ from rodcone.plots import ORANGE as ORANGE  # noqa: PLC0414
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.emva1288.characterise import Characterisation
+from studies.pages.page import TEMPLATES
 from studies.photograph.snr import snr_at
 
 UNIT = 1 / 72  # inches: lengths below are points, which are the units of Matplotlib's SVG
@@ -32,27 +33,7 @@ PNG_DPI = 144
 GREEN, PURPLE = "#00795a", "#8d4a78"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 SOFT = "#565d64"
-STYLE: dict[Any, Any] = {  # Matplotlib's settings
-    "svg.hashsalt": "rodcone",  # otherwise the ids of an SVG are random
-    "svg.fonttype": "none",  # text stays text
-    "font.family": "DejaVu Sans",  # Matplotlib brings it
-    "font.size": 10.0,
-    "text.color": INK,
-    "axes.titlesize": 10.0,
-    "axes.titlelocation": "left",
-    "axes.edgecolor": "#b4b7b3",
-    "axes.labelcolor": SOFT,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.grid.axis": "y",
-    "axes.axisbelow": True,
-    "grid.color": "#d9dad5",
-    "xtick.color": SOFT,
-    "ytick.color": SOFT,
-    "legend.frameon": False,
-    "lines.linewidth": 1.6,
-}
+STYLE = rc_params_from_file(TEMPLATES / "plots.mplstyle", use_default_template=False)
 
 
 def svg_text(figure: Figure) -> str:

@@ -20,7 +20,7 @@ from markupsafe import Markup
 from render.spectrum import VISIBLE_NM
 from studies.metrics.metric import MEANINGS, METRICS, SEEN_BY, Metric
 from studies.pages import report_text as text
-from studies.pages.page import address, own_file, write_out
+from studies.pages.page import address, own_file, svg_address, write_out
 from studies.pages.plots import SNR, snr_svg
 from studies.pages.report_compare import (
     CAMERA,
@@ -225,7 +225,6 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
     # The page
     return write_out(
         "report.html.j2",
-        style=own_file("report.css"),
         script=Markup(script),
         digest=b64encode(sha256(script.encode()).digest()).decode("ascii"),
         fetched="" if all(cell.picture or not cell.first for cell in report.cells) else " 'self' file:",
@@ -270,4 +269,4 @@ def _snr_address(report: ReportData) -> str:
         for sensor in report.sensors
         if sensor.config and VISIBLE_NM[0] <= sensor.config.window_nm[0] and sensor.config.window_nm[1] <= VISIBLE_NM[1]
     }
-    return address("svg+xml", snr_svg(sensors, "D65", 0.033, SNR).encode()) if sensors else ""
+    return svg_address(snr_svg(sensors, "D65", 0.033, SNR)) if sensors else ""

@@ -7,7 +7,7 @@ from matplotlib import rc_context
 from matplotlib.figure import Figure
 
 from studies.pages import report_text as text
-from studies.pages.page import address, own_file, write_out
+from studies.pages.page import svg_address, write_out
 from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 
 LEAST_SHARE = 1e-5  # that is told as a figure
@@ -15,10 +15,8 @@ LEAST_SHARE = 1e-5  # that is told as a figure
 
 def bench_page(results: Mapping[str, Any]) -> str:
     """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
-    drawn = [(stage, address("svg+xml", svg_text(plane(stage)).encode())) for stage in results["stages"]]
-    return write_out(
-        "bench.html.j2", results=results, stages=drawn, text=text, style=own_file("report.css"), least=LEAST_SHARE
-    )
+    drawn = [(stage, svg_address(svg_text(plane(stage)))) for stage in results["stages"]]
+    return write_out("bench.html.j2", results=results, stages=drawn, text=text, least=LEAST_SHARE)
 
 
 @rc_context(STYLE)
