@@ -2,6 +2,7 @@
 
 import csv
 import re
+from collections.abc import Iterable, Sequence
 from io import StringIO
 from pathlib import Path
 
@@ -49,3 +50,12 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
             f"{what}: {str(path)!r} has wavelengths up to {table[:, 0].max():g}; allowed: nm; convert them"
         )
     return dict(zip(names, table.T, strict=True))
+
+
+def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]], line_end: str = "\r\n") -> str:
+    """Table as CSV (RFC 4180)."""
+    text = StringIO()
+    writer = csv.writer(text, lineterminator=line_end)
+    writer.writerow(head)
+    writer.writerows(rows)
+    return text.getvalue()

@@ -34,6 +34,13 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
             place.unlink(missing_ok=True)
 
 
+def write_files(files: Mapping[Path, str | bytes | memoryview]) -> None:
+    """Write files by `replacing`, text as UTF-8 with the ends of lines that it has."""
+    with replacing(*files) as places:
+        for place, content in zip(places, files.values(), strict=True):
+            place.write_bytes(content.encode("utf-8") if isinstance(content, str) else content)
+
+
 def is_half_written(path: Path) -> bool:
     """Whether a path is a file that `replacing` had begun to write; of a killed program it stays behind."""
     return bool(_HALF_WRITTEN.fullmatch(path.name)) and path.is_file() and not path.is_symlink()

@@ -1,11 +1,13 @@
 """Parts of a page that a program writes, between comments in the page's own text; full tables go beside it as CSV."""
 
-import csv
-import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 
+from rodcone.csv_file import csv_text as csv_of
+
+csv_text = partial(csv_of, line_end="\n")  # as git keeps the results' tables
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 
 
@@ -23,12 +25,3 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
         if count != 1:
             raise KeyError(name)
     return text
-
-
-def csv_text(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table as CSV."""
-    out = io.StringIO()
-    writer = csv.writer(out, lineterminator="\n")
-    writer.writerow(head)
-    writer.writerows(rows)
-    return out.getvalue()

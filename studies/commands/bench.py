@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
+from rodcone.files import write_files
 from rodcone.progress import progress
 from scenes.catalog import load
 from sensor.presets import preset
@@ -57,9 +57,7 @@ def bench(
             if not json:
                 _print_stage(stage)
     content = notation.dumps(results, indent=1, allow_nan=False) + "\n"
-    with replacing(out / "bench.json", out / "bench.html") as (data, page):
-        data.write_text(content, "utf-8")
-        page.write_text(bench_page(results), "utf-8")
+    write_files({out / "bench.json": content, out / "bench.html": bench_page(results)})
     print(content if json else out / "bench.html", end="" if json else "\n")
 
 

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from rodcone.errors import InputError, require_absent, require_whole, unknown
-from rodcone.files import check_place
+from rodcone.files import check_place, write_files
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.cfa import channels
@@ -16,7 +16,7 @@ from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import of_reading
-from studies.commands.console import Time, print_json, print_table, require_new, require_place, say, write_text
+from studies.commands.console import Time, print_json, print_table, require_new, require_place, say
 from studies.pages.plots import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
@@ -98,7 +98,7 @@ def characterise(
     require_place(out, ".svg")
     chip = measure(sensor, (height, width), seed, exposure)
     if out is not None:
-        write_text(out, transfer_svg(chip, f"{preset}, characterised after EMVA 1288"))
+        write_files({out: transfer_svg(chip, f"{preset}, characterised after EMVA 1288")})
     if json:
         print_json(_facts(chip))
         return
@@ -126,7 +126,7 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
     )
     if out is not None:
         title = f"A camera measured from {flats[0].name} and others."
-        write_text(out, preset_text(title, frame_numbers(camera, flats), None, ""))
+        write_files({out: preset_text(title, frame_numbers(camera, flats), None, "")})
     if json:
         print_json({**asdict(camera), "levels_dn": camera.levels_dn.tolist()})
         return

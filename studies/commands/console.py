@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rodcone.errors import InputError
-from rodcone.files import check_place, finite, replacing
+from rodcone.files import check_place, finite
 from rodcone.time_text import parse_time
 
 
@@ -63,12 +63,6 @@ def print_table(head: Sequence[str], rows: Iterable[Sequence[str | Text]], words
     for row in rows:
         table.add_row(*(Text(cell) if isinstance(cell, str) else cell for cell in row))
     Console(width=None if sys.stdout.isatty() else 200).print(table)
-
-
-def write_text(out: Path, text: str) -> None:
-    """Write a text file, whole or not at all."""
-    with replacing(out) as (place,):
-        place.write_text(text, "utf-8")
 
 
 def require_new(out: Path, ending: str) -> None:

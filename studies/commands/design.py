@@ -10,7 +10,7 @@ import numpy as np
 from cyclopts import Parameter
 
 from rodcone.errors import InputError, read_errors, require_range, unknown
-from rodcone.files import read_bounded, replacing
+from rodcone.files import read_bounded, write_files
 from rodcone.progress import progress
 from rodcone.toml_file import read_toml
 from scenes.levels import DEMO_LEVELS
@@ -19,7 +19,6 @@ from sensor.cfa import MOSAICS, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.presets import preset, preset_file
 from sensor.variations import VARIATIONS, vary
-from studies.commands.console import write_text
 from studies.commands.expect import levels_between
 from studies.design.expect import expect
 from studies.design.filters import best_filters
@@ -27,6 +26,7 @@ from studies.design.search import Goal, Known, best_tile, search_for
 from studies.pages.design_page import design_page, tile_text
 
 SIDES = {"2x2": 2, "4x4": 4}
+_STUDY = Path(__file__).parent.parent / "data" / "design_study.toml"
 MOST_BYTES = 1 << 24  # of the file of tiles that were tried
 
 
@@ -113,16 +113,12 @@ def design(
     tried, question = out / "tried.json", [repr(base), list(reference), light, prior, levels, blur]
     known = _known(tried, question)
 
-    def keep() -> None:
-        with replacing(tried) as (place,):
-            place.write_text(json.dumps({"question": question, "gains_db": known}), "utf-8")
-
     search = search_for(goal)
     with progress(sys.stderr) as step:
         try:
             found = best_tile(search, SIDES[tile], steps, seed, known, step)
         finally:
-            keep()
+            write_files({tried: json.dumps({"question": question, "gains_db": known})})
         camera = with_tile(base, found, base.responses)
         if filters:
             camera = best_filters(goal, found, 4, step)
@@ -142,7 +138,7 @@ def design(
         name: expect(one, list(levels.values()), light, prior=prior, blur=blur) for name, one in cameras.items()
     }
     _write(out, sensor, camera, filters)
-    write_text(out / "design.html", design_page(goal, camera, levels, by_camera, len(known)))
+    write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(known))})
     print(f"{tile_text(found)}\n{out}")
 
 
@@ -177,22 +173,5 @@ def _write(out: Path, sensor: str, camera: SensorConfig, filters: bool) -> None:
         parts.append(
             f'\n[responses]\ncsv = "curves.csv"\nrange_nm = [{nm[0]}, {nm[-1]}]\nquantum_efficiency = "{kind}"\n'
         )
-        write_text(out / "curves.csv", responses_csv(curves))
-    write_text(out / "sensor.toml", "".join(parts))
-    write_text(out / "study.toml", _STUDY)
-
-
-_STUDY = """# The design beside Bayer by simulation: rodcone sweep study.toml -o out, then rodcone report out
-name = "design"
-scenes = ["generated-d1", "generated-d2", "generated-d3", "still_life"]
-levels = ["0.036cd/m2", "0.57cd/m2", "5.7cd/m2", "25cd/m2", "100cd/m2", "5700cd/m2"]
-exposures = ["auto:information"]
-sensors = ["sensor.toml"]
-white_balances = ["as-shot"]
-processors = ["ple", "ple_bayer", "ple_rgbw"]  # ple takes the sensor's own mosaic
-seeds = [0, 1]
-
-[render]
-size = 128
-spp = 256
-"""
+        write_files({out / "curves.csv": responses_csv(curves)})
+    write_files({out / "sensor.toml": "".join(parts), out / "study.toml": _STUDY.read_bytes()})

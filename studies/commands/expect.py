@@ -1,21 +1,21 @@
 """The command `rodcone expect`."""
 
-from csv import DictWriter
 from dataclasses import asdict, fields
-from io import StringIO
 from math import pi
 from pathlib import Path
 from typing import Annotated
 
 from cyclopts import Parameter
 
+from rodcone.csv_file import csv_text
 from rodcone.errors import InputError
+from rodcone.files import write_files
 from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
 from sensor.cfa import OWN
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
 from sensor.variations import vary
-from studies.commands.console import print_json, print_table, require_place, write_text
+from studies.commands.console import print_json, print_table, require_place
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.expect_chart import gain_svg
@@ -74,7 +74,7 @@ def expect(
         for tile in mosaic or [""]
     }
     if out is not None:
-        write_text(out, _csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera))
+        write_files({out: _csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera)})
     if json:
         print_json({name: [asdict(row) for row in rows] for name, rows in by_camera.items()})
         return
@@ -109,8 +109,5 @@ def levels_between(over: str) -> dict[str, float]:
 
 
 def _csv(by_camera: dict[str, list[ExpectedError]]) -> str:
-    text = StringIO()
-    table = DictWriter(text, ["camera", *(key.name for key in fields(ExpectedError))])
-    table.writeheader()
-    table.writerows({"camera": name} | asdict(row) for name, rows in by_camera.items() for row in rows)
-    return text.getvalue()
+    head = ("camera", *(key.name for key in fields(ExpectedError)))
+    return csv_text(head, ((name, *vars(row).values()) for name, rows in by_camera.items() for row in rows))

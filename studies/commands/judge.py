@@ -1,13 +1,13 @@
 """The command `rodcone judge`."""
 
-from csv import writer
 from dataclasses import asdict
-from io import StringIO
 from math import isfinite
 from pathlib import Path
 
+from rodcone.csv_file import csv_text
 from rodcone.errors import require_whole
-from studies.commands.console import print_json, print_table, require_place, write_text
+from rodcone.files import write_files
+from studies.commands.console import print_json, print_table, require_place
 from studies.commands.sweep import MOST_WORKERS, local_runner
 from studies.dataset.judge import MEASURED, Score
 from studies.dataset.judge import judge as judge_pictures
@@ -47,7 +47,7 @@ def judge(
         require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
     head, scores = judge_pictures(pictures, of, name or pictures.resolve().name, local_runner(workers))
     if out is not None:
-        write_text(out, _csv(scores) if out.suffix.lower() == ".csv" else judge_page(head, scores))
+        write_files({out: _csv(scores) if out.suffix.lower() == ".csv" else judge_page(head, scores)})
     if json:
         print_json({"set": head, "scores": [asdict(score) for score in scores]})
         return
@@ -64,12 +64,9 @@ def _row(score: Score) -> tuple[str, ...]:
 
 
 def _csv(scores: list[Score]) -> str:
-    text = StringIO()
-    table = writer(text)
     keys = [metric.key for metric in MEASURED]
     halves = [f"{key}_half" for key in keys]
-    table.writerow(["camera", "level", "luminance_cd_m2", "developer", "scenes", *keys, *halves])
-    for x in scores:
-        figures = [of[key] for of in (x.means, x.halves) for key in keys]
-        table.writerow([x.camera, x.level, x.luminance_cd_m2, x.developer, x.scenes, *figures])
-    return text.getvalue()
+    head = ("camera", "level", "luminance_cd_m2", "developer", "scenes", *keys, *halves)
+    places = ([getattr(x, name) for name in head[:5]] for x in scores)
+    figures = ([of[key] for of in (x.means, x.halves) for key in keys] for x in scores)
+    return csv_text(head, (place + of_place for place, of_place in zip(places, figures, strict=True)))

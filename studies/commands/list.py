@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from rodcone.errors import InputError
-from rodcone.files import check_place
-from studies.commands.console import print_json, print_table, require_ending, write_text
+from rodcone.files import check_place, write_files
+from studies.commands.console import print_json, print_table, require_ending
 
 # Scenes, lights and processors as their catalogues have them, which import Dr.Jit and take a second.
 NAMES = Path(__file__).parent.parent / "data" / "names.toml"
@@ -55,7 +55,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
             f"{name}{'' if camera.balanced else '*'}": camera.responses for name, camera in measured_cameras().items()
         }
         text = responses_svg({"the presets": low_noise().responses, **measured})
-    write_text(out, text)
+    write_files({out: text})
 
 
 def texts(kind: Kind) -> dict[str, str]:

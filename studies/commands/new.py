@@ -8,7 +8,7 @@ from types import MappingProxyType
 from cyclopts import App
 
 from rodcone.errors import InputError, require_absent, require_keys, require_range
-from rodcone.files import check_place, replacing
+from rodcone.files import check_place, write_files
 from rodcone.toml_file import read_toml
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import measured_camera
@@ -95,9 +95,7 @@ def preset(
     text = preset_text(f"{title}, as its sources tell it.", numbers, shape, curves_file.name if curves else "")
     check_place(out)
     files = {curves_file: curves, out: text} if curves else {out: text}
-    with replacing(*files) as places:
-        for place, content in zip(places, files.values(), strict=True):
-            place.write_text(content, "utf-8")
+    write_files(files)
     if "K" in numbers.left_out:
         say(f"{out}: K = {numbers.left_out['K']}")
     if missing(numbers):
@@ -193,6 +191,5 @@ def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = Ma
     for target, other in {**beside, out: source}.items():
         if target != out:
             target.parent.mkdir(exist_ok=True)
-        with replacing(target) as (place,):
-            place.write_bytes(other.read_bytes())
+        write_files({target: other.read_bytes()})
     print(out)

@@ -3,8 +3,7 @@
 from pathlib import Path
 
 from rodcone.errors import InputError, require_absent, require_whole, unknown
-from rodcone.files import replacing
-from studies.commands.console import write_text
+from rodcone.files import write_files
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison
 from studies.pages.report_markdown import markdown
@@ -35,7 +34,7 @@ def report(folder: Path, /, *, out: Path | None = None, pictures: int | None = N
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")
     path = out or folder / FILE
     if path.suffix.lower() == ".md":
-        write_text(path, _markdown(folder, path, camera))
+        write_files({path: _markdown(folder, path, camera)})
     else:
         require_absent("for a page, which has a menu; allowed: with an --out that ends in .md", camera=camera)
         write_report(folder, path, pictures)
@@ -62,11 +61,8 @@ def write_results(folder: Path) -> Path:
     InputError, OSError
         As `write_report`.
     """
-    page = render_report(*sweep_report(folder)).encode()
-    files = {FILE: page, RESULTS: results_json(folder)}
-    with replacing(*(folder / name for name in files)) as places:
-        for place, content in zip(places, files.values(), strict=True):
-            place.write_bytes(content)
+    page = render_report(*sweep_report(folder))
+    write_files({folder / FILE: page, folder / RESULTS: results_json(folder)})
     return folder / FILE
 
 
@@ -81,5 +77,5 @@ def write_report(folder: str | Path, path: str | Path, pictures: int | None = No
         Where the file can't be written.
     """
     path = Path(path)
-    write_text(path, render_report(*sweep_report(Path(folder), pictures)))
+    write_files({path: render_report(*sweep_report(Path(folder), pictures))})
     return path

@@ -8,9 +8,10 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.errors import require_range
+from rodcone.files import write_files
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from studies.commands.console import Time, print_json, print_table, require_place, write_text
+from studies.commands.console import Time, print_json, print_table, require_place
 from studies.metrics.truth import GREY
 from studies.pages.plots import snr_svg
 from studies.pages.report_text import MISSING
@@ -60,7 +61,7 @@ def snr(
     light_by_sensor = {name: light_for_snr(at, sensor, light, exposure) for name, sensor in opened.items()}
     if out is not None:
         named = {f"{name}{RELATIVE * sensor.responses.relative}": sensor for name, sensor in opened.items()}
-        write_text(out, snr_svg(named, light, exposure, at))
+        write_files({out: snr_svg(named, light, exposure, at)})
     if json:
         relative = {name: {"relative": sensor.responses.relative} for name, sensor in opened.items()}
         print_json({name: [asdict(x) | relative[name] for x in of] for name, of in light_by_sensor.items()})

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from rodcone.files import replacing
+from rodcone.files import write_files
 from studies.dataset.sample import PLANES
 from studies.dataset.shards import MANIFEST, read_manifest
+from studies.pages.report_text import table
 from studies.study.render_noise import noise_note
 
 CARD = "README.md"
@@ -20,8 +21,7 @@ _BAR = 30  # characters of the longest
 
 def write_card(folder: Path) -> None:
     """Write the card of a set by its manifest."""
-    with replacing(folder / CARD) as (place,):
-        place.write_text(card(read_manifest(folder)), "utf-8")
+    write_files({folder / CARD: card(read_manifest(folder))})
 
 
 def card(lines: Sequence[dict[str, Any]]) -> str:
@@ -40,10 +40,10 @@ def card(lines: Sequence[dict[str, Any]]) -> str:
         f"{len(samples)} raw frames of simulated cameras with the truth behind them, {size:.3g} GB in "
         f"{len(of_kind['shard'])} shards. Made by rodcone {head['rodcone']}:",
         f"    {head['command']}",
-        _table(("split", "samples", "scenes"), [(split, *counts) for split, counts in splits.items()]),
+        table(("split", "samples", "scenes"), [(split, *counts) for split, counts in splits.items()]),
         "A scene is in one split alone, chosen by its hash. Shards are tar files in WebDataset's layout: "
         "`KEY.raw.npy` (DN), `KEY.json` (facts: mosaic, black and white level, gain, noise, exposure, light) and",
-        _table(("file", "what it holds"), [(f"`KEY.{name}.npy`", PLANES[name]) for name in head["planes"]]),
+        table(("file", "what it holds"), [(f"`KEY.{name}.npy`", PLANES[name]) for name in head["planes"]]),
         f"Facts of noise: the variance of a pixel is a x + b + c x² [DN²], x its mean above black. `{MANIFEST}` lists "
         "scenes, shards with their digests, and samples.",
         "## Light, noise and the render's own noise",
@@ -52,7 +52,7 @@ def card(lines: Sequence[dict[str, Any]]) -> str:
         _counts("render's variance over the sensor's", _histogram([x["render_noise"] for x in samples], _NOISE)),
         *(note for note in [noise_note(max((x["render_noise"] for x in samples), default=0.0), 0)] if note),
         "## Licences",
-        _table(("scenes", "licence"), [(count, text) for text, count in licences.items()]),
+        table(("scenes", "licence"), [(count, text) for text, count in licences.items()]),
     ]
     return "\n\n".join(parts) + "\n"
 
@@ -70,9 +70,4 @@ def _range(low: float, high: float) -> str:
 
 def _counts(what: str, counts: Counter[str]) -> str:
     most = max(counts.values(), default=1) or 1
-    return _table((what, "samples", ""), [(name, n, "█" * round(_BAR * n / most)) for name, n in counts.items()])
-
-
-def _table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
-    lines = [head, ["---"] * len(head), *rows]
-    return "\n".join(f"| {' | '.join(map(str, line))} |" for line in lines)
+    return table((what, "samples", ""), [(name, n, "█" * round(_BAR * n / most)) for name, n in counts.items()])

@@ -12,7 +12,7 @@ import numpy as np
 
 from rodcone.digests import digest_file
 from rodcone.errors import read_errors
-from rodcone.files import inside, replacing
+from rodcone.files import inside, replacing, write_files
 from studies.dataset.sample import Arrays, Sample, make_sample
 from studies.sweep.run_cell import limit_threads
 
@@ -91,8 +91,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
 def write_manifest(folder: Path, head: Lines, shards: Sequence[LinesMade]) -> None:
     """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
     lines = head + [line for made in sorted(shards, key=lambda made: made.lines[0]["name"]) for line in made.lines]
-    with replacing(folder / MANIFEST) as (place,):
-        place.write_text("".join(f"{json.dumps(line)}\n" for line in lines), "utf-8")
+    write_files({folder / MANIFEST: "".join(f"{json.dumps(line)}\n" for line in lines)})
 
 
 def read_manifest(folder: Path) -> Lines:

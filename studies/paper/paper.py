@@ -1,15 +1,14 @@
 """The paper's figures and claims, all of them: computed, written as files, and as one page."""
 
-import csv
 import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
-from rodcone.files import finite, replacing
+from rodcone.csv_file import csv_text
+from rodcone.files import finite, write_files
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
 from studies.pages.report_sweep import environment
@@ -89,9 +88,7 @@ def write(paper: Paper, folder: Path) -> Path:
         style=own_file("report.css") + own_file("paper.css"),
     )
     files["paper.html"] = page.encode()
-    with replacing(*(folder / name for name in files)) as places:
-        for place, content in zip(places, files.values(), strict=True):
-            place.write_bytes(content)
+    write_files({folder / name: content for name, content in files.items()})
     return folder / "paper.html"
 
 
@@ -113,11 +110,10 @@ def as_json(paper: Paper) -> dict[str, Any]:
 
 def as_csv(paper: Paper) -> str:
     """A row for each check, under its claim's number."""
-    table = StringIO()
-    writer = csv.writer(table, lineterminator="\n")
-    writer.writerow(["number", "where", "claim", "verdict", "condition", "computed", "claimed", "check", "default"])
+    head = ("number", "where", "claim", "verdict", "condition", "computed", "claimed", "check", "default")
+    rows = []
     for number, claim in enumerate(paper.claims, 1):
         for check in claim.checks:
             computed = value_text(check), range_text(check), "holds" if check.holds else "fails", default_text(check)
-            writer.writerow([number, claim.where, claim.text, claim.verdict, check.condition, *computed])
-    return table.getvalue()
+            rows.append([number, claim.where, claim.text, claim.verdict, check.condition, *computed])
+    return csv_text(head, rows, line_end="\n")

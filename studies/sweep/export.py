@@ -1,16 +1,14 @@
 """A sweep's rows as values, as CSV and as JSON."""
 
-import csv
 import json
 from collections.abc import Sequence
-from dataclasses import asdict
 from importlib import metadata
-from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from rodcone.csv_file import csv_text
 from rodcone.errors import unknown
-from rodcone.files import finite, replacing
+from rodcone.files import finite, write_files
 from studies.sweep.database import COLUMNS, last_run, read_results, rows
 from studies.sweep.row import Row
 
@@ -32,11 +30,7 @@ def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
 
 def to_csv(table: Sequence[Row]) -> str:
     """Rows as CSV (RFC 4180) with a header; a text that a spreadsheet would run as a formula gets a quote in front."""
-    text = StringIO()
-    writer = csv.writer(text)
-    writer.writerow(COLUMNS)
-    writer.writerows([_harmless(value) for value in asdict(row).values()] for row in table)
-    return text.getvalue()
+    return csv_text(COLUMNS, ([_harmless(value) for value in vars(row).values()] for row in table))
 
 
 def write_csv(table: Sequence[Row], path: Path) -> None:
@@ -51,8 +45,7 @@ def write_csv(table: Sequence[Row], path: Path) -> None:
     """
     if path.suffix != ".csv":
         raise unknown(f"out: {str(path)!r}: ending", path.suffix, (".csv",))
-    with replacing(path) as (place,):
-        place.write_text(to_csv(table), "utf-8", newline="")
+    write_files({path: to_csv(table)})
 
 
 def results_json(folder: Path) -> bytes:

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from rodcone.digests import digest, digest_bytes, digest_file
 from rodcone.errors import InputError, read_errors
-from rodcone.files import inside, replacing
+from rodcone.files import inside, write_files
 
 
 def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
@@ -23,8 +23,7 @@ def keep(folder: Path, content: bytes | memoryview, ending: str) -> str:
     name = digest_bytes(content)
     place = folder / name[:2] / f"{name}{ending}"
     place.parent.mkdir(parents=True, exist_ok=True)
-    with replacing(place) as (part,):
-        part.write_bytes(content)
+    write_files({place: content})
     return f"{name[:2]}/{name}{ending}"
 
 
@@ -37,8 +36,7 @@ def keep_array(folder: Path, array: NDArray[Any]) -> str:
 
 def keep_facts(folder: Path, key: str, facts: Mapping[str, Any]) -> None:
     """Write what goes by a key as JSON with its digest, whole or not at all."""
-    with replacing(folder / f"{key}.json") as (text,):
-        text.write_text(json.dumps({"facts": facts, "digest": digest(facts)}), "utf-8")
+    write_files({folder / f"{key}.json": json.dumps({"facts": facts, "digest": digest(facts)})})
 
 
 def read_facts(folder: Path, key: str) -> dict[str, Any] | None:
