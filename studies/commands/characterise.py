@@ -1,6 +1,6 @@
 """The command `rodcone characterise`."""
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -11,6 +11,7 @@ from rodcone.files import check_place, write_files
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
 from sensor.cfa import channels
+from sensor.config import SensorConfig
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
@@ -21,24 +22,74 @@ from studies.pages.plots import transfer_svg
 
 HEAD = ("figure", "unit", "configured", "measured", "std. error", "in std. errors")
 FRAMES_HEAD = ("figure", "unit", "measured", "95 % from", "to")
-Files = list[Path] | None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Frames:
+    """What is measured: raw files, or a part of a chip.
+
+    Attributes
+    ----------
+    flats : tuple of Path
+        Raw files of a real camera instead: an evenly lit surface, two or more at each light.
+    dark : tuple of Path
+        Raw files with the cap on, two or more, at the same exposure index and time.
+    reading : int, optional
+        Of a sensor with several readings, which: 1 for the first; it is measured alone.
+    channel : str, optional
+        Of a sensor that reads channels apart, which, such as W: a chip of such pixels alone, in the electrons that they
+        hold; of a metered one, after its longest time.
+    window : int, optional
+        Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
+    height : int
+        Height of the chip in pixels; a larger chip has smaller standard errors.
+    width : int
+        Width of the chip in pixels; more columns measure the column noise better.
+    exposure : float
+        Exposure time of the photon-transfer series, such as 10ms, the default.
+    seed : int
+        Seed of the chip and of its frames.
+    """
+
+    flats: Annotated[tuple[Path, ...], Parameter(name="--from", consume_multiple=True)] = ()
+    dark: Annotated[tuple[Path, ...], Parameter(consume_multiple=True)] = ()
+    reading: int | None = None
+    channel: str | None = None
+    window: int | None = None
+    height: int = 256
+    width: int = 320
+    exposure: Time = 0.01
+    seed: int = 0
+
+    def part_of(self, preset: str) -> SensorConfig:
+        """Sensor of which one reading or channel is measured, where it has several."""
+        require_absent(f"for {preset!r}; allowed: with --from and --dark", window=self.window)
+        sensor = sensor_preset(preset)
+        if self.reading is not None:
+            if not sensor.chip.readings:
+                raise InputError(f"reading: {self.reading} of {preset!r}, whose pixels are read once; leave it out")
+            require_whole("reading", self.reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
+            sensor = of_reading(sensor, self.reading - 1)
+        if sensor.chip.channels:
+            names = channels(sensor.cfa)
+            if self.channel not in names:
+                raise unknown(f"channel of {preset!r}, which reads channels apart", str(self.channel), names)
+            return of_channel(sensor, self.channel)[0]
+        if self.channel is not None:
+            raise InputError(f"channel: {self.channel!r} of {preset!r}, whose channels are read alike; leave it out")
+        return sensor
+
+
+DEFAULT = Frames()
 
 
 def characterise(
     preset: str | None = None,
     /,
+    frames: Annotated[Frames, Parameter(name="*")] = DEFAULT,
     *,
-    flats: Annotated[Files, Parameter(name="--from", consume_multiple=True)] = None,
-    dark: Annotated[Files, Parameter(consume_multiple=True)] = None,
-    reading: int | None = None,
-    channel: str | None = None,
-    window: int | None = None,
     out: Path | None = None,
     json: bool = False,
-    height: int = 256,
-    width: int = 320,
-    exposure: Time = 0.01,
-    seed: int = 0,
 ) -> None:
     """Measure a simulated chip as an EMVA 1288 laboratory does, or a camera of your own from its raw files.
 
@@ -46,57 +97,22 @@ def characterise(
     ----------
     preset
         Sensor preset by name, or a .toml file (see `rodcone new preset`): its figures are printed beside the measured.
-    flats
-        Raw files of a real camera instead: an evenly lit surface, two or more at each light.
-    dark
-        Raw files with the cap on, two or more, at the same exposure index and time.
-    reading
-        Of a sensor with several readings, which: 1 for the first; it is measured alone.
-    channel
-        Of a sensor that reads channels apart, which, such as W: a chip of such pixels alone, in the electrons that they
-        hold; of a metered one, after its longest time.
-    window
-        Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
     out
         With a preset, plot to write as well: photon transfer (linear and logarithmic), SNR and linearity, as .svg. With
         raw files, preset file of the camera (.toml), every number with its interval.
     json
         Print one JSON object, which also holds the photon-transfer series, instead of the table.
-    height
-        Height of the chip in pixels; a larger chip has smaller standard errors.
-    width
-        Width of the chip in pixels; more columns measure the column noise better.
-    exposure
-        Exposure time of the photon-transfer series, such as 10ms, the default.
-    seed
-        Seed of the chip and of its frames.
     """
-    if flats or dark:
-        require_absent(
-            "beside raw files; allowed: a sensor, or --from and --dark", preset=preset, reading=reading, channel=channel
-        )
-        _measure_files(flats or [], dark or [], window, out, json)
+    if frames.flats or frames.dark:
+        beside = "beside raw files; allowed: a sensor, or --from and --dark"
+        require_absent(beside, preset=preset, reading=frames.reading, channel=frames.channel)
+        _measure_files(frames, out, json)
         return
     if preset is None:
         raise InputError("preset: none is given; allowed: PRESET, or raw files by --from and --dark; give one")
-    require_absent(f"for {preset!r}; allowed: with --from and --dark", window=window)
-    # Which of a sensor's readings or channels
-    sensor = sensor_preset(preset)
-    if reading is not None:
-        if not sensor.chip.readings:
-            raise InputError(f"reading: {reading} of {preset!r}, whose pixels are read once; leave it out")
-        require_whole("reading", reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
-        sensor = of_reading(sensor, reading - 1)
-    if sensor.chip.channels:
-        if channel not in channels(sensor.cfa):
-            raise unknown(f"channel of {preset!r}, which reads channels apart", str(channel), channels(sensor.cfa))
-        sensor = of_channel(sensor, channel)[0]
-    elif channel is not None:
-        raise InputError(f"channel: {channel!r} of {preset!r}, whose channels are read alike; leave it out")
-
-    # Measure and print
+    sensor = frames.part_of(preset)
     require_place(out, ".svg")
-    chip = measure(sensor, (height, width), seed, exposure)
+    chip = measure(sensor, (frames.height, frames.width), frames.seed, frames.exposure)
     if out is not None:
         write_files({out: transfer_svg(chip, f"{preset}, characterised after EMVA 1288")})
     if json:
@@ -112,12 +128,12 @@ def characterise(
     print("\n".join(["", *(f"- {note}" for note in chip.notes)]))
 
 
-def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out: Path | None, json: bool) -> None:
+def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
     """Print what raw files tell, and write it as a preset."""
     if out is not None:
         require_new(out, ".toml")
         check_place(out)
-    camera = measure_files(flats, dark, window)
+    camera = measure_files(frames.flats, frames.dark, frames.window)
     rows = (
         ("gain", "DN/e-", camera.gain_dn_per_e),
         ("read noise", "e-", camera.read_noise_e),
@@ -125,8 +141,8 @@ def _measure_files(flats: list[Path], dark: list[Path], window: int | None, out:
         ("PRNU", "1", camera.prnu),
     )
     if out is not None:
-        title = f"A camera measured from {flats[0].name} and others."
-        write_files({out: preset_text(title, frame_numbers(camera, flats), None, "")})
+        title = f"A camera measured from {frames.flats[0].name} and others."
+        write_files({out: preset_text(title, frame_numbers(camera, frames.flats), None, "")})
     if json:
         print_json({**asdict(camera), "levels_dn": camera.levels_dn.tolist()})
         return

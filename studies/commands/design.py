@@ -3,13 +3,14 @@
 import json
 import re
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, read_errors, require_range, unknown
+from rodcone.errors import InputError, read_errors, require_fields, unknown
 from rodcone.files import read_bounded, write_files
 from rodcone.progress import progress
 from rodcone.toml_file import read_toml
@@ -30,25 +31,93 @@ _STUDY = Path(__file__).parent.parent / "data" / "design_study.toml"
 MOST_BYTES = 1 << 24  # of the file of tiles that were tried
 
 
-def design(
-    sensor: str,
-    /,
-    *,
-    out: Path,
-    tile: str = "4x4",
-    letters: str = "RGBW",
-    filters: bool = False,
-    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}",
-    weights: Annotated[list[float] | None, Parameter(negative_iterable=())] = None,
-    never_worse_than: str = "bayer",
-    behind: float = 0.1,
-    behind_in_luminance: float = 0.5,
-    light: str = "D65",
-    prior: str = "drawn",
-    blur: bool = False,
-    steps: int = 500,
-    seed: int = 0,
-) -> None:
+@dataclass(frozen=True, kw_only=True)
+class DesignOrder:
+    """What a mosaic is sought for, and among which.
+
+    Attributes
+    ----------
+    tile : str
+        Size of the tile: 2x2, all of which are tried, or 4x4, by annealing.
+    letters : str
+        Channels to choose from; the sensor has a curve of each.
+    filters : bool
+        Then shape the transmittances of the filters too, in front of the pixel of channel W.
+    over : str
+        Named levels of light, from one to another.
+    weights : tuple of float
+        Of the levels in the mean gain; equal by default.
+    never_worse_than : str
+        Mosaic that gains are over, by name or by rows.
+    behind : float
+        Decibels by which the design may fall behind it at any level, in PSNR, and in a* and b*.
+    behind_in_luminance : float
+        The same in luminance; half a decibel is the least that a person sees.
+    light : str
+        Illuminant; the camera knows it.
+    prior : str
+        Prior over patches: drawn or photographs.
+    blur : bool
+        Count what the lens spreads: its diffraction and defocus, at 550 nm.
+    steps : int
+        Tiles of 4x4 to look at.
+    seed : int
+        Of the search.
+    """
+
+    tile: str = "4x4"
+    letters: str = "RGBW"
+    filters: bool = False
+    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}"
+    weights: tuple[float, ...] = ()
+    never_worse_than: str = "bayer"
+    behind: Annotated[float, (0.0, 100.0, "give decibels, such as 0.1")] = 0.1
+    behind_in_luminance: Annotated[float, (0.0, 100.0, "give decibels, such as 0.1")] = 0.5
+    light: str = "D65"
+    prior: str = "drawn"
+    blur: bool = False
+    steps: int = 500
+    seed: int = 0
+
+    def __post_init__(self) -> None:
+        require_fields(self)
+        if self.tile not in SIDES:
+            raise unknown("tile", self.tile, SIDES)
+        count = len(self.levels)
+        if self.weights and (len(self.weights) != count or min(self.weights) < 0 or not sum(self.weights)):
+            raise InputError(
+                f"weights: {list(self.weights)} for {count} levels; allowed: a number for each, 0 or more; see over"
+            )
+
+    @property
+    def levels(self) -> dict[str, float]:
+        """Luminances [cd m^-2] by the levels' names."""
+        return levels_between(self.over)
+
+    def goal(self, base: SensorConfig) -> Goal:
+        """Goal of a search with a camera's pixel, lens and responses."""
+        reference = vary(base, self.never_worse_than).cfa
+        for letter in self.letters + "".join(reference):
+            if letter not in base.responses.curves:
+                raise unknown("letters", letter, base.responses.curves)
+        share = np.array(self.weights or [1.0] * len(self.levels))
+        return Goal(
+            sensor=base,
+            levels_cd_m2=np.array(list(self.levels.values())),
+            weights=share / share.sum(),
+            reference=reference,
+            behind_db=np.array([self.behind, self.behind_in_luminance, self.behind]),
+            letters=self.letters,
+            light=self.light,
+            prior=self.prior,
+            blur=self.blur,
+        )
+
+
+DEFAULT = DesignOrder()
+
+
+def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = DEFAULT, *, out: Path) -> None:
     """Search for the mosaic whose pictures have the least expected error over several levels of light.
 
     Writes the camera found (sensor.toml, a preset file like any other), a page with its gain over light beside
@@ -61,66 +130,25 @@ def design(
         Sensor preset by name, or a preset file: its pixel, lens and responses.
     out
         Folder to write to.
-    tile
-        Size of the tile: 2x2, all of which are tried, or 4x4, by annealing.
-    letters
-        Channels to choose from; the sensor has a curve of each.
-    filters
-        Then shape the transmittances of the filters too, in front of the pixel of channel W.
-    over
-        Named levels of light, from one to another.
-    weights
-        Of the levels in the mean gain; equal by default.
-    never_worse_than
-        Mosaic that gains are over, by name or by rows.
-    behind
-        Decibels by which the design may fall behind it at any level, in PSNR, and in a* and b*.
-    behind_in_luminance
-        The same in luminance; half a decibel is the least that a person sees.
-    light
-        Illuminant; the camera knows it.
-    prior
-        Prior over patches: drawn or photographs.
-    blur
-        Count what the lens spreads: its diffraction and defocus, at 550 nm.
-    steps
-        Tiles of 4x4 to look at.
-    seed
-        Of the search.
     """
-    if tile not in SIDES:
-        raise unknown("tile", tile, SIDES)
-    levels = levels_between(over)
-    if weights is not None and (len(weights) != len(levels) or min(weights) < 0 or not sum(weights)):
-        raise InputError(
-            f"weights: {weights} for {len(levels)} levels; allowed: a number for each, 0 or more; see over"
-        )
-    for name, bound in (("behind", behind), ("behind_in_luminance", behind_in_luminance)):
-        require_range(name, bound, 0.0, 100.0, "give decibels, such as 0.1")
-    base = preset(sensor)
-    reference = vary(base, never_worse_than).cfa
-    for letter in letters + "".join(reference):
-        if letter not in base.responses.curves:
-            raise unknown("letters", letter, base.responses.curves)
-    share = np.array(weights or [1.0] * len(levels))
-    goal = Goal(
-        sensor=base, levels_cd_m2=np.array(list(levels.values())), weights=share / share.sum(), reference=reference,
-        behind_db=np.array([behind, behind_in_luminance, behind]), letters=letters, light=light, prior=prior,
-        blur=blur,
-    )  # fmt: skip
+    base, levels = preset(sensor), order.levels
+    goal = order.goal(base)
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
-    tried, question = out / "tried.json", [repr(base), list(reference), light, prior, levels, blur]
+    tried, question = (
+        out / "tried.json",
+        [repr(base), list(goal.reference), order.light, order.prior, order.blur, levels],
+    )
     known = _known(tried, question)
 
     search = search_for(goal)
     with progress(sys.stderr) as step:
         try:
-            found = best_tile(search, SIDES[tile], steps, seed, known, step)
+            found = best_tile(search, SIDES[order.tile], order.steps, order.seed, known, step)
         finally:
             write_files({tried: json.dumps({"question": question, "gains_db": known})})
         camera = with_tile(base, found, base.responses)
-        if filters:
+        if order.filters:
             camera = best_filters(goal, found, 4, step)
     # Beside the design: mosaics of three channels or more that the sensor can have, Bayer's in one phase.
     tiles = {**MOSAICS, **{name: rows for name, (rows, _) in VARIATIONS.items()}}
@@ -132,12 +160,13 @@ def design(
         and not name.startswith("bayer_")
         and (curves >= set("RGBW") or curves >= {*"".join(rows)})
     ]
-    cameras = {never_worse_than: vary(base, never_worse_than), "design": camera}
-    cameras |= {name: vary(base, name) for name in names if name != never_worse_than}
+    cameras = {order.never_worse_than: vary(base, order.never_worse_than), "design": camera}
+    cameras |= {name: vary(base, name) for name in names if name != order.never_worse_than}
+    at_cd_m2 = goal.levels_cd_m2.tolist()
     by_camera = {
-        name: expect(one, list(levels.values()), light, prior=prior, blur=blur) for name, one in cameras.items()
+        name: expect(one, at_cd_m2, order.light, prior=order.prior, blur=order.blur) for name, one in cameras.items()
     }
-    _write(out, sensor, camera, filters)
+    _write(out, sensor, camera, order.filters)
     write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(known))})
     print(f"{tile_text(found)}\n{out}")
 

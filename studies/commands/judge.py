@@ -5,10 +5,9 @@ from math import isfinite
 from pathlib import Path
 
 from rodcone.csv_file import csv_text
-from rodcone.errors import require_whole
 from rodcone.files import write_files
 from studies.commands.console import print_json, print_table, require_place
-from studies.commands.sweep import MOST_WORKERS, local_runner
+from studies.commands.sweep import Workers
 from studies.dataset.judge import MEASURED, Score
 from studies.dataset.judge import judge as judge_pictures
 from studies.dataset.judge_page import judge_page
@@ -43,9 +42,8 @@ def judge(
         Print one JSON object instead of the table.
     """
     require_place(out, ".html", ".csv")
-    if workers is not None:
-        require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
-    head, scores = judge_pictures(pictures, of, name or pictures.resolve().name, local_runner(workers))
+    with Workers(workers=workers).runner() as runner:
+        head, scores = judge_pictures(pictures, of, name or pictures.resolve().name, runner)
     if out is not None:
         write_files({out: _csv(scores) if out.suffix.lower() == ".csv" else judge_page(head, scores)})
     if json:

@@ -2,19 +2,19 @@
 
 import errno
 import sys
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager, nullcontext
+from collections.abc import Callable, Generator, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from math import prod
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from isp.processors.catalogue import require_libraries
 from render.radiance_files.radiance_source import extent_of
-from rodcone.errors import InputError, require_absent, require_whole
+from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.memory import Memory, memory, require_memory
 from rodcone.progress import Step, duration, progress
 from studies.budget.ledger import Plan
@@ -37,7 +37,6 @@ from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.table import lines, markdown
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
-MOST_WORKERS = 1024
 # Measured on two shared cores of a server (AVX-512): `benchmarks/bench_sweep.py` prints them for another machine.
 RENDER_S = 1e-7  # a pixel, sample, band and light group
 CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
@@ -92,19 +91,94 @@ def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene]
     return Estimate(cells, kept, renders, workers, seconds, total, largest)
 
 
+@dataclass(frozen=True, kw_only=True)
+class Workers:
+    """Who makes what a study asks for.
+
+    Attributes
+    ----------
+    workers : int, optional
+        Processes on this machine, one for each core by default; 1 runs everything in this process.
+    cluster : str, optional
+        Address of a dask scheduler whose workers do it instead, such as tcp://127.0.0.1:8786.
+    force : bool
+        Run even where the estimate needs more memory than is free.
+    """
+
+    workers: Annotated[int | None, (1, 1024, "give processes")] = None
+    cluster: str | None = None
+    force: bool = False
+
+    def __post_init__(self) -> None:
+        require_fields(self)
+        if self.cluster is not None:
+            require_absent("beside --cluster, which has workers of its own", workers=self.workers)
+
+    @property
+    def processes(self) -> int:
+        """On this machine; 0 where a cluster works."""
+        return 0 if self.cluster else self.workers or cores()
+
+    def runner(self) -> AbstractContextManager[Callable[..., Generator[Any, None, None]]]:
+        """What runs tasks, for as long as it is open."""
+        if self.cluster is not None:
+            return on_cluster(self.cluster)
+        return nullcontext(
+            partial(run, executor=InThisProcess())
+            if self.processes == 1
+            else partial(run_in_processes, workers=self.processes)
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class SweepOrder:
+    """How a study is swept, and where to.
+
+    Attributes
+    ----------
+    out : Path
+        Folder of the results database, the pictures and the renders.
+    set : tuple of str
+        KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
+    reference : bool
+        Model everything, also what the sensor's noise hides.
+    as_stated : bool
+        Use bands, samples and lenses as the study and its sensors state them; make no plan.
+    dry_run : bool
+        Print cells, renders, and an estimate of time and memory; compute nothing.
+    trust_code : bool
+        Run the Python files that the study names as processors (mine.py:develop); they may do all that you may.
+    """
+
+    out: Path = Path("out/sweep")
+    set: tuple[str, ...] = ()
+    reference: bool = False
+    as_stated: bool = False
+    dry_run: bool = False
+    trust_code: bool = False
+
+    def __post_init__(self) -> None:
+        if self.reference:
+            require_absent("beside --reference", as_stated=self.as_stated)
+
+    def plan(self, study: Study, step: Step) -> Plan:
+        """Plan of a study: of its pilots, as it is stated, or of everything."""
+        if self.reference:
+            return reference_plan(study)
+        if self.as_stated:
+            return plan_as_stated(study)
+        return plan_study(study, cache=self.out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
+
+
+ORDER, WORKERS = SweepOrder(), Workers()
+
+
 def sweep(
     study: Path,
     /,
+    order: Annotated[SweepOrder, Parameter(name="*")] = ORDER,
+    who: Annotated[Workers, Parameter(name="*")] = WORKERS,
     *,
-    out: Path = Path("out/sweep"),
-    set: list[str] | None = None,
-    workers: int | None = None,
-    cluster: str | None = None,
-    reference: bool = False,
-    as_stated: bool = False,
-    dry_run: bool = False,
-    trust_code: bool = False,
-    force: bool = False,
     json: bool = False,
 ) -> int:
     """Make every picture of a study, note its figures in a results database, and write a report; prints its path.
@@ -115,43 +189,18 @@ def sweep(
     ----------
     study
         Study file (.toml); `rodcone new study` writes one to start from.
-    out
-        Folder of the results database, the pictures and the renders.
-    set
-        KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
-    workers
-        Processes on this machine, one for each core by default; 1 runs everything in this process.
-    cluster
-        Address of a dask scheduler whose workers do it instead, such as tcp://127.0.0.1:8786.
-    reference
-        Model everything, also what the sensor's noise hides.
-    as_stated
-        Use bands, samples and lenses as the study and its sensors state them; make no plan.
-    dry_run
-        Print cells, renders, and an estimate of time and memory; compute nothing.
-    trust_code
-        Run the Python files that the study names as processors (mine.py:develop); they may do all that you may.
-    force
-        Run even where the estimate needs more memory than is free.
     json
         Print one JSON object instead of the path.
     """
     clock = Clock()
-    task = read_study(study, set or (), trust_code=trust_code)
-    if reference:
-        require_absent("beside --reference", as_stated=as_stated)
-    if cluster is not None:
-        require_absent("beside --cluster, which has workers of its own", workers=workers)
-    if workers is not None:
-        require_whole("workers", workers, 1, MOST_WORKERS, "give processes")
-    if dry_run:
-        sizes = _estimated(task, out, reference, workers or cores())
+    task = read_study(study, order.set, trust_code=order.trust_code)
+    if order.dry_run:
+        sizes = _estimated(task, order.out, order.reference, who.workers or cores())
         print_result(_words(sizes), vars(sizes), json=json)
         return 0
-    check_memory(task, out, reference=reference, workers=0 if cluster else workers or cores(), force=force)
-    with nullcontext(local_runner(workers)) if cluster is None else on_cluster(cluster) as runner:
-        planned = partial(_plan, task, out, reference, as_stated)
-        swept, report = make_all(task, out, planned, runner, clock)
+    check_memory(task, order.out, reference=order.reference, workers=who.processes, force=who.force)
+    with who.runner() as runner:
+        swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock)
     say(f"its report is {report}")
     ledger = swept.out / FILE
     paths = {"out": str(swept.out), "ledger": str(ledger), "report": str(report)}
@@ -208,20 +257,6 @@ def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(
     """
     write_csv(read_rows(folder, everything), out)
     print(out)
-
-
-def local_runner(workers: int | None) -> Runner:
-    """Run tasks in so many processes, one for each core where left out; one alone is this process."""
-    count = workers or cores()
-    return partial(run, executor=InThisProcess()) if count == 1 else partial(run_in_processes, workers=count)
-
-
-def _plan(study: Study, out: Path, reference: bool, as_stated: bool, step: Step) -> Plan:
-    if reference:
-        return reference_plan(study)
-    if as_stated:
-        return plan_as_stated(study)
-    return plan_study(study, cache=out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
 
 
 def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
