@@ -135,10 +135,8 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     goal = order.goal(base)
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
-    tried, question = (
-        out / "tried.json",
-        [repr(base), list(goal.reference), order.light, order.prior, order.blur, levels],
-    )
+    tried = out / "tried.json"
+    question = [repr(base), list(goal.reference), order.light, order.prior, order.blur, levels]
     known = _known(tried, question)
 
     search = search_for(goal)

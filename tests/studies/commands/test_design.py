@@ -16,8 +16,10 @@ FEW = ["design", "low_noise", "--tile", "2x2", "--letters", "RGB", "--over", "cl
 
 @pytest.mark.thorough
 def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) -> None:
-    code, out, _ = call([*FEW, "-o", tmp_path / "found", "--behind", "9", "--behind-in-luminance", "9"])
+    asked = [*FEW, "-o", tmp_path / "found", "--behind", "9", "--behind-in-luminance", "9"]
+    code, out, _ = call(asked)
     assert code == 0
+    assert call(asked)[:2] == (0, out)  # from the tiles that were tried
     tile = tuple(out.splitlines()[0].split("/"))
     camera = preset(tmp_path / "found" / "sensor.toml")
     assert camera.cfa == tile
