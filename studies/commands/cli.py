@@ -63,8 +63,8 @@ app.command("studies.commands.render:render", name="render", help="Render a scen
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
 app.command("studies.commands.snr:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
 app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
-app.command("studies.commands.sweep:export", name="export", help="Write a sweep's results as CSV.")
-app.command("studies.commands.sweep:table", name="table", help="Print a sweep's figures as a Markdown table.")
+app.command("studies.commands.export:export", name="export", help="Write a sweep's results as CSV.")
+app.command("studies.commands.export:table", name="table", help="Print a sweep's figures as a Markdown table.")
 app.command("studies.commands.train:train", name="train", help="Train the prior of ple, ple_rgbw and ple_bayer.")
 app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 

@@ -1,4 +1,4 @@
-"""The commands `rodcone sweep`, `export` and `table`, and what a run will take, before anything is computed."""
+"""The command `rodcone sweep`, and what a run will take, before anything is computed."""
 
 import errno
 import sys
@@ -14,7 +14,7 @@ from cyclopts import Parameter
 
 from isp.processors.catalogue import require_libraries
 from render.radiance_files.radiance_source import extent_of
-from rodcone.errors import InputError, require_absent, require_fields
+from rodcone.errors import require_absent, require_fields
 from rodcone.memory import Memory, memory, require_memory
 from rodcone.progress import Step, duration, progress
 from studies.budget.ledger import Plan
@@ -30,11 +30,10 @@ from studies.study.study import SceneChoice, Study, conditions
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
-from studies.sweep.export import read_rows, write_csv
+from studies.sweep.export import read_rows
 from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, Swept, at_work
 from studies.sweep.run_sweep import sweep as run_sweep
-from studies.sweep.table import lines, markdown
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
 # Measured on two shared cores of a server (AVX-512): `benchmarks/bench_sweep.py` prints them for another machine.
@@ -243,22 +242,6 @@ def make_all(
     return swept, report
 
 
-def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
-    """Write the cells of a sweep as a table, a row a cell; prints its path.
-
-    Parameters
-    ----------
-    folder
-        Folder of the sweep.
-    out
-        File to write, ending in .csv.
-    everything
-        Also write the cells of earlier runs that the last run didn't ask for.
-    """
-    write_csv(read_rows(folder, everything), out)
-    print(out)
-
-
 def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
     """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
     plan = reference_plan(study) if reference else plan_as_stated(study)
@@ -287,35 +270,3 @@ def saying_what_is_kept(out: Path) -> Iterator[None]:
         full = f"{error.filename or out}: {error.strerror}"
         say(f"{full}; make room: {out} keeps what is done, and the same command goes on")
         raise SystemExit(1) from None
-
-
-def table(
-    folder: Path,
-    /,
-    *,
-    by: str = "spectrum,level,processor",
-    show: str = "psnr_db,delta_e_median",
-    where: list[str] | None = None,
-) -> None:
-    """Print figures of a sweep as a Markdown table: means over the seeds, with the half width of their 95 % interval.
-
-    Parameters
-    ----------
-    folder
-        Folder of the sweep.
-    by
-        Axes joined by commas, with a line for each combination: scene, spectrum, level, exposure, sensor, processor.
-    show
-        Figures, joined by commas: the database's columns, electrons_W (G, R, B), pair_delta_e and
-        true_pair_delta_e of scene metamers, daylight_delta_e of scene color_checker.
-    where
-        AXIS=VALUE to keep, such as level=10lux; may be given several times.
-    """
-    axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
-    chosen = {}
-    for text in where or ():
-        axis, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
-        chosen[axis] = value
-    print(markdown(lines(read_rows(folder), folder, axes, figures, chosen), axes, figures))

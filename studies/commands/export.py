@@ -1,0 +1,58 @@
+"""The commands `rodcone export` and `rodcone table`: a sweep's figures."""
+
+from pathlib import Path
+from typing import Annotated
+
+from cyclopts import Parameter
+
+from rodcone.errors import InputError
+from studies.sweep.export import read_rows, write_csv
+from studies.sweep.table import lines, markdown
+
+
+def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
+    """Write the cells of a sweep as a table, a row a cell; prints its path.
+
+    Parameters
+    ----------
+    folder
+        Folder of the sweep.
+    out
+        File to write, ending in .csv.
+    everything
+        Also write the cells of earlier runs that the last run didn't ask for.
+    """
+    write_csv(read_rows(folder, everything), out)
+    print(out)
+
+
+def table(
+    folder: Path,
+    /,
+    *,
+    by: str = "spectrum,level,processor",
+    show: str = "psnr_db,delta_e_median",
+    where: list[str] | None = None,
+) -> None:
+    """Print figures of a sweep as a Markdown table: means over the seeds, with the half width of their 95 % interval.
+
+    Parameters
+    ----------
+    folder
+        Folder of the sweep.
+    by
+        Axes joined by commas, with a line for each combination: scene, spectrum, level, exposure, sensor, processor.
+    show
+        Figures, joined by commas: the database's columns, electrons_W (G, R, B), pair_delta_e and
+        true_pair_delta_e of scene metamers, daylight_delta_e of scene color_checker.
+    where
+        AXIS=VALUE to keep, such as level=10lux; may be given several times.
+    """
+    axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
+    chosen = {}
+    for text in where or ():
+        axis, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
+        chosen[axis] = value
+    print(markdown(lines(read_rows(folder), folder, axes, figures, chosen), axes, figures))
