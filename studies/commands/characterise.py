@@ -35,10 +35,10 @@ class Frames:
     dark : tuple of Path
         Raw files with the cap on, two or more, at the same exposure index and time.
     reading : int, optional
-        Of a sensor with several readings, which: 1 for the first; it is measured alone.
+        Reading to measure, of a sensor that has several: 1 for the first.
     channel : str, optional
-        Of a sensor that reads channels apart, which, such as W: a chip of such pixels alone, in the electrons that they
-        hold; of a metered one, after its longest time.
+        Channel to measure, such as W, of a sensor that reads channels apart: its pixels alone, in the electrons that
+        they hold, and at the longest time of a metered channel.
     window : int, optional
         Width in pixels of the square in the middle of the frames to measure; the whole frame by default.
     height : int
@@ -152,7 +152,7 @@ def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
         words=2,
     )
     if out is not None:
-        say(f"{out}: pitch_um and fill_factor are yours to add, no frame tells them")
+        say(f"{out}: add pitch_um and fill_factor, which frames don't show")
 
 
 def _facts(chip: Characterisation) -> dict[str, Any]:

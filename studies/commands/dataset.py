@@ -46,7 +46,7 @@ def dataset(
     generated
         Number of drawn scenes, beside the file's own.
     seed
-        From which the drawn scenes' hashes are counted.
+        Seed of the drawn scenes.
     truth
         Planes of truth in a sample, joined by commas; raw frame and facts are always there.
     shards

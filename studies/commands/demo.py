@@ -46,7 +46,7 @@ class DemoOrder:
     max_seconds : float, optional
         Time for the render, at most; 65 by default.
     seed : int
-        Seed of the render, and the first of three of the chips and the exposures.
+        Seed of the render; chips and exposures take it and the next two.
     light : str, optional
         Light of the scene by name, such as A; for a file the light that is shown as neutral (D65 by default).
     define : tuple of str
@@ -54,8 +54,8 @@ class DemoOrder:
     denoise : bool
         Photograph denoised light; the report's Monte Carlo share is then its measured error. Needs rodcone[denoise].
     render : bool
-        Render here in full what is photographed, also where the project ships the light of the scene, size and bands
-        and a short render only tests it; --spp, --max-seconds and --denoise do too.
+        Render the scene here in full, even if the project ships its light; --spp, --max-seconds and --denoise do so
+        too.
     """
 
     scene: str | None = None

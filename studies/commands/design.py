@@ -42,15 +42,15 @@ class DesignOrder:
     letters : str
         Channels to choose from; the sensor has a curve of each.
     filters : bool
-        Then shape the transmittances of the filters too, in front of the pixel of channel W.
+        Shape the filters' transmittances too, in front of a pixel of channel W.
     over : str
         Named levels of light, from one to another.
     weights : tuple of float
-        Of the levels in the mean gain; equal by default.
+        Weight of each level in the mean gain; equal by default.
     never_worse_than : str
         Mosaic that gains are over, by name or by rows.
     behind : float
-        Decibels by which the design may fall behind it at any level, in PSNR, and in a* and b*.
+        Decibels that the design may lose to it at any level, in PSNR, and in a* and b*.
     behind_in_luminance : float
         The same in luminance; half a decibel is the least that a person sees.
     light : str
@@ -62,7 +62,7 @@ class DesignOrder:
     steps : int
         Tiles of 4x4 to look at.
     seed : int
-        Of the search.
+        Seed of the search.
     """
 
     tile: str = "4x4"

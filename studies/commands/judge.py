@@ -31,9 +31,9 @@ def judge(
     pictures
         Folder of KEY.png, KEY.tif or KEY.npy by the keys of the set's manifest, encoded sRGB in which white is 1.
     of
-        Folder that rodcone dataset made; where rodcone sweep developed the same study in it, its figures stand beside.
+        Folder that rodcone dataset made; if rodcone sweep developed the same study there, its figures are shown too.
     name
-        Whose pictures they are; the folder's name by default.
+        Name of whoever made the pictures; the folder's name by default.
     out
         File with every metric: a page (.html) or a table (.csv).
     workers

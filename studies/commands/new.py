@@ -57,8 +57,8 @@ def preset(
     camera
         Measured response of a camera by name, such as "Nikon D850": see rodcone list sensors.
     noise
-        Where its noise stands: an EMVA 1288 report as .toml, or a .dng with a NoiseProfile. For raw frames of
-        your own: rodcone characterise --from.
+        Source of its noise: an EMVA 1288 report as .toml, or a .dng with a NoiseProfile. For raw frames of your own
+        use rodcone characterise --from.
     anchor
         Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response, or the curves of
         the preset that is named, into electrons.
@@ -86,7 +86,7 @@ def preset(
             shape = lent_curves(lender, str(name), numbers)
     if shape is None and anchor and noise and noise.suffix.lower() != ".toml":  # a report is of a chip without filters
         raise InputError(
-            f"anchor: {anchor} scales a response, and {noise.name!r} tells none; allowed with "
+            f"anchor: {anchor} scales a response, and {noise.name!r} has none; allowed with "
             "--camera, or with a preset that lends its curves; add low_noise, or leave --anchor out"
         )
     # the files
@@ -99,10 +99,7 @@ def preset(
     if "K" in numbers.left_out:
         say(f"{out}: K = {numbers.left_out['K']}")
     if missing(numbers):
-        say(
-            f"{out}: needed, and told by no source: {', '.join(missing(numbers))}; add them, or name a preset, "
-            "which lends them"
-        )
+        say(f"{out}: no source gives {', '.join(missing(numbers))}; add them, or name a preset, which lends them")
     print(out)
 
 

@@ -53,7 +53,7 @@ def reference(
     define
         NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     out
-        Folder of references; by default that of the variable RODCONE_REFERENCES, or the one in your home.
+        Folder of references; by default the variable RODCONE_REFERENCES names it, or it lies in your home.
     """
     # What to render, as the demo would
     require_range("until", until, 1e-4, 1e3, "give a share of the sensor's noise variance: 0.03")

@@ -36,7 +36,7 @@ def train(
     """
     require_ending(out, ".npz")
     if (sensor is None) == (spectral is None):
-        raise InputError("sensor: give one of --sensor and --spectral: whose prior is it?")
+        raise InputError("sensor: allowed: either --sensor or --spectral; give one")
     if spectral is not None:
         if spectral not in KINDS_OF:
             raise unknown("spectral", spectral, KINDS_OF)

@@ -155,7 +155,7 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
         frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
         windows = list(_windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop))
         if not windows:
-            raise InputError(f"crop: {order.crop} is over the frames' side; allowed: up to that; raise render.size")
+            raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
         for part, window in enumerate(windows):
             key = f"{frame}_s{cell.seed}" + (f"_{window[0]}-{window[1]}" if order.crop else "")
             known = samples.get(key)

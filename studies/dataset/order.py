@@ -68,8 +68,7 @@ def check_cameras(study: Study, order: SetOrder) -> None:
     for name in study.sensors:
         if preset(name).chip.sites > 1 or preset(name).chip.readings:
             raise InputError(
-                f"sensors: {name!r} bins or merges readings; allowed in a data set: pixels read once, whose noise a "
-                "and b tell; leave it out"
+                f"sensors: {name!r} bins or merges readings; allowed in a data set: pixels read once; leave it out"
             )
     for sensor in _cameras(study):
         tile = len(sensor.cfa), len(sensor.cfa[0])

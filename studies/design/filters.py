@@ -39,7 +39,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         For a sensor without W, whose curve is that of a clear pixel.
     """
     if "W" not in goal.sensor.responses.curves:
-        raise InputError("curves: the sensor has no W, what a pixel without a filter collects; add W to its responses")
+        raise InputError("curves: the sensor has no W, the response without a filter; add W to its responses")
     # What all rounds share.
     search = search_for(replace(goal, letters=goal.letters + "W"))
     prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)

@@ -74,7 +74,7 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
     """
     if base.chip.binning:
         raise InputError(
-            f"sensor: {controls.sensor!r} bins, which is not explored; allowed: one without binning; take "
+            f"sensor: {controls.sensor!r} bins; allowed in the explorer: sensors without binning; take "
             "binning out of its file"
         )
     if base.chip.readings and (fixed := {"full_well_e", "read_noise_e", "dsnu_e"} & set(controls.pixel)):

@@ -269,8 +269,8 @@ def _check_cameras(study: Study) -> None:
         # sensors of one size are compared at the coarsest's pixels
         if study.sensor_side_um is None and sensor.chip.sites != preset(study.sensors[0]).chip.sites:
             raise InputError(
-                f"sensors: {name!r} and {study.sensors[0]!r}, of which one bins: its pictures are half as large, and "
-                "have another truth; allowed: all bin, or none; give each a study of its own"
+                f"sensors: of {name!r} and {study.sensors[0]!r} one bins, so that its pictures are half as large; "
+                "allowed: all bin, or none; give each a study of its own"
             )
         for mosaic in mosaics(study):
             vary(sensor, mosaic)

@@ -129,7 +129,7 @@ def _check_encryption(address: str) -> None:
             "file that DASK_CONFIG names; start from: rodcone new cluster -o dask.yaml"
         )
     if address.startswith("tcp:") and security.require_encryption:
-        raise InputError(f"cluster: {address} is in clear and dask's settings require encryption; write tls://")
+        raise InputError(f"cluster: {address} is unencrypted, and dask's settings require encryption; write tls://")
 
 
 def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:

@@ -34,7 +34,7 @@ def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path):
     for line in printed.splitlines()[1:]:
         measured, low, high = map(float, line.split()[-3:])
         assert low < measured < high
-    assert "pitch_um and fill_factor are yours to add" in err
+    assert "add pitch_um and fill_factor, which" in err
     assert out.read_text("utf-8").startswith("# A camera measured from flat1.tif and others.")
     found = json.loads(call(["characterise", "--from", *flats, "--dark", *darks, "--json"])[1])
     assert found["gain_dn_per_e"]["low"] < 1 / SENSOR.gain_e_per_dn < found["gain_dn_per_e"]["high"]

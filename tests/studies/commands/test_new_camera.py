@@ -70,7 +70,7 @@ def test_an_anchor_makes_it_absolute_and_what_is_missing_is_told(tmp_path):
     path = tmp_path / "one.toml"
     code, _, err = call(["new", "preset", "--camera", "Maker Model One", "--anchor", "0.5@540", "-o", path])
     assert code == 0
-    assert "needed, and told by no source: pitch_um, fill_factor, full_well_e" in err
+    assert "no source gives pitch_um, fill_factor, full_well_e" in err
     assert tomllib.loads(path.read_text("utf-8"))["responses"]["quantum_efficiency"] == pytest.approx(0.5, rel=0.02)
 
 
@@ -103,7 +103,7 @@ def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_pat
     asked = ("--noise", tmp_path / "shot.dng", "--anchor", "0.5@540", "-o", tmp_path / "mine.toml")
     code, out, err = call(["new", "preset", *asked])
     assert (code, out, len(err.splitlines())) == (2, "", 1)
-    assert "anchor: 0.5@540 scales a response, and 'shot.dng' tells none" in err
+    assert "anchor: 0.5@540 scales a response, and 'shot.dng' has none" in err
     assert not (tmp_path / "mine.toml").exists()
     assert call(["new", "preset", "low_noise", *asked])[0] == 0
     sensor = read_sensor(tmp_path / "mine.toml")

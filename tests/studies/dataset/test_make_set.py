@@ -190,7 +190,7 @@ def test_the_whole_frame_is_that_of_the_sweep(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changes", "words"),
     [
-        ({"order": SetOrder(crop=32)}, "crop: 32 is over the frames' side"),
+        ({"order": SetOrder(crop=32)}, "crop: 32 exceeds the frames' side"),
         ({"order": SetOrder(crop=17)}, "crop: 17 cuts the tile of 2x2 pixels; allowed: its multiples; give 16"),
         ({"sensors": ("dual_gain",)}, "'dual_gain' bins or merges readings"),
         ({"frames": (2,)}, r"frames: \[2\] in a data set"),

@@ -31,7 +31,7 @@ def test_a_binned_cell_is_measured_at_its_own_size(binning: str, tmp_path: Path)
 
 
 def test_a_study_holds_cameras_that_bin_or_none(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"sensors: .* of which one bins: .*; give each a study of its own") as found:
+    with pytest.raises(InputError, match=r"sensors: .* one bins, so that .*; give each a study of its own") as found:
         SAMPLE.small_study(tmp_path, sensors=("low_noise", quad_file(tmp_path, "charge")))
     assert "\n" not in str(found.value)
 
