@@ -195,7 +195,7 @@ def reaching(mutant: Mutant, text: str, lines: dict[int, set[str]]) -> set[str]:
         for node in ast.walk(ast.parse(text))
         if isinstance(node, ast.stmt) and node.lineno <= mutant.line <= (node.end_lineno or 0)
     ]
-    *outer, inner = sorted(around, key=lambda node: (node.lineno, -(node.end_lineno or 0)))
+    *outer, inner = sorted(around, key=lambda node: (node.lineno, -(node.end_lineno or 0))) or [ast.Pass()]
     in_function = any(isinstance(node, ast.FunctionDef) for node in outer)
     numbers = range(inner.lineno, (inner.end_lineno or 0) + 1) if in_function else lines
     return {test for number in numbers for test in lines.get(number, ())}

@@ -143,6 +143,12 @@ def test_illuminance_of_a_mean_luminance_is_the_one_that_gives_it():
     assert transport(irradiance=None).illuminance_lux(25.0) is None
 
 
+def test_the_mean_radiance_at_a_level_is_that_of_the_relit_picture():
+    made = transport()
+    values = made.relight(luminance_cd_m2=12.0).values
+    assert made.mean_radiance(luminance_cd_m2=12.0) == pytest.approx(values.mean(axis=(0, 1), dtype=float), rel=1e-6)
+
+
 def test_luminance_is_refused_where_every_pixel_sees_a_light():
     seen = np.zeros((2, *SIZE), np.float32)
     seen[0] = 1.0
