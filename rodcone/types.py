@@ -13,7 +13,9 @@ Planes: TypeAlias = NDArray[np.float32]  # (band, h, w), or (group, band, h, w)
 
 
 def real_array(name: str, value: Any) -> NDArray[Any]:
-    """Array of whole or floating numbers; raises `InputError` for complex ones, text, truth values and the like."""
+    """Array of whole or floating numbers; raises `InputError` for complex ones, masked values, text and the like."""
+    if np.ma.is_masked(value):
+        raise InputError(f"{name}: values that are masked are not allowed; fill them, as by values.filled(0)")
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, OverflowError):  # rows of unequal length, among others

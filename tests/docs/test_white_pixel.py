@@ -15,13 +15,15 @@ from studies.sweep.row import Row
 # PSNR [dB] of RGBW over Bayer by scene; the seeds of both mosaics move in step.
 LEADS_DB = {"still_life": 1.0, "night_street": 3.0, "generated-1": -2.5, "generated-2": -0.5}
 
+SIZES = (128, 96), (64, 48), (64, 48), (64, 48)  # height, width
+
 
 def swept(*cameras: str) -> ReportData:
     def change(row: Row) -> Row:
         lead_db = LEADS_DB[row.scene] if row.processor == "ple_rgbw" else 0.0
         return replace(row, psnr_db=20.0 + 0.3 * row.seed + lead_db)
 
-    scenes = tuple(ReportScene(name, 128, 96) for name in LEADS_DB)
+    scenes = tuple(ReportScene(name, *size) for name, size in zip(LEADS_DB, SIZES, strict=True))
     report = sample_report(
         change, levels=2, scenes=scenes, sensors=SENSORS[:1], seeds=(0, 1), cameras=cameras,
         balances=("as-shot", "gray-world"),
@@ -36,7 +38,10 @@ def test_leads_are_means_over_named_and_over_drawn_scenes_by_balance() -> None:
         assert f"| mean of 2 drawn scenes, {balance} | **−1.5 ± 0.0** | **−1.5 ± 0.0** |" in content["psnr_db"]
         assert f'PSNR [dB],"generated-1, {balance}",**−2.5 ± 0.0**' in table
         assert figure.count(f">{balance}</text>") == 2  # a line in each chart
-    assert "rodcone 0.2.0+abc: scenes of 128 pixels on the longer side, 2 seeds" in content["set-up"]
+    report = swept("ple_bayer", "ple_rgbw")
+    turned = replace(report, scenes=tuple(ReportScene(x.name, x.width, x.height) for x in report.scenes))
+    for one in (report, turned):
+        assert "rodcone 0.2.0+abc: scenes of 128 pixels on the longer side, 2 seeds" in parts(one)[0]["set-up"]
 
 
 def test_the_page_has_a_place_for_every_part() -> None:

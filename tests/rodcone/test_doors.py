@@ -94,6 +94,7 @@ NEVER: tuple[Any, ...] = (
     np.array([1j]),
     np.array([np.nan]),
     np.array([True]),
+    np.ma.masked_array([0.5], mask=[True]),
     np.array(["a"]),
     [[1], [2, 3]],
 )
@@ -282,13 +283,15 @@ def test_a_linear_picture_encodes_itself(tmp_path: Path) -> None:
 
 
 def test_a_frame_that_is_all_full_or_all_dark_is_told() -> None:
-    for luminance_cd_m2, exposure, words in (
-        (25.0, 10, "saturated at 10 s"),
-        (1e-4, "1us", "no more than dark noise"),
-        (25.0, "10ms", ""),
-        (0.0, 0, ""),
+    """Of 256 pixels in the dark one may lie above its noise by chance."""
+    for side, luminance_cd_m2, exposure, words in (
+        (64, 25.0, 10, "saturated at 10 s"),
+        (64, 1e-4, "1us", "no more than dark noise"),
+        (16, 1e-4, "1us", "no more than dark noise"),
+        (64, 25.0, "10ms", ""),
+        (64, 0.0, 0, ""),
     ):
-        values = np.full((64, 64, 40), 1e-3 * luminance_cd_m2 / RADIANCE.luminance().mean())
+        values = np.full((side, side, 40), 1e-3 * luminance_cd_m2 / RADIANCE.luminance().mean())
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
             public.capture(public.SpectralRadiance(values, NM), "low_noise", exposure)
