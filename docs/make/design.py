@@ -1,4 +1,4 @@
-"""Expected gains of mosaics beside those of simulation: `docs/make/design.py HASH`, half an hour on one core.
+"""Expected gains of mosaics beside those of simulation: `docs/make/design.py HASH`, a quarter of an hour on a core.
 
 HASH is a commit's: ten scenes are drawn from it that no setting was chosen on. Each is lit by D65, photographed by each
 mosaic at five levels of light, and developed by `ple`, whose prior is trained anew where a mosaic's curves need it.
@@ -10,6 +10,7 @@ import sys
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
+from itertools import product
 from math import log10, sqrt
 from pathlib import Path
 
@@ -41,7 +42,7 @@ FOLDER = Path("out/design")
 SCENES, SIDE, SPP = 10, 96, 256
 SENSORS = ("low_noise", "table1_output")
 LEVELS = {level.name: level.luminance_cd_m2 for level in DEMO_LEVELS[:5]}  # by day the exposures are the same
-SHOWN = ("moonlight", "street", "corridor", "bright office")
+SHOWN = ("moonlight", "street", "bright office")
 BAYER = "bayer"
 # Mosaics by name or rows. `ple` knows R, G, B and W: other curves stand in their places, with a prior of their own.
 MOSAICS: Mapping[str, Mapping[str, str]] = {
@@ -50,7 +51,12 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
     "rccb": {"C": "W"},
     "ryyb": {"Y": "G"},
     "BRBR/RGRG/BRBR/RGWG": {},  # found by `rodcone design low_noise`
+    "cyym": {"C": "R", "Y": "G", "M": "B"},
+    "cygm": {"C": "R", "M": "B", "Y": "W"},
+    "cmyw": {"C": "R", "M": "G", "Y": "B"},
 }
+# By the seed of the sensor's noise; the first is Bayer.
+RUNS = {0: tuple(MOSAICS), 1: (BAYER, "rgbw", "cyym", "cygm", "cmyw")}
 FIGURES = ("psnr_db", "luminance_db", "colour")
 
 
@@ -80,7 +86,7 @@ def prior_of(mosaic: str) -> Prior:
     return load_prior(path)
 
 
-def scene_rows(name: str, transport: Transport, mosaic: str) -> Iterator[dict[str, str | float]]:
+def scene_rows(name: str, transport: Transport, mosaic: str, seed: int) -> Iterator[dict[str, str | float]]:
     """Errors of each sensor and level of a mosaic in one scene."""
     for sensor_name in SENSORS:
         sensor = in_places(camera(sensor_name, mosaic), MOSAICS[mosaic])
@@ -90,14 +96,14 @@ def scene_rows(name: str, transport: Transport, mosaic: str) -> Iterator[dict[st
             light = light_in_bands(illuminant("D65"), radiance.wavelength_nm, radiance.widths_nm)
             white_cd_m2 = shown_white_cd_m2(transport, luminance_cd_m2)
             truth = encode_srgb(true_srgb(radiance, light, white_cd_m2))
-            rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic)])
+            rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic), seed])
             raw = capture(radiance, sensor, rng=rng)
             fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
             linear, _ = develop_to_scale(raw, processor, fit, sensor, light, white_cd_m2, balance=neutral)
             shown = encode_srgb(linear)
             off = rgb2lab(shown) - rgb2lab(truth)
             yield {
-                "scene": name, "sensor": sensor_name, "level": level, "mosaic": mosaic,
+                "scene": name, "seed": seed, "sensor": sensor_name, "level": level, "mosaic": mosaic,
                 "psnr_db": -10 * log10(np.mean((shown - truth) ** 2)),
                 "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
                 "colour": sqrt(np.mean(off[..., 1:] ** 2) * 2),
@@ -107,38 +113,37 @@ def scene_rows(name: str, transport: Transport, mosaic: str) -> Iterator[dict[st
 def simulated(commit: str) -> list[dict[str, str | float]]:
     """Rows of all scenes drawn from a commit's hash; those of finished scenes are read."""
     rows = []
-    for mosaic in MOSAICS:
+    for seed, mosaic in [(seed, mosaic) for seed, mosaics in RUNS.items() for mosaic in mosaics]:
         for number in range(SCENES):
             name = f"generated-{int(commit, 16) + number:x}"
-            path = FOLDER / f"{name}-{mosaic.replace('/', '_')}.json"
+            path = FOLDER / f"{name}-{mosaic.replace('/', '_')}-{seed}.json"
             if not path.exists():
                 transport = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
-                path.write_text(json.dumps(list(scene_rows(name, transport, mosaic))))
+                path.write_text(json.dumps(list(scene_rows(name, transport, mosaic, seed))))
             rows += json.loads(path.read_text())
-        print(mosaic, file=sys.stderr)
+        print(seed, mosaic, file=sys.stderr)
     return rows
 
 
 def gains(rows: Sequence[Mapping[str, str | float]]) -> list[dict[str, str | float]]:
     """Expected and simulated gains over Bayer of each sensor, mosaic and level, with twice the standard error."""
-    by_picture = {(row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
+    by_picture = {(row["seed"], row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
     scenes, result = sorted({str(row["scene"]) for row in rows}), []
-    for sensor in SENSORS:
-        expected = {mosaic: expect(camera(sensor, mosaic), list(LEVELS.values())) for mosaic in MOSAICS}
-        for mosaic in list(MOSAICS)[1:]:
-            for index, level in enumerate(LEVELS):
-                line: dict[str, str | float] = {"sensor": sensor, "mosaic": mosaic, "level": level}
-                for figure in FIGURES:
-                    of, beside = (_decibels(figure, getattr(expected[m][index], figure)) for m in (mosaic, BAYER))
-                    gain = np.array([
-                        np.subtract(*(_decibels(figure, float(by_picture[scene, sensor, m, level][figure]))
-                                      for m in (mosaic, BAYER)))
-                        for scene in scenes
-                    ])  # fmt: skip
-                    line[f"{figure}_expected"] = of - beside
-                    line[f"{figure}_simulated"] = float(gain.mean())
-                    line[f"{figure}_error"] = 2 * float(gain.std(ddof=1)) / sqrt(len(scenes))
-                result.append(line)
+    for (seed, mosaics), sensor in product(RUNS.items(), SENSORS):
+        expected = {mosaic: expect(camera(sensor, mosaic), list(LEVELS.values())) for mosaic in mosaics}
+        for mosaic, (index, level) in product(mosaics[1:], enumerate(LEVELS)):
+            line: dict[str, str | float] = {"seed": str(seed), "sensor": sensor, "mosaic": mosaic, "level": level}
+            for figure in FIGURES:
+                of, beside = (_decibels(figure, getattr(expected[m][index], figure)) for m in (mosaic, BAYER))
+                gain = np.array([
+                    np.subtract(*(_decibels(figure, float(by_picture[seed, scene, sensor, m, level][figure]))
+                                  for m in (mosaic, BAYER)))
+                    for scene in scenes
+                ])  # fmt: skip
+                line[f"{figure}_expected"] = of - beside
+                line[f"{figure}_simulated"] = float(gain.mean())
+                line[f"{figure}_error"] = 2 * float(gain.std(ddof=1)) / sqrt(len(scenes))
+            result.append(line)
     return result
 
 
@@ -146,10 +151,8 @@ def _decibels(figure: str, value: float) -> float:
     return -20 * log10(value) if figure == "colour" else value
 
 
-def main(commit: str) -> None:
-    """Write the page's parts and the table of all gains."""
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    lines = gains(simulated(commit))
+def write(lines: Sequence[Mapping[str, str | float]]) -> None:
+    """Write the table of all gains, and the page's parts from those of the first seed."""
     (RESULTS / "design.csv").write_text(
         csv_text(list(lines[0]), [[x if isinstance(x, str) else f"{x:.3f}" for x in line.values()] for line in lines])
     )
@@ -157,7 +160,7 @@ def main(commit: str) -> None:
     for sensor in SENSORS:
         cells = []
         for figure in FIGURES:
-            of_sensor = [line for line in lines if line["sensor"] == sensor]
+            of_sensor = [line for line in lines if line["seed"] == "0" and line["sensor"] == sensor]
             expected_db, simulated_db = (np.array([line[f"{figure}_{kind}"] for line in of_sensor], dtype=float)
                               for kind in ("expected", "simulated"))  # fmt: skip
             clear = np.abs(simulated_db) > 0.3
@@ -170,7 +173,7 @@ def main(commit: str) -> None:
         "|---" * (len(SHOWN) + 1) + "|",
     ]
     for mosaic in list(MOSAICS)[1:]:
-        of = [line for line in lines if line["sensor"] == SENSORS[0] and line["mosaic"] == mosaic]
+        of = [line for line in lines if (line["seed"], line["sensor"], line["mosaic"]) == ("0", SENSORS[0], mosaic)]
         cells = [
             f"{line['psnr_db_expected']:+.1f}/{line['psnr_db_simulated']:+.1f}" for line in of if line["level"] in SHOWN
         ]
@@ -179,4 +182,5 @@ def main(commit: str) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1])
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    write(gains(simulated(sys.argv[1])))
