@@ -59,7 +59,7 @@ def sample_row(level: int, sensor: int, camera: str, seed: int = 0, **values: An
         "substitution": int(level < 3 - sensor) if rgbw else None,
         "balance": json.dumps({"R": fallen, "G": "gray world", "B": "gray world"}),
         "saturated": 0.0 if level < 4 else 0.012,
-        "mean_electrons": json.dumps(dict(zip("RGBW" if rgbw else "RGB", electrons, strict=False))),
+        "mean_electrons": json.dumps(dict(zip("RGBW" if rgbw or "rgbw" in camera else "RGB", electrons, strict=False))),
         "variant": "llvm_ad_spectral",
         "readout_engine": "llvm",
         "capture_s": 0.021,

@@ -1,5 +1,6 @@
 """The page's answer in words: who is better in which light, by how much, and how much light that is worth."""
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -205,6 +206,31 @@ def pair_words(group: Group) -> str:
 
 def _balances(*cells: ReportCell) -> set[str]:
     return {cell.first.white_balance for cell in cells if cell.first}
+
+
+def best_words(group: Group, cells: Sequence[ReportCell]) -> str:
+    """Say which Bayer camera has the best PSNR at each level, and RGBW's lead over it; empty where one has no rival.
+
+    Parameters
+    ----------
+    group : Group
+        Of the same method on both mosaics; nothing is said of others.
+    cells : sequence of ReportCell
+        Of all cameras in its place. Those with electrons in R, G and B alone are Bayer's.
+    """
+    if not group.ours or (group.ours[0].camera, group.theirs[0].camera) != WHITE_PIXEL:
+        return ""
+    bayer = [cell for cell in cells if cell.first and json.loads(cell.first.mean_electrons).keys() == set("RGB")]
+    if len(bayer) < 2 * len(group.ours):
+        return ""
+    best = [max((x for x in bayer if x.level == ours.level), key=lambda x: x.mean(PSNR.key)) for ours in group.ours]
+    lead = np.array([ours.mean(PSNR.key) - cell.mean(PSNR.key) for ours, cell in zip(group.ours, best, strict=True)])
+    parts = [
+        f"{camera_name(best[first].camera)}{f' {where}' if (where := _where(group.pair.levels, first, last)) else ''} "
+        f"({_span(PSNR, lead[first : last + 1])})"
+        for first, last in _runs([cell.camera for cell in best])
+    ]
+    return f"Beside the best Bayer: {'; '.join(parts)}."
 
 
 def balance_words(group: Group) -> str:

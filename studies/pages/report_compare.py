@@ -11,7 +11,17 @@ from numpy.typing import NDArray
 
 from studies.metrics.metric import METRICS, Metric
 from studies.pages import report_text as text
-from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, in_light, over_groups, pair_words
+from studies.pages.headline import (
+    WHITE_PIXEL,
+    Group,
+    Pair,
+    answer,
+    balance_words,
+    best_words,
+    in_light,
+    over_groups,
+    pair_words,
+)
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.verdict import OUTCOMES, Leads, counts, leads
 
@@ -162,15 +172,16 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
             }
         for a, b in permutations(range(length), 2) if axis in RIVALS else ():
             groups = groups_of(report, axis, a, b)
+            places = report.by_group if axis == CAMERA else [()] * len(groups)
             key = f"{a} {b}"
             across["answers"][key] = [
                 {
                     "said": answer(x.pair),
                     "light": in_light(x.pair),
                     "balance": balance_words(x) if axis != BALANCE else "",
-                    "times": pair_words(x),
+                    "times": " ".join(filter(None, (pair_words(x), best_words(x, place)))),
                 }
-                for x in groups
+                for x, place in zip(groups, places, strict=True)
             ]
             across["over"][key] = over_groups(groups)
             if a < b:

@@ -3,8 +3,16 @@
 from math import isnan
 
 from studies.metrics.metric import Metric
-from studies.pages.headline import answer, balance_words, in_light
-from studies.pages.report_compare import BALANCE, axes_of, first_comparison, groups_of, means_over_scenes, shown_metrics
+from studies.pages.headline import answer, balance_words, best_words, in_light
+from studies.pages.report_compare import (
+    BALANCE,
+    CAMERA,
+    axes_of,
+    first_comparison,
+    groups_of,
+    means_over_scenes,
+    shown_metrics,
+)
 from studies.pages.report_data import ReportData
 from studies.pages.report_text import MISSING, fixed, lead_text, table
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts
@@ -24,6 +32,8 @@ def markdown(report: ReportData, command: str, a: int) -> str:
     of = first_comparison(report)
     axis = axes_of(report)[of.compared]
     b = of.b if a == of.a else next(value for value in range(len(axis.values)) if value != a)
+    groups = groups_of(report, of.compared, a, b)
+    places = report.by_group if of.compared == CAMERA else [()] * len(groups)
     words = [
         " ".join(
             filter(
@@ -34,10 +44,11 @@ def markdown(report: ReportData, command: str, a: int) -> str:
                     answer(group.pair),
                     in_light(group.pair),
                     balance_words(group) if of.compared != BALANCE else "",
+                    best_words(group, place),
                 ),
             )
         )
-        for group in groups_of(report, of.compared, a, b)
+        for group, place in zip(groups, places, strict=True)
     ]
     parts = [
         f"# {code(report.title)}",

@@ -140,6 +140,25 @@ def test_every_place_has_its_answer_and_a_loss_elsewhere_is_told() -> None:
     assert over_groups(groups_of(one_seed, CAMERA, 0, 1)) == "", "one seed can't say that nothing is seen"
 
 
+def test_the_best_bayer_of_each_level_is_named_with_the_lead_over_it() -> None:
+    figures = {"ple_rgbw": (20.0, 30.0, 30.0), "ple_bayer": (19.0, 30.5, 30.0), "mine.whl:net": (18.0, 31.0, 31.5)}
+
+    def change(made: Row) -> Row:
+        level = [name for name, *_ in SAMPLE.LEVELS].index(made.level)
+        return replace(made, psnr_db=figures[made.processor][level])
+
+    def times(*cameras: str) -> str:
+        report = SAMPLE.sample_report(change, levels=3, sensors=SAMPLE.SENSORS[:1], cameras=cameras)
+        (answer,) = comparisons(report)[CAMERA]["answers"][f"{cameras.index('ple_rgbw')} {cameras.index('ple_bayer')}"]
+        return str(answer["times"]).replace("\N{NO-BREAK SPACE}", " ")
+
+    assert times("mine.whl:net", "ple_bayer", "ple_rgbw").endswith(
+        "Beside the best Bayer: PLE, Bayer moonlight (PSNR +1.0 dB); "
+        "mine.whl:net from street light on (PSNR −1.5 to −1.0 dB)."
+    )
+    assert "best Bayer" not in times("ple_bayer", "ple_rgbw")
+
+
 def test_by_the_mosaic_alone_is_said_only_where_the_times_agree() -> None:
     first, second = (one["times"] for one in comparisons(two_sensors())[CAMERA]["answers"]["0 1"])
     assert first.endswith("and the same exposure times: they differ by the mosaic alone.")
