@@ -5,6 +5,8 @@ this list may be native code. The list is what Mitsuba 3.9 ships, less what the 
 ``blender``, which reads memory at addresses that the scene states.
 """
 
+import tomllib
+from pathlib import Path
 from typing import Any
 
 from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
@@ -15,47 +17,12 @@ UNUSED_CAMERAS = ("batch", "distant", "radiancemeter")  # read, and left out whe
 METER = "irradiancemeter"  # in a shape it marks the plane on which illuminance is measured
 SPECTRA = ("blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform")
 
-# By kind. Films, filters, samplers and integrators are read and left out: the engine brings its own.
-_STOCK = {
-    "scene": "scene",
-    "shape": "bsplinecurve cube cylinder disk instance linearcurve obj ply rectangle sdfgrid serialized shapegroup "
-    "sphere",
-    "bsdf": "blendbsdf bumpmap conductor dielectric diffuse hair mask measured normalmap null plastic principled "
-    "principledthin roughconductor roughdielectric roughplastic thindielectric twosided",
-    "texture": "bitmap checkerboard mesh_attribute volume",
-    "volume": "constvolume gridvolume",  # inside a texture; media, which also hold them, are refused
-    "film": "hdrfilm specfilm",
-    "rfilter": "box catmullrom gaussian lanczos mitchell tent",
-    "sampler": "independent ldsampler multijitter orthogonal stratified",
-    "integrator": "aov depth direct direct_projective moment path prb prb_basic prb_projective prbvolpath ptracer "
-    "stokes volpath volpathmis",
-}
-ALLOWED: dict[str, tuple[str, ...]] = {kind: tuple(names.split()) for kind, names in _STOCK.items()}
+_TABLES = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+ALLOWED: dict[str, tuple[str, ...]] = {kind: tuple(names.split()) for kind, names in _TABLES["allowed"].items()}
 ALLOWED["texture"] += SPECTRA
 ALLOWED |= {"emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS), "sensor": (*CAMERAS, METER, *UNUSED_CAMERAS)}
 _KIND = {name: kind for kind, names in ALLOWED.items() for name in names}
-
-_MEDIA = "participating media aren't simulated"
-_POLARISED = "polarisation isn't simulated"
-_RELIT = "its light can't be relit"
-_PRIMITIVES = "it needs an integrator of its own"
-_NO_MEDIUM = "remove the medium; nearest to a dense one comes a plastic or diffuse surface, to a thin one null"
-_REASONS: dict[str, tuple[str, str]] = {  # why a plug-in is refused, and the nearest thing that works
-    **dict.fromkeys(("homogeneous", "heterogeneous"), (_MEDIA, _NO_MEDIUM)),
-    **dict.fromkeys(("hg", "isotropic", "rayleigh", "sggx", "tabphase", "blendphase"), (_MEDIA, _NO_MEDIUM)),
-    **dict.fromkeys(
-        ("circular", "polarizer"), (_POLARISED, "nearest: a mask of opacity 0.5 over a diffuse of reflectance 0")
-    ),
-    "retarder": (_POLARISED, "nearest: null, which it is to unpolarised light"),
-    "pplastic": (_POLARISED, "nearest: roughplastic"),
-    "measured_polarized": (_POLARISED, "nearest: measured, principled or roughconductor"),
-    "directionalarea": (_RELIT, "nearest: area or directional"),
-    "projector": (_RELIT, "nearest: spot with a texture"),
-    "timed_sunsky": (_RELIT, "nearest: sunsky"),
-    **dict.fromkeys(("ellipsoids", "ellipsoidsmesh"), (_PRIMITIVES, "nearest: sphere, or a mesh as ply")),
-    "volprim_rf_basic": (_PRIMITIVES, "remove it: the engine brings its own"),
-    "blender": ("it reads memory at addresses that the scene states", "save the mesh as ply"),
-}
+_REASONS: dict[str, tuple[str, str]] = _TABLES["refused"]  # why a plug-in is refused, and the nearest thing that works
 
 
 def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:

@@ -3,6 +3,7 @@
 Equations are numbered as in release 4.0 Linear of the standard.
 """
 
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, sqrt
@@ -17,24 +18,10 @@ from rodcone.toml_file import read_toml
 from sensor.cameras.numbers import PixelNumbers, Sourced
 
 # Symbols, each with what is allowed and its unit. Those of RESULTS follow from the others: a check, and no input.
-INPUTS = {
-    "pixel_pitch_um": (1e-3, 1e4, "micrometres"),
-    "K": (1e-9, 1e9, "DN per electron; 1 / (e-/DN) where the report gives that"),
-    "sigma_d": (0.0, 1e9, "electrons"),
-    "DSNU1288": (0.0, 1e9, "electrons"),
-    "PRNU1288": (0.0, 100.0, "per cent"),
-    "mu_e_sat": (1.0, 1e12, "electrons"),
-    "mu_I": (0.0, 1e12, "electrons per second"),
-    "eta": (1e-6, 100.0, "per cent, the whole pixel's at lambda_nm"),
-    "lambda_nm": (100.0, 20_000.0, "nanometres"),
-    "exposure_s": (0.0, 1e6, "seconds"),
-}
-RESULTS = {
-    "SNR_max_dB": (0.0, 300.0, "decibels"),
-    "DR_dB": (0.0, 300.0, "decibels"),
-    "mu_e_min": (0.0, 1e9, "electrons"),
-    "SNR_50_dB": (0.0, 300.0, "decibels, at half of saturation"),
-}
+_SYMBOLS: dict[str, dict[str, tuple[float, float, str]]] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text("utf-8")
+)
+INPUTS, RESULTS = _SYMBOLS["inputs"], _SYMBOLS["results"]
 _TEXTS = ("camera", "maker", "source", "date")
 _WHOLE = {"bits": (1, 16), "black_level_dn": (0, 65_534)}
 

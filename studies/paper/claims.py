@@ -91,7 +91,7 @@ class Claim:
 
 @cache
 def _texts() -> dict[str, dict[str, str]]:
-    """Place, text and note of each claim, by its number."""
+    """Place, text and note of each claim, by its number; and the captions of the figures."""
     return tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 
 
@@ -149,6 +149,11 @@ class PaperFigure:
     name: str
     caption: str
     drawing: Figure
+
+
+def paper_figure(name: str, drawing: Figure, **values: object) -> PaperFigure:
+    """Figure with its caption of `claims.toml`, whose braces `values` fill."""
+    return PaperFigure(name, _texts()["captions"][name].format(**values), drawing)
 
 
 def range_text(check: ClaimCheck) -> str:

@@ -14,7 +14,7 @@ from sensor.response import channel_electrons
 from studies.metrics.truth import light_of
 from studies.pages import report_text as text
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, near, over_seeds
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, near, over_seeds, paper_figure
 from studies.paper.setup import (
     READINGS,
     TODAY,
@@ -85,11 +85,7 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             ]
         )
     dark, lit = ({name: half_snr_db(seen, name, side) for name in (*READINGS, TODAY, LARGE)} for side in (True, False))
-    caption = (
-        f"One photograph of a cabinet: the left half at {DARK_CD_M2:g} cd/m², the right one at {LIT_CD_M2:g}. "
-        "Beside it the same with the left half brightened on the screen: what the camera recorded there."
-    )
-    return PaperFigure("1a", caption, picture_rows(rows)), claims_1a(dark, lit)
+    return paper_figure("1a", picture_rows(rows), dark=DARK_CD_M2, lit=LIT_CD_M2), claims_1a(dark, lit)
 
 
 def gain_db(reading: str, *, shot_alone: bool = False) -> float:
@@ -136,7 +132,4 @@ def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         pictures.append((f"{pitch} µm, PSNR {psnr[pitch].mean():.1f} dB", encode_srgb(developed[0])))
     everything = {name: gain_db(name) for name in READINGS}
     claims = claims_1b(gain_db("table1_output", shot_alone=True), everything, psnr[LARGE_UM] - psnr[SMALL_UM])
-    caption = (
-        "The same scene at 100 cd/m², f/4 and 10 ms with pixels of 6 µm and of 2 µm; both pictures have as many pixels."
-    )
-    return PaperFigure("1b", caption, picture_rows([pictures])), claims
+    return paper_figure("1b", picture_rows([pictures])), claims

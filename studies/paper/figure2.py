@@ -15,7 +15,7 @@ from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
-from studies.paper.claims import Claim, PaperFigure, about, at_least, claim
+from studies.paper.claims import Claim, PaperFigure, about, at_least, claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
 from studies.photograph.snr import channel_e, snr
@@ -137,11 +137,7 @@ def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
     bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
     pure = {name: snr_gains(name, bright_cd_m2(name), fixed_pattern=False) for name in SENSORS}
     claims = signal_claims({light: signal_ratios(light) for light in ("E", "D65")}, coverage())
-    caption = (
-        "Electrons per photon of R, G, B and W, and the 2×2 tile. On the right W's gain in SNR over G, one pixel at "
-        f"{SNR_EXPOSURE_S * 1e3:g} ms and f/2.8 under D65: the signal's ratio in the dark, less in light."
-    )
-    return PaperFigure("2", caption, _drawing()), (*claims, *snr_claims(moon, bright, pure))
+    return paper_figure("2", _drawing(), ms=SNR_EXPOSURE_S * 1e3), (*claims, *snr_claims(moon, bright, pure))
 
 
 @rc_context(STYLE)

@@ -9,7 +9,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import encode_srgb
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, near, over_seeds
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, near, over_seeds, paper_figure
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -115,8 +115,7 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         )
         for name in (PAPER, DEFAULT)
     )
-    caption = "Bayer, interleaved and the default with Table 1's pixel at 25 cd/m², by exposure time."
-    return PaperFigure("6", caption, picture_rows(table)), beside(paper, default)
+    return paper_figure("6", picture_rows(table)), beside(paper, default)
 
 
 def swap(setup: Setup, seen: View, camera: Camera) -> Swap:

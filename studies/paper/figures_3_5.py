@@ -18,7 +18,17 @@ from sensor.cfa import channels, mask
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_least, at_most, beside, claim, over_seeds
+from studies.paper.claims import (
+    Claim,
+    ClaimCheck,
+    PaperFigure,
+    at_least,
+    at_most,
+    beside,
+    claim,
+    over_seeds,
+    paper_figure,
+)
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -93,11 +103,9 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             )
             pictures[RESULT[name]] = result[0]
         rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
-    caption = (
-        f"One exposure at {LOW_CD_M2:g} cd/m² and {LOW_S * 1e3:g} ms: R, G and B filled in bilinearly, W "
-        "filled in, and the interleaved reconstruction with luminance substitution, the paper's and the default."
+    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), beside(
+        claims_3(stages[PAPER]), claims_3(stages[DEFAULT])
     )
-    return PaperFigure("3", caption, picture_rows(rows)), beside(claims_3(stages[PAPER]), claims_3(stages[DEFAULT]))
 
 
 @dataclass(frozen=True)
@@ -175,5 +183,4 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         shown = {f"{name}, white is full": encode_srgb(grey(plane, full_e)) for name, plane in recorded.items()}
         (first, picture), *others = (shown | pictures).items()
         rows.append([(f"{reading}: {first}", picture), *others])
-    caption = "R as recorded, W as recorded with much of it full, and the result, at 200 cd/m², 66 ms and 3 µm."
-    return PaperFigure("5", caption, picture_rows(rows)), beside(claims_5(bright[PAPER]), claims_5(bright[DEFAULT]))
+    return paper_figure("5", picture_rows(rows)), beside(claims_5(bright[PAPER]), claims_5(bright[DEFAULT]))

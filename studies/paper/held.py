@@ -14,7 +14,7 @@ from sensor.config import SensorConfig
 from sensor.shake import blur_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, PaperFigure, beside, claim, over_seeds
+from studies.paper.claims import Claim, PaperFigure, beside, claim, over_seeds, paper_figure
 from studies.paper.setup import (
     DEFAULT,
     PAPER,
@@ -141,10 +141,6 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
     more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice
     paper, default = (claims_held(best[BAYER], best[name], more_light) for name in (PAPER, DEFAULT))
-    caption = (
-        f"A camera held in the hand, {READING}: the time of the best PSNR by level, and that PSNR. still_life; a "
-        "longer time blurs, a shorter one is noisy."
-    )
     names = {"Bayer": best[BAYER], "interleaved": best[PAPER], "the default": best[DEFAULT]}
     charts = {
         "Best time by hand, ms": {
@@ -154,4 +150,4 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             name: [one.psnr_db.mean() for one in of_level.values()] for name, of_level in names.items()
         },
     }
-    return PaperFigure("B", caption, light_charts(LEVELS_CD_M2, charts)), beside(paper, default)
+    return paper_figure("B", light_charts(LEVELS_CD_M2, charts), reading=READING), beside(paper, default)

@@ -20,7 +20,7 @@ from studies.metrics.appearance import flip
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import measure, psnr_db
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, claim, over_seeds
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, claim, over_seeds, paper_figure
 from studies.paper.figures_3_5 import GAIN_DB
 from studies.paper.setup import (
     CAMERAS,
@@ -173,10 +173,6 @@ def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Curves of the paper's method and of the default, and the claims about them."""
     seen = close_up(view(setup, "still_life", 1.0))
     by_camera = {name: curves(setup, seen, Camera(READING, name)) for name in CAMERAS}
-    caption = (
-        f"{len(LEVELS_CD_M2)} levels of light on still_life, {READING}: W's part (the paper's method), PSNR with W and "
-        "of the same frame without it, and FLIP."
-    )
     paper, default = by_camera[PAPER], by_camera[DEFAULT]
     charts = {
         "W's part, share": {"similarity": paper.similarity, "luminance": paper.weight, "W full": paper.white_full},
@@ -189,4 +185,4 @@ def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     }
     means = {title: {name: x.mean(axis=1) for name, x in lines.items()} for title, lines in charts.items()}
     claims = beside(claims_levels(paper), claims_levels(default))
-    return PaperFigure("A", caption, light_charts(LEVELS_CD_M2, means)), claims
+    return paper_figure("A", light_charts(LEVELS_CD_M2, means), count=len(LEVELS_CD_M2), reading=READING), claims

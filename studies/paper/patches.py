@@ -23,7 +23,7 @@ from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, sensor_of, view
 
@@ -109,11 +109,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             shares[f"{reading}, {name}"] = edge.share
             if name == next(iter(LEVELS)):
                 parts.append((reading, planes(raw)[channels(raw.cfa).index("W")], edge))
-    caption = (
-        f"W beside an edge at {next(iter(LEVELS))}, in units of noise, and the patches around x, y and z enlarged. "
-        "The numbers are their distances."
-    )
-    return PaperFigure("4", caption, _drawing(parts)), claims_4(shares)
+    return paper_figure("4", _drawing(parts), level=next(iter(LEVELS))), claims_4(shares)
 
 
 @rc_context(STYLE)
