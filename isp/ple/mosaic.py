@@ -15,7 +15,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import STRIDE, Scale, border, padded
 from isp.ple.prior import LETTERS, PATCH
-from isp.ple.tables import Sampling, Singles, lift
+from isp.ple.tables import Sampling, Singles
+from isp.ple.units import transform
 from sensor.cfa import Tile, channel_map, channels, colour_channels, mask
 from sensor.raw import RawImage
 
@@ -147,7 +148,7 @@ def full_white(raw: RawImage) -> NDArray[np.bool_]:
 def scale_of_cells(cells: Cells) -> Scale:
     """Sums in units of noise, as `isp.ple.estimate` takes them."""
     stable = [
-        lift(plane, cells.sampling.dark_e[channel])
+        transform(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
     ]
     held = _first_patch(cells.held).ravel()
@@ -171,10 +172,10 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
         )
         for top in range(0, lcm(down, STRIDE), STRIDE)
     )
-    samples = lift(electrons, raw.dark_noise_e)
+    samples = transform(electrons, raw.dark_noise_e)
     for noise in raw.channel_noise:
         at = mask(raw.cfa, noise.channel, raw.shape)
-        samples[at] = lift(electrons[at], noise.dark_noise_e / noise.shot)
+        samples[at] = transform(electrons[at], noise.dark_noise_e / noise.shot)
     samples, full = continued(raw.cfa, samples, full)
     return Scale(raw.shape, samples, full, samplings)
 

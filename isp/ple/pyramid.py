@@ -22,7 +22,8 @@ from isp.ple.mosaic import (
     scale_of_pixels,
 )
 from isp.ple.prior import LETTERS, PATCH, Prior
-from isp.ple.tables import LIFT, PILOT_ERROR, Sampling, Singles, lifted_root, unlift
+from isp.ple.tables import PILOT_ERROR, Sampling, Singles
+from isp.ple.units import readings
 from sensor.raw import RawImage
 
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on
@@ -76,8 +77,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
     for first in range(0, len(planes), TOGETHER):
         rows = planes[first : first + TOGETHER]
-        counted = [unlift(rows[..., c], dark_e[i]) * shot[i] for c, i in apart]
-        rows[...] = unlift(rows, raw.dark_noise_e)
+        counted = [readings(float(dark_e[i])).electrons(rows[..., c]) * shot[i] for c, i in apart]
+        rows[...] = readings(raw.dark_noise_e).electrons(rows)
         for (c, _), plane in zip(apart, counted, strict=True):
             rows[..., c] = plane
     return planes, found.noise[list(cells.index)]
@@ -138,15 +139,19 @@ def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLigh
 
 def _held(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
     """Cells of a scale in a finer one's units of noise: roots by channel, their variance, light, its variance."""
-    old, new, share = np.array(before.dark_e), np.array(now.dark_e), np.array(now.gains) / np.array(before.gains)
-    electrons = np.stack([unlift(planes[..., c], old[c]) for c in range(4)], axis=-1)
-    finer = electrons * share
-    noise = np.maximum(finer, 0) + (LIFT * new) ** 2 + 0.375
-    wide = variance * (share**2 * (np.maximum(electrons, 0) + (LIFT * old) ** 2 + 0.375) / noise)
-    light = finer[..., 3] / now.gains[3]
-    light_variance = wide[..., 3] * noise[..., 3] / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
-    roots = 2.0 * lifted_root(np.maximum(finer, 0.0), new)
-    return np.concatenate([roots, np.stack([wide.mean(axis=-1), light, light_variance], axis=-1)], axis=-1)
+    values = np.empty((7, *planes.shape[:2]))
+    values[4] = 0.0
+    for c in range(4):
+        share = now.gains[c] / before.gains[c]
+        old, new = readings(before.dark_e[c]), readings(now.dark_e[c])
+        finer = old.electrons(planes[..., c]) * share
+        seen = np.maximum(finer, 0.0)
+        error = variance[..., c] * (share / old.slope(seen / share)) ** 2
+        values[c] = new.mean(seen)
+        values[4] += 0.25 * error * new.slope(seen) ** 2
+    light = finer / now.gains[3]
+    values[5:] = light, error / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
+    return np.moveaxis(values, 0, -1)
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:

@@ -1,22 +1,20 @@
 """The prior in a frame's own units of noise, at one light: what picks a component, and the estimate that it gives.
 
-In units of noise (`isp.anscombe`, for a dark noise d = `LIFT` times s) a sample of e electrons reads about
-t = 2 sqrt(e + d^2 + 3/8 - r / 4), with noise of variance r = (e + s^2) / (e + d^2). Of a patch with light m and roots
-of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is straight in u, so each component
-is a Gaussian over t as well. Its estimate from the mosaic's samples y is the linear one with the least squared error,
-t + C_xy (C_yy + N)^-1 (y - t_y).
+In units of noise (`isp.ple.units`) a sample of e expected electrons reads t(e) in the mean, with noise of variance r.
+Of a patch with light m and roots of signal u, a sample of channel c holds e = m g_c u^2. About a component's mean t is
+straight in u, so each component is a Gaussian over t as well. Its estimate from the mosaic's samples y is the linear
+one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
 """
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.anscombe import stabilise, unstabilise
 from isp.ple.prior import Mixture, Prior, mixture
+from isp.ple.units import readings
 
 Doubles = NDArray[np.float64]
 Singles = NDArray[np.float32]
@@ -26,10 +24,6 @@ LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's
 PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
 PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
 TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
-# The transform bends most at 0, where dark noise of its own size makes outliers of dark samples; as for twice the dark
-# noise it is nearly straight, and the samples' noise under 1 by a known factor.
-LIFT = 2.0
-_LEAST_BASE = 1e-12
 FEW = 20  # directions in which components are told apart first
 MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
 # Tables that are kept, all of a 4x4 tile over six decades of light: 1.3 MB each, and 70 kB for each of its estimators
@@ -85,33 +79,6 @@ class Estimator:
     pilot_inner: Doubles
 
 
-def lift(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
-    """Samples in units of noise, as the transform makes them for `LIFT` times the dark noise."""
-    return stabilise(electrons, LIFT * dark_e, 0.0)
-
-
-def lifted_root(electrons: NDArray[Any], dark_e: NDArray[Any]) -> Doubles:
-    """Half of what samples of these expected electrons read in the mean after `lift`.
-
-    To second order E sqrt(x) = sqrt(E x - var x / (4 E x)).
-    """
-    base = electrons + (LIFT * dark_e) ** 2
-    return np.asarray(np.sqrt(base + 0.375 - 0.25 * (electrons + dark_e**2) / np.maximum(base, _LEAST_BASE)))
-
-
-def unlift(stable: NDArray[Any], dark_e: float) -> Doubles:
-    """Electrons whose samples read this in the mean after `lift`.
-
-    To second order as `lifted_root`; beyond, what the exact inverse adds for shot noise, by its share of the noise.
-    """
-    plain = 0.25 * np.asarray(stable, dtype=np.float64) ** 2 - (LIFT * dark_e) ** 2 - 0.375
-    skew = unstabilise(stable, LIFT * dark_e) - plain - 0.25
-    seen = np.maximum(plain, 0.0)
-    ratio = (seen + dark_e**2) / np.maximum(seen + (LIFT * dark_e) ** 2, _LEAST_BASE)
-    share = seen / np.maximum(seen + dark_e**2, _LEAST_BASE) if dark_e else 1.0
-    return np.asarray(plain + 0.25 * ratio + share * skew)
-
-
 def taper(size: int) -> Singles:
     """How much each line of a patch's pixels counts where patches overlap: its edges are less sure."""
     return np.asarray(np.sin(np.pi * (np.arange(size) + 0.5) / size) ** TAPER, dtype=np.float32)
@@ -129,32 +96,36 @@ class Table:
         self.mix, self.rows = mix, np.array(sampling.rows)
         pixels, count = mix.size**2, len(sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
+        curves = [readings(dark_e) for dark_e in sampling.dark_e]
         # The components in units of noise: values t, their slope in u, and their slope in the light.
         variances = np.diagonal(mix.covariances, axis1=1, axis2=2)
         electrons = gains * light * (mix.means**2 + variances)
-        root = lifted_root(electrons, dark)
-        self.values, self.slopes = 2.0 * root, 2.0 * gains * light * mix.means / root
+        self.values, steep, noise = np.empty((3, *electrons.shape))
+        for channel, curve in enumerate(curves):
+            places = (slice(None), slice(channel, None, 4))
+            self.values[places] = curve.mean(electrons[places])
+            steep[places], noise[places] = curve.slope(electrons[places]), curve.variance(electrons[places])
+        noise += (sampling.prnu * electrons * steep) ** 2
+        self.slopes = 2.0 * gains * light * mix.means * steep
         own = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
-        self.drift = electrons / root * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(own.sum())))
+        self.drift = electrons * steep * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(own.sum())))
         # Samples: whitening, and the log likelihood's constant.
         at = self.rows
         seen = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
         seen += self.drift[:, at, None] * self.drift[:, None, at]
-        shot = electrons + dark**2 + (sampling.prnu * electrons) ** 2
-        noise = shot[:, at] / (electrons[:, at] + (LIFT * dark[at]) ** 2)
-        self.unit = (electrons + (LIFT * dark) ** 2) / (electrons + dark**2)
-        seen[:, np.arange(count), np.arange(count)] += noise
+        self.unit = 1.0 / (steep**2 * (electrons + dark**2))
+        seen[:, np.arange(count), np.arange(count)] += noise[:, at]
         factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(seen)])
         self.log_scale = mix.log_weights + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
         self.average = np.tile(np.eye(4), pixels) / pixels
-        steep = self.average * self.slopes[:, None]
-        lean = steep.astype(np.float32) @ mix.covariances
+        shown = self.average * self.slopes[:, None]
+        lean = shown.astype(np.float32) @ mix.covariances
         drift = (self.average @ self.drift.T).T
         cross = lean[:, :, at] * self.slopes[:, None, at] + drift[:, :, None] * self.drift[:, None, at]
-        whole = lean @ steep.swapaxes(1, 2) + drift[:, :, None] * drift[:, None]
+        whole = lean @ shown.swapaxes(1, 2) + drift[:, :, None] * drift[:, None]
         half = cross @ factors.swapaxes(1, 2)
-        brightness = np.sqrt((self.average @ (electrons / root).T) ** 2).mean(axis=1)
+        brightness = (self.average @ (electrons * steep).T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
         scale = np.sqrt(PILOT_VARIANCE + (PILOT_ERROR * brightness) ** 2)
         left = (whole - half @ half.swapaxes(1, 2)) / scale / scale[:, None]
@@ -171,7 +142,7 @@ class Table:
         self.reads = np.ascontiguousarray(reads, dtype=np.float32)
         self.centre, self.few, self.quick, outside = self._quick_likelihood(seen)
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
-        signal = 1.0 - np.mean(noise) / (np.exp(self.mix.log_weights) @ outside)
+        signal = 1.0 - np.mean(noise[:, at]) / (np.exp(self.mix.log_weights) @ outside)
         self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
         self.estimators: dict[int, Estimator] = {}
 

@@ -8,6 +8,7 @@ from builders import raw_image
 
 from isp.ple import estimate, mosaic, pyramid
 from isp.ple.prior import LETTERS, PATCH, own_prior
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels
 from sensor.raw import RawImage
 
@@ -45,6 +46,21 @@ def test_a_flat_field_keeps_its_mean(tile, level_e):
             samples = plane.size * "".join(tile).count(name) / len("".join(tile))
             error = np.sqrt((expected + NOISE_E**2 + 1 / 12) / samples)
             assert abs(plane.mean() - expected) < max(0.005 * expected, 4 * error), name
+
+
+@pytest.mark.parametrize(("tile", "level_e", "most"), [(BAYER, 1.0, 2), (BAYER, 3.0, 6), (RGBW, 1.0, 11)])
+def test_a_sample_far_under_0_leaves_no_dark_speck(tile, level_e, most):
+    # One sample in 128 lies 4.5 dark noises under 0, on every site of the tile. A speck is a pixel whose encoded
+    # luminance is more than 0.25 under the flat field's, as bright as a scene's grey at 0.05 cd/m2. Without a floor
+    # under the readings 24 to 33, 50 to 74 and 111 to 117 of them.
+    rng, shape, neutral = np.random.default_rng(3), (128, 128), own_prior().neutral_e[:3]
+    raw = exposure(grey(level_e, tile, shape), tile, rng)
+    low = raw.dn.copy()
+    for row, column in ((8, 9), (24, 8), (9, 1), (25, 0)):
+        low[row::32, column::16] = 200 - 4.5 * NOISE_E
+    planes = reconstruct(replace(raw, dn=low))[0][..., :3] / neutral
+    shown, truth = (encode_srgb(luminance / (3.5 * level_e)) for luminance in (luminance_of_srgb(planes), level_e))
+    assert np.count_nonzero(shown < truth - 0.25) <= most
 
 
 @pytest.mark.thorough

@@ -5,7 +5,8 @@ import pytest
 
 from isp.ple.pick import pick
 from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
-from isp.ple.tables import LIFT, PILOT_VARIANCE, Sampling, Table, window
+from isp.ple.tables import PILOT_VARIANCE, Sampling, Table, window
+from isp.ple.units import readings
 from sensor.cfa import BAYER, MOSAICS, RGBW
 
 GAINS = (0.5, 1.0, 0.45, 4.9)
@@ -32,8 +33,14 @@ def drawn(table: Table, k: int, light_e: float, count: int, rng):
     values = table.values[k] + rng.standard_normal((count, len(factor))) @ factor.T * table.slopes[k]
     values += rng.standard_normal((count, 1)) * table.drift[k]
     electrons = np.tile(GAINS, 64)[at] * light_e * (mix.means[k] ** 2 + np.diag(mix.covariances[k]))[at]
-    noise = np.sqrt((electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2))
+    noise = np.sqrt(variance(electrons))
     return values, (values[:, at] + noise * rng.standard_normal((count, len(at)))).astype(np.float32)
+
+
+def variance(electrons, prnu=0.01):
+    """Of a reading at a dark noise of 1.8 e-; `test_units` holds the curves."""
+    curves = readings(1.8)
+    return curves.variance(electrons) + (prnu * electrons * curves.slope(electrons)) ** 2
 
 
 def _with_1(y):
@@ -87,16 +94,15 @@ def test_one_component_is_the_textbooks_linear_estimate():
     mix = Mixture(PATCH, np.zeros(1), rng.uniform(0.5, 1.5, (1, 256)), covariance[None].astype(np.float32))
     given, light = sampling(prnu=0.0), 30.0
     at, gains = np.array(given.rows), np.tile(given.gains, 64)
-    # by hand, in units of noise: t = 2 sqrt(e + d^2 + 3/8 - r / 4), slope 2 g m u / (t / 2), noise r
+    # by hand, in units of noise: t, slope 2 g m u dt/de, noise r
     electrons = gains * light * (mix.means[0] ** 2 + np.diag(covariance))
-    noise = (electrons + 1.8**2) / (electrons + (LIFT * 1.8) ** 2)
-    deviation = np.sqrt(electrons + (LIFT * 1.8) ** 2 + 0.375 - noise / 4)
-    slope = 2 * gains * light * mix.means[0] / deviation
+    noise, reading = variance(electrons, prnu=0.0), readings(1.8).mean(electrons)
+    slope = 2 * gains * light * mix.means[0] * readings(1.8).slope(electrons)
     table = Table(mix, given, light)
     whole = slope[:, None] * covariance * slope + np.outer(table.drift[0], table.drift[0])
-    y = 2 * deviation[at] + rng.normal(0, 2, 64)
+    y = reading[at] + rng.normal(0, 2, 64)
     gain = np.linalg.solve(whole[np.ix_(at, at)] + np.diag(noise[at]), whole[at]).T
-    expected = 2 * deviation + gain @ (y - 2 * deviation[at])
+    expected = reading + gain @ (y - reading[at])
     by = table.estimator(0)
     found = _with_1(y[None])[0] @ by.linear[:65] / np.repeat(window(PATCH).ravel(), 4)
     assert found == pytest.approx(expected, rel=2e-4)
@@ -116,7 +122,7 @@ def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
         electrons = (np.tile(GAINS, 16) * light_e * (mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)))[
             :, at
         ]
-        noise = (electrons + 1.8**2 + (0.01 * electrons) ** 2) / (electrons + (LIFT * 1.8) ** 2)
+        noise = variance(electrons)
         if pilot_noise is not None:
             seen = np.concatenate([seen, table.average])
             pilot = pilot_noise / (table.turn[0].T @ table.turn[0]).diagonal()

@@ -1,0 +1,130 @@
+"""Samples in units of noise: the transform, what it reads of expected electrons, and which electrons a reading means.
+
+The transform is the generalised Anscombe transform (`isp.anscombe`) for `LIFT` times the dark noise s. It bends most
+under 0, where no light is: a sample far under 0 would lie even farther from its neighbours, and a patch that takes it
+for signal would show a dark speck. So samples under -`FLOOR` s count as -`FLOOR` s.
+
+Mean and variance of a reading t(X) follow from the distribution of X about e expected electrons,
+
+    X = e + v (z + k (z^2 - 1) / 6),   v^2 = e + s^2,   k = e / v^3,   z normal,
+
+which has the mean, variance and skewness of shot and dark noise (Cornish & Fisher 1938); for s under 1 e- they are sums
+over Poisson's counts. In light the mean is 2 sqrt(e + d^2 + 1/8), d = `LIFT` s, and the variance 1.
+"""
+
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import gammaln, xlogy
+
+from isp.anscombe import stabilise
+
+Doubles = NDArray[np.float64]
+# For dark noise of its own size the transform makes outliers of dark samples; for twice of it, it is nearly straight.
+LIFT = 2.0
+FLOOR = 0.7  # dark noises under 0
+_KNOTS, _STEPS = 200, 8192  # at which the curves are made, and between which they are looked up
+_LARGEST_ROOT = 8.0  # of expected electrons, over the dark noise: from there on the curves keep their last value
+_NORMAL = np.linspace(-6.0, 6.0, 193)
+
+
+@dataclass(frozen=True, eq=False)
+class Readings:
+    """Mean, slope and variance of readings over expected electrons e, and the way back, at one dark noise.
+
+    Attributes
+    ----------
+    dark_e : float
+        Dark noise s [e-].
+    most : (2,) tuple of float
+        sqrt(e) at the end of the first three curves, and the mean reading there, at that of the last one.
+    offset, steepness, variances : (step,) float64
+        Mean less 2 sqrt(e + d^2 + 1/8), slope times this root, and variance as a share of (e + s^2 + 1/8) /
+        (e + d^2 + 1/8), each over sqrt(e).
+    excess : (step,) float64
+        Electrons over t^2 / 4 - d^2 - 1/8, over readings t.
+    """
+
+    dark_e: float
+    most: tuple[float, float]
+    offset: Doubles
+    steepness: Doubles
+    variances: Doubles
+    excess: Doubles
+
+    def mean(self, electrons: NDArray[Any]) -> Doubles:
+        """Mean reading of expected electrons, 0 or more."""
+        return 2.0 * _limit(electrons, self.dark_e) + self.offset[self._step(electrons)]
+
+    def slope(self, electrons: NDArray[Any]) -> Doubles:
+        """Slope of the mean reading [1/e-]."""
+        return self.steepness[self._step(electrons)] / _limit(electrons, self.dark_e)
+
+    def variance(self, electrons: NDArray[Any]) -> Doubles:
+        """Variance of a reading by shot and dark noise."""
+        return np.asarray(self.variances[self._step(electrons)] * _straight(electrons, self.dark_e))
+
+    def electrons(self, readings: NDArray[Any]) -> Doubles:
+        """Electrons whose mean reading this is; under 0 where it is under the mean reading of 0."""
+        values = np.maximum(readings, 0.0)
+        plain = 0.25 * np.square(values, dtype=np.float64) - ((LIFT * self.dark_e) ** 2 + 0.125)
+        return np.asarray(plain + self.excess[_nearest(values, self.most[1])])
+
+    def _step(self, electrons: NDArray[Any]) -> NDArray[np.intp]:
+        return _nearest(np.sqrt(electrons), self.most[0])
+
+
+def transform(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
+    """Readings of samples [e-], of their type."""
+    return stabilise(np.maximum(electrons, electrons.dtype.type(-FLOOR * dark_e)), LIFT * dark_e, 0.0)
+
+
+@lru_cache(maxsize=256)
+def readings(dark_e: float) -> Readings:
+    """Curves at one dark noise [e-]."""
+    roots = np.linspace(0.0, _LARGEST_ROOT * max(dark_e, 1.0), _KNOTS)
+    electrons = roots[:, None] ** 2
+    density = np.exp(-0.5 * _NORMAL**2)
+    density /= density.sum()
+    if dark_e < 1.0:
+        counts = np.arange(2 * electrons[-1, 0])
+        shares = np.exp(xlogy(counts, electrons) - electrons - gammaln(counts + 1))
+        values = transform(counts[:, None] + dark_e * _NORMAL, dark_e)
+    else:
+        spread = np.sqrt(electrons + dark_e**2)
+        skewness = electrons / spread**3
+        shares = np.eye(_KNOTS)
+        values = transform(electrons + spread * (_NORMAL + skewness / 6 * (_NORMAL**2 - 1)), dark_e)
+    mean, square = (shares @ (values**power @ density) for power in (1, 2))
+    # From knots to steps of equal length, over roots and over readings.
+    limit = _limit(electrons[:, 0], dark_e)
+    curves = (
+        mean - 2 * limit,
+        np.gradient(mean, electrons[:, 0]) * limit,
+        (square - mean**2) / _straight(electrons[:, 0], dark_e),
+    )
+    most = float(roots[-1]), float(mean[-1])
+    at_roots, at_readings = (np.linspace(0.0, end, _STEPS) for end in most)
+    plain = 0.25 * mean**2 - ((LIFT * dark_e) ** 2 + 0.125)
+    offset, steepness, variances = (np.interp(at_roots, roots, curve) for curve in curves)
+    return Readings(dark_e, most, offset, steepness, variances, np.interp(at_readings, mean, electrons[:, 0] - plain))
+
+
+def _limit(electrons: NDArray[Any], dark_e: float) -> Doubles:
+    """Half of the mean reading in light."""
+    return np.asarray(np.sqrt(np.asarray(electrons, np.float64) + ((LIFT * dark_e) ** 2 + 0.125)))
+
+
+def _straight(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
+    """Variance of a reading where the transform is straight."""
+    base = electrons + (dark_e**2 + 0.125)
+    return np.asarray(base / (base + (LIFT**2 - 1) * dark_e**2))
+
+
+def _nearest(values: NDArray[Any], most: float) -> NDArray[np.intp]:
+    """Nearest of `_STEPS` steps from 0 to `most`; its last one beyond."""
+    steps = values * values.dtype.type((_STEPS - 1) / most) + values.dtype.type(0.5)
+    return np.asarray(np.minimum(steps, values.dtype.type(_STEPS - 1)).astype(np.intp))

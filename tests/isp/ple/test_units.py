@@ -1,0 +1,39 @@
+"""Readings in units of noise: their curves beside drawn samples, and the way back to electrons."""
+
+import numpy as np
+import pytest
+
+from isp.ple.units import readings, transform
+
+DRAWS, SIGMAS = 400_000, 4.5
+
+
+@pytest.mark.sample(4)
+@pytest.mark.parametrize("dark_e", [0.0, 0.3, 1.8, 14.0])
+@pytest.mark.parametrize("electrons", [0.0, 0.1, 1.0, 10.0, 300.0, 10_000.0])
+def test_mean_and_variance_of_a_reading_are_those_of_drawn_samples(dark_e, electrons):
+    rng = np.random.default_rng(1)
+    drawn = transform(rng.poisson(electrons, DRAWS) + rng.normal(0.0, dark_e, DRAWS), dark_e)
+    curves, expected = readings(dark_e), np.array(electrons)
+    error = SIGMAS * drawn.std() / np.sqrt(DRAWS)
+    assert curves.mean(expected) == pytest.approx(drawn.mean(), abs=error + 2e-4)
+    # 2 % in the middle, where the distribution of X is told by its first three moments
+    assert curves.variance(expected) == pytest.approx(drawn.var(), rel=0.02, abs=1e-9)
+
+
+@pytest.mark.parametrize("dark_e", [0.0, 0.3, 1.8, 14.0])
+def test_electrons_are_those_whose_mean_reading_it_is_and_the_slope_is_the_curves(dark_e):
+    curves, electrons = readings(dark_e), np.geomspace(0.05, 20_000.0, 60)
+    # curves are looked up at the nearest step: to 1 % of the dark noise
+    error_e = max(4e-3, 0.01 * dark_e)
+    assert curves.electrons(curves.mean(electrons)) == pytest.approx(electrons, rel=1e-3, abs=error_e)
+    electrons = np.geomspace(1.0, 100.0, 30) * max(dark_e, 1.0) ** 2
+    step = 0.1 * electrons
+    slope = (curves.mean(electrons + step) - curves.mean(electrons - step)) / (2 * step)
+    assert curves.slope(electrons) == pytest.approx(slope, rel=0.02)
+
+
+def test_electrons_fall_with_the_reading_under_that_of_no_light_to_minus_the_dark_noise_squared():
+    least = readings(1.8).electrons(np.linspace(-3.0, 7.5, 50))
+    assert np.all(np.diff(least) >= 0.0)
+    assert least[0] > -14.0
