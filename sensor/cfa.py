@@ -1,6 +1,8 @@
 """Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
 
+import tomllib
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -21,33 +23,8 @@ def quad(tile: Tile) -> Tile:
     return tuple("".join(2 * channel for channel in row) for row in tile for _ in range(2))
 
 
-# Mosaics by name; any other tile will do, with a response for each channel.
-MOSAICS: Mapping[str, Tile] = MappingProxyType(
-    {
-        "rgbw": RGBW,
-        "bayer": BAYER,
-        "bayer_rggb": BAYER,
-        "bayer_bggr": ("BG", "GR"),
-        "bayer_grbg": ("GR", "BG"),
-        "bayer_gbrg": ("GB", "RG"),
-        # White on a checkerboard, and 2x2 cells of one colour on a diagonal, G R over B G. Demosaicking studies call it
-        # Kodak's, after Compton & Hamilton, "Image sensor with improved light sensitivity", US patent 8 139 130; some
-        # begin it two rows later, with W B W G.
-        "rgbw_4x4": ("WGWR", "GWRW", "WBWG", "BWGW"),
-        "rgbw_sparse": ("RGRG", "GBWB", "RGRG", "WBGB"),  # ours: Bayer with W in a quarter of green's places
-        # Cameras in cars: one red pixel in four, or one red and one blue, the others clear (C).
-        "rccc": ("RC", "CC"),
-        "rccb": ("RC", "CB"),
-        "ryyb": ("RY", "YB"),  # telephones: yellow, which passes red and green, in green's place
-        "mono": ("W",),
-        # Telephones with pixels of 1 um and less: 2x2 pixels under one filter, which bin to the plain mosaic. Bayer's
-        # is Sony's Quad Bayer and Samsung's Tetracell. RGBW of 2x2 cells of one colour, so that all four share a
-        # floating diffusion, is proposed by Singh, "Double binnable RGB, RGBW and LMS color filter arrays",
-        # arXiv:2306.17078, with a tile of 8x8; here the cells are those of Parmar & Wandell's tile.
-        "quad_bayer": quad(BAYER),
-        "quad_rgbw": quad(RGBW),
-    }
-)
+_TILES = tomllib.loads(Path(__file__).with_name("mosaics.toml").read_text("utf-8"))
+MOSAICS: Mapping[str, Tile] = MappingProxyType({name: tuple(rows) for name, rows in _TILES.items()})
 
 
 def mosaics() -> tuple[str, ...]:

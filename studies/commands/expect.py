@@ -18,7 +18,7 @@ from sensor.variations import vary
 from studies.commands.console import print_json, print_table, require_place
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
-from studies.pages.expect_chart import gain_svg
+from studies.pages.design_page import gain_svg
 from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
 
 

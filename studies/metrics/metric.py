@@ -1,6 +1,8 @@
 """The figures that tell pictures apart: what each says, and which difference a person sees."""
 
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 
 
 @dataclass(frozen=True)
@@ -40,29 +42,11 @@ PU21 = Metric("pu21_psnr_db", "PU21-PSNR", 1, "dB", higher=True, seen=0.5)
 MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True, seen=0.02)
 CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False, seen=1.0)
 PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True, seen=0.5)
-# Where the sizes in `Metric.seen` come from, as the page says it.
-SEEN_BY = (
-    "0.5 dB of PSNR is what video coding groups long took for visible; it isn't a measured threshold. A CIEDE2000 of 1 "
-    "is about the just noticeable difference of two large patches side by side; between pictures it takes more, 2.5 of "
-    "CIELAB in the mean (Song and Luo, Color and Imaging Conference 9, 2001). For FLIP and SSIM nobody has published a "
-    "size: 0.02, a fiftieth of their scales, is this program's choice, as is 0.02 cycles per pixel of MTF50."
-)
+_TEXTS = tomllib.loads(Path(__file__).with_name("meanings.toml").read_text("utf-8"))
+# Where the sizes in `Metric.seen` come from; what each metric says, and where it misleads, by its key.
+SEEN_BY: str = _TEXTS["seen_by"]
+MEANINGS: dict[str, str] = _TEXTS["meanings"]
 ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for
-# What each says, and where it misleads: in one sentence.
-MEANINGS = {
-    PSNR.key: "Mean squared error of the encoded picture: noise counts wherever it is, seen or not.",
-    SSIM.key: "How alike the structure is around each pixel, from 0 to 1; flat surfaces under noise count heavily.",
-    DELTA_E.key: "Difference of colour in half of the pixels, pixel by pixel: of a large patch, 1 is just seen.",
-    DELTA_E_95.key: "The same, exceeded in 5 % of the pixels only: fringes, highlights, lost colours.",
-    S_CIELAB.key: "The same after the eye's own blur: fine noise no longer counts, blotches and casts do.",
-    S_CIELAB_95.key: "The same, exceeded in 5 % of the pixels only.",
-    FLIP.key: "The difference that is seen when picture and truth alternate on a screen, from 0 to 1.",
-    PU21.key: "What an eye that is adapted to the scene's own light sees of the error: by moonlight it sees so little "
-    "that even a picture full of noise gets some 45 dB, and figures of two light levels don't compare.",
-    MTF50.key: "Spatial frequency at which an edge's contrast has fallen to a half.",
-    CHART.key: "Mean difference of colour over the chart's patches.",
-    PATCHES.key: "Signal over noise within the chart's patches.",
-}  # fmt: skip
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
 # Metrics that say much the same: the largest of each family is named, and none is a vote.
 FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))

@@ -1,4 +1,4 @@
-"""A design as one self-contained page: its tile and filters, gains over light, and what it gives up."""
+"""A design as one self-contained page: tile and filters, gains over light, and what it gives up; the gains' plot."""
 
 from collections.abc import Mapping, Sequence
 from importlib import metadata
@@ -10,9 +10,8 @@ from sensor.cfa import Tile
 from sensor.config import SensorConfig
 from studies.design.expect import ExpectedError
 from studies.design.search import Goal
-from studies.pages.expect_chart import gain_svg
 from studies.pages.page import svg_address, write_out
-from studies.pages.plots import CHART, INK, STYLE, blank, plain_ticks, svg_text
+from studies.pages.plots import CHART, INK, SOFT, STYLE, blank, plain_ticks, svg_text
 
 
 def tile_text(tile: Tile) -> str:
@@ -75,4 +74,24 @@ def _drawn(camera: SensorConfig) -> str:
         responses.plot(curve.wavelength_nm, curve.values, color=CHANNEL_COLOURS.get(letter, INK))
     responses.set(xlim=(380, 780), ylim=(0, 1.05), title="electrons per photon", xlabel="nm")
     plain_ticks(responses)
+    return svg_text(figure)
+
+
+@rc_context(STYLE)
+def gain_svg(by_camera: Mapping[str, Sequence[ExpectedError]]) -> str:
+    """Draw the gain in expected PSNR [dB] and in the error of a*, b* over luminance."""
+    figure = blank(2 * CHART[0], 1.2 * CHART[1])
+    decibels, colours = figure.subplots(1, 2)
+    reference, *others = by_camera
+    for index, name in enumerate(others):
+        pairs = list(zip(by_camera[name], by_camera[reference], strict=True))
+        light = [row.luminance_cd_m2 for row, _ in pairs]
+        style = {"marker": ".", "linestyle": "-" if index < 10 else "--"}  # colours begin anew
+        decibels.semilogx(light, [row.psnr_db - beside.psnr_db for row, beside in pairs], label=name, **style)
+        colours.semilogx(light, [beside.colour - row.colour for row, beside in pairs], **style)
+    for axes, title in ((decibels, "expected gain in PSNR [dB]"), (colours, "less error of a*, b*")):
+        axes.axhline(0.0, color=SOFT, linewidth=0.8)
+        axes.set(title=f"{title} over {reference}", xlabel="cd/m²")
+        plain_ticks(axes)
+    decibels.legend(fontsize=7, ncols=1 + len(others) // 8)
     return svg_text(figure)

@@ -15,7 +15,7 @@ from sensor.emva1288.photon_transfer import Transfer
 from sensor.presets import low_noise, preset
 from studies.design.expect import ExpectedError
 from studies.metrics.truth import light_of
-from studies.pages import expect_chart, plots
+from studies.pages import design_page, plots
 from studies.photograph.snr import channel_e
 
 Drawn = Callable[..., list[Axes]]
@@ -24,7 +24,7 @@ Drawn = Callable[..., list[Axes]]
 @pytest.fixture
 def drawn(monkeypatch: pytest.MonkeyPatch) -> Drawn:
     """Axes of what a function draws, in place of its SVG."""
-    for module in (plots, expect_chart):
+    for module in (plots, design_page):
         monkeypatch.setattr(module, "svg_text", lambda figure: figure)
     return lambda draw, *arguments: draw(*arguments).axes
 
@@ -81,7 +81,7 @@ def test_a_camera_that_is_better_than_the_first_gains(drawn: Drawn) -> None:
     def errors(psnr_db: float, colour: float) -> list[ExpectedError]:
         return [ExpectedError(light, 0.01, psnr_db + light, 9.0, 9.0, 9.0, colour) for light in (0.1, 10.0)]
 
-    decibels, colours = drawn(expect_chart.gain_svg, {"first": errors(20.0, 5.0), "better": errors(21.5, 4.0)})
+    decibels, colours = drawn(design_page.gain_svg, {"first": errors(20.0, 5.0), "better": errors(21.5, 4.0)})
     for axes, gain in ((decibels, 1.5), (colours, 1.0)):
         light, gains = axes.lines[0].get_data()
         assert (list(light), list(gains)) == ([0.1, 10.0], [gain, gain])
