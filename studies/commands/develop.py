@@ -1,6 +1,7 @@
 """The commands `rodcone capture` and `rodcone develop`."""
 
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
@@ -29,20 +30,52 @@ def capture(order: Annotated[Order, Parameter(name="*")], *, json: bool = False)
     print_result("\n".join(map(str, taken.paths)), taken.facts, json=json)
 
 
+@dataclass(frozen=True, kw_only=True)
+class DevelopOrder:
+    """How raw files are developed, and into which picture.
+
+    Attributes
+    ----------
+    out : Path, optional
+        Picture to write, .png or .tif; the raw file's name with .png by default.
+    isp : str, optional
+        Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
+        Or a function in a Python file of your own, mine.py:develop, with --trust-code.
+    bits : int
+        Bits a channel: 8 or 16.
+    ev : float, optional
+        Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
+        shown at 90 % of white.
+    white_balance : str, optional
+        Illuminant, such as D65, under which grey is shown as grey; as-shot for the one that capture or the camera set,
+        as raw converters do; or gray-world, found in the picture as in the paper. By default as-shot, and gray-world
+        for interleaved_paper.
+    height : int, optional
+        Pixels of the picture, at most the raw file's; with one of height and width the other keeps the proportions.
+    width : int, optional
+        Pixels; as height.
+    encoding : str
+        Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
+    trust_code : bool
+        Run the Python file that --isp names, which may do all that you may.
+    """
+
+    out: Path | None = None
+    isp: str | None = None
+    bits: int = 8
+    ev: float | None = None
+    white_balance: str | None = None
+    height: int | None = None
+    width: int | None = None
+    encoding: str = "srgb"
+    trust_code: bool = False
+
+
+DEFAULT = DevelopOrder()
+
+
 def develop(
-    raw: Path,
-    /,
-    *more: Path,
-    out: Path | None = None,
-    isp: str | None = None,
-    bits: int = 8,
-    ev: float | None = None,
-    white_balance: str | None = None,
-    height: int | None = None,
-    width: int | None = None,
-    encoding: str = "srgb",
-    trust_code: bool = False,
-    json: bool = False,
+    raw: Path, /, *more: Path, order: Annotated[DevelopOrder, Parameter(name="*")] = DEFAULT, json: bool = False
 ) -> None:
     """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
 
@@ -53,38 +86,16 @@ def develop(
         pip install 'rodcone[photographs]'.
     more
         Further raw files of the same camera and scene, such as capture --frames writes: all are merged, then developed.
-    out
-        Picture to write, .png or .tif; the raw file's name with .png by default.
-    isp
-        Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
-        Or a function in a Python file of your own, mine.py:develop, with --trust-code.
-    bits
-        Bits a channel: 8 or 16.
-    ev
-        Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
-        shown at 90 % of white.
-    white_balance
-        Illuminant, such as D65, under which grey is shown as grey; as-shot for the one that capture or the camera set,
-        as raw converters do; or gray-world, found in the picture as in the paper. By default as-shot, and gray-world
-        for interleaved_paper.
-    height
-        Pixels of the picture, at most the raw file's; with one of height and width the other keeps the proportions.
-    width
-        Pixels; as height.
-    encoding
-        Colours of the picture: srgb, or display-p3 for screens with a wider gamut.
-    trust_code
-        Run the Python file that --isp names, which may do all that you may.
     json
         Print one JSON object with the path and the choices made instead of the path.
     """
     if not raw.name:
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
+    choices = vars(order).copy()
+    out, bits = choices.pop("out"), choices.pop("bits")
     picture = raw.with_suffix(".png") if out is None else out
-    check_picture_file(picture, bits, encoding)
+    check_picture_file(picture, bits, order.encoding)
     check_place(picture)
-    developed = develop_file(
-        (raw, *more), isp, ev, white_balance, encoding, height=height, width=width, trust_code=trust_code
-    )
-    write_picture(developed.encoded, picture, bits, encoding)
+    developed = develop_file((raw, *more), **choices)
+    write_picture(developed.encoded, picture, bits, order.encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)
