@@ -1,77 +1,200 @@
-"""What the white pixel brings, as a page: `docs/make/white_pixel.py SWEEP`, of the study white_pixel."""
+"""What the white pixel brings, as a page: a study with photographs beside the scenes, and the page of its sweep.
 
+The page has the commands: ``white_pixel.py study WHEELS`` and ``white_pixel.py page SWEEP``.
+"""
+
+import io
+import json
+import re
 import sys
-from collections.abc import Sequence
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from importlib.util import find_spec
 from pathlib import Path
+from zipfile import ZipFile
 
 import numpy as np
 from page_parts import RESULTS, csv_text, fill
+from PIL import Image
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
+from studies.metrics.confidence import half_width
 from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
-from studies.pages.headline import WHITE_PIXEL, Group
+from studies.pages.headline import WHITE_PIXEL
 from studies.pages.plots import light_charts, svg_text
-from studies.pages.report_compare import CAMERA, groups_of, means_over_scenes, shown_metrics
-from studies.pages.report_data import ReportData
-from studies.pages.report_markdown import lead_cells
-from studies.pages.report_sweep import sweep_report
-from studies.pages.report_text import table
+from studies.pages.report_compare import DRAWN
+from studies.pages.report_text import fixed, lead_text, level_text, significant, table
+from studies.sweep.export import read_rows
+from studies.sweep.row import Row
 
-PAGE = Path(__file__).resolve().parents[1] / "white_pixel.md"
-METRICS = (PSNR, DELTA_E, FLIP)  # that the page shows; the CSV has all
+ROOT = Path(__file__).resolve().parents[2]
+PAGE = ROOT / "docs" / "white_pixel.md"
+STUDY = ROOT / "studies" / "configs" / "white_pixel.toml"
+METRICS = (PSNR, DELTA_E, FLIP)
+# No training picture is among them (studies/training/pictures.py); by the wheel and the folder in it that holds them.
+PHOTOGRAPHS = {
+    "china.jpg": "sklearn/datasets/images",
+    "flower.jpg": "sklearn/datasets/images",
+    "grace_hopper.jpg": "matplotlib/mpl-data/sample_data",
+    "hubble_deep_field.jpg": "skimage/data",
+    "motorcycle_left.png": "skimage/data",
+    "retina.jpg": "skimage/data",
+    "ihc.png": "skimage/data",
+}
+SIDE = 128  # pixels of a photograph's longer side, means of its own
+Places = Mapping[tuple[str, str, str], Mapping[str, Row]]  # by balance, scene and level, then by camera
 
 
-def parts(report: ReportData) -> tuple[dict[str, str], str, str]:
-    """Return the page's generated parts, its figure as SVG, and every lead as CSV."""
-    missing = set(WHITE_PIXEL) - set(report.cameras)
-    if missing:
-        raise InputError(
-            f"study: it lacks {', '.join(sorted(missing))}; allowed: the study white_pixel; sweep that one"
-        )
-    groups = groups_of(report, CAMERA, *(report.cameras.index(camera) for camera in WHITE_PIXEL))
-    means, levels = means_over_scenes(report, groups), [level.name for level in report.levels]
+def write_study(folder: Path) -> None:
+    """Write the study with photographs and the strongest Bayer cameras into a folder that holds the two wheels."""
+    net, sklearn = (next(folder.glob(f"{name}-*.whl"), None) for name in ("demosaicnet", "scikit_learn"))
+    if net is None or sklearn is None:
+        raise InputError(f"{folder}: it lacks a wheel; run pip download --no-deps -d {folder} scikit-learn demosaicnet")
+    for name, inside in PHOTOGRAPHS.items():
+        package = find_spec(inside.split("/")[0])
+        if package is None:
+            content = ZipFile(sklearn).read(f"{inside}/{name}")
+        else:
+            content = Path(str(package.origin)).parents[1].joinpath(inside, name).read_bytes()
+        photograph = Image.open(io.BytesIO(content)).convert("RGB")
+        photograph.thumbnail((SIDE, SIDE), Image.Resampling.BOX)
+        photograph.save(folder / f"{name.partition('.')[0]}.png")
+    cameras = [*WHITE_PIXEL, f"{net.name}:bayer_net"]
+    names = [f"{name.partition('.')[0]}.png" for name in PHOTOGRAPHS]
+    text = STUDY.read_text("utf-8").replace("scenes = [", f"scenes = [\n  {json.dumps(names)[1:-1]},", 1)
+    (folder / "study.toml").write_text(re.sub(r"processors = .*", f"processors = {json.dumps(cameras)}", text), "utf-8")
+
+
+def parts(rows: Iterable[Row], version: str) -> tuple[dict[str, str], str, str]:
+    """Return the page's generated parts, its figure as SVG, and every figure as CSV."""
+    places: dict[tuple[str, str, str], dict[str, Row]] = {}
+    for row in rows:
+        places.setdefault((row.white_balance, row.scene, row.level), {})[row.processor] = row
+    missing = [camera for camera in WHITE_PIXEL if any(camera not in cameras for cameras in places.values())]
+    if missing or not places:
+        raise InputError(f"study: it lacks {' and '.join(missing) or 'rows'}; allowed: the study white_pixel, one seed")
+    balances, scenes, levels = (list(dict.fromkeys(axis)) for axis in zip(*places, strict=True))
+    head = [level_text(level) for level in levels]
     content = {
-        "set-up": f"The numbers are those of rodcone {report.environment['rodcone']}: scenes of "
-        f"{max(report.scenes[0].height, report.scenes[0].width)} pixels on the longer side, {len(report.seeds)} seeds. "
-        "**Bold**: RGBW is behind by what a person sees (0.5 dB, 1 ΔE2000, 0.02 of FLIP). In brackets: less than "
-        "that, or undecided.",
-        **{metric.key: table([_with_unit(metric), *levels], lead_rows(metric, means)) for metric in METRICS},
+        "set-up": f"rodcone {version}, {len(scenes)} scenes, each once a balance and level. Exposure times, by "
+        f"`auto:information`, in the median over scenes, RGBW and Bayer: {exposures(places, balances[0], levels)}.",
+        **{f"leads {balance}": table(["", *head], lead_rows(places, balance, scenes, levels)) for balance in balances},
+        "best": table(["", *head], best_rows(places, balances[0], scenes, levels)),
     }
-    rows = [[_with_unit(x), *row] for x in shown_metrics(report.cells) for row in lead_rows(x, [*groups, *means])]
-    return content, svg_text(light_charts(*_charts(means))), csv_text(["metric", "where", *levels], rows)
+    charts = {
+        f"PSNR, dB: lead, {kind}": {
+            name: np.array([leads(places, PSNR, balance, kept, level, against).mean() for level in levels])
+            for balance in balances
+            for name, against in ((balance, False), (f"{balance}, best Bayer", True))
+        }
+        for kind, kept in kinds(scenes).items()
+    }
+    light = [next(iter(places[balances[0], scenes[0], level].values())).luminance_cd_m2 for level in levels]
+    cells = [
+        [*place, camera, *(f"{getattr(row, metric.key):.4g}" for metric in METRICS), f"{row.exposure_s * 1e3:.4g}"]
+        for place, cameras in places.items()
+        for camera, row in cameras.items()
+    ]
+    columns = ["balance", "scene", "level", "camera", *(metric.key for metric in METRICS), "exposure_ms"]
+    return content, svg_text(light_charts(light, charts)), csv_text(columns, cells)
 
 
-def lead_rows(metric: Metric, groups: Sequence[Group]) -> list[list[str]]:
-    """Return leads of RGBW over Bayer with half their intervals: places down, light across."""
-    return [[group.title, *lead_cells(metric, group.pair.leads[metric.key])] for group in groups]
+def kinds(scenes: Sequence[str]) -> dict[str, list[str]]:
+    """Return the scenes by kind: photographs, drawn from a number, and named."""
+    kind_of = {
+        scene: "photographs" if scene.endswith(".png") else "drawn" if scene.startswith(DRAWN) else "named"
+        for scene in scenes
+    }
+    return {kind: [scene for scene in scenes if kind_of[scene] == kind] for kind in dict.fromkeys(kind_of.values())}
 
 
-def _charts(means: Sequence[Group]) -> tuple[list[float], dict[str, dict[str, np.ndarray]]]:
-    """Leads in PSNR over light: a chart for the named and one for the drawn scenes, a line for each other condition."""
-    charts: dict[str, dict[str, np.ndarray]] = {}
-    for group in means:
-        scenes, _, condition = group.title.partition(", ")
-        charts.setdefault(f"PSNR, dB: lead, {scenes}", {})[condition] = group.pair.leads[PSNR.key].mean
-    return [light or np.nan for light in means[0].pair.light_cd_m2], charts
+def best_bayer(cameras: Mapping[str, Row], metric: Metric) -> Row:
+    """Return the row of the Bayer camera that is best by a metric: those that count electrons in R, G and B alone."""
+    bayer = [row for row in cameras.values() if set(json.loads(row.mean_electrons)) == set("RGB")]
+    return max(bayer, key=lambda row: getattr(row, metric.key) * (1 if metric.higher else -1))
 
 
-def _with_unit(metric: Metric) -> str:
-    return f"{metric.name} [{metric.unit}]" if metric.unit else metric.name
+def leads(
+    places: Places, metric: Metric, balance: str, scenes: Sequence[str], level: str, best: bool = False
+) -> np.ndarray:
+    """Return by scene how much better RGBW is than Bayer by the same method, or than the best Bayer of the place."""
+    found = []
+    for scene in scenes:
+        cameras = places[balance, scene, level]
+        theirs = best_bayer(cameras, metric) if best else cameras[WHITE_PIXEL[1]]
+        lead = getattr(cameras[WHITE_PIXEL[0]], metric.key) - getattr(theirs, metric.key)
+        found.append(lead if metric.higher else -lead)
+    return np.array(found)
+
+
+def lead_rows(places: Places, balance: str, scenes: Sequence[str], levels: Sequence[str]) -> list[list[str]]:
+    """Return a row for each scene, and means over each kind with half the 95 % interval over its scenes."""
+    rows = []
+    for kind, kept in kinds(scenes).items():
+        for scene in kept:
+            cells = [[float(leads(places, m, balance, [scene], level)[0]) for m in METRICS] for level in levels]
+            short = f"drawn {scene[-2:]}" if kind == "drawn" else scene.partition(".")[0]
+            rows.append([f"`{short}`", *("/".join(map(written, METRICS, cell)) for cell in cells)])
+        rows.append([f"{len(kept)} {kind}", *(mean_cell(places, balance, kept, level) for level in levels)])
+    return rows
+
+
+def best_rows(places: Places, balance: str, scenes: Sequence[str], levels: Sequence[str]) -> list[list[str]]:
+    """Return RGBW's mean leads over each place's best Bayer camera, and how often which was the best in PSNR."""
+    rows = [
+        [f"{len(kept)} {kind}", *(mean_cell(places, balance, kept, level, best=True) for level in levels)]
+        for kind, kept in kinds(scenes).items()
+    ]
+    for metric in METRICS:
+        cells = []
+        for level in levels:
+            best = Counter(best_bayer(places[balance, scene, level], metric).processor for scene in scenes)
+            cells.append(", ".join(f"`{name.rpartition(':')[2]}` {count}" for name, count in best.most_common()))
+        rows.append([f"best by {metric.name.partition(',')[0]}", *cells])
+    return rows
+
+
+def written(metric: Metric, lead: float) -> str:
+    """Write a lead, in bold where a person sees that RGBW is behind."""
+    return f"**{lead_text(metric, lead)}**" if lead <= -metric.seen else lead_text(metric, lead)
+
+
+def mean_cell(places: Places, balance: str, scenes: Sequence[str], level: str, best: bool = False) -> str:
+    """Write means of leads over scenes by metric, each with half its 95 % interval."""
+    of_scenes = {metric: leads(places, metric, balance, scenes, level, best) for metric in METRICS}
+    return "/".join(
+        f"{written(metric, float(x.mean()))}±{fixed(float(half_width(x)), metric.digits)}"
+        for metric, x in of_scenes.items()
+    )
+
+
+def exposures(places: Places, balance: str, levels: Sequence[str]) -> str:
+    """Say the two cameras' exposure times at each level, in the median over scenes [ms]."""
+    said = []
+    for level in levels:
+        here = [cameras for (of, _, at), cameras in places.items() if (of, at) == (balance, level)]
+        times = [np.median([cameras[name].exposure_s * 1e3 for cameras in here]) for name in WHITE_PIXEL]
+        said.append(f"{significant(times[0])} and {significant(times[1], 'ms')} at {level_text(level)}")
+    return ", ".join(said)
 
 
 def main(arguments: Sequence[str]) -> None:
-    """Write the page's parts, its figure and its table, all or none."""
+    """Write the study, or the page's parts, its figure and its table, all or none."""
     try:
-        if len(arguments) != 1:
-            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder")
-        content, figure, leads = parts(sweep_report(Path(arguments[0]), 0)[0])
+        if len(arguments) != 2 or arguments[0] not in ("study", "page"):
+            raise InputError(f"arguments: {list(arguments)} are not allowed; give study and a folder, or page and one")
+        if arguments[0] == "study":
+            write_study(Path(arguments[1]))
+            return
+        rows = read_rows(arguments[1])
+        content, figure, cells = parts(rows, json.loads(rows[0].versions)["rodcone"] if rows else "")
     except InputError as error:
         raise SystemExit(f"white_pixel: {error}") from error
     with replacing(PAGE, PAGE.with_suffix(".svg"), RESULTS / "white_pixel.csv") as (page, drawing, file):
         page.write_text(fill(PAGE.read_text("utf-8"), content), "utf-8")
         drawing.write_text(figure, "utf-8")
-        file.write_text(leads, "utf-8")
+        file.write_text(cells, "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,72 +1,82 @@
-"""The page of the white pixel: means over named and drawn scenes apart, positive where RGBW is better."""
+"""The page of the white pixel: each scene, means over each kind, the best Bayer, and the study with photographs."""
 
+import csv
+import io
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-import white_pixel
-from report_sample import SENSORS, sample_report
-from white_pixel import PAGE, main, parts
+from PIL import Image
+from report_sample import sample_row
+from white_pixel import PAGE, PHOTOGRAPHS, SIDE, main, parts, write_study
 
 from rodcone.errors import InputError
-from studies.pages.report_data import ReportData, ReportScene
+from studies.study.study_file import read_study
 from studies.sweep.row import Row
 
-# PSNR [dB] of RGBW over Bayer by scene; the seeds of both mosaics move in step.
-LEADS_DB = {"still_life": 1.0, "night_street": 3.0, "generated-1": -2.5, "generated-2": -0.5}
-
-SIZES = (128, 96), (64, 48), (64, 48), (64, 48)  # height, width
+# PSNR [dB] of RGBW over Bayer by scene.
+LEADS_DB = {"china.png": -1.0, "still_life": 1.0, "night_street": 3.0, "generated-1": -2.5, "generated-2": -0.2}
 
 
-def swept(*cameras: str) -> ReportData:
-    def change(row: Row) -> Row:
-        lead_db = LEADS_DB[row.scene] if row.processor == "ple_rgbw" else 0.0
-        return replace(row, psnr_db=20.0 + 0.3 * row.seed + lead_db)
-
-    scenes = tuple(ReportScene(name, *size) for name, size in zip(LEADS_DB, SIZES, strict=True))
-    report = sample_report(
-        change, levels=2, scenes=scenes, sensors=SENSORS[:1], seeds=(0, 1), cameras=cameras,
-        balances=("as-shot", "gray-world"),
-    )  # fmt: skip
-    return replace(report, environment={"rodcone": "0.2.0+abc"})
+def swept(*cameras: str) -> list[Row]:
+    rows = []
+    for scene, lead_db in LEADS_DB.items():
+        for level, balance in ((level, balance) for level in (0, 1) for balance in ("as-shot", "gray-world")):
+            for camera in cameras:
+                row = sample_row(level, 1, camera, scene=scene, white_balance=balance)
+                psnr_db = 20.0 + {"ple_rgbw": lead_db, "mine.whl:net": 2.0 * level - 1}.get(camera, 0.0)
+                rows.append(replace(row, level=f"{level + 1}cd/m2", psnr_db=psnr_db, delta_e_median=5.0, flip_mean=0.2))
+    return rows
 
 
-def test_leads_are_means_over_named_and_over_drawn_scenes_by_balance() -> None:
-    content, figure, table = parts(swept("ple_bayer", "ple_rgbw"))
-    for balance in ("balanced as shot", "balanced by Gray World"):
-        assert f"| mean of 2 named scenes, {balance} | +2.0 ± 0.0 | +2.0 ± 0.0 |" in content["psnr_db"]
-        assert f"| mean of 2 drawn scenes, {balance} | **−1.5 ± 0.0** | **−1.5 ± 0.0** |" in content["psnr_db"]
-        assert f'PSNR [dB],"generated-1, {balance}",**−2.5 ± 0.0**' in table
-        assert figure.count(f">{balance}</text>") == 2  # a line in each chart
-    report = swept("ple_bayer", "ple_rgbw")
-    turned = replace(report, scenes=tuple(ReportScene(x.name, x.width, x.height) for x in report.scenes))
-    for one in (report, turned):
-        assert "rodcone 0.2.0+abc: scenes of 128 pixels on the longer side, 2 seeds" in parts(one)[0]["set-up"]
+def test_every_scene_has_its_row_and_each_kind_its_mean() -> None:
+    content, figure, table = parts(swept("ple_bayer", "mine.whl:net", "ple_rgbw"), "0.2.0+abc")
+    for balance in ("as-shot", "gray-world"):
+        shown = content[f"leads {balance}"]
+        assert "| `china` | **−1.0**/0.0/0.000 | **−1.0**/0.0/0.000 |" in shown
+        assert "| `drawn -2` | −0.2/0.0/0.000 | −0.2/0.0/0.000 |" in shown
+        # two scenes: half the interval is 12.7 times the deviation of the mean, here 1 dB
+        assert "| 2 named | +2.0±12.7/0.0±0.0/0.000±0.000 |" in shown
+    assert "| 2 named | +2.0±12.7/0.0±0.0/0.000±0.000 | +1.0±12.7/0.0±0.0/0.000±0.000 |" in content["best"]
+    assert "| best by PSNR | `ple_bayer` 5 | `net` 5 |" in content["best"]
+    assert "rodcone 0.2.0+abc, 5 scenes" in content["set-up"]
+    assert "66 and 66\N{NO-BREAK SPACE}ms at 1\N{NO-BREAK SPACE}cd/m²" in content["set-up"]
+    assert figure.count(">gray-world, best Bayer</text>") == 3
+    cells = list(csv.DictReader(io.StringIO(table)))
+    assert len(cells) == 60
+    (cell,) = (x for x in cells if list(x.values())[:4] == ["as-shot", "generated-1", "2cd/m2", "ple_rgbw"])
+    assert (cell["psnr_db"], cell["exposure_ms"]) == ("17.5", "66")
 
 
 def test_the_page_has_a_place_for_every_part() -> None:
     text = PAGE.read_text("utf-8")
-    assert [name for name in parts(swept("ple_rgbw", "ple_bayer"))[0] if text.count(f"<!-- {name} -->") != 1] == []
+    content, _, _ = parts(swept("ple_rgbw", "ple_bayer"), "")
+    assert [name for name in content if text.count(f"<!-- {name} -->") != 1] == []
+
+
+def test_the_study_has_small_photographs_and_the_network(tmp_path: Path) -> None:
+    with pytest.raises(InputError, match="lacks a wheel; run pip download --no-deps"):
+        write_study(tmp_path)
+    (tmp_path / "demosaicnet-1-py3-none-any.whl").write_bytes(b"")
+    picture = io.BytesIO()
+    Image.fromarray(np.full((300, 400, 3), 99, np.uint8)).save(picture, "JPEG")
+    with zipfile.ZipFile(tmp_path / "scikit_learn-1-any.whl", "w") as wheel:
+        for name, folder in PHOTOGRAPHS.items():
+            wheel.writestr(f"{folder}/{name}", picture.getvalue())
+    write_study(tmp_path)
+    with Image.open(tmp_path / "china.png") as china:
+        assert china.size == (SIDE, SIDE * 3 // 4)
+    text = (tmp_path / "study.toml").read_text("utf-8").replace('"demosaicnet-1-py3-none-any.whl:bayer_net"', '"bayer"')
+    (tmp_path / "study.toml").write_text(text, "utf-8")
+    study = read_study(tmp_path / "study.toml")
+    assert len(study.scenes) == 15
+    assert study.processors == ("ple_rgbw", "ple_bayer", "bayer")
 
 
 def test_another_study_is_refused() -> None:
     with pytest.raises(InputError, match="ple_bayer"):
-        parts(swept("ple_rgbw", "bayer"))
-    for folders in ([], ["one", "other"]):
-        with pytest.raises(SystemExit, match="give the sweep's folder"):
-            main(folders)
-
-
-def test_the_command_writes_page_figure_and_table(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """All three hold what `parts` gives, in the places that the page has for it."""
-    report = swept("ple_bayer", "ple_rgbw")
-    monkeypatch.setattr(white_pixel, "sweep_report", lambda folder, pictures: {tmp_path: (report, pictures)}[folder])
-    page = tmp_path / "white_pixel.md"
-    page.write_text(PAGE.read_text("utf-8"), "utf-8")
-    monkeypatch.setattr(white_pixel, "PAGE", page)
-    monkeypatch.setattr(white_pixel, "RESULTS", tmp_path)
-    main([str(tmp_path)])
-    content, figure, table = parts(report)
-    assert page.with_suffix(".svg").read_text("utf-8") == figure
-    assert (tmp_path / "white_pixel.csv").read_text("utf-8") == table
-    assert all(part in page.read_text("utf-8") for part in content.values())
+        parts(swept("ple_rgbw", "bayer"), "")
+    with pytest.raises(SystemExit, match="give study and a folder, or page and one"):
+        main([])
