@@ -14,7 +14,11 @@ FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states
 DEEPEST = 1 << 16  # paths of integrators without a limit; Russian roulette ends them long before
 LONGEST_CHAIN = 100  # of nested and referenced parts: Mitsuba follows them by recursion
 _UNSEEN_BY_METER = ("directional", "point", "spot")  # it sends rays out, which meet none of these: it would read 0
-_PATHS = ("path", "volpath", "volpathmis", "prb", "prb_basic", "prbvolpath", "ptracer")  # with a max_depth
+# Integrators with a max_depth, and the longest path of those that state none; -1 is without a limit.
+_PATHS = {
+    **dict.fromkeys(("path", "volpath", "volpathmis", "ptracer"), -1),
+    **dict.fromkeys(("prb", "prb_basic", "prb_projective", "prbvolpath"), 6),
+}
 _LEFT_OUT = ("film", "sampler", "rfilter", "reconstructionfilter", "integrator")
 
 
@@ -65,7 +69,8 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     for integrator in integrators:
         limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
         engine = f"the engine brings its own, with paths {limit}, roulette from {rr_depth}"
-        notes.append(f"integrator {integrator['type']!r}: {engine}")
+        seen = "; lights are seen, hide_emitters is left out" if integrator.get("hide_emitters") else ""
+        notes.append(f"integrator {integrator['type']!r}: {engine}{seen}")
     camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
@@ -105,9 +110,9 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
     """Longest path and first depth of Russian roulette, of the first integrator that has paths, alone or in another."""
     stated = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
     if not stated:
-        direct = any(node["type"] == "direct" for node in integrators)
+        direct = any(node["type"] in ("direct", "direct_projective") for node in integrators)
         return 2 if direct else Scene.max_depth, Scene.rr_depth
-    depth, rr_depth = stated[0].get("max_depth", -1), stated[0].get("rr_depth", Scene.rr_depth)
+    depth, rr_depth = stated[0].get("max_depth", _PATHS[stated[0]["type"]]), stated[0].get("rr_depth", Scene.rr_depth)
     require_whole(f"scene {name}: rr_depth", rr_depth, 1, 1 << 31, "roulette begins after the first surface")
     return DEEPEST if depth < 0 else max(2, int(depth)), min(int(rr_depth), DEEPEST)
 

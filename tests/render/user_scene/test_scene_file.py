@@ -263,19 +263,20 @@ def test_an_area_light_stated_beside_its_shape_is_put_on_it(tmp_path: Path) -> N
     assert len(ours) == len(stock) == 1
 
 
+HIDDEN = '<integrator type="volpath"><boolean name="hide_emitters" value="true"/></integrator>'
+
+
 def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> None:
     second = CAMERA.replace('id="camera"', 'id="second"').replace('value="8"', 'value="80"')
     crop = '<integer name="crop_width" value="2"/></film>'
-    opened = load_scene_file(
-        write(tmp_path, '<integrator type="volpath"/>', CAMERA.replace("</film>", crop), second, SUN)
-    )
+    opened = load_scene_file(write(tmp_path, HIDDEN, CAMERA.replace("</film>", crop), second, SUN))
     assert opened.size == (6, 8)
     assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
     assert {value["type"] for value in opened.scene.geometry.values() if isinstance(value, dict)} == {
         *("perspective", "directional")
     }
     told = " ".join(opened.notes)
-    assert all(word in told for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "crop"))
+    assert all(word in told for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "crop", "hide_emitters"))
 
 
 PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
@@ -289,6 +290,8 @@ PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></inte
         ('<integrator type="path"><integer name="max_depth" value="-1"/></integrator>', 65536),
         ('<integrator type="path"><integer name="max_depth" value="17"/></integrator>', 17),
         ('<integrator type="direct"/>', 2),
+        ('<integrator type="direct_projective"/>', 2),
+        ('<integrator type="prb_projective"/>', 6),
         (f'<integrator type="aov">{PATH_OF_3}</integrator>', 3),
     ],
 )
