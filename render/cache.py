@@ -25,7 +25,7 @@ from rodcone.digests import digest_file, digest_inputs
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 10  # raise it where a value or an array's name changes: older entries are then not used
+ENGINE_VERSION = 11  # raise it where a value or an array's name changes: older entries are then not used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("variance", "counts")
 _MEANS = tuple(field.name for field in fields(SceneMeans))

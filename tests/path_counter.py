@@ -3,10 +3,11 @@
 from collections import Counter
 from typing import Any
 
+import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from render.integrator.dense import Tracer
-from rodcone.jit import dr
 
 
 def count_paths(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
@@ -17,9 +18,15 @@ def count_paths(monkeypatch: pytest.MonkeyPatch) -> Counter[str]:
     return counts
 
 
+def pixels_of_paths(pixel: Any, points: Any) -> NDArray[np.uint64]:
+    """Pixel of each path; one that is traced twice, to fill a packet up, counts once."""
+    places = (pixel.numpy().astype(np.uint64) << np.uint64(32)) + points.index.numpy()
+    return np.unique(places) >> np.uint64(32)
+
+
 def _counted(own: Any, name: str, counts: Counter[str]) -> Any:
     def trace(*given: Any) -> Any:
-        counts[name] += dr.width(given[-1].index)
+        counts[name] += pixels_of_paths(*given[-2:]).size
         return own(*given)
 
     return trace

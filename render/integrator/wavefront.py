@@ -1,5 +1,6 @@
 """Means of paths over spans of their points."""
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -15,6 +16,7 @@ from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
 
+LANES = 16  # of the widest packet of paths
 Channels = dict[str, list[Any]]  # of a tracer, by name: one Float a channel
 _COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
@@ -47,13 +49,19 @@ def traced(
     """
     mi, flat = mitsuba_module(), rates.ravel()
     order = np.argsort(flat, kind="stable")
+    # Paths of one packet change each other's last bits: Embree goes through its tree in another way once few are left.
+    # So a packet holds the same paths whatever the launch, and a rate's last pixel fills its last packet up.
+    together = LANES // math.gcd(LANES, span.chunk)
+    rated = np.split(order, np.flatnonzero(np.diff(flat[order])) + 1)
+    order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in rated])
     ends = np.cumsum(flat[order].astype(np.int64) * span.chunk * span.chunks)
+    cuts = (np.flatnonzero(np.diff(ends // threads)) + 1) // together * together
     means: dict[str, Planes] = {}
-    for few in np.split(order, np.flatnonzero(np.diff(ends // threads)) + 1):
+    for batch in np.split(order, np.unique(cuts[cuts > 0])):
         # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
         # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
-        values, firsts = np.unique(flat[few], return_index=True)
-        parts = list(zip(values.tolist(), np.split(few, firsts[1:]), strict=True))
+        values, firsts = np.unique(flat[batch], return_index=True)
+        parts = list(zip(values.tolist(), np.split(batch, firsts[1:]), strict=True))
         blocks = np.concatenate([_blocks(rate, pixels, span) for rate, pixels in parts], axis=1)
         pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
         dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from path_counter import count_paths
+from path_counter import count_paths, pixels_of_paths
 
 from render.engine import render
 from render.integrator.dense import Tracer
@@ -60,7 +60,7 @@ def test_each_pixel_has_the_samples_that_its_count_tells(monkeypatch):
     own, found = Tracer.camera, np.zeros(size[0] * size[1], int)
 
     def camera(self, size, pixel, points):
-        found[:] += np.bincount(np.asarray(pixel), minlength=found.size)
+        found[:] += np.bincount(pixels_of_paths(pixel, points).astype(int), minlength=found.size)
         return own(self, size, pixel, points)
 
     monkeypatch.setattr(Tracer, "camera", camera)
