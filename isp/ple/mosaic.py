@@ -1,8 +1,8 @@
 """What of a mosaic lies where: sums of samples over cells, the samples of a patch, and the mosaic beyond its frame.
 
-Patches lie two pixels apart, so those of a tile of four pixels begin at its first or at its third one: each phase has
-samples of its own. Cells of 2x2 pixels are then a mosaic of cells, whose tile is two cells a side; larger cells
-hold every channel.
+Patches lie two pixels apart. In a tile of four pixels they begin at its first or third pixel, which are the tile's
+*phases*; the channels of a patch's samples, its sampling, depend on the phase. Cells of 2x2 pixels may lack channels
+too: they form a mosaic of cells, whose tile is two cells a side. Larger cells hold every channel.
 """
 
 from dataclasses import dataclass
@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.ple.estimate import STRIDE, Scale, border, padded
+from isp.ple.estimate import Scale
+from isp.ple.overlap import STRIDE, border, padded
 from isp.ple.prior import LETTERS, PATCH
 from isp.ple.tables import Sampling, Singles
 from isp.ple.units import transform
@@ -36,7 +37,7 @@ class Cells:
         Of the mosaic's channels [e-]; 0 where a cell has no sample of a channel.
     full : (h, w, channel) bool
         Where a saturated W is in the sum.
-    held : (row, column, channel) bool
+    presence : (row, column, channel) bool
         Which channels the first cells hold; the others repeat them.
     sampling : Sampling
         Of patches of 4x4 cells.
@@ -46,7 +47,7 @@ class Cells:
 
     electrons: Singles
     full: NDArray[np.bool_]
-    held: NDArray[np.bool_]
+    presence: NDArray[np.bool_]
     sampling: Sampling
     index: tuple[int, ...]
 
@@ -68,11 +69,12 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     index = tuple(LETTERS.index(name) for name in names)
     down, across = (lcm(side, 2) // 2 for side in (len(raw.cfa), len(raw.cfa[0])))
     letters = channel_map(raw.cfa, (2 * down, 2 * across)).reshape(down, 2, across, 2)
-    found = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
-    # The finest cells. Where some hold more samples of a channel than others, those are left out here.
-    least = np.where(found > 0, found, 4).min(axis=(0, 1))
+    tally = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
+    # The finest cells are to be alike: each sums as many samples of a channel as the cell with the fewest (`least`, of
+    # the cells that have any). The samples beyond are kept apart, in sums[1], for the larger cells.
+    least = np.where(tally > 0, tally, 4).min(axis=(0, 1))
     height, width = (length // 2 for length in raw.shape)
-    shape = (1 + int(np.any(found > least)), height, width, len(names))
+    shape = (1 + int(np.any(tally > least)), height, width, len(names))
     sums: Singles = np.zeros(shape, np.float32)
     fulls: NDArray[np.bool_] = np.zeros(shape, bool)
     for (a, b), (c, name) in product(np.ndindex(down, across), enumerate(names)):
@@ -86,9 +88,10 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
             sums[cells] += electrons[site]
             fulls[cells] |= full[site]
     counts, whole = np.ones(4), np.ones(4)
-    counts[list(index)], whole[list(index)] = least, 4 * found.mean(axis=(0, 1))
-    finest = _cell_sampling(raw, white_e, counts, found > 0, index)
-    levels = [Cells(sums[0], fulls[0], found > 0, finest, index)]
+    counts[list(index)], whole[list(index)] = least, 4 * tally.mean(axis=(0, 1))
+    # `counts` are the samples of a channel in a cell of 2x2 pixels, `whole` those in a cell of 4x4.
+    finest = _cell_sampling(raw, white_e, counts, tally > 0, index)
+    levels = [Cells(sums[0], fulls[0], tally > 0, finest, index)]
     sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), np.asarray(fulls.any(axis=0)))
     # Larger cells hold every channel, and all of its samples.
     every = np.ones((1, 1, len(names)), bool)
@@ -103,16 +106,16 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
 
 
 def _cell_sampling(
-    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], held: NDArray[np.bool_], index: tuple[int, ...]
+    raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], presence: NDArray[np.bool_], index: tuple[int, ...]
 ) -> Sampling:
-    rows = [4 * place + channel for place, each in enumerate(_first_patch(held)) for channel in np.array(index)[each]]
+    rows = [4 * place + channel for place, row in enumerate(_first_patch(presence)) for channel in np.array(index)[row]]
     return _sampling(raw, white_e, counts, CELLS, tuple(map(int, rows)))
 
 
-def _first_patch(held: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _first_patch(presence: NDArray[np.bool_]) -> NDArray[np.bool_]:
     """Which channels the cells of a patch hold, shape (cell, channel): patches begin at the tile's first one."""
-    down, across, count = held.shape
-    return np.tile(held, (CELLS // down, CELLS // across, 1)).reshape(-1, count)
+    down, across, count = presence.shape
+    return np.tile(presence, (CELLS // down, CELLS // across, 1)).reshape(-1, count)
 
 
 def _sampling(
@@ -151,13 +154,13 @@ def scale_of_cells(cells: Cells) -> Scale:
         transform(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
     ]
-    held = _first_patch(cells.held).ravel()
+    presence = _first_patch(cells.presence).ravel()
     return Scale(
         shape=cells.full.shape[:2],
         samples=padded(np.stack(stable, axis=-1), CELLS),
         full=padded(cells.full, CELLS),
         samplings=((cells.sampling,),),
-        columns=None if held.all() else np.flatnonzero(held),
+        columns=None if presence.all() else np.flatnonzero(presence),
     )
 
 
@@ -194,24 +197,24 @@ def continued(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
 
     Where the reflected pixel is of another channel, the nearest pixel beside it of the right one stands for it.
     """
-    wide = tuple(padded(each, PATCH) for each in samples)
+    wide = tuple(padded(plane, PATCH) for plane in samples)
     if max(len(tile), len(tile[0])) <= 2:  # which reflection keeps
         return wide
     shape = samples[0].shape
     sides = [border(length, PATCH) for length in shape]
     letters = np.array([[LETTERS.index(name) for name in row] for row in tile], dtype=np.int8)
     rows, columns = (np.arange(length) - side[0] for length, side in zip(wide[0].shape, sides, strict=True))
-    asked = letters[rows[:, None] % len(tile), columns % len(tile[0])]
-    own = asked[sides[0][0] :, sides[1][0] :][: shape[0], : shape[1]]
-    left = np.nonzero(padded(own, PATCH) != asked)
+    wide_letters = letters[rows[:, None] % len(tile), columns % len(tile[0])]
+    frame_letters = wide_letters[sides[0][0] :, sides[1][0] :][: shape[0], : shape[1]]
+    gaps = np.nonzero(padded(frame_letters, PATCH) != wide_letters)
     y, x = (
-        np.pad(np.arange(length), side, mode="reflect")[at] for length, side, at in zip(shape, sides, left, strict=True)
+        np.pad(np.arange(length), side, mode="reflect")[at] for length, side, at in zip(shape, sides, gaps, strict=True)
     )
     offsets = product(range(-SIDES[-1] + 1, SIDES[-1]), repeat=2)
     for dy, dx in sorted(offsets, key=lambda offset: (offset[0] ** 2 + offset[1] ** 2, offset)):
         inside = (y + dy >= 0) & (y + dy < shape[0]) & (x + dx >= 0) & (x + dx < shape[1])
-        right = inside & (own[np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)] == asked[left])
-        for to, each in zip(wide, samples, strict=True):
-            to[left[0][right], left[1][right]] = each[y[right] + dy, x[right] + dx]
-        left, y, x = (left[0][~right], left[1][~right]), y[~right], x[~right]
+        fits = inside & (frame_letters[np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)] == wide_letters[gaps])
+        for to, plane in zip(wide, samples, strict=True):
+            to[gaps[0][fits], gaps[1][fits]] = plane[y[fits] + dy, x[fits] + dx]
+        gaps, y, x = (gaps[0][~fits], gaps[1][~fits]), y[~fits], x[~fits]
     return wide

@@ -11,13 +11,13 @@ BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of t
 MOST = 24  # components that a patch is held against, of the likeliest in a few directions
 
 
-def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
+def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
     """Pick each patch's likeliest component.
 
     Parameters
     ----------
     at : Table
-    known : (patch, sample + 1) or (patch, sample + 5) float32
+    evidence : (patch, sample + 1) or (patch, sample + 5) float32
         Samples in units of noise, 1, and with a pilot its means.
     noise : (patch,) float32 or None
         The pilot's variance over the table's typical one.
@@ -29,26 +29,26 @@ def pick(at: Table, known: Singles, noise: Singles | None) -> tuple[NDArray[np.i
     (patch,) float32
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
     """
-    count, size = len(known), len(at.centre)
-    best, chosen = np.full(count, -np.inf, np.float32), np.zeros(count, np.int16)
+    count, size = len(evidence), len(at.centre)
+    best, component = np.full(count, -np.inf, np.float32), np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
     width = size if noise is None else size + 4
     # Arrays are made once: fresh memory costs as much as the sums.
-    taken, reads = (np.empty((BLOCK, each), np.float32) for each in (known.shape[1], width))
-    candidates = _candidates(at, known[:, :size])
-    for k, some in ((k, some) for k, row in enumerate(candidates) for some in blocks(np.flatnonzero(row))):
-        np.take(known, some, axis=0, out=taken[: some.size], mode="clip")
-        read = np.matmul(taken[: some.size], at.reads[k][: known.shape[1], :width], out=reads[: some.size])
+    block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
+    candidates = _candidates(at, evidence[:, :size])
+    for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
+        np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
+        read = np.matmul(block[: group.size], at.reads[k][: evidence.shape[1], :width], out=reads[: group.size])
         square = np.vecdot(read[:, :size], read[:, :size])
         likelihood = at.log_scale[k] - 0.5 * square
         if noise is not None:
             # A row a direction, for sums along them.
-            news, spread = read[:, size:].T.copy(), noise[some] + at.spread[k, :, None].astype(np.float32)
+            news, spread = read[:, size:].T.copy(), noise[group] + at.spread[k, :, None].astype(np.float32)
             likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (news * news / spread).sum(axis=0))
-        better = likelihood > best[some]
-        winners = some[better]
-        best[winners], chosen[winners], misfit[winners] = likelihood[better], k, square[better] / size
-    return chosen, misfit
+        wins = likelihood > best[group]
+        winners = group[wins]
+        best[winners], component[winners], misfit[winners] = likelihood[wins], k, square[wins] / size
+    return component, misfit
 
 
 def blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
@@ -59,17 +59,17 @@ def blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
 def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
     """Which components may be the likeliest, shape (component, patch), by the likelihood in a few directions."""
     quick = np.empty((len(at.quick), len(y)), np.float32)
-    few = at.few.shape[1]
-    starts = np.cumsum([0, *range(few, 0, -1)]).tolist()
-    held = np.empty((at.quick.shape[1], BLOCK), np.float32)
+    count = at.directions.shape[1]
+    starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
+    products = np.empty((at.quick.shape[1], BLOCK), np.float32)
     for first in range(0, len(y), BLOCK):
         off = y[first : first + BLOCK] - at.centre
-        told = np.ascontiguousarray((off @ at.few).T)
-        features = held[:, : len(off)]
+        coordinates = np.ascontiguousarray((off @ at.directions).T)
+        features = products[:, : len(off)]
         for i, start in enumerate(starts[:-1]):
-            np.multiply(told[i], told[i:], out=features[start : starts[i + 1]])
-        features[starts[-1] : starts[-1] + few] = told
-        features[-2] = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->j", told, told)
+            np.multiply(coordinates[i], coordinates[i:], out=features[start : starts[i + 1]])
+        features[starts[-1] : starts[-1] + count] = coordinates
+        features[-2] = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->j", coordinates, coordinates)
         features[-1] = 1.0
         quick[:, first : first + BLOCK] = at.quick @ features
     candidates = np.asarray(quick > quick.max(axis=0) - at.margin)

@@ -88,9 +88,9 @@ def mixture(prior: Prior, size: int = PATCH) -> Mixture:
     inside = np.zeros((PATCH, PATCH, 4), dtype=bool)
     edge = (PATCH - size) // 2
     inside[edge : edge + size, edge : edge + size] = True
-    kept = inside.ravel()
-    basis = prior.basis[kept]
-    means = prior.mean[kept] + prior.centres @ basis.T
+    middle = inside.ravel()
+    basis = prior.basis[middle]
+    means = prior.mean[middle] + prior.centres @ basis.T
     spread = basis @ prior.factors
     covariances = spread @ spread.swapaxes(1, 2)
     outside = np.eye(len(basis), dtype=np.float32) - basis @ basis.T
@@ -121,14 +121,14 @@ def load_prior(path: Path) -> Prior:
         if needed > MOST_BYTES:
             raise ValueError(f"its arrays take {needed} bytes; allowed: {MOST_BYTES}")
         with path.open("rb") as place, np.load(place, allow_pickle=False) as file:
-            held = {name: np.asarray(file[name]) for name in _FIELDS}
+            arrays = {name: np.asarray(file[name]) for name in _FIELDS}
             source = str(file["source"])
-        if not all(np.issubdtype(array.dtype, np.floating) and np.all(np.isfinite(array)) for array in held.values()):
+        if not all(np.issubdtype(array.dtype, np.floating) and np.all(np.isfinite(array)) for array in arrays.values()):
             raise ValueError("it holds values that are no finite numbers")
-    rows, (components, directions) = 4 * PATCH**2, (*held["centres"].shape, 0, 0)[:2]
+    rows, (components, directions) = 4 * PATCH**2, (*arrays["centres"].shape, 0, 0)[:2]
     lower = directions * (directions + 1) // 2
     shapes = {
-        "neutrals_e": (*held["neutrals_e"].shape[:1], 4),
+        "neutrals_e": (*arrays["neutrals_e"].shape[:1], 4),
         "mean": (rows,),
         "basis": (rows, directions),
         "weights": (components,),
@@ -136,24 +136,24 @@ def load_prior(path: Path) -> Prior:
         "factors": (components, lower),
         "rest": (components,),
     }
-    wrong = [name for name, shape in shapes.items() if held[name].shape != shape]
+    wrong = [name for name, shape in shapes.items() if arrays[name].shape != shape]
     if wrong or directions > rows or not 0 < components <= MOST_COMPONENTS:
         raise InputError(
             f"prior: {str(path)!r} holds {', '.join(wrong) or 'Gaussians'} of other patches than {PATCH}x{PATCH}; "
             "train one anew"
         )
     factors = np.zeros((components, directions, directions), np.float32)
-    factors[:, *np.tril_indices(directions)] = held["factors"]
-    single = {name: held[name].astype(np.float32) for name in _FIELDS[1:] if name != "factors"}
-    return Prior(neutrals_e=held["neutrals_e"], factors=factors, source=source, **single)
+    factors[:, *np.tril_indices(directions)] = arrays["factors"]
+    single = {name: arrays[name].astype(np.float32) for name in _FIELDS[1:] if name != "factors"}
+    return Prior(neutrals_e=arrays["neutrals_e"], factors=factors, source=source, **single)
 
 
 def save_prior(prior: Prior, path: Path) -> None:
     """Write a prior; factors and basis in half precision."""
     lower = prior.factors[:, *np.tril_indices(prior.factors.shape[1])].astype(np.float16)
-    held = {name: getattr(prior, name) for name in _FIELDS} | {
+    arrays = {name: getattr(prior, name) for name in _FIELDS} | {
         "factors": lower,
         "basis": prior.basis.astype(np.float16),
     }
     with replacing(path) as (place,), place.open("wb") as file:
-        np.savez_compressed(file, source=prior.source, allow_pickle=False, **held)
+        np.savez_compressed(file, source=prior.source, allow_pickle=False, **arrays)

@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.ple.estimate import STRIDE, PatchPilot, ScaleEstimate, border, estimate
+from isp.ple.estimate import PatchPilot, ScaleEstimate, estimate
 from isp.ple.mosaic import (
     CELLS,
     Cells,
@@ -21,6 +21,7 @@ from isp.ple.mosaic import (
     scale_of_cells,
     scale_of_pixels,
 )
+from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import PILOT_ERROR, Sampling, Singles
 from isp.ple.units import readings
@@ -63,17 +64,19 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     white_e = np.asarray(white_e) / shot
     levels = pyramid(raw, white_e, electrons, full)
     coarsest = levels[-1]
-    light = _own_light(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
-    found = estimate(prior, scale_of_cells(coarsest), light, None)
+    light = _light_of_sums(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
+    estimates = estimate(prior, scale_of_cells(coarsest), light, None)
     for coarse, cells in zip(levels[:0:-1], levels[-2::-1], strict=True):
-        own = _own_light(cells, [border(length, CELLS) for length in cells.full.shape[:2]], STRIDE)
-        found = estimate(prior, scale_of_cells(cells), *_told(found, coarse.sampling, cells.sampling, own))
+        sums = _light_of_sums(cells, [border(length, CELLS) for length in cells.full.shape[:2]], STRIDE)
+        estimates = estimate(
+            prior, scale_of_cells(cells), *_from_coarser(estimates, coarse.sampling, cells.sampling, sums)
+        )
 
     cells = levels[0]
-    own = _own_light(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
+    sums = _light_of_sums(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
     scale = scale_of_pixels(raw, white_e, electrons, full)
-    found = estimate(prior, scale, *_told(found, cells.sampling, scale.samplings[0][0], own))
-    planes = found.planes[..., cells.index]
+    estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
+    planes = estimates.planes[..., cells.index]
     apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
     for first in range(0, len(planes), TOGETHER):
         rows = planes[first : first + TOGETHER]
@@ -81,7 +84,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
         rows[...] = readings(raw.dark_noise_e).electrons(rows)
         for (c, _), plane in zip(apart, counted, strict=True):
             rows[..., c] = plane
-    return planes, found.noise[list(cells.index)]
+    return planes, estimates.noise[list(cells.index)]
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
@@ -93,51 +96,53 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
     ]
 
 
-def _own_light(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
+def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
     """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
-    gains, dark = (np.array(each)[list(cells.index)] for each in (cells.sampling.gains, cells.sampling.dark_e))
+    gains, dark = (np.array(values)[list(cells.index)] for values in (cells.sampling.gains, cells.sampling.dark_e))
     weights = gains / (np.maximum(_medians(cells), 0.1) + dark**2)
-    mode: Literal["reflect", "symmetric"] = "symmetric" if cells.held.all() else "reflect"  # which keeps the mosaic
+    mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # which keeps the mosaic
     full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
     weights = np.where(full > 0, 0.0, weights)
-    share = cells.held.mean(axis=(0, 1))  # of cells that hold a channel
+    share = cells.presence.mean(axis=(0, 1))  # of cells that hold a channel
     gains, floors = gains * share, dark**2 * share
     whole = CELLS**2 * (weights @ gains)
     mean = (sums * weights).sum(axis=-1) / whole
-    shot, floor = (CELLS**2 * (weights**2 * each).sum(axis=-1) / whole**2 for each in (gains, floors))
-    return PatchLight(*(each.astype(np.float32) for each in (mean, shot, floor)))
+    shot, floor = (CELLS**2 * (weights**2 * values).sum(axis=-1) / whole**2 for values in (gains, floors))
+    return PatchLight(*(values.astype(np.float32) for values in (mean, shot, floor)))
 
 
 def _medians(cells: Cells) -> NDArray[np.float64]:
     """Median of each channel's electrons over the cells that hold it, shape (channel,)."""
-    down, across, _ = cells.held.shape
+    down, across, _ = cells.presence.shape
     medians = np.empty(len(cells.index))
     for c in range(len(cells.index)):
-        each = [cells.electrons[a::down, b::across, c].ravel() for a, b in np.argwhere(cells.held[..., c])]
-        medians[c] = np.median(np.concatenate(each))
+        parts = [cells.electrons[a::down, b::across, c].ravel() for a, b in np.argwhere(cells.presence[..., c])]
+        medians[c] = np.median(np.concatenate(parts))
     return medians
 
 
-def _told(coarse: ScaleEstimate, before: Sampling, now: Sampling, own: PatchLight) -> tuple[Singles, PatchPilot]:
+def _from_coarser(
+    coarse: ScaleEstimate, before: Sampling, now: Sampling, sums: PatchLight
+) -> tuple[Singles, PatchPilot]:
     """Light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
 
     A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
     """
-    held = np.empty((*coarse.planes.shape[:2], 7), np.float32)
-    for first in range(0, len(held), TOGETHER):
+    values = np.empty((*coarse.planes.shape[:2], 7), np.float32)
+    for first in range(0, len(values), TOGETHER):
         part = slice(first, first + TOGETHER)
         wide = np.repeat(np.repeat(coarse.variance[first // STRIDE : -(-part.stop // STRIDE)], STRIDE, 0), STRIDE, 1)
         planes = coarse.planes[part]
-        held[part] = _held(planes, wide[: len(planes), : planes.shape[1]], before, now)
-    means = _patch_means(held, own.mean.shape, now.size)
+        values[part] = _in_finer_units(planes, wide[: len(planes), : planes.shape[1]], before, now)
+    means = _patch_means(values, sums.mean.shape, now.size)
     light, light_variance = means[..., 5], means[..., 6]
-    most = np.maximum(np.maximum(own.mean, light), 0.0)
-    own_variance = own.shot * most + own.floor + (COLOUR_SPREAD * most) ** 2
-    both = (light * own_variance + own.mean * light_variance) / (own_variance + light_variance)
+    most = np.maximum(np.maximum(sums.mean, light), 0.0)
+    sums_variance = sums.shot * most + sums.floor + (COLOUR_SPREAD * most) ** 2
+    both = (light * sums_variance + sums.mean * light_variance) / (sums_variance + light_variance)
     return both.astype(np.float32), PatchPilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
-def _held(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
+def _in_finer_units(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
     """Cells of a scale in a finer one's units of noise: roots by channel, their variance, light, its variance."""
     values = np.empty((7, *planes.shape[:2]))
     values[4] = 0.0
@@ -145,10 +150,10 @@ def _held(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -
         share = now.gains[c] / before.gains[c]
         old, new = readings(before.dark_e[c]), readings(now.dark_e[c])
         finer = old.electrons(planes[..., c]) * share
-        seen = np.maximum(finer, 0.0)
-        error = variance[..., c] * (share / old.slope(seen / share)) ** 2
-        values[c] = new.mean(seen)
-        values[4] += 0.25 * error * new.slope(seen) ** 2
+        positive = np.maximum(finer, 0.0)
+        error = variance[..., c] * (share / old.slope(positive / share)) ** 2
+        values[c] = new.mean(positive)
+        values[4] += 0.25 * error * new.slope(positive) ** 2
     light = finer / now.gains[3]
     values[5:] = light, error / now.gains[3] ** 2 + (PILOT_ERROR * light) ** 2
     return np.moveaxis(values, 0, -1)

@@ -24,7 +24,7 @@ LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's
 PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
 PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
 TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
-FEW = 20  # directions in which components are told apart first
+DIRECTIONS = 20  # directions in which components are told apart first
 MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
 # Tables that are kept, all of a 4x4 tile over six decades of light: 1.3 MB each, and 70 kB for each of its estimators
 # of 8x8 pixels that was asked for.
@@ -107,15 +107,15 @@ class Table:
             steep[places], noise[places] = curve.slope(electrons[places]), curve.variance(electrons[places])
         noise += (sampling.prnu * electrons * steep) ** 2
         self.slopes = 2.0 * gains * light * mix.means * steep
-        own = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
-        self.drift = electrons * steep * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(own.sum())))
+        information = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
+        self.drift = electrons * steep * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(information.sum())))
         # Samples: whitening, and the log likelihood's constant.
         at = self.rows
-        seen = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
-        seen += self.drift[:, at, None] * self.drift[:, None, at]
+        scatter = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
+        scatter += self.drift[:, at, None] * self.drift[:, None, at]
         self.unit = 1.0 / (steep**2 * (electrons + dark**2))
-        seen[:, np.arange(count), np.arange(count)] += noise[:, at]
-        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(seen)])
+        scatter[:, np.arange(count), np.arange(count)] += noise[:, at]
+        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(scatter)])
         self.log_scale = mix.log_weights + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
         self.average = np.tile(np.eye(4), pixels) / pixels
@@ -128,36 +128,36 @@ class Table:
         brightness = (self.average @ (electrons * steep).T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
         scale = np.sqrt(PILOT_VARIANCE + (PILOT_ERROR * brightness) ** 2)
-        left = (whole - half @ half.swapaxes(1, 2)) / scale / scale[:, None]
-        self.spread, turns = np.linalg.eigh(left)
+        remainder = (whole - half @ half.swapaxes(1, 2)) / scale / scale[:, None]
+        self.spread, turns = np.linalg.eigh(remainder)
         self.spread = np.maximum(self.spread, 0.0)
         self.turn = turns.swapaxes(1, 2) / scale  # (component, direction, channel)
         # One matrix takes samples, 1 and the pilot's means to whitened samples and the pilot's innovations.
-        told = self.turn @ (half @ factors)
-        reads = np.concatenate([factors, -told], axis=1)
+        forecast = self.turn @ (half @ factors)
+        reads = np.concatenate([factors, -forecast], axis=1)
         offset = -np.einsum("kij,kj->ki", reads, self.values[:, at])
         offset[:, count:] -= np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T)
         turn = np.concatenate([np.zeros((len(reads), count, 4)), self.turn], axis=1)
         reads = np.concatenate([reads, offset[..., None], turn], axis=2).swapaxes(1, 2)
         self.reads = np.ascontiguousarray(reads, dtype=np.float32)
-        self.centre, self.few, self.quick, outside = self._quick_likelihood(seen)
+        self.centre, self.directions, self.quick, outside = self._quick_likelihood(scatter)
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
         signal = 1.0 - np.mean(noise[:, at]) / (np.exp(self.mix.log_weights) @ outside)
         self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
         self.estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(self, seen: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
-        """Log likelihood in `FEW` directions and the rest's length, as one matrix on products of coordinates."""
+    def _quick_likelihood(self, covariances: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
+        """Log likelihood in `DIRECTIONS` directions and the rest's length, as one matrix on products of coordinates."""
         weights, at = np.exp(self.mix.log_weights), self.values[:, self.rows]
         centre = weights @ at
         off = at - centre
-        pooled = np.tensordot(weights, seen, 1) + (off.T * weights) @ off
-        count = min(FEW, seen.shape[1] - 1)
-        few = np.linalg.eigh(pooled)[1][:, ::-1][:, :count]
-        mean, within = off @ few, few.T @ seen @ few
+        pooled = np.tensordot(weights, covariances, 1) + (off.T * weights) @ off
+        count = min(DIRECTIONS, covariances.shape[1] - 1)
+        directions = np.linalg.eigh(pooled)[1][:, ::-1][:, :count]
+        mean, within = off @ directions, directions.T @ covariances @ directions
         inverse = np.linalg.inv(within)
-        others = seen.shape[1] - count
-        total = np.trace(seen, axis1=1, axis2=2) + (off**2).sum(axis=1)
+        others = covariances.shape[1] - count
+        total = np.trace(covariances, axis1=1, axis2=2) + (off**2).sum(axis=1)
         outside = (total - np.trace(within, axis1=1, axis2=2) - (mean**2).sum(axis=1)) / others
         pairs = np.triu_indices(count)
         square = -0.5 * inverse[:, pairs[0], pairs[1]] * np.where(pairs[0] == pairs[1], 1.0, 2.0)
@@ -166,7 +166,7 @@ class Table:
             np.linalg.slogdet(within)[1] + (straight * mean).sum(axis=1) + others * np.log(outside)
         )
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
-        return centre.astype(np.float32), few.astype(np.float32), quick.astype(np.float32), outside
+        return centre.astype(np.float32), directions.astype(np.float32), quick.astype(np.float32), outside
 
     @cached_property
     def inner(self) -> Doubles:

@@ -16,8 +16,8 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
-from isp.ple.estimate import STRIDE
 from isp.ple.mosaic import SIDES
+from isp.ple.overlap import STRIDE
 from isp.ple.prior import LETTERS, Prior, own_prior
 from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels

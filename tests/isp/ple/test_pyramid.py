@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.ple import estimate, mosaic, pyramid
+from isp.ple import estimate, mosaic, overlap, pyramid
 from isp.ple.prior import LETTERS, PATCH, own_prior
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels
@@ -134,8 +134,8 @@ def test_a_patchs_own_light_is_the_frames_up_to_its_border_and_varies_as_stated(
     ):
         cells = mosaic.pyramid(raw, white_e, raw.electrons.astype(np.float32), np.zeros(shape, bool))[0]
         sides = pyramid._sides(shape, cells.full.shape, PATCH)
-        sides = sides if size == PATCH else [estimate.border(length, size) for length in cells.full.shape[:2]]
-        light = pyramid._own_light(cells, sides, stride)
+        sides = sides if size == PATCH else [overlap.border(length, size) for length in cells.full.shape[:2]]
+        light = pyramid._light_of_sums(cells, sides, stride)
         means.append(light.mean)
     assert means[0] == pytest.approx(np.full(means[0].shape, level_e), rel=1e-5)
     inside = (slice(4, -4), slice(4, -4))

@@ -1,0 +1,76 @@
+"""Patches that overlap: where they lie, beyond the frame too, and their weighted sums."""
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.ple.pick import BLOCK
+from isp.ple.tables import Singles, taper
+
+STRIDE = 2  # pixels from patch to patch
+
+
+@dataclass(frozen=True)
+class Patches:
+    """Estimates of some patches; arrays over the patches first.
+
+    Attributes
+    ----------
+    values : (patch, value) float32
+        Every channel at every pixel, times window and weight.
+    weight : (patch,) float32
+        w of `isp.ple.estimate`'s formula.
+    inner, noise : (patch, 4) float32
+        By channel: posterior variance of the mean of the patch's middle, and of a pixel over a sample's noise.
+    """
+
+    values: Singles
+    weight: Singles
+    inner: Singles
+    noise: Singles
+
+
+def border(length: int, size: int) -> tuple[int, int]:
+    """Samples to add before and behind, so that every one lies in as many patches."""
+    return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
+
+
+def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
+    """Samples (h, w, ...), continued by reflection by their `border`."""
+    sides = [border(length, size) for length in samples.shape[:2]]
+    return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
+
+
+def overlapped(patches: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
+    """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
+    (ny, nx), across = shape, size // STRIDE
+    total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
+    values = patches.values.reshape(ny, nx, size, -1)
+    # Some rows of patches at once, so that values are read once. In a row patches that don't overlap, so that a sum
+    # runs over a patch's width.
+    together = max(1, 4 * BLOCK // nx)
+    for first in range(0, ny, together):
+        lines = slice(first, min(first + together, ny))
+        for i in range(size):
+            rows = total[first * STRIDE + i : (lines.stop - 1) * STRIDE + i + 1 : STRIDE]
+            for j in range(min(across, nx)):
+                part = values[lines, j::across, i]
+                line = rows[:, j : j + part.shape[1] * across].reshape(part.shape)  # a view: `total` takes the sum
+                line += part
+    # The window is a product of two lines: weights are summed across, then down, and so are the cells.
+    inner = np.concatenate([patches.inner, np.ones((ny * nx, 1), np.float32)], axis=1)
+    inner = (inner * patches.weight[:, None]).reshape(ny, nx, 5)
+    shares, sides = inner[..., 4:], taper(size).reshape(across, STRIDE)
+    weight, cells = (np.zeros((ny, nx - 1 + across, width), np.float32) for width in (STRIDE, 5))
+    for j in range(across):
+        weight[:, j : j + nx] += shares * sides[j]
+        cells[:, j : j + nx] += inner
+    weights = np.zeros((len(total), nx - 1 + across, STRIDE), np.float32)
+    sums = np.zeros((ny - 1 + across, nx - 1 + across, 5), np.float32)
+    for i in range(across):
+        sums[i : i + ny] += cells
+        for side in range(STRIDE):
+            weights[STRIDE * i + side :: STRIDE][:ny] += weight * sides[i, side]
+    return total.reshape(len(total), -1, 4), weights.reshape(len(total), -1), sums[..., :4], sums[..., 4]
