@@ -29,7 +29,7 @@ def flat(cfa: Tile, level_e: float) -> RawImage:
     return raw_image(np.rint(electrons + 100), cfa, read_noise_e=2.0, dsnu_e=0.0)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize("level_e", [20.0, 400.0])
 def test_most_of_the_noise_of_a_flat_field_goes_and_no_light(name: str, level_e: float) -> None:

@@ -67,7 +67,7 @@ def test_what_has_no_curves_or_no_place_is_refused(tmp_path: Path, monkeypatch: 
     check_refusals("list", rows, tmp_path)
 
 
-@pytest.mark.sample(2)
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("kind", ["", "scenes", "lights", "sensors", "mosaics", "processors", "metrics"])
 def test_lists_import_no_renderer(kind: str) -> None:
     """Nor what takes long to load: 0.2 to 0.6 s of processor time a command, where a list of mosaics took 1.7 s."""

@@ -34,7 +34,7 @@ def test_what_is_kept_changes_no_bit():
         assert kept.exposed.exposure_s == fresh.exposed.exposure_s
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(2)
 @pytest.mark.parametrize("processor", [name for name in PROCESSORS if not libraries(name) and not is_slow(name)])
 def test_every_mosaic_that_the_page_offers_is_developed(processor):
     for mosaic in mosaics_of(PROCESSORS[processor]):

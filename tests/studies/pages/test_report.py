@@ -261,6 +261,7 @@ def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_tit
     assert read_study(CONFIGS / "demo.toml").title == "What does the white pixel bring?"
 
 
+@pytest.mark.thorough
 def test_a_camera_without_an_infrared_filter_has_a_page() -> None:
     seeing = replace(SAMPLE.SENSORS[1].config, window_nm=(380.0, 1068.0))
     sensors = (SAMPLE.SENSORS[0], replace(SAMPLE.SENSORS[1], config=seeing))
@@ -278,6 +279,7 @@ def test_every_metric_is_explained() -> None:
     assert "by moonlight it sees so little that even a picture full of noise gets some 45 dB" in page
 
 
+@pytest.mark.thorough
 def test_the_largest_share_of_the_renders_noise_is_told_once() -> None:
     of = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.052 if row.level == "office" else 0.03))
     page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")

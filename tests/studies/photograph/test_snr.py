@@ -77,6 +77,7 @@ def test_an_even_field_is_simulated_as_the_closed_form_has_it(dark: str, luminan
     assert found.simulated_db == pytest.approx(found.snr_db, abs=0.08)
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("binning", ["charge", "digital"])
 def test_four_pixels_that_bin_take_a_quarter_of_the_light_and_their_read_noise_once_or_twice(binning) -> None:
     """Without fixed patterns and dark current: e^2 / (e + dark^2) = SNR^2, of the sum's own electrons."""
