@@ -143,20 +143,21 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
     start, chunk, apart = means.count, chunk_from(means.count), means.indirect is not None
+    # Chunks of one length (it grows along the sequence), as many as the threads of a launch hold
     threads = launch_threads(light_groups, film, apart=apart)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
-    alike = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
-    chunks = min(alike, -(-(stop - start) // chunk))
+    equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
+    chunks = min(equal_chunks, -(-(stop - start) // chunk))
     span = Span(start, chunk, chunks)
-    drawn = [_drawn(each, film, means.rates, span, threads, seed, apart=apart) for each in light_groups]
+    draws = [_drawn(loaded, film, means.rates, span, threads, seed, apart=apart) for loaded in light_groups]
     if len(light_groups[0].groups) == 2:
         means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
         # Each light group is found by paths of its own: together they cover the sum of what each does.
-        even, odd = (sum(of_group.coverage[half][index] for of_group in drawn) for half in range(2))
+        even, odd = (sum(of_group.coverage[half][index] for of_group in draws) for half in range(2))
         means.coverage.add(np.asarray(even), np.asarray(odd), weight)
-        for loaded, of_group in zip(light_groups, drawn, strict=True):
+        for loaded, of_group in zip(light_groups, draws, strict=True):
             for slot, group in enumerate(loaded.groups):
                 even, odd = of_group.radiance
                 means.light[group].add(even[index, slot], odd[index, slot], weight)
@@ -203,11 +204,11 @@ def _drawn(
     """Draw a span of both halves of one light group's paths."""
     halves, groups = [], len(loaded.groups)
     for half in range(2):
-        own_seed, parts = seed_of(seed, loaded.groups[0], half), []
+        group_seed, parts = seed_of(seed, loaded.groups[0], half), []
         for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
             bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-            tracer = Tracer(mitsuba_module(), loaded, bands, own_seed, apart=apart)
-            parts.append(traced(partial(tracer.camera, film.size), rates, span, threads, own_seed))
+            tracer = Tracer(mitsuba_module(), loaded, bands, group_seed, apart=apart)
+            parts.append(traced(partial(tracer.camera, film.size), rates, span, threads, group_seed))
         scattered, indirect = (
             np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
             for name, count in (("scattered", groups), ("indirect", groups * apart))

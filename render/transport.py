@@ -245,8 +245,8 @@ class Transport:
                 require_keys(f"{what}: light group", given, self.groups)
         lights = {}
         for name, group in self.groups.items():
-            own = (spectra or {}).get(name, group.spectrum)
-            spectrum = illuminant(own) if isinstance(own, str) else own
+            choice = (spectra or {}).get(name, group.spectrum)
+            spectrum = illuminant(choice) if isinstance(choice, str) else choice
             require_kind(f"spectra[{name!r}]", spectrum, Spectrum, "give rodcone.illuminant(name)")
             power = (powers or {}).get(name, group.power)
             require_range(f"powers[{name!r}]", power, 0.0, 1e30, "give a factor of 0 or more")
@@ -274,17 +274,17 @@ class Transport:
         weights = self._luminance_weights(emitted)
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
-            asked, present = luminance_cd_m2, self.scene_means.luminance_level(weights)
+            target, level = luminance_cd_m2, self.scene_means.luminance_level(weights)
         elif illuminance_lux is not None:
             require_range("illuminance_lux", illuminance_lux, 0.0, 1e15, "give an illuminance of 0 or more")
             if self.meter is None:
                 raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
-            asked, present = illuminance_lux, self.meter().level(weights)
+            target, level = illuminance_lux, self.meter().level(weights)
         else:
             return emitted, None
-        if present.value <= 0:
-            raise InputError(f"level: {asked} can't be reached, the scene gives no light; raise a power or spectrum")
-        return emitted * (asked / present.value), present.relative_error
+        if level.value <= 0:
+            raise InputError(f"level: {target} can't be reached, the scene gives no light; raise a power or spectrum")
+        return emitted * (target / level.value), level.relative_error
 
     def _luminance_weights(self, emitted: Floats) -> Floats:
         """Luminance of a transport of 1 in each group and band, shape (group, band)."""

@@ -66,13 +66,13 @@ def denoiser() -> Any:
 def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
     """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
     bands = film.wavelength_nm.size
-    own_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
+    group_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
     once = np.ones(film.size, np.uint32)
     for part in np.array_split(np.arange(bands), -(-bands // PART_BANDS)):
         of_part = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-        tracer = Tracer(mitsuba_module(), loaded, of_part, own_seed)
+        tracer = Tracer(mitsuba_module(), loaded, of_part, group_seed)
         span = Span(0, SURFACE_POINTS, 1)
-        image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, own_seed)
+        image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, group_seed)
         albedo.append(image["albedo"][0])
         normal.append(image["normal"][0])
     return np.concatenate(albedo), normal[0]
@@ -111,33 +111,36 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
     options["device"] = library.Device(library.DeviceType.CPU)  # the same light on every machine
 
     def filtered(planes: Planes) -> Planes:
-        filled = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
-        made = [library.denoise(_last(planes[three]), **options) for three in filled.reshape(-1, _PLANES)]
-        return np.concatenate([np.moveaxis(image, -1, 0) for image in made])[: len(planes)]
+        indices = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
+        images = [library.denoise(_last(planes[triple]), **options) for triple in indices.reshape(-1, _PLANES)]
+        return np.concatenate([np.moveaxis(image, -1, 0) for image in images])[: len(planes)]
 
     even, odd = np.maximum(reduced + error, 0), np.maximum(reduced - error, 0)
     share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
-    mixed = reduced + share * (filtered(reduced) - reduced)
-    return np.asarray(np.maximum(np.tensordot(_way_back(light, reduced), mixed, 1), 0) * unit)
+    mixture = reduced + share * (filtered(reduced) - reduced)
+    return np.asarray(np.maximum(np.tensordot(_way_back(light, reduced), mixture, 1), 0) * unit)
 
 
-def _denoised_share(error: Planes, missed: tuple[Planes, Planes]) -> Planes:
-    """Share of denoised light in each pixel (h, w), by the variance of the noisy and the squared error of the denoised.
+def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
+    """Share s of denoised light in each pixel (h, w): V / (V + E), as of a Wiener filter.
+
+    V is the variance of the noisy light, E the squared error of the denoised, both means over a Gaussian window.
 
     Parameters
     ----------
     error : (spectrum, h, w) float32
         Half the difference of the halves.
-    missed : pair of (spectrum, h, w) float32
-        What a half, denoised, differs by from the other half: its error, and the noise of that half.
+    residuals : pair of (spectrum, h, w) float32
+        Each half, denoised, less the other: its error, and the noise of the other.
     """
     from scipy.ndimage import gaussian_filter  # late: a render that isn't denoised does without
 
-    noisy, one, other = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *missed))
+    variance, even, odd = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *residuals))
     # A half has twice the variance of the mean. What is left must be more than that estimate's own standard error.
-    variance, pixels = 2 * noisy, 4 * np.pi * MIXING_PIXELS**2
-    squared = np.maximum((one + other) / 2 - variance - variance * (2 / pixels) ** 0.5, 0)
-    return np.asarray(np.divide(noisy, noisy + squared, out=np.ones_like(noisy), where=noisy + squared > 0))
+    of_half, pixels = 2 * variance, 4 * np.pi * MIXING_PIXELS**2
+    squared = np.maximum((even + odd) / 2 - of_half - of_half * (2 / pixels) ** 0.5, 0)
+    total = variance + squared
+    return np.asarray(np.divide(variance, total, out=np.ones_like(total), where=total > 0))
 
 
 def _hats(bands: int) -> Planes:

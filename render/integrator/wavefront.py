@@ -52,8 +52,8 @@ def traced(
     # Paths of one packet change each other's last bits: Embree goes through its tree in another way once few are left.
     # So a packet holds the same paths whatever the launch, and a rate's last pixel fills its last packet up.
     together = LANES // math.gcd(LANES, span.chunk)
-    rated = np.split(order, np.flatnonzero(np.diff(flat[order])) + 1)
-    order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in rated])
+    by_rate = np.split(order, np.flatnonzero(np.diff(flat[order])) + 1)
+    order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in by_rate])
     ends = np.cumsum(flat[order].astype(np.int64) * span.chunk * span.chunks)
     cuts = (np.flatnonzero(np.diff(ends // threads)) + 1) // together * together
     means: dict[str, Planes] = {}

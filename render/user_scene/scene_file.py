@@ -81,19 +81,19 @@ def load_scene_file(
     state = _parse(mi, file, trust, define or {})
     # A trusted scene's <path> folders are on Mitsuba's search path by now.
     searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
-    read = assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
-    return read if extend else _with_held_ends(read)
+    opened = assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
+    return opened if extend else _with_held_ends(opened)
 
 
-def _with_held_ends(read: SceneFile) -> SceneFile:
+def _with_held_ends(opened: SceneFile) -> SceneFile:
     """Hold the ends of tables that cover 400 to 700 nm: beyond lies less than 0.1 % of luminance."""
-    known = known_range(read.scene)
+    known = known_range(opened.scene)
     if known is None or known[0] > HELD_NM[0] or known[1] < HELD_NM[1]:
-        return read
+        return opened
     if known[0] <= VISIBLE_NM[0] and known[1] >= VISIBLE_NM[1]:
-        return read
+        return opened
     note = f"surfaces known over {known[0]:g}-{known[1]:g} nm go on at their end values beyond"
-    return replace(read, scene=replace(read.scene, extend="hold"), notes=(*read.notes, note))
+    return replace(opened, scene=replace(opened.scene, extend="hold"), notes=(*opened.notes, note))
 
 
 def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
@@ -173,11 +173,11 @@ def _xml_part(
 
 def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str, tag: str) -> str:
     """Key of a part: the name wanted, else its kind; without separators of paths, numbered where a part has it."""
-    own = _RESERVED.sub("_", wanted) or tag
-    name = own if wanted else ""
+    stem = _RESERVED.sub("_", wanted) or tag
+    name = stem if wanted else ""
     while not name or name in taken or (name != wanted and name in ids):
-        name = f"{own}_{numbers[own]}"
-        numbers[own] += 1
+        name = f"{stem}_{numbers[stem]}"
+        numbers[stem] += 1
     return name
 
 

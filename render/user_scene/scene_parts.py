@@ -108,11 +108,11 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
 
 def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
     """Longest path and first depth of Russian roulette, of the first integrator that has paths, alone or in another."""
-    stated = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
-    if not stated:
+    nodes = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
+    if not nodes:
         direct = any(node["type"] in ("direct", "direct_projective") for node in integrators)
         return 2 if direct else Scene.max_depth, Scene.rr_depth
-    depth, rr_depth = stated[0].get("max_depth", _PATHS[stated[0]["type"]]), stated[0].get("rr_depth", Scene.rr_depth)
+    depth, rr_depth = nodes[0].get("max_depth", _PATHS[nodes[0]["type"]]), nodes[0].get("rr_depth", Scene.rr_depth)
     require_whole(f"scene {name}: rr_depth", rr_depth, 1, 1 << 31, "roulette begins after the first surface")
     return DEEPEST if depth < 0 else max(2, int(depth)), min(int(rr_depth), DEEPEST)
 
@@ -128,14 +128,14 @@ def _camera(mi: Any, name: str, description: Node, notes: list[str]) -> tuple[No
     named = {part.get("id", key): part for key, part in description.items() if _kind(mi, part) in _LEFT_OUT}
     camera = next((sensor for sensor in sensors if sensor["type"] in CAMERAS), None)
     if camera is None:
-        found = ", ".join(repr(sensor["type"]) for sensor in sensors) or "'none'"
-        raise InputError(f"scene {name}: camera {found}; allowed: {', '.join(CAMERAS)}; add a sensor")
+        types = ", ".join(repr(sensor["type"]) for sensor in sensors) or "'none'"
+        raise InputError(f"scene {name}: camera {types}; allowed: {', '.join(CAMERAS)}; add a sensor")
     if len(sensors) > 1:
         rendered = f"{camera['type']!r}, the first that can be, is rendered"
         notes.append(f"{len(sensors) - 1} of {len(sensors)} cameras are left out: {rendered}")
-    own = {key: named.get(part["id"], part) if type_of(part) == "ref" else part for key, part in camera.items()}
-    kept = {key: part for key, part in own.items() if _kind(mi, part) not in _LEFT_OUT}
-    film: Node = next((part for part in own.values() if _kind(mi, part) == "film"), {})
+    parts = {key: named.get(part["id"], part) if type_of(part) == "ref" else part for key, part in camera.items()}
+    kept = {key: part for key, part in parts.items() if _kind(mi, part) not in _LEFT_OUT}
+    film: Node = next((part for part in parts.values() if _kind(mi, part) == "film"), {})
     size = film.get("height", FILM_SIZE[0]), film.get("width", FILM_SIZE[1])
     for side, pixels in zip(("height", "width"), size, strict=True):
         require_whole(f"scene {name}: film {side}", pixels, 1, 1 << 15, "give pixels")
