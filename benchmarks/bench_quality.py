@@ -1,19 +1,15 @@
 """How good the interleaved camera's pictures are, beside its opponents', and whether anything jumps over the light.
 
-Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... daylight``, ``... exposures``,
-``... substitution``, ``... fringes`` or ``... settings``; renders are kept in ``out/bench_quality``. Quality is against
-the noise-free truth at the known exposure scale, as in the demo.
+Run ``python benchmarks/bench_quality.py transitions``, ``... ranking``, ``... substitution`` or ``... settings``;
+renders are kept in ``out/bench_quality``. Quality is against the noise-free truth at the known exposure scale, as in
+the demo.
 
 - transitions: quality over light in half octaves, at a fixed exposure and with auto exposure, and the deepest drop over
   one octave until the colours themselves saturate.
 - ranking: every processor on the same scene, exposure, pixel and well, at light that gives Bayer's green a stated
   median SNR, and at Figure 6's conditions; the interleaved camera's lead over each with its 95 % interval (20 seeds for
   it and the paper's reference, 5 for the others, 3 for BM3D, which is slow). Where W's SNR is under 1: not ranked.
-- daylight: bright light, where Bayer samples green twice as densely, with and without W below saturation.
-- exposures: what exposing for W is worth beside exposing for green, white balance given, and which of the two holds
-  more information (`sensor.exposure.information_bits`); on training pictures first.
 - substitution: Figure 6's decision, 20 seeds a scene and exposure.
-- fringes: a grey star that no scene holds: RMS of R - G and B - G of the encoded picture, 0 in truth.
 - settings: sweep of patch, sigma_d and sigma_s that the defaults come from.
 """
 
@@ -27,7 +23,6 @@ import numpy as np
 from environment import print_environment
 from numpy.typing import NDArray
 from scipy.optimize import brentq
-from training_pictures import TRAINING, TRAINING_SEED, training_pictures
 
 from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
@@ -35,17 +30,14 @@ from isp.processors.catalogue import NAMED, PROCESSORS
 from isp.settings import NEIGHBOURHOOD, Settings
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, substitution_weight
 from render.engine import render
-from render.illuminants import illuminant
-from render.radiance import SpectralRadiance
-from render.spectrum import band_widths
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.capture import expose
-from sensor.cfa import channels, mask, unit_channel
+from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import auto_exposure_s, information_bits
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -53,14 +45,12 @@ from sensor.response import expected_electrons
 from sensor.variations import vary
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import Quality, measure
-from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 
 SIZE = 160
-FINER = 8  # samples a pixel along either axis, of the star
 WAVELENGTH_NM = np.arange(390.0, 780.0, 20.0)
 FIXED_S, LONGEST_S = 0.020, 0.066
-DAYLIGHT_CD_M2 = 1000.0
 OUT = Path("out/bench_quality")
 SNR_DB = (-16.0, -8.0, 0.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)  # of Bayer's green; the claim is on 0 to 15
 FIGURE_6 = ((25.0, 0.005), (25.0, 0.010), (25.0, 0.020))  # cd/m^2 and s
@@ -70,7 +60,7 @@ SEEDS = {
     "bayer": 20,
     **{name: 3 for name, one in PROCESSORS.items() if one.extra == "bm3d"},
 }  # 5: others
-STAGES = ("transitions", "ranking", "daylight", "exposures", "substitution", "fringes", "settings")
+STAGES = ("transitions", "ranking", "substitution", "settings")
 METRICS = (("PSNR", "psnr_db", 1), ("dE2000", "delta_e_median", -1))  # sign: which way is better
 
 
@@ -249,39 +239,6 @@ def verdict(found: dict[str, list[Quality]], white_snr_db: float) -> str:
     return "; ".join(said)
 
 
-def daylight(bench: SceneAndSensor) -> None:
-    """In bright light, with an exposure by green as all cameras choose it, and one that keeps W below saturation."""
-    for name, channel in (("bayer", "G"), ("bayer_menon", "G"), ("interleaved", "G"), ("interleaved", "W")):
-        shots = [bench.shot(bench.camera(name, s), DAYLIGHT_CD_M2, channel, s) for s in range(5)]
-        psnr, delta_e = ([getattr(shot.quality, x) for shot in shots] for x in ("psnr_db", "delta_e_median"))
-        print(f"  {name:12s} exposed for {channel}, {shots[0].raw.exposure_s * 1e3:.3g} ms:", end="")
-        print(f" {np.mean(psnr):.2f} dB  dE {np.mean(delta_e):.2f}", end="")
-        if name == "interleaved":
-            full = [shot.raw.saturated[mask(shot.raw.cfa, "W", shot.raw.shape)].mean() for shot in shots]
-            print(f"  W full {np.mean(full):.2f}", end="")
-        print(flush=True)
-
-
-def exposures(bench: SceneAndSensor, levels: Sequence[float], seeds: int) -> None:
-    """What exposing for W in place of green changes in the interleaved camera's pictures, and what bits say of it."""
-    for level in levels:
-        found, told = {}, {}
-        for channel in "GW":
-            cameras = [bench.camera("interleaved", seed) for seed in range(seeds)]
-            electrons, seconds = bench.exposed(cameras[0], level, channel)
-            balance = neutral_electrons(cameras[0].sensor, bench.stage.light, seconds)
-            shots = [bench.shot(camera, level, seconds, s, balance=balance) for s, camera in enumerate(cameras)]
-            found[channel] = np.mean([(shot.quality.psnr_db, shot.quality.delta_e_median) for shot in shots], axis=0)
-            told[channel] = information_bits(electrons, cameras[0].sensor, seconds), seconds
-        psnr_db, delta_e = found["W"] - found["G"]
-        bits, shorter = told["W"][0] - told["G"][0], told["G"][1] / told["W"][1]
-        print(
-            f"{level:8.4g} cd/m2: a time {shorter:.2f} times shorter, for W: {psnr_db:+.2f} dB, dE {delta_e:+.2f}",
-            end="",
-        )
-        print(f", {bits:+.2f} bits a sample", flush=True)
-
-
 def substitution(bench: SceneAndSensor) -> None:
     """Figure 6: 25 cd/m^2 at 5, 10 and 20 ms, each reading of Table 1 with its own threshold."""
     threshold = THRESHOLDS[bench.sensor]
@@ -293,37 +250,6 @@ def substitution(bench: SceneAndSensor) -> None:
             f" threshold {threshold}",
             flush=True,
         )
-
-
-def star() -> RenderedScene:
-    """White card with a star of 29 black spokes, between 9 and 27 pixels from the middle, grey under D65."""
-    y, x = (np.indices((128 * FINER, 128 * FINER)) + 0.5) / FINER
-    radius, angle = np.hypot(y - 70.8, x - 57.3), np.arctan2(y - 70.8, x - 57.3)
-    black = (np.sin(29 * (angle - 0.19)) > 0) & (radius < 27.0) | (radius < 9.0)
-    card = np.where(black, 0.04, 0.85).reshape(128, FINER, 128, FINER).mean(axis=(1, 3))
-    light = light_in_bands(illuminant("D65"), WAVELENGTH_NM, band_widths(WAVELENGTH_NM))
-    radiance = SpectralRadiance(card[..., None] * light.spectrum, WAVELENGTH_NM)
-    radiance = SpectralRadiance(radiance.values / radiance.luminance().mean(), WAVELENGTH_NM)
-    white = float(radiance.luminance().max()) / 0.9
-    return RenderedScene(radiance, light, white, encode_srgb(true_srgb(radiance, light, white)))
-
-
-def fringes(bench: SceneAndSensor, names: Sequence[str], levels: Sequence[float], seeds: int) -> None:
-    """Colour on a grey star: RMS of R - G and B - G within 30 pixels of its middle, balance given."""
-    y, x = np.indices((128, 128)) + 0.5
-    near = np.hypot(y - 70.8, x - 57.3) < 30.0
-    for level in levels:
-        for name in names:
-            cfa = bench.camera(name, 0).sensor.cfa
-            for channel in dict.fromkeys((unit_channel(cfa), "W" if "W" in channels(cfa) else unit_channel(cfa))):
-                found = []
-                for seed in range(seeds):
-                    camera = bench.camera(name, seed)
-                    _, seconds = bench.exposed(camera, level, channel)
-                    balance = neutral_electrons(camera.sensor, bench.stage.light, seconds)
-                    rgb = bench.shot(camera, level, seconds, seed, balance=balance).encoded[near]
-                    found.append(np.sqrt(np.mean((rgb[:, [0, 2]] - rgb[:, 1:2]) ** 2)))
-                print(f"{level:8.4g} cd/m2, {name}, exposed for {channel}: {np.mean(found):.4f}", flush=True)
 
 
 def settings(bench: SceneAndSensor, levels: Sequence[float]) -> None:
@@ -356,11 +282,6 @@ def main() -> None:
     options = parser.parse_args()
     print_environment()
     stages = {scene: lambda scene=scene: open_stage(scene, max_spp=768) for scene in options.scene}
-    if options.what == "exposures":
-        made = enumerate(training_pictures(SIZE, TRAINING, TRAINING_SEED), 1)
-        stages = {f"training {n}": lambda one=one: RenderedScene(**vars(one)) for n, one in made} | stages
-    if options.what == "fringes":
-        stages = {"star": star}
     for scene, open_one in stages.items():
         stage = open_one()
         for sensor in options.sensor if options.what != "substitution" else THRESHOLDS:
@@ -371,14 +292,8 @@ def main() -> None:
             elif options.what == "ranking":
                 lit = [(bench.level_of_snr(snr, FIXED_S), FIXED_S) for snr in options.snr]
                 ranking(bench, [*lit, *FIGURE_6], ["interleaved", "bayer", *options.opponent])
-            elif options.what == "daylight":
-                daylight(bench)
-            elif options.what == "exposures":
-                exposures(bench, options.level, options.seeds)
             elif options.what == "substitution":
                 substitution(bench)
-            elif options.what == "fringes":
-                fringes(bench, options.opponent, options.level, options.seeds)
             else:
                 settings(bench, options.level)
 

@@ -40,7 +40,7 @@ class DevelopOrder:
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp : str, optional
         Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
-        Or a function in a Python file of your own, mine.py:develop, with --trust-code.
+        Or a function in a Python file of your own, mine.py:develop, with --trust-code; or FILE.whl:bayer_net.
     bits : int
         Bits a channel: 8 or 16.
     ev : float, optional
