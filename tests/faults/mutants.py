@@ -24,7 +24,7 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -57,11 +57,10 @@ NEEDS_ARGUMENTS = ("VariableInserter", "VariableReplacer")
 
 @dataclass(frozen=True)
 class Mutant:
-    """A file with one change: its code, the first line that changed, and the change as text."""
+    """A file with one change: its code, and the lines that changed."""
 
     file: str
     code: str
-    line: int
     change: str
 
 
@@ -97,8 +96,7 @@ def drawn(seed: int, copy: Path) -> Iterator[Mutant]:
         code = mutate_code(text, operators[name], number)
         with suppress(SyntaxError):
             if without_annotations(code) != without_annotations(text):
-                change = difference(text, code)
-                yield Mutant(file, code, int(change.split()[1].rstrip(":")), change)
+                yield Mutant(file, code, difference(text, code))
 
 
 def without_annotations(code: str) -> str:
@@ -117,10 +115,11 @@ def difference(text: str, code: str) -> str:
 
 
 class Reach:
-    """Pytest's plugin: the tests that reach each line of some files, and the seconds of each test that passes."""
+    """Pytest's plugin: writes the tests that reach each line of some files, and the seconds of each that passes."""
 
     def __init__(self, files: list[str]) -> None:
         self.coverage, self.seconds = Coverage(data_file=None, include=files), dict[str, float]()
+        self.coverage.start()
 
     @pytest.hookimpl(tryfirst=True)
     def pytest_runtest_protocol(self, item: pytest.Item) -> None:
@@ -133,42 +132,18 @@ class Reach:
     def pytest_sessionfinish(self) -> None:
         self.coverage.stop()
         data = self.coverage.get_data()
-        lines = {file: data.contexts_by_lineno(file) for file in data.measured_files()}
+        lines = {os.path.relpath(file): data.contexts_by_lineno(file) for file in data.measured_files()}
         Path("reach.json").write_text(json.dumps([self.seconds, lines]))
 
 
-class Order:
-    """Pytest's plugin: the tests that reach a mutant's lines, the quickest first, then the rest of their files."""
-
-    def __init__(self, reaching: set[str], seconds: dict[str, float]) -> None:
-        self.reaching, self.seconds = reaching, seconds
-
-    @pytest.hookimpl(trylast=True)
-    def pytest_collection_modifyitems(self, items: list[pytest.Item]) -> None:
-        files = Counter[str]()
-        for test in self.reaching:
-            files[test.partition("::")[0]] += self.seconds[test]  # type: ignore[assignment]
-        keys = {
-            item.nodeid: (
-                item.nodeid not in self.reaching,
-                files[item.nodeid.partition("::")[0]],
-                self.seconds[item.nodeid],
-            )
-            for item in items
-            if item.nodeid in self.seconds
-        }
-        items[:] = sorted((item for item in items if item.nodeid in keys), key=lambda item: keys[item.nodeid])
-
-
-def reached(copy: Path, commit: str, known: dict[str, Any]) -> dict[str, tuple[dict[str, float], dict[int, set[str]]]]:
+def reached(copy: Path, known: dict[str, Any]) -> dict[str, tuple[dict[str, float], dict[str, list[str]]]]:
     """Of each file: the seconds of its package's tests, and the tests that reach each line; kept in `known`."""
     result = {}
     for tests in dict.fromkeys(TESTS.values()):
         files = [file for file in TESTS if TESTS[file] == tests]
-        kept = " ".join(git("rev-parse", *(f"{commit}:{path}" for path in (f"tests/{tests}", *files))).decode().split())
+        kept = " ".join(git("rev-parse", *(f"HEAD:{path}" for path in (f"tests/{tests}", *files))).decode().split())
         if kept not in known:
-            plugin = Reach([str(copy / file) for file in files])
-            log = run_tests(copy, ["-q", "-m", MAKE_TEST, f"tests/{tests}"], plugin, seconds=3600)[1]
+            log = run_tests(copy, ["-q", "-m", MAKE_TEST, f"tests/{tests}"], 3600, files)[1]
             print(
                 tests,
                 *re.findall("^(?:FAILED|ERROR) .*", log, re.MULTILINE),
@@ -178,9 +153,7 @@ def reached(copy: Path, commit: str, known: dict[str, Any]) -> dict[str, tuple[d
             )
             known[kept] = json.loads((copy / "reach.json").read_text())
         seconds, lines = known[kept]
-        for file in files:
-            of_file = next((x for path, x in lines.items() if path.endswith(file)), {})
-            result[file] = seconds, {int(number): set(names) for number, names in of_file.items()}
+        result |= {file: (seconds, lines.get(file, {})) for file in files}
     return result
 
 
@@ -188,28 +161,31 @@ def git(*words: str) -> bytes:
     return subprocess.check_output(["git", *words], cwd=ROOT)
 
 
-def reaching(mutant: Mutant, text: str, lines: dict[int, set[str]]) -> set[str]:
-    """The tests that reach a mutant's statement; of code that runs at import, all that reach the file."""
-    around = [
-        node
-        for node in ast.walk(ast.parse(text))
-        if isinstance(node, ast.stmt) and node.lineno <= mutant.line <= (node.end_lineno or 0)
-    ]
-    *outer, inner = sorted(around, key=lambda node: (node.lineno, -(node.end_lineno or 0))) or [ast.Pass()]
-    in_function = any(isinstance(node, ast.FunctionDef) for node in outer)
-    numbers = range(inner.lineno, (inner.end_lineno or 0) + 1) if in_function else lines
+def reaching(text: str, line: int, lines: dict[str, list[str]]) -> set[str]:
+    """The tests that reach the statement at a line; of code that runs at import, all that reach the file."""
+    nodes = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt))
+    around = [node for node in nodes if node.lineno <= line <= (node.end_lineno or 0)]  # the outermost first
+    in_function = any(isinstance(node, ast.FunctionDef) for node in around[:-1])
+    numbers = map(str, range(around[-1].lineno, (around[-1].end_lineno or 0) + 1)) if in_function else lines
     return {test for number in numbers for test in lines.get(number, ())}
 
 
-def tried(mutant: Mutant, copy: Path, seconds: dict[str, float], lines: dict[int, set[str]]) -> dict[str, Any]:
-    """What its tests make of a mutant; the copy is as before afterwards."""
+def tried(mutant: Mutant, copy: Path, seconds: dict[str, float], lines: dict[str, list[str]]) -> dict[str, Any]:
+    """What its tests make of a mutant: those of one file after another, the quickest first, then the files' others."""
     file, text, start = copy / mutant.file, (copy / mutant.file).read_text("utf-8"), time.perf_counter()
-    order = Order(reaching(mutant, text, lines) & seconds.keys(), seconds)
-    files = sorted({test.partition("::")[0] for test in order.reaching})
-    expected = sum(seconds[test] for test in seconds if test.partition("::")[0] in files)
+    near = reaching(text, int(mutant.change.split()[1].rstrip(":")), lines) & seconds.keys()
+    of_file = {test: test.partition("::")[0] for test in seconds}
+    spent = Counter[str]()
+    for test in near:
+        spent[of_file[test]] += seconds[test]  # type: ignore[assignment]
+    tests = sorted(
+        (test for test in seconds if of_file[test] in spent),
+        key=lambda test: (test not in near, spent[of_file[test]], of_file[test], seconds[test]),
+    )
     try:
         file.write_text(mutant.code, "utf-8")
-        code, log = run_tests(copy, ["-x", "-q", *files], order, 120 + 4 * expected) if files else (0, "not reached")
+        most_s = 120 + 4 * sum(seconds[test] for test in tests)
+        code, log = run_tests(copy, ["-x", "-q", *tests], most_s) if tests else (0, "not reached")
     finally:
         file.write_text(text, "utf-8")
     failed = re.search(r"^(?:FAILED|ERROR) (\S+)", log, re.MULTILINE)
@@ -218,10 +194,10 @@ def tried(mutant: Mutant, copy: Path, seconds: dict[str, float], lines: dict[int
     return {"file": mutant.file, "result": result, "by": test, "seconds": round(time.perf_counter() - start, 1)}
 
 
-def run_tests(copy: Path, arguments: list[str], plugin: Reach | Order, seconds: float) -> tuple[int, str]:
+def run_tests(copy: Path, arguments: list[str], seconds: float, reach: Sequence[str] = ()) -> tuple[int, str]:
     """Exit code of pytest and what it printed; in a fork, which has the libraries loaded."""
     log = copy / "log"
-    child = multiprocessing.get_context("fork").Process(target=_pytest, args=(copy, arguments, plugin, log))
+    child = multiprocessing.get_context("fork").Process(target=_pytest, args=(copy, arguments, reach, log))
     child.start()
     child.join(seconds)
     if child.is_alive():
@@ -230,17 +206,16 @@ def run_tests(copy: Path, arguments: list[str], plugin: Reach | Order, seconds: 
     return child.exitcode or 0, log.read_text()
 
 
-def _pytest(copy: Path, arguments: list[str], plugin: Reach | Order, log: Path) -> None:
+def _pytest(copy: Path, arguments: list[str], reach: Sequence[str], log: Path) -> None:
     os.chdir(copy)
     os.environ["PYTHONPATH"] = str(copy)
     sys.path.insert(0, str(copy))
-    sys.dont_write_bytecode = isinstance(plugin, Order)
+    sys.dont_write_bytecode = not reach
     with log.open("w") as out:
         os.dup2(out.fileno(), 1)
         os.dup2(out.fileno(), 2)
-    if isinstance(plugin, Reach):
-        plugin.coverage.start()
-    os._exit(int(pytest.main(["-p", "no:cacheprovider", *arguments], plugins=[plugin])))
+    plugins = [Reach([str(copy / file) for file in reach])] if reach else []
+    os._exit(int(pytest.main(["-p", "no:cacheprovider", *arguments], plugins=plugins)))
 
 
 def main() -> int:
@@ -260,7 +235,7 @@ def main() -> int:
         subprocess.run(["tar", "-x", "-C", folder], input=git("archive", commit), check=True)
         for library in LIBRARIES:
             importlib.import_module(library)
-        reach = reached(copy, commit, known.setdefault("reach", {}))
+        reach = reached(copy, known.setdefault("reach", {}))
         for mutant in drawn(options.seed, copy):
             key = f"{mutant.file} {mutant.change}"
             if key not in results:
