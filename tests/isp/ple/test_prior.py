@@ -53,6 +53,9 @@ HOSTILE = {  # each a few kB on disk
     "a shape of 4 EiB": lambda path: shape_alone(path, (1 << 30, 1 << 30)),
     "pickles": lambda path: np.savez(path, **arrays(rest=np.array([{}, {}], dtype=object))),
     "not a number": lambda path: np.savez(path, **arrays(rest=np.full_like(own_prior().rest, np.nan))),
+    "a negative weight": lambda path: np.savez(path, **arrays(weights=-own_prior().weights)),
+    "a variance of 0": lambda path: np.savez(path, **arrays(rest=0 * own_prior().rest)),
+    "dark neutrals": lambda path: np.savez(path, **arrays(neutrals_e=0 * own_prior().neutrals_e)),
     "other shapes": lambda path: np.savez(path, **arrays(rest=np.ones(3))),
     "a million Gaussians": lambda path: np.savez_compressed(path, **without_directions(1_000_000)),
 }
