@@ -14,7 +14,7 @@ from scipy import stats
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
-from sensor.readout import read_out
+from sensor.readout import draw_frame, draw_mean_frame, read_out
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 
@@ -110,6 +110,15 @@ def test_half_of_the_saturated_pixels_read_under_the_top_with_the_moments_of_a_h
 
 
 # The converter
+
+
+def test_with_and_without_shot_noise_a_key_draws_one_read_noise_of_each_reading():
+    """In the dark nothing else is drawn; where no reading is named it is the first."""
+    sensor, dark, chip = camera(read_noise_e=30.0), np.zeros((32, 32)), even((32, 32))
+    first, second = (draw_frame(dark, sensor, chip, 0.01, 7, reading) for reading in (0, 1))
+    for draw in (draw_frame, draw_mean_frame):
+        np.testing.assert_array_equal(draw(dark, sensor, chip, 0.01, 7), first)
+    assert not np.array_equal(first, second)
 
 
 def test_dn_are_electrons_over_gain_plus_black_rounded():
