@@ -152,3 +152,11 @@ def test_frames_may_be_smaller_than_a_patch_and_than_a_packet(shape, tile):
     raw = exposure(np.random.default_rng(6).uniform(0.0, FULL / 2, shape), tile)
     settings = Settings(patch=7, neighbourhood=3)
     assert np.abs(reconstruct(raw, settings) - reconstruct_reference(raw, settings)).max() < 1e-4 * FULL
+
+
+@needs_kernel
+@pytest.mark.parametrize("shape", [(30, 4), (4, 30)])
+def test_a_neighbourhood_may_be_wider_than_the_frame(shape):
+    raw = exposure(np.random.default_rng(8).uniform(0.0, FULL / 2, shape), ("R", "W"))
+    settings = Settings(patch=3, neighbourhood=21)
+    assert np.abs(reconstruct(raw, settings) - reconstruct_reference(raw, settings)).max() < 1e-4 * FULL
