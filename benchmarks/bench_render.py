@@ -11,6 +11,9 @@ are medians of repeats in turn, on the clock and of the processor, after one tha
 for rodcone's error over rodcone's time: (t_stock e_stock^2) / (t_rodcone e_rodcone^2), since error falls with one over
 the root of time. Below it the same for the four wide channels of the RGBW sensor, which stock records as such (four
 channels) and rodcone sums from its bands.
+
+``--growth`` prints as CSV how one render grows with samples, side, bands and light groups instead: processor seconds
+of the second of two calls, and the peak of Dr.Jit's allocator; ``docs/results/render_growth.csv`` holds it.
 """
 
 import argparse
@@ -19,13 +22,14 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-from environment import in_turn, print_environment
+from environment import in_turn, print_environment, seconds_of
 from numpy.typing import NDArray
 
 from render.engine import render
 from render.loader import mitsuba_module, variant
 from render.photometry import photons_per_joule
 from render.scene import Scene
+from rodcone.jit import backend, dr
 from scenes.catalog import load
 from sensor.curves import rgbw
 
@@ -34,6 +38,12 @@ BANDS = (4, 8, 16, 32, 64)
 CHANNELS = ("R", "G", "B", "W")
 DEPTH = 8
 CURVE_NM = np.arange(380.0, 781.0, 5.0)
+GROWTH = {
+    "spp": (32, 128, 256),
+    "size": (64, 256),
+    "bands": (10, 40, 80),
+    "scene": ("still_life_outdoor", "night_street"),
+}
 Draw = Callable[[int], NDArray[np.float64]]  # seed -> (channel, h, w)
 
 
@@ -109,6 +119,21 @@ def compare(label: str, draws: dict[str, Draw], repeats: int) -> None:
         )
 
 
+def growth() -> None:
+    base: dict[str, Any] = {"scene": "still_life", "size": 128, "bands": 20, "spp": 64}
+    print(",".join([*base, "groups", "processor_s", "seconds_a_band", "peak_mib"]))
+    for case in (base, *(base | {name: value} for name, values in GROWTH.items() for value in values)):
+        scene, nm = load(case["scene"]), 380.0 + 400.0 / case["bands"] * (np.arange(case["bands"]) + 0.5)
+        draw = partial(ours(scene, nm, case["size"], case["spp"]), 0)
+        dr.flush_malloc_cache()
+        dr.detail.malloc_clear_statistics()
+        _, (_, processor_s) = seconds_of(draw), seconds_of(draw)
+        kind = dr.JitBackend.CUDA if backend() == "cuda" else dr.JitBackend.LLVM
+        peak_mib, a_band_s = dr.detail.malloc_watermark(kind) / (1 << 20), processor_s / case["bands"]
+        row = [*case.values(), len(scene.groups), f"{processor_s:.3g}", f"{a_band_s:.3g}", f"{peak_mib:.0f}"]
+        print(",".join(map(str, row)), flush=True)
+
+
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", action="append", help="scene by name; may be given several times")
@@ -116,7 +141,11 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=8)
+    parser.add_argument("--growth", action="store_true")
     given = parser.parse_args()
+    if given.growth:
+        growth()
+        return
     print_environment()
     print(f"Mitsuba {mitsuba_module().__version__}, {variant()}")
     print(f"{given.size}x{given.size}, {given.spp} samples a pixel, depth {DEPTH}, {given.repeats} repeats")
