@@ -81,6 +81,8 @@ def lines(
         if all(str(getattr(row, axis)) == value for axis, value in where.items()):
             groups.setdefault(tuple(str(getattr(row, axis)) for axis in by), []).append(row)
     require_alike([row for group in groups.values() for row in group])
+    if not groups and not where:
+        raise InputError("table: the sweep has made no cell yet; run rodcone sweep, which goes on")
     if not groups:
         raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
     for at, group in groups.items():

@@ -72,6 +72,8 @@ def test_where_chooses_and_a_mean_over_cameras_is_refused() -> None:
     ):
         with pytest.raises(InputError, match=words):
             lines(ROWS, HERE, by, show, where)
+    with pytest.raises(InputError, match="the sweep has made no cell yet"):
+        lines([], HERE, ["processor"], ["psnr_db"], {})
 
 
 def test_chart_colours_are_read_from_the_pictures(tmp_path: Path) -> None:
