@@ -12,7 +12,7 @@ from rodcone.files import check_place
 from rodcone.progress import progress
 from studies.commands.console import print_result, say
 from studies.photograph.develop import develop_file
-from studies.photograph.picture_file import check_picture_file, write_picture
+from studies.photograph.picture_file import check_picture_file, default_path, write_picture
 from studies.photograph.shot import Order, take
 
 
@@ -93,7 +93,7 @@ def develop(
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
     choices = vars(order).copy()
     out, bits = choices.pop("out"), choices.pop("bits")
-    picture = raw.with_suffix(".png") if out is None else out
+    picture = default_path(raw) if out is None else out
     check_picture_file(picture, bits, order.encoding)
     check_place(picture)
     developed = develop_file((raw, *more), **choices)

@@ -21,6 +21,7 @@ from rodcone.files import write_files
 
 DATA = Path(__file__).parents[1] / "data"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
+_SOFTWARE = b"Software\0rodcone"
 _RGB, _PERCEPTUAL, _UP = 2, 0, 2  # colour type, sRGB rendering intent, filter: the difference from the row above
 # Primaries of P3 with D65, transfer function of sRGB, R G B as they are, full range: ITU-T H.273, tables 2 to 4.
 _P3_CODES = bytes([12, 13, 0, 1])
@@ -37,7 +38,8 @@ def to_png(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> byte
     filtered[1:, 1:] = rows[1:] - rows[:-1]  # modulo 256, as the filter is defined
     header = struct.pack(">IIBBBBB", width, height, bits, _RGB, 0, 0, 0)
     data = zlib.compress(filtered.tobytes(), 6)
-    chunks = ((b"IHDR", header), *_colour_chunks(encoding), (b"IDAT", data), (b"IEND", b""))
+    before = (b"IHDR", header), *_colour_chunks(encoding), (b"tEXt", _SOFTWARE)
+    chunks = (*before, (b"IDAT", data), (b"IEND", b""))
     return _SIGNATURE + b"".join(_chunk(name, content) for name, content in chunks)
 
 
@@ -70,6 +72,16 @@ def check_picture_file(path: Path, bits: int, encoding: str) -> None:
         raise InputError(f"bits: {bits!r} is not allowed; give 8 or 16")
     if encoding not in ENCODINGS:
         raise unknown("encoding", encoding, ENCODINGS)
+
+
+def default_path(raw: Path) -> Path:
+    """Raw file's name with .png; `InputError` where that is a picture which another program wrote."""
+    path = raw.with_suffix(".png")
+    if path.is_file() and path != raw:
+        with path.open("rb") as file:
+            if _SOFTWARE not in file.read(1 << 12):
+                raise InputError(f"out: {str(path)!r} exists and isn't rodcone's; to write over it give -o {path}")
+    return path
 
 
 def write_picture(

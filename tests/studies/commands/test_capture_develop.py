@@ -405,6 +405,19 @@ def test_any_processor_of_the_mosaic_can_be_asked_for(tmp_path: Path) -> None:
             assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.6, isp
 
 
+def test_a_picture_of_another_program_beside_the_raw_file_is_left_alone(tmp_path: Path) -> None:
+    negative(tmp_path / "shot.dng", "bayer", 0.25)
+    picture = tmp_path / "shot.png"
+    picture.write_bytes(b"\x89PNG of another program")
+    code, _, err = call(["develop", str(tmp_path / "shot.dng")])
+    assert (code, picture.read_bytes()) == (2, b"\x89PNG of another program")
+    assert err.endswith(f"{str(picture)!r} exists and isn't rodcone's; to write over it give -o {picture}\n")
+    for asked in (["-o", str(picture)], []):  # by its name, and rodcone's own
+        assert call(["develop", str(tmp_path / "shot.dng"), *asked])[0] == 0
+    with Image.open(picture) as image:
+        assert image.text == {"Software": "rodcone"}
+
+
 def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(tmp_path: Path) -> None:
     pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
     raw = negative(tmp_path / "shot.dng")
