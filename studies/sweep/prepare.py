@@ -1,6 +1,7 @@
 """From a study to its cells: one render a scene, the files that its cells share, and a cell for every combination."""
 
 import sqlite3
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -91,7 +92,9 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         return cells
     with job.clock.stage("renders"):
         transport, assumed = scene_transport(job, opened, progress)
-    with job.clock.stage("what cells share"):
+    with job.clock.stage("what cells share"), warnings.catch_warnings():
+        if job.plan.ledgers:  # they charge the error within bands
+            warnings.filterwarnings("ignore", "bands: the one at")
         record = RenderRecord(
             content=digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data),
             facts=render_facts(transport, photographed(transport, 1.0)),
