@@ -12,6 +12,8 @@ import pytest
 from command_line import call, check_refusals
 from PIL import Image
 
+from sensor.curves import rgbw
+from studies.metrics.truth import light_of
 from studies.paper import held, levels
 from studies.paper.claims import ClaimCheck, at_least, at_most, over_seeds, range_text, value_text
 from studies.paper.figure1 import gain_db
@@ -19,6 +21,7 @@ from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, as_json, make, write
 from studies.paper.patches import edge_columns
 from studies.paper.setup import READINGS, Setup, noise, sensor_of
+from studies.photograph.snr import channel_e
 
 pytestmark = pytest.mark.thorough
 FIGURES = ["1a", "1b", "2", "3", "4", "5", "6", "A", "B"]
@@ -152,6 +155,24 @@ def test_the_lines_of_the_figures_are_recounted_from_the_claims(paper: Paper) ->
     bayer_db, ours_db, _ = axes["B", "PSNR at the best time, dB"]
     better = checks["By hand, the picture at the best time is better than Bayer's at its own"]
     assert np.subtract(ours_db, bayer_db) == pytest.approx(better)
+
+
+def test_the_curves_and_gains_of_figure_2_are_recounted_from_curves_and_data_sheets(paper: Paper) -> None:
+    (drawing,) = (figure.drawing for figure in paper.figures if figure.name == "2")
+    axes = {one.get_title("left"): one.lines for one in drawing.axes}
+    for letter, line in zip("RGBW", axes["Responses, electrons per photon"], strict=True):
+        curve = rgbw().curves[letter]
+        expected = np.interp(line.get_xdata(), curve.wavelength_nm, curve.values)
+        np.testing.assert_allclose(line.get_ydata(), expected, atol=0.01)  # a mean over 2 nm
+    *gains, root = axes["W's SNR over G's, one pixel"]
+    for name, line in zip((*READINGS, "low_noise"), gains, strict=True):
+        pixel = sensor_of(name).pixel
+        lit_e = channel_e(sensor_of(name), light_of("D65"), 1.0, 0.02)
+        electrons = np.multiply.outer(line.get_xdata(), lit_e[[1, 3]])
+        dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor_of(name).gain_e_per_dn ** 2 / 12
+        ratio = electrons / np.sqrt(electrons + dark_e2 + (pixel.prnu * electrons) ** 2)
+        np.testing.assert_allclose(line.get_ydata(), ratio[:, 1] / ratio[:, 0], rtol=1e-9)
+        np.testing.assert_allclose(root.get_ydata(), np.sqrt(lit_e[3] / lit_e[1]), rtol=1e-9)
 
 
 def test_json_holds_what_the_page_says(paper: Paper, folder: Path) -> None:
