@@ -133,7 +133,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
                 continue
             middle, late = np.percentile(latencies_ms(page, key, low, high, asked.changes), [50, 95])
             rate, age_ms = drag(page, key, low, high, asked.drag_s)
-            jump = f"{middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {most:.0f} ms"
+            jump = f"{middle:.0f} ms | {late:.0f} ms | {median:.0f} ms | {'' if np.isnan(most) else f'{most:.0f} ms'}"
             print(f"| {key} | {jump} | {rate:.1f} | {age_ms:.0f} ms |", flush=True)
         print(f"kernels compiled meanwhile: {kernels.count - before}")
         for number in range(1, asked.memory + 1):
