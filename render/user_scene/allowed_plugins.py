@@ -22,7 +22,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {kind: tuple(names.split()) for kind, name
 ALLOWED["texture"] += SPECTRA
 ALLOWED |= {"emitter": (*EMISSION_PARAMETER, *COLOURED_EMITTERS), "sensor": (*CAMERAS, METER, *UNUSED_CAMERAS)}
 _KIND = {name: kind for kind, names in ALLOWED.items() for name in names}
-_REASONS: dict[str, tuple[str, str]] = _TABLES["refused"]  # why a plug-in is refused, and the nearest thing that works
+# Why a plug-in is refused, and the nearest thing that works.
+_REASONS = {name: (row["reason"], row["fix"]) for row in _TABLES["refused"] for name in row["plugins"].split()}
 
 
 def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
