@@ -217,10 +217,14 @@ def within_band_error(
     return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
 
 
-def warn_of_wide_bands(error: Floats, values: Planes, wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Warn (`UserWarning`) where `within_band_error` is large in a band of a picture (band, h, w), with what would do.
+class WideBandsWarning(UserWarning):
+    """Bands within which light and surfaces vary together by more than products of band averages tell."""
 
-    For smooth light the error falls with the square of the width.
+
+def warn_of_wide_bands(error: Floats, values: Planes, wavelength_nm: Floats, width_nm: Floats) -> None:
+    """Warn (`WideBandsWarning`) where `within_band_error` is large in a band of a picture, with what would do.
+
+    For smooth light the error falls with the square of the width. `values` has the shape (band, h, w).
     """
     light = values.mean(axis=(1, 2), dtype=np.float64) * width_nm
     error = np.where(light >= LEAST_LIGHT * light.sum(), error, 0.0)
@@ -231,7 +235,7 @@ def warn_of_wide_bands(error: Floats, values: Planes, wavelength_nm: Floats, wid
             f"bands: the one at {wavelength_nm[worst]:g} nm is off by about {error[worst]:.1%}, for light and surfaces "
             f"vary together within its {width_nm[worst]:g} nm; bands of {int(enough_nm) or enough_nm:.3g} nm would do, "
             "or for a lamp's lines rodcone.line_bands",
-            UserWarning,
+            WideBandsWarning,
             stacklevel=3,
         )
 

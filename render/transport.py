@@ -131,8 +131,9 @@ class Transport:
         Warns
         -----
         UserWarning
-            Where a light's spectrum ends within the bands at a value other than 0: outside it is dark. Where
-            `band_error` is over 1 % in a band that holds 1 % of the light or more, with the width that would do.
+            Where a light's spectrum ends within the bands at a value other than 0: outside it is dark.
+        WideBandsWarning
+            Where `band_error` is over 1 % in a band that holds 1 % of the light or more, with the width that would do.
         """
         if isinstance(spectra, float | int):
             powers = dict.fromkeys(self.groups, spectra)

@@ -12,6 +12,7 @@ import numpy as np
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of, user_file
+from render.error_estimates import WideBandsWarning
 from render.transport import Transport
 from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend
@@ -94,7 +95,7 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         transport, assumed = scene_transport(job, opened, progress)
     with job.clock.stage("what cells share"), warnings.catch_warnings():
         if job.plan.ledgers:  # they charge the error within bands
-            warnings.filterwarnings("ignore", "bands: the one at")
+            warnings.simplefilter("ignore", WideBandsWarning)
         record = RenderRecord(
             content=digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data),
             facts=render_facts(transport, photographed(transport, 1.0)),
