@@ -33,7 +33,11 @@ PNG_DPI = 144
 GREEN, PURPLE = "#00795a", "#8d4a78"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 SOFT = "#565d64"
-STYLE = rc_params_from_file(TEMPLATES / "plots.mplstyle", use_default_template=False)
+STYLE: dict[Any, Any] = {
+    **rc_params_from_file(TEMPLATES / "plots.mplstyle", use_default_template=False),
+    "text.color": INK,
+    **dict.fromkeys(("axes.labelcolor", "xtick.color", "ytick.color"), SOFT),
+}
 
 
 def svg_text(figure: Figure) -> str:
