@@ -163,9 +163,9 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
     for spectrum in study.spectra:
         lit = under(pilot.transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
-        noise = _pilot_noise(pilot, lit)
+        noise, radiance = _pilot_noise(pilot, lit), lit.relight(luminance_cd_m2=1.0)
         for name in study.sensors:
-            auto_s = unit_exposure_s(lit.relight(luminance_cd_m2=1.0), preset(name).undivided)
+            auto_s = unit_exposure_s(radiance, preset(name).undivided)
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)

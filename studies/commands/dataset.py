@@ -20,7 +20,7 @@ from studies.study.study_file import read_study
 def dataset(
     study: Path,
     /,
-    who: Annotated[Workers, Parameter(name="*")] = WORKERS,
+    workforce: Annotated[Workers, Parameter(name="*")] = WORKERS,
     *,
     out: Path = Path("out/dataset"),
     set: tuple[str, ...] = (),
@@ -59,12 +59,12 @@ def dataset(
     order = SetOrder(planes=tuple(name.strip() for name in truth.split(",")), shards=shards, crop=crop)
     task = read_study(study, set)
     task = replace(task, scenes=(*task.scenes, *generated_scenes(generated, seed)))
-    check_memory(task, out, reference=False, workers=who.processes, force=who.force)
+    check_memory(task, out, reference=False, workers=workforce.processes, force=workforce.force)
     changes = [word for change in set for word in ("--set", change)]
     numbers = {"--generated": generated, "--seed": seed, "--truth": truth, "--shards": shards, "--crop": crop}
     words = [word for name, value in numbers.items() if value is not None for word in (name, str(value))]
     command = join(["rodcone", "dataset", study.name, *changes, *words])
-    with who.runner() as runner, saying_what_is_kept(out), progress(sys.stderr) as step:
+    with workforce.runner() as runner, saying_what_is_kept(out), progress(sys.stderr) as step:
         made = make_set(task, out, order, command, runner, step)
     print_result(made.folder, {**asdict(made), "folder": str(made.folder)}, json=json)
     return 0

@@ -64,7 +64,9 @@ def _row(score: Score) -> tuple[str, ...]:
 def _csv(scores: list[Score]) -> str:
     keys = [metric.key for metric in MEASURED]
     halves = [f"{key}_half" for key in keys]
-    head = ("camera", "level", "luminance_cd_m2", "developer", "scenes", *keys, *halves)
-    places = ([getattr(x, name) for name in head[:5]] for x in scores)
-    figures = ([of[key] for of in (x.means, x.halves) for key in keys] for x in scores)
-    return csv_text(head, (place + of_place for place, of_place in zip(places, figures, strict=True)))
+    head = ("camera", "level", "luminance_cd_m2", "developer", "scenes")
+    rows = (
+        [*(getattr(score, name) for name in head), *(of[key] for of in (score.means, score.halves) for key in keys)]
+        for score in scores
+    )
+    return csv_text((*head, *keys, *halves), rows)

@@ -176,7 +176,7 @@ def sweep(
     study: Path,
     /,
     order: Annotated[SweepOrder, Parameter(name="*")] = ORDER,
-    who: Annotated[Workers, Parameter(name="*")] = WORKERS,
+    workforce: Annotated[Workers, Parameter(name="*")] = WORKERS,
     *,
     json: bool = False,
 ) -> int:
@@ -194,11 +194,11 @@ def sweep(
     clock = Clock()
     task = read_study(study, order.set, trust_code=order.trust_code)
     if order.dry_run:
-        sizes = _estimated(task, order.out, order.reference, who.workers or cores())
+        sizes = _estimated(task, order.out, order.reference, workforce.workers or cores())
         print_result(_words(sizes), vars(sizes), json=json)
         return 0
-    check_memory(task, order.out, reference=order.reference, workers=who.processes, force=who.force)
-    with who.runner() as runner:
+    check_memory(task, order.out, reference=order.reference, workers=workforce.processes, force=workforce.force)
+    with workforce.runner() as runner:
         swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock)
     say(f"its report is {report}")
     ledger = swept.out / FILE
