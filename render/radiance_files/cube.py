@@ -130,7 +130,7 @@ def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
         nm = np.array(stored.wavelength_nm if isinstance(given, str) else given, dtype=np.float64).ravel()
     except (TypeError, ValueError, OverflowError):
         nm = np.empty(0)
-    if isinstance(given, list) and nm.size == 2 < bands and nm[0] < nm[1]:
+    if isinstance(given, list) and nm.size == 2 < bands and 0 < nm[0] < nm[1] < np.inf:
         nm = np.linspace(nm[0], nm[1], bands)
     if nm.size != bands:
         raise InputError(

@@ -116,6 +116,7 @@ def test_reflectances_are_lit_by_any_light_and_white_has_100_cd_m2(tmp_path: Pat
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [400, 500, 600]\n', "3 numbers don't fit 7 bands"),
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [0.4, 0.7]\n', "desk.npy"),
         (CUBE, 'holds = "reflectance"\nwavelength_nm = [700, 400]\n', "2 numbers don't fit"),
+        (CUBE, 'holds = "reflectance"\nwavelength_nm = [400, inf]\n', "2 numbers don't fit"),
         (CUBE, "holds = [", "desk.toml: can't be read"),
         (CUBE * 100, PLAIN, "of its reflectances exceed 1"),
         (np.where(CUBE > 0.9, np.nan, CUBE), PLAIN, "finite numbers >= 0"),
