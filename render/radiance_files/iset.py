@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from render.illuminants import unit_luminance
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, in_place
 from rodcone.types import Floats
 
@@ -24,6 +26,8 @@ _KEYS = (
     *("scene/spectrum/wave", "scene/data/photons", "scene/data/dmin", "scene/data/dmax", "scene/data/min"),
     *("scene/data/max", "mcCOEF", "basis/basis", "basis/wave", "imgMean", "photons", "data", "wave", "wavelength"),
 )
+_PHOTONS = ("illuminant/data/photons", "illuminant/spectrum/wave")
+_ENERGY = ("illuminant/data", "illuminant/wavelength")  # of files before illuminants were structs
 Numbers = Mapping[str, NDArray[Any]]  # by the keys above
 
 
@@ -33,8 +37,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     Three forms are known, and looked for in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with
     ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative
     photons become 0, as in ISETCam, with a `UserWarning`: any that a basis gives, and up to 1 % of those that
-    stand in the file. Wavelength samples stand for bands as wide as their spacing. The illuminant in the file is not
-    needed for radiance and not read.
+    stand in the file. Wavelength samples stand for bands as wide as their spacing.
 
     Parameters
     ----------
@@ -69,6 +72,25 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
                 plane[:] = band / per_joule
         _clip_negative(planes, 1.0 if from_basis else MOST_NEGATIVE)
         return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
+
+
+def read_iset_illuminant(path: str | Path) -> Spectrum | None:
+    """Illuminant of an ISETCam scene, scaled to 1 cd/m^2; None where the file holds none, or one for each pixel.
+
+    Raises
+    ------
+    InputError
+        For a file that can't be read, or an illuminant that is no spectrum.
+    """
+    keys = [place + key for place in ("scene/", "") for key in (*_PHOTONS, *_ENERGY)]
+    numbers = read_numbers(Path(path), keys)
+    for values_key, nm_key in zip(keys[::2], keys[1::2], strict=True):
+        values, nm = (numbers.get(key, np.empty(0)).ravel().astype(np.float64) for key in (values_key, nm_key))
+        if nm.size and values.size == nm.size and values.any():
+            with in_place(f"{path}: illuminant"):
+                per_joule = photons_per_joule(nm) if values_key.endswith("photons") else 1.0
+                return unit_luminance(Spectrum(nm, values / per_joule))
+    return None
 
 
 def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:

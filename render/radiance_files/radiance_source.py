@@ -13,7 +13,7 @@ from render.radiance_files import cube, photo
 from render.radiance_files.cube import REFLECTANCE, cube_holds, description, read_cube
 from render.radiance_files.envi import data_file
 from render.radiance_files.exr import read_exr
-from render.radiance_files.iset import read_iset_scene
+from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.reference import open_reference
 from render.scene import LightGroup
 from render.spectrum import DEFAULT_WAVELENGTH_NM, LONGEST_NM, SHORTEST_NM, Spectrum
@@ -24,7 +24,7 @@ from rodcone.memory import file_extent
 WHITE_CD_M2 = 100.0  # luminance of a reflectance of 1, where no level is asked for
 _READERS = {
     ".exr": read_exr,
-    ".mat": lambda path: read_cube(path) if description(path).is_file() else read_iset_scene(path),
+    ".mat": lambda path: read_iset_scene(path) if is_iset(path) else read_cube(path),
     **dict.fromkeys((".npy", ".hdr"), read_cube),
     **dict.fromkeys(photo.EXTENSIONS, photo.read_photo),
 }
@@ -42,6 +42,11 @@ def is_reference(path: str | Path) -> bool:
     return Path(path).suffix.lower() == REFERENCE
 
 
+def is_iset(path: str | Path) -> bool:
+    """Whether a file is named as an ISETCam scene: a ``.mat`` that no description lies beside."""
+    return Path(path).suffix.lower() == ".mat" and not description(path).is_file()
+
+
 def is_reflectance(path: str | Path) -> bool:
     """Whether a file holds reflectances, which any light can light: a photograph, or a cube that says so.
 
@@ -51,7 +56,7 @@ def is_reflectance(path: str | Path) -> bool:
         For a cube without a description.
     """
     suffix = Path(path).suffix.lower()
-    if suffix in cube.EXTENSIONS and (suffix != ".mat" or description(path).is_file()):
+    if suffix in cube.EXTENSIONS and not is_iset(path):
         return cube_holds(path) == REFLECTANCE
     return suffix in photo.EXTENSIONS
 
@@ -110,6 +115,11 @@ def load_picture(path: str | Path, light: Spectrum) -> Transport:
     if not is_reflectance(path):
         return transport
     return replace(transport, groups={"light": LightGroup((), light, WHITE_CD_M2)})
+
+
+def stored_illuminant(path: str | Path) -> Spectrum | None:
+    """Illuminant that a picture file holds, at 1 cd/m^2: an ISETCam scene may; None where there is none."""
+    return read_iset_illuminant(path) if is_iset(path) else None
 
 
 def _read(path: str | Path) -> SpectralRadiance:

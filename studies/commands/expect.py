@@ -65,6 +65,8 @@ def expect(
         Print one JSON object: a list of errors by level for each camera.
     """
     require_place(out, ".csv", ".svg")
+    if out is not None and out.suffix.lower() == ".svg" and len(sensors) * len(mosaic or [""]) == 1:
+        raise InputError(f"out: {out} plots gains over the first camera, and there is one; add a sensor or a --mosaic")
     levels = {text: _luminance(text) for text in level} if level else levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
     choices = (list(levels.values()), light, exposure if time_s is None else time_s, prior, blur)

@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.loader import Film
 from render.photometry import luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference
+from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference, stored_illuminant
 from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
@@ -140,6 +140,10 @@ def make_transport(
     """
     if opened.scene is None or model is None:
         transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
+        if study.render.size is not None:
+            assumed.append(
+                f"{Path(opened.choice.source).name}: a picture keeps its own pixels; render.size is for scenes"
+            )
         return transport, tuple(assumed)
     limits = study.render
     progress(0.0, np.inf)
@@ -239,11 +243,12 @@ def spectral_luminance(spectrum: Spectrum) -> float:
 
 
 def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
-    """Light that the cameras' colours are set to: the scene's first, or D65 where that has colours of its own."""
+    """Light that the cameras' colours are set to: the scene's first, a file's own, or D65 where neither is known."""
     if spectrum != OWN:
         return illuminant(spectrum)
     if opened.scene is None:
-        return illuminant(opened.choice.light or LIGHT)
+        stored = None if opened.choice.light else stored_illuminant(opened.choice.source)
+        return stored or illuminant(opened.choice.light or LIGHT)
     first = next(iter(opened.scene.groups.values()))
     return illuminant(LIGHT) if first.coloured else first.spectrum
 

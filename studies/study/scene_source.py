@@ -8,7 +8,14 @@ from pathlib import Path
 from render.illuminants import illuminant
 from render.radiance_files.file_checks import require_file
 from render.radiance_files.photo import EXTENSIONS
-from render.radiance_files.radiance_source import ENDINGS, REFERENCE, is_reference, is_reflectance, load_picture
+from render.radiance_files.radiance_source import (
+    ENDINGS,
+    REFERENCE,
+    is_reference,
+    is_reflectance,
+    load_picture,
+    stored_illuminant,
+)
 from render.scene import Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
@@ -134,7 +141,10 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
         first = next(iter(transport.groups.values()))
         assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")
         return transport, spectrum if light or first.coloured else first.spectrum, assumed
-    if light is None:
+    if light is None and (stored := stored_illuminant(path)):
+        spectrum = stored
+        assumed.append(f"{name}: its colours are judged under the illuminant that it holds")
+    elif light is None:
         use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
         assumed.append(f"{name}: {use} {LIGHT}; give another light where that isn't so")
     if Path(path).suffix.lower() in EXTENSIONS:

@@ -9,7 +9,8 @@ import scipy.io
 from loop import loop
 from refusal import refusal
 
-from render.radiance_files.iset import read_iset_scene
+from render.photometry import luminance
+from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from rodcone.errors import InputError
 
 NM = np.arange(400.0, 701.0, 10.0)
@@ -60,6 +61,32 @@ def test_saved_scene_struct_is_read(tmp_path: Path) -> None:
     }
     read = read_iset_scene(save(tmp_path, scene=scene))
     assert read.values == pytest.approx(PHOTONS * JOULE, rel=2e-7)  # rounded twice
+
+
+@loop(
+    ("form", "stored"),
+    [
+        ("energy", {"illuminant": {"data": NM, "wavelength": NM}}),
+        ("photons", {"illuminant": {"data": {"photons": NM / JOULE}, "spectrum": {"wave": NM[:, None]}}}),
+        ("scene", {"scene": {"illuminant": {"data": {"photons": NM / JOULE}, "spectrum": {"wave": NM}}}}),
+        ("of each pixel", {"illuminant": {"data": {"photons": PHOTONS}, "spectrum": {"wave": NM}}}),
+        ("dark", {"illuminant": {"data": 0 * NM, "wavelength": NM}}),
+        ("negative", {"illuminant": {"data": -NM, "wavelength": NM}}),
+    ],
+)
+def test_illuminant_is_energy_at_1_cd_m2_or_none(form: str, stored: dict[str, Any], tmp_path: Path) -> None:
+    path = save(tmp_path, photons=PHOTONS, wave=NM, **stored)
+    if form == "negative":
+        assert "illuminant: spectrum values" in refusal(read_iset_illuminant, path)
+        return
+    light = read_iset_illuminant(path)
+    if form in ("of each pixel", "dark"):
+        assert light is None
+        return
+    assert light is not None
+    assert light.values / light.values[0] == pytest.approx(NM / NM[0])  # energy in proportion to wavelength
+    nm = np.arange(360.5, 830.0)
+    assert luminance(light.band_average(nm, 0 * nm + 1), nm, 0 * nm + 1) == pytest.approx(1.0)
 
 
 @pytest.mark.sample(1)

@@ -10,9 +10,10 @@ import tifffile
 from builders import any_order, raw_image
 from command_line import call, check_refusals
 from PIL import Image
+from scipy.io import savemat
 
 from render.illuminants import illuminant
-from render.photometry import luminance
+from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -26,6 +27,8 @@ from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
 from studies.photograph.camera import calibrate, iso_speed
 from studies.photograph.shot import Order, take
+from studies.study.lit_scene import open_choice, white_spectrum
+from studies.study.study import OWN, SceneChoice, Study
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -140,6 +143,23 @@ def test_a_cube_that_ends_inside_the_window_is_photographed_with_a_warning(tmp_p
     code, printed, err = call(["capture", str(cut(tmp_path / "cut.exr", 380, 650)), "-o", str(out)])
     assert (code, printed.split()[0], err.count("radiance: its bands, 380 to 650 nm, don't fill")) == (0, str(out), 1)
     assert "they leave out 5.6% of R, 0.0% of G, 0.0% of B, 41.3% of W; give those bands, or narrow" in err
+
+
+def test_an_isetcam_scene_is_judged_under_the_illuminant_that_it_holds(tmp_path: Path) -> None:
+    lamp, nm = illuminant("A"), np.arange(390.0, 711.0, 10.0)
+    photons = lamp.band_average(nm, 0 * nm + 10) * photons_per_joule(nm)
+    held = {"data": {"photons": photons}, "spectrum": {"wave": nm}}
+    path, out = tmp_path / "grey.mat", tmp_path / "shot.dng"
+    savemat(path, {"photons": np.tile(photons, (32, 32, 1)), "wave": nm, "illuminant": held})
+    code, _, err = call(["capture", path, "--cfa", "bayer", "-o", out])
+    assert (code, "judged under the illuminant that it holds" in err, "D65" in err) == (0, True, False)
+    colour = read_raw(out).colour
+    assert colour is not None
+    assert colour.neutral == pytest.approx(calibrate(preset("low_noise", "bayer"), lamp).neutral, rel=0.01)
+    study = Study(scenes=(SceneChoice(str(path)),), sensors=("low_noise",), levels=("5cd/m2",))
+    white = white_spectrum(open_choice(study.scenes[0], study), OWN)
+    inner = nm[1:-1], np.full(nm.size - 2, 10.0)  # outside its samples the illuminant is 0
+    assert white.band_average(*inner) == pytest.approx(lamp.band_average(*inner), rel=0.02)
 
 
 def test_the_file_carries_the_calibration_for_the_light_or_the_white_balance_asked_for(

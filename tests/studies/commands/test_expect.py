@@ -50,5 +50,6 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
         ("--prior draw", "did you mean 'drawn'"),
         ("--exposure autoo", "did you mean 'auto'"),
         ("-o gain.pdf", "doesn't end in .csv or .svg"),
+        ("-o gain.svg", "plots gains over the first camera, and there is one"),
     )
     check_refusals("expect low_noise", rows, tmp_path)

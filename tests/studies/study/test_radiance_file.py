@@ -8,7 +8,9 @@ import pytest
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from rodcone.errors import InputError
+from studies.study.lit_scene import make_transport, open_choice
 from studies.study.scene_source import open_radiance_file
+from studies.study.study import RenderLimits, SceneChoice, Study
 
 NM = 385.0 + 10 * np.arange(40)
 
@@ -31,6 +33,15 @@ def test_what_is_assumed_of_a_file_is_told(tmp_path: Path) -> None:
     assert all(note.startswith("a.exr: ") for note in told)
     assert light.band_average([450.0], [5.0]) > light.band_average([650.0], [5.0])
     assert [note for note in open_radiance_file(path, "D65")[2] if "D65" in note] == []
+
+
+@pytest.mark.parametrize("size", [None, 16])
+def test_a_size_that_a_picture_does_not_take_is_told(tmp_path: Path, size: int | None) -> None:
+    choice = SceneChoice(str(ramp(tmp_path / "a.exr")))
+    study = Study((choice,), ("1cd/m2",), render=RenderLimits(size=size))
+    lit, notes = make_transport(open_choice(choice, study), study, None, tmp_path, lambda share, error: None)
+    assert lit.counts.shape == (20, 26)
+    assert any("render.size" in note for note in notes) == (size is not None)
 
 
 @pytest.mark.parametrize(("height", "width"), [(15, 20), (20, 4097)])
