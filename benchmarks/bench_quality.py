@@ -45,7 +45,7 @@ from sensor.response import expected_electrons
 from sensor.variations import vary
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import Quality, measure
-from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 
 SIZE = 160
@@ -136,7 +136,8 @@ class SceneAndSensor:
         electrons, seconds = self.exposed(camera, level, exposure)
         raw = expose(electrons, camera.sensor, seconds, camera.device, np.random.default_rng([seed, 1]), exact=True)
         white = stage.white_cd_m2 * level
-        linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, stage.light, white, **options)
+        neutral = neutral_electrons(camera.sensor, stage.light, seconds)
+        linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, neutral, white, **options)
         encoded = encode_srgb(linear)
         return MeasuredShot(raw, picture, encoded, measure(encoded, stage.truth))
 

@@ -117,8 +117,8 @@ def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float,
         linear = shot.planes @ colours.matrix().T / (shot.neutral[channels(shot.raw.cfa).index("G")] * white)
     else:
         knowing = replace(processor, noise_gains=gains)
-        light, balance_e = shot.picture.light, shot.neutral
-        linear, _ = develop_to_scale(shot.raw, knowing, shot.colours, shot.sensor, light, white, balance=balance_e)
+        neutral = shot.neutral
+        linear, _ = develop_to_scale(shot.raw, knowing, shot.colours, shot.sensor, neutral, white, balance=neutral)
     found = measure(encode_srgb(linear), shot.picture.truth)
     return 10 ** (-found.psnr_db / 20), found.delta_e_median
 

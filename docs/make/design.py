@@ -99,7 +99,7 @@ def scene_rows(name: str, transport: Transport, mosaic: str, seed: int) -> Itera
             rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic), seed])
             raw = capture(radiance, sensor, rng=rng)
             fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
-            linear, _ = develop_to_scale(raw, processor, fit, sensor, light, white_cd_m2, balance=neutral)
+            linear, _ = develop_to_scale(raw, processor, fit, sensor, neutral, white_cd_m2, balance=neutral)
             shown = encode_srgb(linear)
             off = rgb2lab(shown) - rgb2lab(truth)
             yield {

@@ -163,7 +163,8 @@ def judge_shard(task: Judging, most_threads: int | None = None) -> LinesMade:
             truth = true_picture(arrays["rgb"].astype(np.float64))
             encoded = read_picture(task.pictures[facts["key"]], truth.encoded.shape[:2])
             figures = vars(measure(encoded, truth.encoded, truth.lab))
-            figures |= vars(appearance(decode_srgb(encoded), truth, facts["white_cd_m2"]))
+            linear = decode_srgb(encoded)
+            figures |= vars(appearance(linear, encode_srgb(linear), truth, facts["white_cd_m2"]))
             mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}
             place = {name: facts[name] for name in ("scene", "luminance_cd_m2", *_PLACE)}
             rows.append({**place, **figures, "mistakes": mistakes})

@@ -107,7 +107,7 @@ class Development:
     raw: RawImage
     colours: ColourFit
     sensor: SensorConfig
-    light: Light
+    neutral: NDArray[np.float64]
     white_cd_m2: float
     options: dict[str, Any]
 
@@ -115,7 +115,7 @@ class Development:
         """Linear sRGB at the scale of the truth, and the processor's own result."""
         processor = PROCESSORS[self.processor]
         return develop_to_scale(
-            self.raw, processor, self.colours, self.sensor, self.light, self.white_cd_m2, **self.options
+            self.raw, processor, self.colours, self.sensor, self.neutral, self.white_cd_m2, **self.options
         )
 
 
@@ -229,10 +229,10 @@ def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Developm
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
     colours = memo.of("colours", fitted, colour_fit, sensor, PROCESSORS[controls.processor], light)
-    options = options_of(controls)
+    neutral, options = neutral_electrons(sensor, light, raw.exposure_s), options_of(controls)
     if controls.white_balance == AS_SHOT:
-        options["balance"] = neutral_electrons(sensor, light, raw.exposure_s)
-    return Development(controls.processor, raw, colours, sensor, light, exposed.white_cd_m2, options)
+        options["balance"] = neutral
+    return Development(controls.processor, raw, colours, sensor, neutral, exposed.white_cd_m2, options)
 
 
 def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:

@@ -85,13 +85,15 @@ def true_picture(linear: Image) -> TruePicture:
     return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
 
 
-def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
+def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
     """Compare a picture with the truth, both of one scale: nothing is fitted to the picture.
 
     Parameters
     ----------
     linear : (h, w, 3) float64
         sRGB, not clipped; 1 stands for `white_cd_m2`.
+    encoded : (h, w, 3) float64
+        The same by `rodcone.colour_spaces.encode_srgb`.
     truth : TruePicture
     white_cd_m2 : float
         Luminance of white. FLIP and S-CIELAB compare the pictures as a display shows them, whatever this is; PU21
@@ -103,7 +105,6 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
         For a value that is NaN or infinite.
     """
     require_finite(picture=linear)
-    encoded = encode_srgb(linear)
     difference = deltaE_cie76(seen_lab(encoded), truth.seen)
     luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
     return Appearance(

@@ -136,16 +136,15 @@ def target_figures(scene: str, linear: NDArray[np.float64], truth: NDArray[np.fl
     linear, truth : (h, w, 3) float64
         sRGB, not clipped; white is 1.
     """
-    luminance = luminance_of_srgb(linear)
     if scene == EDGE:
         try:
-            return TargetFigures(mtf50_cy_per_px=edge_response(luminance).mtf50_cycles_per_px)
+            return TargetFigures(mtf50_cy_per_px=edge_response(luminance_of_srgb(linear)).mtf50_cycles_per_px)
         except InputError:  # the edge can't be followed through the noise, or blur leaves none
             return TargetFigures()
     masks = _chart(truth.shape[0], truth.shape[1]) if scene == CHART else None
     if masks is None:
         return TargetFigures()
-    snr_db = float(np.median(patch_snr_db(luminance[..., None], masks)))
+    snr_db = float(np.median(patch_snr_db(luminance_of_srgb(linear)[..., None], masks)))
     return TargetFigures(
         chart_delta_e_mean=float(patch_colour_errors(linear, truth, masks).mean()),
         patch_snr_db=snr_db if np.isfinite(snr_db) else None,

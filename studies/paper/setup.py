@@ -29,7 +29,7 @@ from sensor.shake import held_lens, shaken
 from sensor.variations import vary
 from studies.budget.ledger import as_stated
 from studies.metrics.quality import psnr_db
-from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import make_transport, open_choice
@@ -231,7 +231,8 @@ def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float |
     options = {}
     if camera.processor in CAMERAS:
         options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr
-    return develop_to_scale(raw, processor, colours_of(camera, seen), sensor, seen.light, seen.white_cd_m2, **options)
+    neutral = neutral_electrons(sensor, seen.light, raw.exposure_s)
+    return develop_to_scale(raw, processor, colours_of(camera, seen), sensor, neutral, seen.white_cd_m2, **options)
 
 
 def noise(pictures: Sequence[Image]) -> float:

@@ -21,7 +21,7 @@ from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture as frame_of
-from sensor.cfa import channels, mask, unit_channel
+from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
@@ -30,7 +30,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
 from sensor.shake import held_lens
-from studies.metrics.truth import GREY, Light, green_scale, light_in_bands, neutral_electrons
+from studies.metrics.truth import GREY, Light, green_scale, light_in_bands
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
@@ -139,7 +139,7 @@ def develop_to_scale(
     processor: Processor,
     colours: ColourFit,
     sensor: SensorConfig,
-    light: Light,
+    neutral: Floats,
     white_cd_m2: float,
     **options: Any,
 ) -> tuple[NDArray[np.float64], Picture]:
@@ -157,8 +157,8 @@ def develop_to_scale(
         Of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
     sensor : SensorConfig
         That took the exposure.
-    light : Light
-        That the camera's neutral is set to.
+    neutral : (channel,) float64
+        `studies.metrics.truth.neutral_electrons` of the light and the exposure's time: 1 cd/m^2.
     white_cd_m2 : float
         Luminance shown as white [cd m^-2].
     **options
@@ -176,7 +176,6 @@ def develop_to_scale(
     InputError
         As the processor does.
     """
-    neutral = neutral_electrons(sensor, light, raw.exposure_s)  # of 1 cd/m^2
     picture = processor.develop(raw, colours, neutral=neutral, **options)
     unit_e = float(neutral[channels(sensor.cfa).index(processor.unit or unit_channel(sensor.cfa))])
     linear = picture.rgb / (unit_e * white_cd_m2)
@@ -209,13 +208,6 @@ def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance:
     card = GREY * colours.matrix(names) @ [balanced[name] / unit for name in names]
     lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (card, np.full(3, GREY)))
     return float(deltaE_ciede2000(lab, grey))
-
-
-def mean_electrons(sensor: SensorConfig, expected_e: NDArray[np.float64]) -> dict[str, float]:
-    """Mean expected electrons of each channel's pixels in the raw image."""
-    electrons = sensor.pixel_sums(expected_e)
-    shape = (electrons.shape[0], electrons.shape[1])
-    return {name: float(electrons[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
 
 
 def capture(

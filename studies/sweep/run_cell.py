@@ -18,7 +18,7 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
-from sensor.cfa import block_sums
+from sensor.cfa import block_sums, channels, mask
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.response import behind_filters
@@ -27,7 +27,7 @@ from studies.metrics.appearance import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure
 from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
-from studies.photograph.camera import balance_delta_e, develop_to_scale, mean_electrons
+from studies.photograph.camera import balance_delta_e, develop_to_scale
 from studies.photograph.clock import machine, timed
 from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
@@ -70,7 +70,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
     # In a study with `sensor_side_um` the truth was already averaged to the coarsest sensor's pixels.
     truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
-    errors_e = sensor.pixel_sums(_array(cell.errors)) * light
+    pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(cell.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -93,7 +93,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     neutral = neutral_electrons(sensor, cell.light, raw.exposure_s)
     options = {"balance": neutral} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
-        lambda: develop_to_scale(raw, processor, cell.colours, sensor, cell.light, cell.white_cd_m2, **options),
+        lambda: develop_to_scale(raw, processor, cell.colours, sensor, neutral, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
     )
     if linear.shape != truth.linear.shape:  # of sensors of one size: compared at the coarsest's pixels
@@ -103,7 +103,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     figures, measure_s, first_measure_s = timed(
         lambda: {
             **vars(measure(encoded, truth.encoded, truth.lab)),
-            **vars(appearance(linear, truth, cell.white_cd_m2)),
+            **vars(appearance(linear, encoded, truth, cell.white_cd_m2)),
             **vars(target_figures(names["scene"], linear, truth.linear)),
         },
         *("measure", names["scene"], raw.shape),
@@ -122,17 +122,16 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         budget_share=cell.budget_share,
         **figures,
         mc_share=charged_share(
-            errors_e * frames,
-            sensor.pixel_sums(expected_e) * frames,
-            merged_sensor(sensor, frames),
-            cell.exposure_s * frames,
+            errors_e * frames, pixels_e * frames, merged_sensor(sensor, frames), cell.exposure_s * frames
         ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),
         balance_delta_e=balance_delta_e(raw, cell.colours, neutral, **options) if picture.balance else None,
         balance=json.dumps(dict(picture.balance)),
-        mean_electrons=json.dumps(mean_electrons(sensor, expected_e)),
+        mean_electrons=json.dumps(
+            {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in channels(sensor.cfa)}
+        ),
         variant=cell.made_by.variant,
         readout_engine=raw.engine,
         development_engine=picture.engine,

@@ -57,7 +57,7 @@ def test_a_picture_that_is_not_finite_has_no_quality() -> None:
         [
             psnr_db,
             measure,
-            lambda picture, truth: appearance(picture, true_picture(truth), 40.0),
+            lambda picture, truth: appearance(picture, picture, true_picture(truth), 40.0),
             lambda picture, truth: pu21_psnr_db(picture[..., 0], truth[..., 0]),
         ],
         [np.nan, np.inf, -np.inf],

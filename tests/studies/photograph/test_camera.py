@@ -50,7 +50,8 @@ def patches(name: str, radiance: SpectralRadiance, view_deg: float = 0.0) -> tup
     raw = expose(expected, sensor, EXPOSURE_S, device, np.random.default_rng(1), exact=True)
     assert not raw.saturated.any()
     colours = colour_fit(sensor, processor, LIGHT)
-    linear, picture = develop_to_scale(raw, processor, colours, sensor, LIGHT, 100.0)
+    neutral = neutral_electrons(sensor, LIGHT, EXPOSURE_S)
+    linear, picture = develop_to_scale(raw, processor, colours, sensor, neutral, 100.0)
     assert picture.rgb.shape == linear.shape
     truth = encode_srgb(true_srgb(radiance, LIGHT, 100.0))
     inside = slice(4, -4)

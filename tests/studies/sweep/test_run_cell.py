@@ -75,7 +75,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     linear = picture_bayer(raw, colours, balance=neutral).rgb / (neutral[1] * white)
     truth = true_srgb(radiance, light, white)
     encoded = encode_srgb(linear)
-    quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, true_picture(truth), white)
+    quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, encoded, true_picture(truth), white)
 
     assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
     assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)
@@ -278,7 +278,7 @@ def test_cells_of_a_hand_held_study_are_moved_alike_and_a_dark_frame_is_the_stil
     assert row.saturated == raw.saturated.mean()
     neutral = neutral_electrons(sensor, cells[0].light, 0.066)
     linear, _ = develop_to_scale(
-        raw, PROCESSORS["bayer"], cells[0].colours, sensor, cells[0].light, cells[0].white_cd_m2, balance=neutral
+        raw, PROCESSORS["bayer"], cells[0].colours, sensor, neutral, cells[0].white_cd_m2, balance=neutral
     )
     shown = np.asarray(Image.open(tmp_path / "pictures" / row.picture), dtype=int)
     assert (np.abs(shown - np.rint(encode_srgb(linear) * 255)) <= 1).all()
