@@ -26,7 +26,7 @@ from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
 from rodcone.errors import InputError, require_whole
-from rodcone.progress import Step, render_words, told
+from rodcone.progress import Step, progress_bar, render_words
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
@@ -126,7 +126,7 @@ def render(
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
     silent: Step | None = (lambda what, share: None) if progress else None
-    with told(silent) as step:
+    with progress_bar(silent) as step:
         step(render_words(np.inf), 0.0)
         show = progress or (lambda share, error: step(render_words(error), share))
         try:
@@ -192,10 +192,10 @@ def _render(
     lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
     # Go on from the earlier means, or begin
     if earlier and (earlier.spp > PILOT_FROM or not piloted):
-        means = means_of(earlier, apart=denoise)
+        means = means_of(earlier, split=denoise)
     else:  # a short one that had no pilot is drawn anew
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
-        means, earlier = no_means(scene, film, rates, apart=denoise), None
+        means, earlier = no_means(scene, film, rates, split=denoise), None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
     # Draw runs until a limit is reached
     errors: dict[str, Any] = {"relative_mc_error": np.inf}

@@ -203,7 +203,7 @@ def within_band_error(
     """
     rows, columns = _spread(radiance.shape[2:])
     missed = np.zeros((radiance.shape[1], rows.size, columns.size))
-    seen = np.zeros_like(missed)
+    total = np.zeros_like(missed)
     for light, planes in zip(lights.values(), radiance, strict=True):
         transport = planes[:, rows[:, None], columns].astype(np.float64)
         slope, curvature = _derivatives(transport, wavelength_nm)
@@ -211,9 +211,10 @@ def within_band_error(
             moment[:, None, None] * light.power for moment in _moments(light.spectrum, wavelength_nm, width_nm)
         )
         missed += np.abs(slope * first) + np.abs(curvature * second) / 2
-        seen += transport * mean
-    relative = np.divide(missed, seen, out=np.zeros_like(seen), where=seen > 0)  # a lamp in view doesn't hide the rest
-    lit = np.maximum((seen > 0).sum(axis=(1, 2)), 1)
+        total += transport * mean
+    # a lamp in view doesn't hide the rest
+    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
+    lit = np.maximum((total > 0).sum(axis=(1, 2)), 1)
     return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
 
 

@@ -132,9 +132,9 @@ class Loaded:
     sample_lights: bool
     curves: tuple[Spectrum, ...] = ()
 
-    def channels(self, bands: int, *, apart: bool = False) -> int:
+    def channels(self, bands: int, *, split: bool = False) -> int:
         """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
-        return (bands + 4) * (len(self.groups) * (1 + apart) + self.coloured)
+        return (bands + 4) * (len(self.groups) * (1 + split) + self.coloured)
 
 
 def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Loaded]:
@@ -149,14 +149,14 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
             f"{SPECTRUM_SIZE} bands a render; replace it, nearest: principled or roughplastic"
         )
     names = list(scene.groups)
-    carried = [] if len(names) == 1 else [x for x in names if is_environment(scene, x)][:1]
-    apart = [name for name in names if name not in carried]
+    along = [] if len(names) == 1 else [x for x in names if is_environment(scene, x)][:1]
+    launched = [name for name in names if name not in along]
     geometry, curves = with_rows(with_matte_surfaces(scene.geometry))
     scene = replace(scene, geometry=geometry, extend=None)  # held ends are in the geometry by now
-    scene = _with_common_shapes(scene) if len(apart) > 1 else scene
-    loaded = [_load_group(scene, name, film, curves, metered) for name in apart]
-    if carried:
-        loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(carried[0])))
+    scene = _with_common_shapes(scene) if len(launched) > 1 else scene
+    loaded = [_load_group(scene, name, film, curves, metered) for name in launched]
+    if along:
+        loaded[0] = replace(loaded[0], groups=(*loaded[0].groups, names.index(along[0])))
     return loaded
 
 

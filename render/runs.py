@@ -83,8 +83,8 @@ class Drawn:
     indirect: EvenAndOdd
 
 
-def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, apart: bool = False) -> Means:
-    """Means before the first run; with `apart` indirect light is kept by itself."""
+def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
+    """Means before the first run; with `split` indirect light is kept by itself."""
     bands, groups = film.wavelength_nm.size, scene.groups.values()
     return Means(
         count=0,
@@ -92,13 +92,13 @@ def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, apart: bool
         light=Halves.zeros(len(groups), bands, *film.size),
         seen=[Halves.zeros(bands if group.coloured else 1, *film.size) for group in groups],
         coverage=Halves.zeros(*film.size),
-        indirect=Halves.zeros(len(groups), bands, *film.size) if apart else None,
+        indirect=Halves.zeros(len(groups), bands, *film.size) if split else None,
     )
 
 
-def means_of(transport: Transport, *, apart: bool = False) -> Means:
+def means_of(transport: Transport, *, split: bool = False) -> Means:
     """Means that an earlier render stopped at, to go on from: the same bits."""
-    denoised = transport.denoised if apart else None
+    denoised = transport.denoised if split else None
     return Means(
         count=int(transport.counts.min()) // 2,
         rates=transport.counts // transport.counts.min(),
@@ -142,14 +142,14 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
-    start, chunk, apart = means.count, chunk_from(means.count), means.indirect is not None
+    start, chunk, split = means.count, chunk_from(means.count), means.indirect is not None
     # Chunks of one length (it grows along the sequence), as many as the threads of a launch hold
-    threads = launch_threads(light_groups, film, apart=apart)
+    threads = launch_threads(light_groups, film, split=split)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(equal_chunks, -(-(stop - start) // chunk))
     span = Span(start, chunk, chunks)
-    draws = [_drawn(loaded, film, means.rates, span, threads, seed, apart=apart) for loaded in light_groups]
+    draws = [_drawn(loaded, film, means.rates, span, threads, seed, split=split) for loaded in light_groups]
     if len(light_groups[0].groups) == 2:
         means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
     for index in range(chunks):
@@ -193,13 +193,13 @@ def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: in
     return rates_of(scattered, seen)
 
 
-def launch_threads(light_groups: list[Loaded], film: Film, *, apart: bool = False) -> int:
+def launch_threads(light_groups: list[Loaded], film: Film, *, split: bool = False) -> int:
     """Threads of a launch, by the memory that their channels need."""
-    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, apart=apart) for loaded in light_groups)
+    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in light_groups)
 
 
 def _drawn(
-    loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, apart: bool = False
+    loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, split: bool = False
 ) -> Drawn:
     """Draw a span of both halves of one light group's paths."""
     halves, groups = [], len(loaded.groups)
@@ -207,11 +207,11 @@ def _drawn(
         group_seed, parts = seed_of(seed, loaded.groups[0], half), []
         for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
             bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-            tracer = Tracer(mitsuba_module(), loaded, bands, group_seed, apart=apart)
+            tracer = Tracer(mitsuba_module(), loaded, bands, group_seed, split=split)
             parts.append(traced(partial(tracer.camera, film.size), rates, span, threads, group_seed))
         scattered, indirect = (
             np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
-            for name, count in (("scattered", groups), ("indirect", groups * apart))
+            for name, count in (("scattered", groups), ("indirect", groups * split))
         )
         shares = parts[0]["shares"]  # of all parts of the bands: they see the same paths
         seen = [shares[:, slot, None] for slot in range(groups)]

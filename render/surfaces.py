@@ -60,16 +60,16 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     row = pixel // size[1]
     middle = mi.Point2f((mi.Float(pixel - row * size[1]) + 0.5) / size[1], (mi.Float(row) + 0.5) / size[0])
     ray, _ = sensor.sample_ray(0.0, 0.5, middle, mi.Point2f(0.5))
-    found = mi_scene.ray_intersect(ray)
-    hit = found.is_valid()
-    towards = dr.select(dr.dot(found.sh_frame.n, ray.d) > 0, -found.sh_frame.n, found.sh_frame.n)
+    interaction = mi_scene.ray_intersect(ray)
+    hit = interaction.is_valid()
+    towards = dr.select(dr.dot(interaction.sh_frame.n, ray.d) > 0, -interaction.sh_frame.n, interaction.sh_frame.n)
     to_camera = sensor.world_transform().inverse()
-    normal, place = to_camera @ mi.Vector3f(towards), to_camera @ mi.Point3f(found.p)
+    normal, place = to_camera @ mi.Vector3f(towards), to_camera @ mi.Point3f(interaction.p)
     # Mitsuba's camera has x to the left and y up.
     planes = [dr.select(hit, plane, 0.0) for plane in (place.z, -normal.x, -normal.y, normal.z)]
     depth, *normals = (np.array(mi.Float(plane), np.float32).reshape(size) for plane in planes)
-    numbers = np.array(dr.select(hit, _number(mi, found.shape), 0)).reshape(size)
-    instances = np.array(dr.select(hit, _number(mi, found.instance), 0)).reshape(size)
+    numbers = np.array(dr.select(hit, _number(mi, interaction.shape), 0)).reshape(size)
+    instances = np.array(dr.select(hit, _number(mi, interaction.instance), 0)).reshape(size)
     names = {int(_number(mi, mi.ShapePtr(shape))[0]): shape.id() for shape in mi_scene.shapes()}
     objects = tuple(dict.fromkeys(names.values()))
     of_objects = _materials(scene, objects)

@@ -61,7 +61,7 @@ def progress(file: TextIO) -> Iterator[Step]:
 
 
 @contextmanager
-def told(step: Step | None) -> Iterator[Step]:
+def progress_bar(step: Step | None) -> Iterator[Step]:
     """Give the caller's own step, or where there is none a bar under a notebook's cell; elsewhere nothing is shown.
 
     The bar is a few lines of HTML, which every notebook shows; it vanishes at the end.

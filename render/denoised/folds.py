@@ -24,7 +24,7 @@ def denoise_means(
     """
     assert means.indirect is not None
     folds = no_means(
-        scene, film, means.rates, apart=True
+        scene, film, means.rates, split=True
     )  # by the kernel of the render's own light: no other is compiled
     if earlier is not None:
         folds.count, folds.light = earlier.fold_points, earlier.folds.copy()

@@ -39,12 +39,12 @@ def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
     return _powers_of_two(np.sqrt(weight + UNSEEN * weight.mean()))
 
 
-def _powers_of_two(wanted: Floats) -> NDArray[np.uint32]:
+def _powers_of_two(densities: Floats) -> NDArray[np.uint32]:
     """Powers of two from 1 on, nearest to numbers times the largest factor that keeps their mean at `LEAST_SHARE`."""
-    if not wanted.any():
-        return np.ones(wanted.shape, np.uint32)
-    logarithm, most = np.log2(np.maximum(wanted / wanted.max(), 1e-30)), int(np.log2(MOST_RATE))
-    rates = np.ones(wanted.shape, np.uint32)
+    if not densities.any():
+        return np.ones(densities.shape, np.uint32)
+    logarithm, most = np.log2(np.maximum(densities / densities.max(), 1e-30)), int(np.log2(MOST_RATE))
+    rates = np.ones(densities.shape, np.uint32)
     for shift in np.arange(0, min(most, -logarithm.min()) + 0.5 / STEPS, 1 / STEPS):
         larger = 1 << np.clip(np.floor(logarithm + shift + 0.5), 0, most).astype(np.uint32)
         if larger.mean() > LEAST_SHARE:

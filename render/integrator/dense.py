@@ -39,12 +39,12 @@ class Tracer:
         repeating the last.
     seed : int
         Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
-    apart : bool
+    split : bool
         Whether indirect light is also given by itself.
     """
 
-    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, apart: bool = False) -> None:
-        self.mi, self.scene, self.apart = mi, loaded.mi_scene, apart
+    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, split: bool = False) -> None:
+        self.mi, self.scene, self.split = mi, loaded.mi_scene, split
         self.max_depth, self.rr_depth = film.max_depth, film.rr_depth
         self.coloured, self.sample_lights = loaded.coloured, loaded.sample_lights
         self.environment, self.bands = len(loaded.groups) > 1, film.wavelength_nm.size
@@ -65,7 +65,7 @@ class Tracer:
         Returns
         -------
         dict of lists of Float
-            ``scattered``: bands without the light that is seen directly, then the environment's; with ``apart``
+            ``scattered``: bands without the light that is seen directly, then the environment's; with ``split``
             ``indirect``: as many of indirect light; ``shares`` of paths that meet a light first, which is that light
             at unit emission, and that meet the environment; with ``coloured`` ``lamps``: the light's bands; ``chosen``:
             the share of paths whose BSDF chose by wavelength.
@@ -207,7 +207,7 @@ class Tracer:
         ray, previous, previous_pdf, previous_delta, result = start
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
-        indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.apart else []
+        indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.split else []
         direct, unscattered = mi.Bool(True), mi.Bool(True)  # the light met next; the path so far
         lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
         first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
@@ -251,19 +251,19 @@ class Tracer:
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         sky, indirect_sky = _either(escaped, throughput, dark), _either(escaped & ~direct, throughput, dark)
         scattered = [result, sky] if self.environment else [result]
-        indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.apart else []
+        indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.split else []
         return scattered, indirects, (lamp_first, sky_first, first), chosen
 
     def _indirect(self, indirect: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
         """Add indirect light where it is asked for by itself."""
-        return _plus(indirect, throughput, light, factor) if self.apart else indirect
+        return _plus(indirect, throughput, light, factor) if self.split else indirect
 
     def _share(self, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any) -> Any:
         """Weight of the light that a path meets, beside the chance that it had been sampled from the point before."""
         if not self.sample_lights:
             return self.mi.Float(1.0)
-        seen = self.mi.DirectionSample3f(scene, si, previous)
-        light_pdf = scene.pdf_emitter_direction(previous, seen, ~previous_delta)
+        direction = self.mi.DirectionSample3f(scene, si, previous)
+        light_pdf = scene.pdf_emitter_direction(previous, direction, ~previous_delta)
         return dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
 
     def _emitted(self, scene: Any, si: Any, wavelengths: list[Any]) -> list[Any]:

@@ -102,6 +102,6 @@ def _as_matte(node: Node) -> Node:
     if node.get("type") == "twosided" and len(inner) == 1:
         surface = _as_matte(node[inner[0]])
         if surface["type"] == "matte":
-            kept = {key: value for key, value in node.items() if key not in ("type", inner[0])}
-            return {**surface, **kept, "twosided": True}
+            properties = {key: value for key, value in node.items() if key not in ("type", inner[0])}
+            return {**surface, **properties, "twosided": True}
     return with_matte_surfaces(node)

@@ -80,8 +80,8 @@ def load_scene_file(
     mi = mitsuba_module()
     state = _parse(mi, file, trust, define or {})
     # A trusted scene's <path> folders are on Mitsuba's search path by now.
-    searched = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
-    opened = assemble(mi, file.stem, _from_xml(mi, state, searched, folder), extend)
+    bases = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
+    opened = assemble(mi, file.stem, _from_xml(mi, state, bases, folder), extend)
     return opened if extend else _with_held_ends(opened)
 
 
@@ -98,7 +98,7 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
 
 def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     """Mitsuba's parser state. The scene's folder is on the search path only while no plug-in is loaded."""
-    kept, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
+    resolver, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
     mi.set_file_resolver(search_path(mi, file.parent))
     try:
         state = mi.parser.parse_file(config, str(file), **define)
@@ -109,11 +109,11 @@ def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
         raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
     finally:
         if not trust:
-            mi.set_file_resolver(kept)
+            mi.set_file_resolver(resolver)
     return state
 
 
-def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) -> Node:
+def _from_xml(mi: Any, state: Any, bases: list[Path], folder: Path | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
     nodes, index_of = list(state.nodes), state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
@@ -130,7 +130,7 @@ def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) ->
         try:
             name, tag = node.props.id() or keys.get(index, ""), node.type.name.lower()
             require_allowed(node.props.plugin_name(), tag=tag, name=name, trust=folder is None)
-            parts.append(_xml_part(node, nodes, index_of, searched, folder))
+            parts.append(_xml_part(node, nodes, index_of, bases, folder))
         except InputError as error:
             raise InputError(f"{mi.parser.file_location(state, node)}: {error}") from None
     numbers: Counter[str] = Counter()
@@ -138,14 +138,12 @@ def _from_xml(mi: Any, state: Any, searched: list[Path], folder: Path | None) ->
         for key, value in node.props.items():
             if node.props.type(key).name == "ResolvedReference":
                 child, tag = parts[value.index()], nodes[value.index()].type.name.lower()
-                own = child.get("id", "" if key.startswith("_arg_") else key)
-                part[_key(part, index_of, numbers, own if part is parts[0] else key, tag)] = child
+                label = child.get("id", "" if key.startswith("_arg_") else key)
+                part[_key(part, index_of, numbers, label if part is parts[0] else key, tag)] = child
     return parts[0]
 
 
-def _xml_part(
-    node: Any, nodes: list[Any], index_of: Mapping[str, int], searched: list[Path], folder: Path | None
-) -> Node:
+def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: list[Path], folder: Path | None) -> Node:
     """One node of a parsed scene without its children."""
     properties = node.props
     result: Node = {"type": properties.plugin_name()}
@@ -161,7 +159,7 @@ def _xml_part(
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":
-            file = find_file(value, searched, folder)
+            file = find_file(value, bases, folder)
             check_mesh_file(result["type"], file)
             result[key] = str(file)
         elif kind != "ResolvedReference":
@@ -171,11 +169,11 @@ def _xml_part(
     return result
 
 
-def _key(taken: Node, ids: Mapping[str, int], numbers: Counter[str], wanted: str, tag: str) -> str:
+def _key(part: Node, ids: Mapping[str, int], numbers: Counter[str], label: str, tag: str) -> str:
     """Key of a part: the name wanted, else its kind; without separators of paths, numbered where a part has it."""
-    stem = _RESERVED.sub("_", wanted) or tag
-    name = stem if wanted else ""
-    while not name or name in taken or (name != wanted and name in ids):
+    stem = _RESERVED.sub("_", label) or tag
+    name = stem if label else ""
+    while not name or name in part or (name != label and name in ids):
         name = f"{stem}_{numbers[stem]}"
         numbers[stem] += 1
     return name

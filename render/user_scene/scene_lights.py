@@ -69,8 +69,8 @@ def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) 
     members: dict[str, list[tuple[Keys, Node]]] = {}
     for path, node in walk(geometry):
         if node["type"] in ALLOWED["emitter"]:
-            own = str(node.get("id") or geometry[path[0]].get("id") or path[0])
-            members.setdefault(own.split(":", maxsplit=1)[0] or own, []).append((path, node))
+            light_id = str(node.get("id") or geometry[path[0]].get("id") or path[0])
+            members.setdefault(light_id.split(":", maxsplit=1)[0] or light_id, []).append((path, node))
     groups = {}
     for group, lights in members.items():
         spectra = [_emission(mi, f"scene {name}: {'/'.join(path)}", node, parts) for path, node in lights]

@@ -69,8 +69,8 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     for integrator in integrators:
         limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
         engine = f"the engine brings its own, with paths {limit}, roulette from {rr_depth}"
-        seen = "; lights are seen, hide_emitters is left out" if integrator.get("hide_emitters") else ""
-        notes.append(f"integrator {integrator['type']!r}: {engine}{seen}")
+        lamps = "; lights are seen, hide_emitters is left out" if integrator.get("hide_emitters") else ""
+        notes.append(f"integrator {integrator['type']!r}: {engine}{lamps}")
     camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
@@ -134,14 +134,14 @@ def _camera(mi: Any, name: str, description: Node, notes: list[str]) -> tuple[No
         rendered = f"{camera['type']!r}, the first that can be, is rendered"
         notes.append(f"{len(sensors) - 1} of {len(sensors)} cameras are left out: {rendered}")
     parts = {key: named.get(part["id"], part) if type_of(part) == "ref" else part for key, part in camera.items()}
-    kept = {key: part for key, part in parts.items() if _kind(mi, part) not in _LEFT_OUT}
+    lens = {key: part for key, part in parts.items() if _kind(mi, part) not in _LEFT_OUT}
     film: Node = next((part for part in parts.values() if _kind(mi, part) == "film"), {})
     size = film.get("height", FILM_SIZE[0]), film.get("width", FILM_SIZE[1])
     for side, pixels in zip(("height", "width"), size, strict=True):
         require_whole(f"scene {name}: film {side}", pixels, 1, 1 << 15, "give pixels")
     if any(key.startswith("crop") for key in film):
         notes.append("the film's crop is left out: the whole picture is rendered")
-    return kept, (int(size[0]), int(size[1]))
+    return lens, (int(size[0]), int(size[1]))
 
 
 def _check_references(name: str, geometry: Node) -> dict[str, Node]:

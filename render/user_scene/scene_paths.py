@@ -23,13 +23,13 @@ MOST_SUBSTITUTED = 10_000_000  # characters that $parameters may add
 TRUST = "if you trust the scene, trust=True or --trust-scene"
 
 
-def find_file(name: str, searched: list[Path], folder: Path | None) -> Path:
+def find_file(name: str, bases: list[Path], folder: Path | None) -> Path:
     """Path of a file that a scene names, links not followed: what is named in it is looked for beside the link.
 
     Parameters
     ----------
     name : str
-    searched : list of Path
+    bases : list of Path
         Folders in which a relative name is looked for, in this order.
     folder : Path or None
         The file has to lie inside it, links followed; None allows any folder.
@@ -41,12 +41,12 @@ def find_file(name: str, searched: list[Path], folder: Path | None) -> Path:
     """
     if not name or "\0" in name:
         raise InputError(f"file {name!r} is not allowed; name a file in the scene's folder")
-    candidates = [str(base / name) for base in searched]
+    candidates = [str(base / name) for base in bases]
     chosen = next(filter(os.path.exists, candidates), candidates[0])
     if folder is not None and not Path(os.path.realpath(chosen)).is_relative_to(os.path.realpath(folder)):
         raise InputError(f"file {name!r} lies outside the scene's folder; move it there, or, {TRUST}")
     if not os.path.exists(chosen):
-        places = ", ".join(map(str, searched))
+        places = ", ".join(map(str, bases))
         raise InputError(f"file {name!r} is missing in {places}; put it there or correct the name")
     if not os.path.isfile(chosen):
         raise InputError(f"file {name!r} is a folder or a device; allowed: a plain file; correct the name")
@@ -91,7 +91,7 @@ def screen(path: Path, folder: Path | None, define: Mapping[str, str]) -> None:
     _screen(path, [path.parent], folder, 0, _Spent(parameters=dict(define)))
 
 
-def _screen(path: Path, searched: list[Path], folder: Path | None, level: int, spent: _Spent) -> None:
+def _screen(path: Path, bases: list[Path], folder: Path | None, level: int, spent: _Spent) -> None:
     parser = expat.ParserCreate("utf-8")
     depth = level
 
@@ -105,14 +105,14 @@ def _screen(path: Path, searched: list[Path], folder: Path | None, level: int, s
         depth += 1
         try:
             # As Mitsuba: a file's own folder counts for its includes alone, its includer's for both.
-            places = [path.parent, *searched] if tag == "include" else searched
+            places = [path.parent, *bases] if tag == "include" else bases
             named = _checked_element(tag, attributes, depth, places, folder, spent)
             if tag == "path":  # the latest comes first; one of an included file counts in that file alone
-                searched.insert(0, _named_folder(attributes.get("value", ""), [path.parent, *searched], spent))
+                bases.insert(0, _named_folder(attributes.get("value", ""), [path.parent, *bases], spent))
         except InputError as error:
             refuse(error)
         if named and tag == "include":
-            _screen(named, [path.parent, *searched], folder, depth, spent)
+            _screen(named, [path.parent, *bases], folder, depth, spent)
 
     def end(_: str) -> None:
         nonlocal depth
@@ -146,7 +146,7 @@ def _content(path: Path, spent: _Spent) -> bytes:
 
 
 def _checked_element(
-    tag: str, attributes: dict[str, str], depth: int, searched: list[Path], folder: Path | None, spent: _Spent
+    tag: str, attributes: dict[str, str], depth: int, bases: list[Path], folder: Path | None, spent: _Spent
 ) -> Path | None:
     """Check one element; gives the file that Mitsuba's parser would open for it."""
     if depth > MOST_NESTED:
@@ -163,16 +163,16 @@ def _checked_element(
         spent.parameters.setdefault(given.get("name", ""), given.get("value", ""))
     if tag not in ("include", "spectrum") or "filename" not in attributes:
         return None
-    return find_file(_substitute(attributes["filename"], spent.parameters), searched, folder)
+    return find_file(_substitute(attributes["filename"], spent.parameters), bases, folder)
 
 
-def _named_folder(value: str, searched: list[Path], spent: _Spent) -> Path:
+def _named_folder(value: str, bases: list[Path], spent: _Spent) -> Path:
     """Folder that a ``<path>`` adds to the search path."""
     name = _substitute(value, spent.parameters)
-    for base in searched:
+    for base in bases:
         if (base / name).is_dir():
             return base / name
-    raise InputError(f"<path> folder {name!r} is missing in {searched[0]}; put it there or correct the name")
+    raise InputError(f"<path> folder {name!r} is missing in {bases[0]}; put it there or correct the name")
 
 
 def _substitute(text: str, parameters: Mapping[str, str]) -> str:

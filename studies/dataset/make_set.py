@@ -14,7 +14,7 @@ from isp.processors.own import processor_of
 from rodcone.digests import digest
 from rodcone.errors import InputError
 from rodcone.files import is_half_written
-from rodcone.progress import Step, render_words, told
+from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import as_stated
 from studies.dataset.card import CARD, write_card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
@@ -77,7 +77,7 @@ def make_set(
     """
     check_cameras(study, order)
     scenes, folder = open_all(study), out / SET
-    with at_work(out), told(step) as show, open_results(out) as base:
+    with at_work(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)
         earlier = _earlier(folder)
         job = Job(study, as_stated(study), out, base)

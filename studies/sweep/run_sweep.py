@@ -16,7 +16,7 @@ from typing import Any
 from isp.processors.catalogue import require_libraries
 from rodcone.errors import InputError
 from rodcone.files import is_half_written
-from rodcone.progress import Step, render_words, told
+from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
@@ -143,7 +143,7 @@ def sweep(
         require_libraries(name)
     scenes = open_all(study)
     runner = runner or (lambda cells: run(cells, InThisProcess()))
-    with at_work(out), told(step) as show, open_results(out) as base:
+    with at_work(out), progress_bar(step) as show, open_results(out) as base:
         plan = plan or plan_of(study, cache=out / PILOTS, step=step)
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")

@@ -8,7 +8,7 @@ import pytest
 
 from render.engine import render
 from rodcone import progress as module
-from rodcone.progress import told
+from rodcone.progress import progress_bar
 from scenes.catalog import load
 
 
@@ -29,7 +29,7 @@ def shown(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, str]]:
 
 
 def test_a_bar_moves_and_vanishes(shown: list[dict[str, str]]) -> None:
-    with told(None) as step:
+    with progress_bar(None) as step:
         step("a < b", 0.0)
         step("half", 0.5)
     pages = [data.get("text/html", "") for data in shown]
@@ -38,7 +38,7 @@ def test_a_bar_moves_and_vanishes(shown: list[dict[str, str]]) -> None:
 
 def test_the_callers_own_step_is_called_in_its_place(shown: list[dict[str, str]]) -> None:
     called = []
-    with told(lambda what, share: called.append((what, share))) as step:
+    with progress_bar(lambda what, share: called.append((what, share))) as step:
         step("half", 0.5)
     assert (called, shown) == ([("half", 0.5)], [])
 
@@ -46,7 +46,7 @@ def test_the_callers_own_step_is_called_in_its_place(shown: list[dict[str, str]]
 @pytest.mark.parametrize("shell", [None, SimpleNamespace()])  # no IPython at work, and one in a terminal
 def test_elsewhere_nothing_is_shown(shell: object, shown: list[dict[str, str]]) -> None:
     sys.modules["IPython"].get_ipython = lambda: shell  # type: ignore[attr-defined]
-    with told(None) as step:
+    with progress_bar(None) as step:
         step("half", 0.5)
     assert shown == []
 

@@ -17,9 +17,9 @@ SIZE, POINTS = (20, 24), 16
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
 
-def drawn(scene: Scene, depth: int, *, apart: bool = True) -> Means:
+def drawn(scene: Scene, depth: int, *, split: bool = True) -> Means:
     film = _checked_film(scene, SIZE, BANDS_NM, None, depth)
-    means, loaded = no_means(scene, film, np.ones(film.size, np.uint32), apart=apart), load_groups(scene, film)
+    means, loaded = no_means(scene, film, np.ones(film.size, np.uint32), split=split), load_groups(scene, film)
     while means.count < POINTS:
         add_run(loaded, means, film, POINTS, 3)
     return means
@@ -84,8 +84,8 @@ def test_light_is_direct_in_a_mirror_and_indirect_from_one() -> None:
 
 def test_raw_light_keeps_its_bits() -> None:
     scene = two_lights()
-    apart, plain = drawn(scene, 8), drawn(scene, 8, apart=False)
+    divided, plain = drawn(scene, 8), drawn(scene, 8, split=False)
     assert plain.indirect is None
-    for one, other in ((apart.light, plain.light), (apart.coverage, plain.coverage)):
+    for one, other in ((divided.light, plain.light), (divided.coverage, plain.coverage)):
         assert np.array_equal(one.mean, other.mean)
         assert np.array_equal(one.difference, other.difference)
