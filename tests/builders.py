@@ -1,11 +1,15 @@
 """Values that many tests need, built by hand."""
 
+import io
+import pickle
+import zipfile
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from isp.processors import network
 from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
@@ -101,3 +105,28 @@ def transport_of(
             **changes,
         }
     )
+
+
+def random_weights() -> dict[str, np.ndarray]:
+    """Weights by the names and shapes of `isp.processors.network`."""
+    rng = np.random.default_rng(1)
+    weights = {}
+    for name, shape in network.LAYERS.items():
+        count = 3 if name == "upsampler" else shape[0]
+        weights[f"{name}.weight"] = rng.normal(0, 1.5 / np.sqrt(np.prod(shape[1:])), shape).astype(np.float32)
+        weights[f"{name}.bias"] = rng.normal(0, 0.1, count).astype(np.float32)
+    return weights
+
+
+def wheel_of(weights: dict[str, np.ndarray], before: bytes = b"", packed: int = zipfile.ZIP_STORED) -> bytes:
+    """Wheel of demosaicnet as torch wrote it before 1.6: five pickles, the fourth with names and keys, the arrays."""
+    texts = [[name, "storage", f"key {name}", "cpu"] for name in weights]
+    keys = sorted(f"key {name}" for name in weights)
+    parts = [before, *(pickle.dumps(part, 2) for part in (0x1950A86A20F9469CFC6C, 1001, {}, texts, keys))]
+    for key in keys:
+        array = weights[key.removeprefix("key ")]
+        parts += [array.size.to_bytes(8, "little"), array.astype("<f4").tobytes()]
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", packed) as members:
+        members.writestr(network.MEMBER, b"".join(parts))
+    return out.getvalue()

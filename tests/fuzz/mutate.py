@@ -3,9 +3,11 @@
 Every change is drawn from a `random.Random`, so that a seed and a number name an input.
 """
 
+import io
 import json
 import re
 import struct
+import zipfile
 import zlib
 from collections.abc import Callable, Sequence
 from copy import deepcopy
@@ -21,6 +23,7 @@ NUMBERS = (
     *("0", "-1", "1e400", "-1e400", "nan", "inf", "-inf", "1e-400", "1e308", "0.5", "2147483648", "true", '""', "[]"),
     *("99999999999999999999", "0x" + 300 * "f", 5000 * "9", "{}", '"\\u202e"', "[[1], 2]", "1_000", "1979-05-27"),
 )
+_PACKED = zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED, zipfile.ZIP_BZIP2, zipfile.ZIP_LZMA
 _NUMBER = re.compile(rb"-?\d+\.?\d*(?:[eE][-+]?\d+)?")
 _LETTERS = (*"\0\n\"'[]{}=,.#<>&$/", "\x1b[2J", "\u202e", "\ud800")
 
@@ -199,6 +202,22 @@ _VALUES: Sequence[Any] = (
         {"a": [1]},
     ),
 )
+
+
+def zip_members(random: Random, content: bytes) -> bytes:
+    """Bytes of a zip's members, mostly where they begin, packed in any way: their sums would tell them otherwise."""
+    if random.random() < 0.3:
+        return any_bytes(random, content)
+    made = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as held, zipfile.ZipFile(made, "w") as members:
+        chosen = random.choice(held.namelist())
+        for name in held.namelist():
+            body = held.read(name)
+            if name == chosen:
+                at = random.choice((0, 0, 0, random.randrange(len(body) + 1)))
+                body = body[:at] + any_bytes(random, body[at : at + 8192]) + body[at + 8192 :]
+            members.writestr(zipfile.ZipInfo(name), body, random.choice(_PACKED))
+    return any_bytes(random, made.getvalue()) if random.random() < 0.3 else made.getvalue()
 
 
 def mat_elements(random: Random, content: bytes) -> bytes:

@@ -3,6 +3,7 @@
 import json
 import sys
 import tempfile
+import zipfile
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, fields
 from functools import cache
@@ -11,9 +12,11 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 import numpy as np
-from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, tiff_tags
+from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_elements, tiff_tags, zip_members
 
 from isp.ple.prior import OWN, load_prior
+from isp.processors.network import network_processor
+from isp.processors.own import processor_of
 from render.cache import load_transport, save_transport
 from render.error_estimates import Halves
 from render.illuminants import illuminant
@@ -46,7 +49,7 @@ from studies.sweep.row import Row
 
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
-from builders import transport_of
+from builders import random_weights, transport_of, wheel_of
 
 Sample = Mapping[str, bytes]  # files by name; the first is the one that is read
 
@@ -395,6 +398,16 @@ def _ledger_samples() -> list[Sample]:
     return [_made(write)]
 
 
+def _wheel_samples() -> list[Sample]:
+    zeros = {name: np.zeros_like(array) for name, array in random_weights().items()}
+    return [{"net.whl": wheel_of(zeros, packed=zipfile.ZIP_DEFLATED)}]
+
+
+def _read_wheel(path: Path) -> object:
+    network_processor.cache_clear()  # it holds each wheel
+    return processor_of(f"{path}:bayer_net")
+
+
 _REPORT = b"""camera = "X"
 maker = "M"
 source = "report"
@@ -446,7 +459,8 @@ TARGETS: dict[str, Target] = {
     "lamp": Target(_lamp_samples, {".csv": any_text}, lambda path: (illuminant(str(path)), read_reflectances(path))),
     "curves": Target(_curve_samples, {".csv": any_text}, _read_curves),
     "scene": Target(_scene_samples, {".xml": any_text, ".spd": any_text}, load_scene_file),
-    "cache": Target(_cache_samples, {".npz": any_bytes}, _read_cached),
-    "prior": Target(lambda: [{"prior.npz": OWN.read_bytes()}], {".npz": any_bytes}, load_prior),
+    "cache": Target(_cache_samples, {".npz": zip_members}, _read_cached),
+    "prior": Target(lambda: [{"prior.npz": OWN.read_bytes()}], {".npz": zip_members}, load_prior),
     "ledger": Target(_ledger_samples, {".sqlite": any_bytes}, lambda path: read_rows(path.parent, everything=True)),
+    "wheel": Target(_wheel_samples, {".whl": zip_members}, _read_wheel),
 }

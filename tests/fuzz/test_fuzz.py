@@ -19,7 +19,7 @@ FINDINGS = sorted((FUZZ / "findings").iterdir())
 QUICK = 20  # inputs of each target in `make test`
 NAMES = (
     *("exr", "mat", "dng", "tiff", "photograph", "noise_profile", "study", "sensor", "report", "library"),
-    *("cube", "photo", "lamp", "curves", "scene", "cache", "prior", "ledger"),
+    *("cube", "photo", "lamp", "curves", "scene", "cache", "prior", "ledger", "wheel"),
 )
 
 

@@ -3,17 +3,19 @@
 ``DEMOSAICNET=FILE.whl python -m pytest tests/isp/processors/test_network.py`` runs the last kind, on the wheel itself.
 """
 
-import io
 import os
 import pickle
+import runpy
+import sys
 import zipfile
 from contextlib import suppress
 from itertools import product
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, raw_image
+from builders import BAYER_PHASES, random_weights, raw_image, wheel_of
 from skimage import data
 
 from isp.colour.colour_fit import ColourFit
@@ -25,30 +27,6 @@ from sensor.cfa import mask
 
 RELEASED = os.environ.get("DEMOSAICNET", "")
 released = pytest.mark.skipif(not RELEASED, reason="DEMOSAICNET names no wheel of demosaicnet")
-
-
-def random_weights() -> dict[str, np.ndarray]:
-    rng = np.random.default_rng(1)
-    weights = {}
-    for name, shape in network.LAYERS.items():
-        count = 3 if name == "upsampler" else shape[0]
-        weights[f"{name}.weight"] = rng.normal(0, 1.5 / np.sqrt(np.prod(shape[1:])), shape).astype(np.float32)
-        weights[f"{name}.bias"] = rng.normal(0, 0.1, count).astype(np.float32)
-    return weights
-
-
-def wheel_of(weights: dict[str, np.ndarray], before: bytes = b"") -> bytes:
-    """Wheel as torch wrote it before 1.6: five pickles, the fourth with names and keys, then the arrays."""
-    texts = [[name, "storage", f"key {name}", "cpu"] for name in weights]
-    keys = sorted(f"key {name}" for name in weights)
-    parts = [before, *(pickle.dumps(part, 2) for part in (0x1950A86A20F9469CFC6C, 1001, {}, texts, keys))]
-    for key in keys:
-        array = weights[key.removeprefix("key ")]
-        parts += [array.size.to_bytes(8, "little"), array.astype("<f4").tobytes()]
-    out = io.BytesIO()
-    with zipfile.ZipFile(out, "w") as members:
-        members.writestr(network.MEMBER, b"".join(parts))
-    return out.getvalue()
 
 
 def test_weights_are_read_as_arrays() -> None:
@@ -172,3 +150,25 @@ def test_released_weights_keep_a_field_and_each_sample(cfa: tuple[str, ...]) -> 
     picture = network.demosaic(mosaic, cfa, weights)
     assert np.abs((picture - photograph)[sites]).mean() < 1e-3
     assert -10 * np.log10(np.mean((np.clip(picture, 0, 1) - photograph) ** 2)) > 36.0
+
+
+@released
+def test_released_network_in_torch_gives_the_same_picture(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    torch = pytest.importorskip("torch", reason="torch is not installed")
+    with zipfile.ZipFile(RELEASED) as members:
+        members.extractall(tmp_path)
+    resources = SimpleNamespace(resource_filename=lambda _, name: str(tmp_path / "demosaicnet" / name))
+    monkeypatch.setitem(sys.modules, "pkg_resources", resources)
+    released_network = runpy.run_path(str(tmp_path / "demosaicnet" / "modules.py"))["BayerDemosaick"]()
+    cfa, edge = ("GR", "BG"), 32
+    photograph = data.coffee()[100:200, 100:260] / 255.0
+    samples = photograph * np.stack([mask(cfa, colour, photograph.shape[:2]) for colour in "RGB"], axis=-1)
+    white = np.quantile(samples.sum(axis=-1), network.WHITE)
+    wide = np.pad(samples / white, ((edge, edge), (edge, edge), (0, 0)), mode="reflect").transpose(2, 0, 1)
+    with torch.no_grad():
+        picture = released_network(torch.from_numpy(wide[None].astype(np.float32)))[0].numpy()
+    lost = (wide.shape[1] - picture.shape[1]) // 2
+    inside = slice(edge - lost, lost - edge)
+    weights = network.read_weights(Path(RELEASED).read_bytes())
+    found = network.demosaic(samples.sum(axis=-1), cfa, weights)
+    assert found == pytest.approx(picture[:, inside, inside].transpose(1, 2, 0) * white, abs=1e-5)
