@@ -1,8 +1,8 @@
 """Time against error of the spectral render, beside stock Mitsuba in the same run.
 
 Run ``python benchmarks/bench_render.py``; ``--scene``, ``--bands``, ``--size``, ``--spp`` and ``--repeats`` narrow it
-down. It prints the environment, then for each scene and number of bands between 380 and 780 nm: seconds of one call and
-the error of what it returns, for rodcone's ``render(...).relight()``, the scene's loading included, for Mitsuba's
+down. It prints the environment, then for each scene and number of bands of ``--range``: seconds of one call and the
+error of what it returns, for rodcone's ``render(...).relight()``, the scene's loading included, for Mitsuba's
 ``path`` into a ``specfilm`` of the same bands with the same sampler (``multijitter``), and for the same with Mitsuba's
 default sampler (``independent``); stock's scene is loaded beforehand.
 
@@ -141,6 +141,7 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=128)
     parser.add_argument("--spp", type=int, default=64)
     parser.add_argument("--repeats", type=int, default=8)
+    parser.add_argument("--range", type=float, nargs=2, default=(380.0, 780.0), help="first and last wavelength, nm")
     parser.add_argument("--growth", action="store_true")
     given = parser.parse_args()
     if given.growth:
@@ -152,7 +153,8 @@ def main() -> None:
     for name in given.scene or SCENES:
         scene = load(name)
         for bands in given.bands or BANDS:
-            nm = 380.0 + 400.0 / bands * (np.arange(bands) + 0.5)
+            first_nm, last_nm = given.range
+            nm = first_nm + (last_nm - first_nm) / bands * (np.arange(bands) + 0.5)
             own, size_spp = ours(scene, nm, given.size, given.spp), (given.size, given.spp)
             wide = into_channels(own, nm)
             for label, mine, channels in (
