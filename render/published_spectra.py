@@ -2,7 +2,7 @@
 
 They are colour-science's, to the last digit, in a file of this package: importing that library takes 1 to 2 s.
 Tables of refractive indices are Mitsuba's own.
-``python tests/render/test_published_spectra.py`` writes the file.
+``python tests/render/test_illuminants.py`` writes the file.
 """
 
 import json

@@ -4,11 +4,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.anscombe import LEAST_PRNU, stabilise
-from isp.planes import fill, tent_radius, tent_weights
-from sensor.cfa import BAYER, RGBW, channels, mask
+from isp.planes import bilinear, fill, tent_radius, tent_weights
+from sensor.cfa import BAYER, MOSAICS, RGBW, channels, mask
+from sensor.raw import RawImage
 
 SPARSE = ("RGGG", "GGGG", "GGGG", "GGGG")
 
@@ -77,3 +78,41 @@ def test_single_precision_holds_its_digits() -> None:
 def test_stabilised_mosaic_is_0_far_under_black() -> None:
     for prnu in [0.0, 0.017]:
         assert np.array_equal(stabilise(np.full((2, 2), -100.0), 3.0, prnu), np.zeros((2, 2))), prnu
+
+
+# Bilinear demosaicking: flat fields, ramps and impulses.
+
+
+def raw(dn: np.ndarray, cfa: tuple[str, ...]) -> RawImage:
+    return raw_image(dn, cfa, black_dn=0.0, white_dn=65535.0, read_noise_e=2.0)
+
+
+def test_ramp_is_reproduced_in_the_interior_and_an_even_field_everywhere() -> None:
+    rows, columns = np.indices((12, 14))
+    ramp = 10 * rows + 4 * columns + 100
+    for cfa in BAYER_PHASES:
+        assert bilinear(raw(ramp, cfa))[2:-2, 2:-2] == pytest.approx(np.repeat(ramp[2:-2, 2:-2, None], 3, axis=2)), cfa
+        for shape in ((2, 2), (7, 9)):
+            assert bilinear(raw(np.full(shape, 1000), cfa)) == pytest.approx(np.full((*shape, 3), 1000.0), rel=1e-12)
+
+
+def test_green_impulse_reaches_its_four_neighbours() -> None:
+    dn = np.zeros((8, 8))
+    dn[4, 3] = 800  # a green site of RG/GB
+    green = bilinear(raw(dn, BAYER))[3:6, 2:5, 1]
+    assert green == pytest.approx(800 * np.array([[0.0, 0.25, 0.0], [0.25, 1.0, 0.25], [0.0, 0.25, 0.0]]))
+
+
+def test_samples_at_unequal_distance_weigh_by_a_tent() -> None:
+    """On a tile of two by two all samples within reach lie equally far; on four by four the nearest weigh most."""
+    cfa, generator = MOSAICS["rgbw_4x4"], np.random.default_rng(3)
+    image = raw(generator.integers(1, 60_000, (12, 12)), cfa)
+    red = bilinear(image)[..., 0]
+    for row, column in product(range(4, 8), range(4, 8)):
+        total = weight = 0.0
+        for down, across in product(range(-2, 3), range(-2, 3)):
+            if cfa[(row + down) % 4][(column + across) % 4] == "R":
+                here = (3 - abs(down)) * (3 - abs(across))
+                total, weight = total + here * image.electrons[row + down, column + across], weight + here
+        own = cfa[row % 4][column % 4] == "R"
+        assert red[row, column] == pytest.approx(image.electrons[row, column] if own else total / weight, rel=1e-12)

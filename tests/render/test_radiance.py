@@ -45,11 +45,6 @@ def test_widths_are_the_spacing_of_even_centres_unless_given():
     assert np.array_equal(SpectralRadiance(values, NM, width_nm=[2.0, 3.0, 4.0]).widths_nm, [2.0, 3.0, 4.0])
 
 
-def test_one_band_without_a_width_is_refused_and_with_one_accepted():
-    assert "give width_nm as well" in refusal(SpectralRadiance, np.ones((2, 2, 1)), np.array([550.0]))
-    assert SpectralRadiance(np.ones((2, 2, 1)), np.array([550.0]), width_nm=[7.0]).widths_nm == [7.0]
-
-
 @loop("error", [-1e-9, np.nan, np.inf])
 def test_an_error_that_is_no_standard_error_is_refused(error):
     assert refusal(SpectralRadiance, np.ones((2, 2, 3)), NM, error).startswith(

@@ -7,6 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 from loop import loop
 from refusal import refusal
 from scipy import stats
@@ -14,7 +16,7 @@ from scipy import stats
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
-from sensor.readout import draw_frame, draw_mean_frame, read_out
+from sensor.readout import draw_frame, draw_mean_frame, noise_sources, noise_variance, read_out, spread_charge
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 
@@ -248,3 +250,103 @@ def test_full_pixels_of_weak_columns_count_as_saturated_too():
 def test_a_frame_of_another_size_than_the_chip_s_is_refused():
     words = ("shape (4, 6) is not the device's (6, 4)", "draw the device with the frame's shape")
     refusal(read_out, np.ones((4, 6)), camera(), even((6, 4)), 0.01, rng(), words=words)
+
+
+# Crosstalk: charge goes to the four neighbours, and none is lost.
+
+
+def test_an_impulse_keeps_its_rest_and_gives_its_share_to_each_of_four_neighbours():
+    light = np.zeros((5, 6))
+    light[2, 3] = 100.0
+    expected = np.zeros((5, 6))
+    expected[2, 3] = 60.0
+    expected[1, 3] = expected[3, 3] = expected[2, 2] = expected[2, 4] = 10.0
+    np.testing.assert_allclose(spread_charge(light, 0.1), expected, rtol=1e-15)
+
+
+def test_at_the_border_the_charge_that_has_no_neighbour_stays():
+    light = np.zeros((3, 4))
+    light[0, 0] = 100.0
+    expected = np.zeros((3, 4))
+    expected[0, 0] = 80.0
+    expected[0, 1] = expected[1, 0] = 10.0
+    np.testing.assert_allclose(spread_charge(light, 0.1), expected, rtol=1e-15)
+
+
+@settings(deadline=None)
+@given(st.integers(1, 9), st.integers(1, 9), st.floats(0.0, 0.25), st.integers(0, 2**32))
+def test_the_total_is_kept_and_nothing_becomes_negative(height, width, crosstalk, seed):
+    light = np.random.default_rng(seed).exponential(1e3, (height, width))
+    spread = spread_charge(light, crosstalk)
+    assert spread.shape == light.shape
+    assert spread.min() >= 0
+    assert spread.sum() == pytest.approx(light.sum(), rel=1e-13)
+
+
+@loop("crosstalk", [0.0, 0.05, 0.25])
+def test_a_flat_field_stays_flat(crosstalk):
+    np.testing.assert_allclose(spread_charge(np.full((4, 5), 7.0), crosstalk), 7.0, rtol=1e-15)
+
+
+def test_zero_returns_the_frame_as_it_is_and_the_frame_is_not_written_to():
+    light = np.random.default_rng(1).uniform(0, 9, (4, 4))
+    before = light.copy()
+    np.testing.assert_array_equal(spread_charge(light, 0.0), light)
+    spread_charge(light, 0.2)
+    np.testing.assert_array_equal(light, before)
+
+
+# The noise variance against closed forms and against chips drawn and read out.
+
+NOISELESS = PixelConfig(2.2, 0.9, full_well_e=60_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
+
+
+def deep_camera(**pixel):
+    return SensorConfig(replace(NOISELESS, **pixel), LensConfig(2.8), bits=16)
+
+
+def variance(light_e, exposure_s=0.1, **pixel):
+    sensor = deep_camera(**pixel)
+    total = noise_variance(np.full((2, 2), light_e), sensor, exposure_s)[0, 0]
+    assert sum(sigma**2 for sigma in noise_sources(light_e, sensor, exposure_s).values()) == pytest.approx(total, 1e-12)
+    return total - sensor.gain_e_per_dn**2 / 12
+
+
+@loop(
+    ("pixel", "expected"),
+    [
+        ({}, 100.0),
+        ({"read_noise_e": 3.0}, 109.0),
+        ({"dsnu_e": 4.0}, 116.0),
+        ({"column_offset_e": 5.0}, 125.0),
+        ({"prnu": 0.02}, 100.0 + 4.0),
+        ({"dark_current_e_per_s": 70.0}, 107.0),
+        # 7 e- in a tenth of the pixels: Poisson of the mean, and the spread of the means
+        ({"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 70.0}, 100.0 + 0.7 + 0.09 * 49),
+        ({"column_gain_spread": 0.03}, 100.0 + 0.0009 * (100.0 + 100.0**2)),
+        ({"crosstalk": 0.1}, 100.0),
+        ({"hot_pixel_share": 0.1}, 100.0),
+        ({"hot_pixel_dark_current_e_per_s": 70.0}, 100.0),
+        (
+            {"dark_current_e_per_s": 70.0, "column_gain_spread": 0.03}
+            | {"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 50.0},
+            107.5 + 0.09 * 25 + 0.0009 * (107.5 + 0.09 * 25 + 107.5**2),
+        ),
+    ],
+)
+def test_each_term_alone_in_closed_form(pixel, expected):
+    assert variance(100.0, **pixel) == pytest.approx(expected, rel=1e-12)
+
+
+def test_quantisation_is_gain_squared_over_12_and_the_shape_is_the_light_s():
+    light = np.array([[0.0, 1.0, 5.0], [2.0, 3.0, 4.0]])
+    sensor = deep_camera()
+    np.testing.assert_allclose(noise_variance(light, sensor, 0.1), light + sensor.gain_e_per_dn**2 / 12, rtol=1e-14)
+
+
+def test_crosstalk_spreads_the_shot_noise_as_it_spreads_the_charge():
+    light = np.zeros((5, 5))
+    light[2, 2] = 100.0
+    sensor = deep_camera(crosstalk=0.1)
+    expected = spread_charge(light, 0.1) + sensor.gain_e_per_dn**2 / 12
+    np.testing.assert_allclose(noise_variance(light, sensor, 0.1), expected, rtol=1e-14)

@@ -22,7 +22,7 @@ FULL_E = 15_000.0
 # A neutral's relative electrons; behind its density W collects what G does.
 NEUTRAL = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0, "C": 0.8, "M": 0.7, "Y": 1.0}
 ENDS_IN_W = ("rgbw_sato", "rgbw_yamagami", "cmyw_yamagami")  # whose luminance is W
-SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that library takes seconds: test_bm3d
+SLOW = [name for name in PROCESSORS if PROCESSORS[name].extra == "bm3d"]  # that library takes seconds: test_sub_images
 # ple leans on a prior, by up to 1 % where there is no noise: a file of its own
 QUICK = [name for name in PROCESSORS if name not in SLOW and not name.startswith("ple")]
 AVAILABLE = [name for name in QUICK if not libraries(name)]

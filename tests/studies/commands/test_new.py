@@ -1,10 +1,21 @@
 """`rodcone new preset`: a commented copy to change."""
 
+import json
+import tomllib
+from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
+import numpy as np
+import pytest
+from builders import raw_image
 from command_line import call, check_refusals
 
+from sensor.calibration import ColourCalibration
+from sensor.cameras.library import VARIABLE
+from sensor.cfa import BAYER
+from sensor.config_file import read_sensor
 from sensor.presets import names, preset, preset_file
+from sensor.raw_files.raw_file import write_raw
 from studies.commands import new as new_command
 from studies.study.study_file import read_study
 
@@ -54,3 +65,120 @@ def test_bad_input_is_refused_and_writes_nothing(tmp_path, monkeypatch):
     )
     check_refusals("new preset", rows, tmp_path)
     check_refusals("new preset", [("low_noise -o absent/a.toml", "choose another place with --out")], tmp_path, code=1)
+
+
+# `rodcone new preset --camera --noise`, `rodcone list sensors`: cameras that exist.
+
+_PATH = Path(__file__).parents[2] / "sensor" / "cameras" / "test_library.py"
+_SPEC = spec_from_file_location("library_sample", _PATH)
+sample = module_from_spec(_SPEC)
+_SPEC.loader.exec_module(sample)
+
+COLOUR = ColourCalibration(np.ones(3), np.eye(3), *[np.eye(3)] * 4)
+REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "framos_imx900_lcg.toml"
+
+
+@pytest.fixture
+def cameras(tmp_path, monkeypatch):
+    copy = sample.copy_of(tmp_path / "copy", sample.camera_json())
+    monkeypatch.setenv(VARIABLE, str(copy))
+
+
+@pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
+@pytest.mark.usefixtures("cameras")
+def test_a_measured_camera_is_listed_and_becomes_a_preset(tmp_path):
+    listed = json.loads(call(["list", "sensors", "--json"])[1])["sensors"]
+    assert listed["Maker Model One"].startswith("Measured response, relative: lab, 2025-11-09")
+    path = tmp_path / "one.toml"
+    code, out, err = call(["new", "preset", "low_noise", "--camera", "maker model one", "-o", path])
+    assert (code, out, err) == (0, f"{path}\n", "")
+    assert (tmp_path / "one_curves.csv").is_file()
+    code, out, err = call(["snr", path, "low_noise"])
+    assert code == 0
+    assert "hold up to one factor" in err
+    assert f"{path}*" in " ".join(out.split())
+    assert "* its responses are relative" in out
+    found = json.loads(call(["snr", path, "low_noise", "--json"])[1])
+    assert [rows[0]["relative"] for rows in found.values()] == [True, False]
+
+
+@pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
+def test_a_fresh_installation_has_a_measured_camera(tmp_path, monkeypatch):
+    monkeypatch.delenv(VARIABLE, raising=False)
+    listed = json.loads(call(["list", "sensors", "--json"])[1])["sensors"]
+    assert "each channel by itself: Darrodi" in listed["Nikon D5100"]
+    path = tmp_path / "mine.toml"
+    assert call(["new", "preset", "low_noise", "--camera", "Nikon D5100", "-o", path]) == (0, f"{path}\n", "")
+    assert "BSD-3-Clause" in path.read_text("utf-8")
+    assert "their ratios aren't known" in path.read_text("utf-8")
+    assert call(["snr", path])[0] == 0
+    code, _, err = call(["snr", "nikon d5100"])  # it is listed beside the presets
+    assert code != 0
+    assert "a measured response without a pixel; allowed" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.usefixtures("cameras")
+def test_an_anchor_makes_it_absolute_and_what_is_missing_is_told(tmp_path):
+    path = tmp_path / "one.toml"
+    code, _, err = call(["new", "preset", "--camera", "Maker Model One", "--anchor", "0.5@540", "-o", path])
+    assert code == 0
+    assert "no source gives pitch_um, fill_factor, full_well_e" in err
+    assert tomllib.loads(path.read_text("utf-8"))["responses"]["quantum_efficiency"] == pytest.approx(0.5, rel=0.02)
+
+
+@pytest.mark.usefixtures("cameras")
+def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_measured_one(tmp_path):
+    path = tmp_path / "report.toml"
+    assert call(["new", "preset", "--noise", REPORT, "-o", path])[0] == 0
+    sensor = read_sensor(path)
+    assert (sensor.cfa, sensor.pixel.pitch_um) == (("W",), 2.25)
+    both = tmp_path / "both.toml"
+    assert call(["new", "preset", "--noise", REPORT, "--camera", "Maker Model One", "-o", both])[0] == 0
+    sensor = read_sensor(both)
+    assert sensor.pixel.read_noise_e == 5.56
+    assert sensor.responses.band_average(("G",), [536.0], [0.1])[0, 0] == pytest.approx(0.9125, rel=2e-3)
+
+
+def test_a_report_with_a_preset_that_lends_is_ready_for_any_scene(tmp_path):
+    path = tmp_path / "mine.toml"
+    assert call(["new", "preset", "low_noise", "--noise", REPORT, "-o", path]) == (0, f"{path}\n", "")
+    sensor = read_sensor(path)
+    assert set(sensor.responses.curves) == set("RGBW")
+    assert sensor.pixel.read_noise_e == 5.56
+
+
+def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_path):
+    raw = raw_image(
+        np.full((16, 16), 500), BAYER, gain_e_per_dn=0.8, read_noise_e=3.0, dsnu_e=0.0, iso=400.0, colour=COLOUR
+    )
+    write_raw(raw, tmp_path / "shot.dng")
+    asked = ("--noise", tmp_path / "shot.dng", "--anchor", "0.5@540", "-o", tmp_path / "mine.toml")
+    code, out, err = call(["new", "preset", *asked])
+    assert (code, out, len(err.splitlines())) == (2, "", 1)
+    assert "anchor: 0.5@540 scales a response, and 'shot.dng' has none" in err
+    assert not (tmp_path / "mine.toml").exists()
+    assert call(["new", "preset", "low_noise", *asked])[0] == 0
+    sensor = read_sensor(tmp_path / "mine.toml")
+    assert sensor.cfa == BAYER
+    assert sensor.responses.band_average(("G",), [540.0], [0.1])[0, 0] == pytest.approx(0.5, rel=1e-4)
+    assert sensor.pixel.full_well_e == pytest.approx(12_000)
+
+
+@pytest.mark.usefixtures("cameras")
+def test_what_is_not_allowed_is_refused_and_nothing_is_written(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    rows = (
+        ("", "name: none is given"),
+        ("--anchor 0.5@530", "name: none is given"),
+        ("low_nois --camera 'Maker Model One'", "did you mean 'low_noise'"),
+        ("--camera 'Maker Model Two'", "did you mean 'Maker Model One'"),
+        ("--camera 'Maker Model One' --anchor 0.5", "such as 0.5@530"),
+        ("--camera 'Maker Model One' --anchor 50@530", "anchor: 50.0"),
+        ("--camera 'Maker Model One' --anchor 0.5@nan", "anchor: nan"),
+        ("--camera 'Maker Model One' --anchor 0.5@@530", "such as 0.5@530"),
+        ("--noise absent.toml", "can't be read"),
+        ("--noise absent.dng", "there is no such file"),
+        ("--noise noise.xml", "another ending"),
+    )
+    check_refusals("new preset -o a.toml", rows, tmp_path)
