@@ -166,7 +166,12 @@ def _direct_sun() -> Spectrum:
 
 
 def unit_luminance(spectrum: Spectrum) -> Spectrum:
-    """Scale a spectrum so that its luminance, summed in 1 nm bands over 360-830 nm, is 1."""
+    """Scale a spectrum so that its `spectral_luminance` is 1."""
+    return spectrum * (1.0 / spectral_luminance(spectrum))
+
+
+def spectral_luminance(spectrum: Spectrum) -> float:
+    """Luminance of a spectrum at power 1, summed in 1 nm bands over 360-830 nm."""
     nm = np.arange(360.5, 830.0)
     width = np.ones_like(nm)
-    return spectrum * (1.0 / float(luminance(spectrum.band_average(nm, width), nm, width)))
+    return float(luminance(spectrum.band_average(nm, width), nm, width))

@@ -91,22 +91,17 @@ def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) 
     return Picture(to_rgb(raw, planes, colours, MATCHED_RADIUS), sources)
 
 
-def combine(values: Plane, cfa: Tile, channel: str, radius: int = MATCHED_RADIUS) -> Plane:
-    """Plane of tent-weighted means of one channel's samples, at its own sites too, shape (h, w).
+def combine(values: Plane, cfa: Tile, channel: str) -> Plane:
+    """Plane of tent-weighted means of one channel's samples, at its own sites too, of a mosaic, shape (h, w).
 
-    Parameters
-    ----------
-    values : (h, w) float64
-        Mosaic.
-    radius : int
-        The tent reaches this many pixels; at least one sample has to be in reach everywhere.
+    The tent reaches `MATCHED_RADIUS` pixels: at least one sample is in reach everywhere.
     """
     sampled = mask(cfa, channel, (values.shape[0], values.shape[1]))
     total: NDArray[np.float64] = np.where(sampled, values, 0.0)
     weight = sampled.astype(np.float64)
     for axis in (0, 1):
-        total = scipy.ndimage.convolve1d(total, tent(radius), axis, mode="constant")
-        weight = scipy.ndimage.convolve1d(weight, tent(radius), axis, mode="constant")
+        total = scipy.ndimage.convolve1d(total, tent(MATCHED_RADIUS), axis, mode="constant")
+        weight = scipy.ndimage.convolve1d(weight, tent(MATCHED_RADIUS), axis, mode="constant")
     return np.asarray(total / weight)
 
 

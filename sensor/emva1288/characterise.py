@@ -129,16 +129,16 @@ def characterise(
     return replace(result, notes=(*result.notes, *binned, f"frames were drawn by {engine}"))
 
 
-def plan_for(sensor: SensorConfig, exposure_s: float = 0.01, levels: int = 55, frames: int = 32) -> ExposurePlan:
+def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
     """Even levels up to 1.1 times the well and a few dim ones; dark times that fill the quickest pixels to a third."""
     pixel = sensor.pixel
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
     longest_s = min(0.3 * pixel.full_well_e / current, 1e6) if current else 1.0
-    even = np.linspace(0, 1.1 * pixel.full_well_e, levels + 1)[1:]
+    even = np.linspace(0, 1.1 * pixel.full_well_e, 56)[1:]
     dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: for the plot
     light_e = np.concatenate([dim, even])
     dark_times_s = tuple(np.linspace(0, longest_s, 6))
-    return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=frames, dark_times_s=dark_times_s)
+    return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=32, dark_times_s=dark_times_s)
 
 
 def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum
 from render.transport import Transport
@@ -14,7 +14,6 @@ from sensor.presets import preset
 from sensor.variations import vary
 from studies.explore.controls import Controls, Lamp
 from studies.metrics.truth import Light, light_in_bands
-from studies.study.lit_scene import spectral_luminance
 from studies.study.study import OWN
 
 

@@ -12,7 +12,6 @@ from render.spectrum import VISIBLE_NM, Floats, Spectrum
 from render.transport import Transport
 from rodcone.brief import brief
 from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.response import electrons_per_irradiance
@@ -84,8 +83,3 @@ def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> 
     whole = sensor.undivided
     weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s)
     return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))
-
-
-def green_scale(sensor: SensorConfig, light: Light, exposure_s: float) -> float:
-    """Electrons of a green pixel per cd/m^2 of a neutral."""
-    return float(neutral_electrons(sensor, light, exposure_s)[channels(sensor.cfa).index("G")])

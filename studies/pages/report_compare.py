@@ -24,6 +24,7 @@ from studies.pages.headline import (
 )
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.verdict import OUTCOMES, Leads, counts, leads
+from studies.study.study import OWN
 
 # Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
 SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
@@ -64,7 +65,7 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
     """Return what varies, in the order of `ReportData.cells`."""
     return (
         Axis("Scene", tuple(scene.name for scene in report.scenes)),
-        Axis("Light", tuple(text.spectrum_name(spectrum) for spectrum in report.spectra)),
+        Axis("Light", tuple("own light" if x == OWN else f"under {x}" for x in report.spectra)),
         Axis("Sensor", tuple(text.plain_name(sensor.name) for sensor in report.sensors)),
         Axis("Exposure", tuple(text.exposure_name(exposure) for exposure in report.exposures)),
         Axis("White balance", tuple(text.BALANCE_NAMES.get(balance, balance) for balance in report.balances)),

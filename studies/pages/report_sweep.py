@@ -69,7 +69,9 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         sensors=tuple(sensor_of(name) for name in study["sensors"]),
         exposures=tuple(way_name(*way) for way in _ways(study)),
         balances=tuple(study["white_balances"]),
-        levels=tuple(level_of(level) for level in study["levels"]),
+        levels=tuple(
+            NAMED.get(level) or ReportLevel(level_text(level), "asked for by the study") for level in study["levels"]
+        ),
         cameras=tuple(study["processors"]),
         seeds=tuple(study["seeds"]),
         cells=tuple(cells),
@@ -80,7 +82,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         configuration=configuration(study),
         exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(made, study["sensors"]),
-        notes=(*render_notes(made), *unmade),
+        notes=(*dict.fromkeys(note for row in made for note in _further(row).get("notes", ())), *unmade),
         denoised=study["render"]["denoise"],
         looked_at=next((busiest(truth) for truth in true.values()), (0, 0)),
     )
@@ -139,20 +141,10 @@ def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
     return ReportRender(scene, first.spp, first.bands, first.render_s, **further)
 
 
-def render_notes(rows: Sequence[Row]) -> list[str]:
-    """Return what had to be assumed of the renders, each once."""
-    return list(dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())))
-
-
 def _further(row: Row) -> dict[str, Any]:
     """Facts of the render beside those with columns of their own."""
     facts: dict[str, Any] = json.loads(row.render)
     return facts
-
-
-def level_of(text: str) -> ReportLevel:
-    """Return a level as the study asks for it."""
-    return NAMED.get(text) or ReportLevel(level_text(text), "asked for by the study")
 
 
 def sensor_of(name: str) -> ReportSensor:

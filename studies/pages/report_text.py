@@ -7,7 +7,7 @@ from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from studies.metrics.metric import Metric
 from studies.pages.report_data import ReportCell
 from studies.study.levels import parse_exposure, parse_level
-from studies.study.study import AS_SHOT, GRAY_WORLD, OWN
+from studies.study.study import AS_SHOT, GRAY_WORLD
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
@@ -107,11 +107,6 @@ def exposure_name(exposure: str) -> str:
 def way_name(exposure: str, frames: int = 1) -> str:
     """Write an exposure, and frames of a burst."""
     return exposure + ("" if frames == 1 else f", {frames} frames")
-
-
-def spectrum_name(spectrum: str) -> str:
-    """Write a spectrum as prose does."""
-    return "own light" if spectrum == OWN else f"under {spectrum}"
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

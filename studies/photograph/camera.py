@@ -30,7 +30,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance
 from sensor.shake import held_lens
-from studies.metrics.truth import GREY, Light, green_scale, light_in_bands
+from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
 
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
@@ -71,8 +71,8 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     """
     if "G" not in channels(sensor.cfa):
         return None
-    light = _in_bands(illuminant("D65"))
-    electrons_per_cd_m2 = green_scale(sensor, light, 1.0)
+    neutral = neutral_electrons(sensor, _in_bands(illuminant("D65")), 1.0)
+    electrons_per_cd_m2 = float(neutral[channels(sensor.cfa).index("G")])
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)

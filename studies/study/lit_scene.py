@@ -11,15 +11,14 @@ import numpy as np
 from render.cache import file_digests
 from render.denoised.relight import relight_denoised
 from render.engine import render
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance
 from render.loader import Film
-from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference, stored_illuminant
 from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys
@@ -113,8 +112,6 @@ def make_transport(
     cache: Path,
     progress: Progress,
     share: Callable[[Transport], float] | None = None,
-    *,
-    seed_offset: int = 0,
 ) -> tuple[Transport, tuple[str, ...]]:
     """Render a scene, or read a picture file, with what had to be assumed of the file.
 
@@ -128,8 +125,6 @@ def make_transport(
         As of `render.engine.render`; called before it with an infinite error, since the first passes may compile.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
-    seed_offset : int
-        Added to the study's seed, for a render that is independent of the study's own.
 
     Raises
     ------
@@ -152,7 +147,7 @@ def make_transport(
         "width_nm": model.width_nm,
         "max_spp": model.spp,
         "max_seconds": limits.max_seconds,
-        "seed": limits.seed + seed_offset,
+        "seed": limits.seed,
         "cache": cache,
         "progress": progress,
         "denoise": model.denoise,
@@ -233,13 +228,6 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
                 raise InputError(f"light: group {lit_name!r} of scene {scene.name} {why}; leave it as it is")
             spectra[lit_name] = illuminant(name) * luminance_of_1
     return spectra
-
-
-def spectral_luminance(spectrum: Spectrum) -> float:
-    """Luminance of a spectrum at power 1, in bands of 1 nm as `render.illuminants.unit_luminance` sums it."""
-    nm: Floats = np.arange(360.5, 830.0)
-    width = np.ones_like(nm)
-    return float(luminance(spectrum.band_average(nm, width), nm, width))
 
 
 def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:

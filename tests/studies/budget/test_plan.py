@@ -176,10 +176,11 @@ def predicted_and_measured(study: Study, planned: Plan, cache: Path) -> NDArray[
     leaves out, and that of its level count as predicted.
     """
     reference, pairs = reference_plan(study), []
+    other = replace(study, render=replace(study.render, seed=study.render.seed + (1 << 30)))
     for choice, opened in open_all(study).items():
         lit, true_lit = (
-            make_transport(opened, study, of.renders[choice], cache, lambda *_: None, seed_offset=offset)[0]
-            for of, offset in ((planned, 0), (reference, 1 << 33))
+            make_transport(opened, of_seed, of.renders[choice], cache, lambda *_: None)[0]
+            for of, of_seed in ((planned, study), (reference, other))
         )
         spp_over_reference = planned.renders[choice].spp / reference.renders[choice].spp
         for row in planned.ledgers:

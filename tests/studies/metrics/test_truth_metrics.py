@@ -16,7 +16,7 @@ from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.metrics.quality import measure, psnr_db
-from studies.metrics.truth import green_scale, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.study.render_noise import charged_share, monte_carlo_share
 
 NM = DEFAULT_WAVELENGTH_NM
@@ -39,7 +39,6 @@ def test_known_scale_is_green_electrons_per_luminance() -> None:
     sensor, light = low_noise(), light_in_bands(illuminant("A"), NM, WIDTH)
     electrons = channel_electrons(form_image(neutral_scene(20.0, "A"), sensor), sensor, 0.01)
     assert 20.0 * neutral_electrons(sensor, light, 0.01) == pytest.approx(electrons[0, 0], rel=1e-9)
-    assert 20.0 * green_scale(sensor, light, 0.01) == pytest.approx(electrons[0, 0, 1], rel=1e-9)
 
 
 def test_psnr_closed_form() -> None:

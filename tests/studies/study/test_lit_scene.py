@@ -7,21 +7,14 @@ import numpy as np
 import pytest
 
 from render.error_estimates import Halves
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import as_transport
 from render.scene import LightGroup
 from render.transport import Transport
 from rodcone.errors import InputError
 from scenes.catalog import load
-from studies.study.lit_scene import (
-    digest_scene,
-    level_luminance,
-    open_choice,
-    spectral_luminance,
-    under,
-    white_spectrum,
-)
+from studies.study.lit_scene import digest_scene, level_luminance, open_choice, under, white_spectrum
 from studies.study.study import OWN, SceneChoice, Study
 
 NM = np.arange(385.0, 780.0, 10.0)
