@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass, replace
+from typing import Annotated
 
 import numpy as np
 
 from render.integrator.points import LOG2_POINTS
 from render.transport import Stop, Transport
-from rodcone.errors import InputError, require_range, require_whole
+from rodcone.errors import InputError, require_fields
 
 DEFAULT_SPP = 64
 PILOT_FROM = 64  # samples a pixel: where more are asked for, a pilot says where they are needed
@@ -43,26 +44,19 @@ class Limits:
         For a limit out of range, or both `spp` and `max_spp`.
     """
 
-    spp: int | None = None
-    max_spp: int | None = None
-    noise: float | None = None
-    max_seconds: float | None = None
-    seed: int = 0
+    spp: Annotated[int | None, (1, MOST_SPP, "give samples per pixel")] = None
+    max_spp: Annotated[int | None, (1, MOST_SPP, "give samples per pixel")] = None
+    noise: Annotated[float | None, (1e-6, 10.0, "give a relative error such as 0.02")] = None
+    max_seconds: Annotated[float | None, (1e-3, 1e7, "give seconds")] = None
+    seed: Annotated[int, (0, 2**63, "give a whole number")] = 0
     mean_rate: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("spp", "max_spp"):
-            if getattr(self, name) is not None:
-                require_whole(name, getattr(self, name), 1, MOST_SPP, "give samples per pixel")
+        require_fields(self)
         if self.spp is not None and self.max_spp is not None:
             raise InputError(
                 f"spp and max_spp: {self.spp!r} and {self.max_spp!r} are both given; allowed: one; leave spp out"
             )
-        if self.noise is not None:
-            require_range("noise", self.noise, 1e-6, 10.0, "give a relative error such as 0.02")
-        if self.max_seconds is not None:
-            require_range("max_seconds", self.max_seconds, 1e-3, 1e7, "give seconds")
-        require_whole("seed", self.seed, 0, 2**63, "give a whole number")
 
     @property
     def most_samples(self) -> int:

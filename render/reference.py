@@ -9,6 +9,7 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from zipfile import ZipFile, is_zipfile
@@ -18,6 +19,7 @@ from scipy.special import gammaincc
 
 from render.cache import ENGINE_VERSION, read_arrays, scene_terms, write_arrays
 from render.combine import emission
+from render.denoised.relight import sums_over_blocks
 from render.error_estimates import Halves
 from render.level import SceneMeans
 from render.loader import Film
@@ -208,14 +210,14 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
     that brings a part of the light; then its halves don't tell, and the reference's variance, at as many samples,
     does: the larger of the two counts. So the rate of false alarms is at most `FALSE_ALARM`.
     """
-    ratio = (reference.counts / live.counts).astype(np.float32)
+    ratio, sums = (reference.counts / live.counts).astype(np.float32), partial(sums_over_blocks, side=BLOCK)
     tests: list[Agreement] = []
     count = live.light.mean.shape[0] * live.light.mean.shape[1]
     for group, band in np.ndindex(live.light.mean.shape[:2]):
         planes = [x.light[group][band] for x in (live, reference)]
-        gap = _block_sums(planes[0].mean.astype(np.float64) - planes[1].mean)
+        gap = sums(planes[0].mean.astype(np.float64) - planes[1].mean)
         short, long = (np.square(x.difference.astype(np.float64)) for x in planes)
-        variance = np.maximum(_block_sums(short), _block_sums(long * ratio)) + _block_sums(long)
+        variance = np.maximum(sums(short), sums(long * ratio)) + sums(long)
         lit = variance > 0
         chi_square, blocks = float((gap[lit] ** 2 / variance[lit]).sum()), int(lit.sum())
         chance = min(1.0, count * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
@@ -245,12 +247,6 @@ def require_agreement(live: Transport, reference: Reference) -> str:
         f"light: the reference {reference.path.name}, {reference.transport.spp:.0f} samples a pixel; a render of "
         f"{live.spp:.0f} made here agrees with it within its noise ({words})"
     )
-
-
-def _block_sums(plane: Floats) -> Floats:
-    """Sums over blocks of `BLOCK` pixels each way; what is left at the ends is a block of its own."""
-    rows, columns = (np.arange(0, side, BLOCK) for side in plane.shape)
-    return np.asarray(np.add.reduceat(np.add.reduceat(plane, rows, axis=0), columns, axis=1))
 
 
 def halves_agree(transport: Transport) -> Agreement:

@@ -130,9 +130,9 @@ def read_out(
             "draw the device with the frame's shape"
         )
 
-    def once(light_e: NDArray[np.floating], camera: SensorConfig) -> RawImage:
-        dn = draw(light_e, camera, device, exposure_s, draw_key(rng), 0)
-        return as_raw(dn, camera, exposure_s, engine, device.hot)
+    def once(light_e: NDArray[np.floating], camera: SensorConfig, patterns: Device = device) -> RawImage:
+        dn = draw(light_e, camera, patterns, exposure_s, draw_key(rng), 0)
+        return as_raw(dn, camera, exposure_s, engine, patterns.hot)
 
     if sensor.chip.channels:
         return read_by_channel(expected, as_read(sensor, expected), once)
@@ -140,9 +140,7 @@ def read_out(
         return once(expected, sensor)
     if sensor.chip.switched:
         index = switched_to(sensor, expected)
-        alone, patterns = of_reading(sensor, index), device.readings[index]
-        dn = draw(expected, alone, patterns, exposure_s, draw_key(rng), 0)
-        return as_raw(dn, alone, exposure_s, engine, patterns.hot)
+        return once(expected, of_reading(sensor, index), device.readings[index])
     readings = sensor.chip.readings
     keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in readings)}
     raws = []

@@ -95,7 +95,7 @@ def measured_error(
     product = one.astype(np.float64) * other * weight
     planes = product.reshape(-1, *product.shape[-2:]).mean(axis=0)
     side = max(1, min(BLOCK, min(planes.shape) // LEAST_BLOCKS))
-    sums, pixels = _block_sums(planes, side).ravel(), _block_sums(np.ones(planes.shape), side).ravel()
+    sums, pixels = sums_over_blocks(planes, side).ravel(), sums_over_blocks(np.ones(planes.shape), side).ravel()
     mean = float(sums.sum() / planes.size)
     if sums.size == 1:
         return MeasuredError(mean, np.inf, np.inf)
@@ -105,7 +105,7 @@ def measured_error(
     return MeasuredError(mean, error, max(0.0, mean + float(scipy.special.stdtrit(sums.size - 1, LEVEL)) * error))
 
 
-def _block_sums(planes: Floats, side: int) -> Floats:
-    """Sums over blocks of so many pixels on a side."""
+def sums_over_blocks(planes: Floats, side: int) -> Floats:
+    """Sums over blocks of so many pixels on a side; what is left at the ends is a block of its own."""
     rows, columns = (np.arange(0, length, side) for length in planes.shape)
     return np.asarray(np.add.reduceat(np.add.reduceat(planes, rows, axis=0), columns, axis=1))

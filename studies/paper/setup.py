@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from functools import cache, cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
+from typing import Annotated
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from rodcone.errors import require_whole
+from rodcone.errors import require_fields
 from rodcone.progress import Step, render_words
 from sensor.capture import expose
 from sensor.config import SensorConfig
@@ -74,16 +75,14 @@ class Setup:
     """
 
     out: Path
-    size: int = 192
-    spp: int = 256
+    size: Annotated[int, (16, 1024, "give the side of the pictures in pixels")] = 192
+    spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 256
     band_nm: float = 20.0
-    seeds: int = 4
+    seeds: Annotated[int, (2, 1000, "give 2 exposures or more: noise is their scatter")] = 4
     step: Step = lambda what, share: None
 
     def __post_init__(self) -> None:
-        require_whole("size", self.size, 16, 1024, "give the side of the pictures in pixels")
-        require_whole("spp", self.spp, 1, 1 << 16, "give samples per pixel")
-        require_whole("seeds", self.seeds, 2, 1000, "give 2 exposures or more: noise is their scatter")
+        require_fields(self)
 
 
 @dataclass(frozen=True, eq=False)
