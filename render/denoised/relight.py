@@ -84,14 +84,7 @@ def measured_error(
     -------
     MeasuredError
         The mean may be negative, since it is an estimate; the limit isn't.
-
-    Raises
-    ------
-    InputError
-        For arrays of other shapes.
     """
-    if not (one.shape == other.shape == weight.shape and one.ndim > 1 and one.size):
-        raise InputError(f"weight: shapes {one.shape}, {other.shape}, {weight.shape}; allowed: one of (..., h, w)")
     product = one.astype(np.float64) * other * weight
     planes = product.reshape(-1, *product.shape[-2:]).mean(axis=0)
     side = max(1, min(BLOCK, min(planes.shape) // LEAST_BLOCKS))

@@ -9,14 +9,15 @@ from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.scene import Scene
 from rodcone.colour_spaces import SRGB_TO_XYZ, luminance_of_srgb
-from rodcone.errors import InputError, require_range
+from rodcone.errors import InputError
 from scenes.catalog import load
 from studies.metrics.mtf import edge_response
 
 Masks = NDArray[np.bool_]
+INNER = 0.6  # share of a patch's sides that counts: its border holds the neighbours' light, blurred and mosaicked
 
 
-def patch_masks(scene: Scene, shape: tuple[int, int], inner: float = 0.6) -> Masks:
+def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
     """Pixels of each patch of a scene's chart, shape (patch, h, w), in the chart's order.
 
     The chart's own placement is projected through the scene's own camera; nothing is searched for in a picture.
@@ -27,31 +28,26 @@ def patch_masks(scene: Scene, shape: tuple[int, int], inner: float = 0.6) -> Mas
         With rectangles ``patch00``, ``patch01``, ...: `scenes.color_checker`, or a scene that holds its chart.
     shape : (int, int)
         Height and width of the picture.
-    inner : float
-        Share of a patch's width and height that counts: its border holds the neighbours' light, blurred and mosaicked.
 
     Raises
     ------
     InputError
         For a scene without patches, or a picture so small that a patch has less than four pixels.
     """
-    require_range("inner", inner, 0.01, 1.0, "give a share of the patch's side: 0.6")
     nodes = [scene.geometry[name] for name in sorted(scene.geometry) if name.startswith("patch")]
     if not nodes:
         raise InputError(f"scene: {scene.name!r} has no patches; give one with a chart, such as 'color_checker'")
     camera = scene.geometry["sensor"]
-    if camera.get("fov_axis") != "smaller":
-        raise InputError(f"scene: its camera's fov_axis is {camera.get('fov_axis')!r}; allowed: 'smaller'")
     to_camera = np.linalg.inv(np.array(camera["to_world"]))
     focal_px = min(shape) / 2 / np.tan(np.radians(camera["fov"] / 2))
-    masks = np.stack([_inside(to_camera @ np.array(node["to_world"]), inner, focal_px, shape) for node in nodes])
+    masks = np.stack([_inside(to_camera @ np.array(node["to_world"]), focal_px, shape) for node in nodes])
     least = int(masks.sum(axis=(1, 2)).min())
     if least < 4:
         raise InputError(f"shape: {shape} leaves {least} pixels to a patch; allowed: 4 or more; give a larger picture")
     return masks
 
 
-def _inside(place: NDArray[np.float64], inner: float, focal_px: float, shape: tuple[int, int]) -> Masks:
+def _inside(place: NDArray[np.float64], focal_px: float, shape: tuple[int, int]) -> Masks:
     """Pixels whose centre sees the inner part of a rectangle of side 2 at `place` in the camera's space (h, w).
 
     The camera looks along +z, +x to its left and +y up: pixel (row, column) looks at ((w / 2 - column - 0.5),
@@ -63,7 +59,7 @@ def _inside(place: NDArray[np.float64], inner: float, focal_px: float, shape: tu
     right, up, centre = place[:3, 0], place[:3, 1], place[:3, 3]
     matrices = np.stack([np.broadcast_to(right, rays.shape), np.broadcast_to(up, rays.shape), -rays], axis=-1)
     u, v, distance = np.moveaxis(np.linalg.solve(matrices, np.broadcast_to(-centre, rays.shape)[..., None]), -2, 0)
-    return np.asarray(((np.abs(u) <= inner) & (np.abs(v) <= inner) & (distance > 0))[..., 0])
+    return np.asarray(((np.abs(u) <= INNER) & (np.abs(v) <= INNER) & (distance > 0))[..., 0])
 
 
 def patch_means(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:

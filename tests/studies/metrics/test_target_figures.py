@@ -141,5 +141,3 @@ def test_what_has_no_patches_is_refused() -> None:
         patch_masks(load("flat_field"), CHART_SHAPE)
     with pytest.raises(InputError, match=r"^shape: \(12, 16\) leaves \d pixels"):
         patch_masks(load("color_checker"), (12, 16))
-    with pytest.raises(InputError, match=r"^inner: 1\.5"):
-        patch_masks(load("color_checker"), CHART_SHAPE, 1.5)
