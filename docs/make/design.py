@@ -15,11 +15,12 @@ from math import log10, sqrt
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 from page_parts import RESULTS, csv_text, fill
 from skimage.color import rgb2lab
 
 from isp.ple.prior import Prior, load_prior, own_prior, save_prior
-from isp.processors.catalogue import NAMED
+from isp.processors.catalogue import NAMED, Processor
 from isp.processors.piecewise import picture_ple
 from render.engine import render
 from render.illuminants import illuminant
@@ -92,15 +93,9 @@ def scene_rows(name: str, transport: Transport, mosaic: str, seed: int) -> Itera
         sensor = in_places(camera(sensor_name, mosaic), MOSAICS[mosaic])
         processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior_of(mosaic)))
         for level, luminance_cd_m2 in LEVELS.items():
-            radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
-            light = light_in_bands(illuminant("D65"), radiance.wavelength_nm, radiance.widths_nm)
-            white_cd_m2 = shown_white_cd_m2(transport, luminance_cd_m2)
-            truth = encode_srgb(true_srgb(radiance, light, white_cd_m2))
             rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic), seed])
-            raw = capture(radiance, sensor, rng=rng)
-            fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
-            linear, _ = develop_to_scale(raw, processor, fit, sensor, neutral, white_cd_m2, balance=neutral)
-            shown = encode_srgb(linear)
+            pictures = developed(transport, luminance_cd_m2, sensor, processor, rng)
+            shown, truth = (encode_srgb(picture) for picture in pictures)
             off = rgb2lab(shown) - rgb2lab(truth)
             yield {
                 "scene": name, "seed": seed, "sensor": sensor_name, "level": level, "mosaic": mosaic,
@@ -108,6 +103,19 @@ def scene_rows(name: str, transport: Transport, mosaic: str, seed: int) -> Itera
                 "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
                 "colour": sqrt(np.mean(off[..., 1:] ** 2) * 2),
             }  # fmt: skip
+
+
+def developed(
+    transport: Transport, luminance_cd_m2: float, sensor: SensorConfig, processor: Processor, rng: np.random.Generator
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Picture of a scene at a level under D65, and the truth, in linear sRGB of one scale."""
+    radiance = transport.relight(luminance_cd_m2=luminance_cd_m2)
+    light = light_in_bands(illuminant("D65"), radiance.wavelength_nm, radiance.widths_nm)
+    white_cd_m2 = shown_white_cd_m2(transport, luminance_cd_m2)
+    raw = capture(radiance, sensor, rng=rng)
+    fit, neutral = colour_fit(sensor, processor, light), neutral_electrons(sensor, light, raw.exposure_s)
+    linear, _ = develop_to_scale(raw, processor, fit, sensor, neutral, white_cd_m2, balance=neutral)
+    return linear, true_srgb(radiance, light, white_cd_m2)
 
 
 def simulated(commit: str) -> list[dict[str, str | float]]:

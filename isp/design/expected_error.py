@@ -16,10 +16,11 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
+from scipy.special import erfcx, ndtr
 
 Doubles = NDArray[np.float64]
-LEAST_OPEN = 1e-8  # share of a sample's values that aren't full, at the least
+LEAST_SHARE = 1e-8  # of a sample's variance that reading it explains, at the least
+FAR = 8.0  # standard deviations below the well: never full
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,11 +81,25 @@ def pooled(prior: Gaussians) -> Gaussians:
     return Gaussians(np.ones(1), mean[None], factor.reshape(1, pixels, coefficients, -1), rest[None])
 
 
-def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Doubles:
-    """Variance of samples' noise over the share that isn't full [e-^2].
+def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
+    """Share o of a sample's variance that reading it explains, by how far its mean is from the well; and its slope.
 
-    A full sample is only a lower bound. It enters as none: a sample that is full with probability q tells (1 - q) times
-    as much, so its variance is over 1 - q. That leaves out what the bound itself tells.
+    In standard deviations a of the whole: o = Phi(a) + phi(a) (hazard(a) - a), the open samples' part and that of the
+    bound; its slope is phi(a) (hazard(a) - a)^2.
+    """
+    a = np.minimum(distance, FAR)
+    density, over = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi), np.sqrt(2 / np.pi) / erfcx(a / np.sqrt(2)) - a
+    share = np.asarray(ndtr(a) + density * over)
+    return np.maximum(share, LEAST_SHARE), np.where(share > LEAST_SHARE, density * over**2, 0.0)
+
+
+def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Doubles:
+    """Variance of the Gaussian noise that leaves as much unknown as a sample does that may be full [e-^2].
+
+    A full sample is a lower bound. Of the variance w of signal and noise together, a sample explains the share o of
+    `opening`: for a known signal the Fisher information of a censored Gaussian over that of an open one. So does noise
+    of w / o less the signal's variance. That is exact for a lone sample, and a little harsh where neighbours know the
+    signal.
 
     Parameters
     ----------
@@ -92,11 +107,8 @@ def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Double
         Mean of the expected electrons, and their variance over the prior.
     """
     mean_e = np.maximum(mean_e, 0.0)
-    variance = np.asarray(noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2)
-    if np.isinf(noise.full_e).all():
-        return variance
-    open_share = ndtr((noise.full_e - mean_e) / np.sqrt(variance + spread_e2))
-    return np.asarray(variance / np.maximum(open_share, LEAST_OPEN))
+    total = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2 + spread_e2
+    return np.asarray(total / opening((noise.full_e - mean_e) / np.sqrt(total))[0] - spread_e2)
 
 
 @dataclass(frozen=True, eq=False)

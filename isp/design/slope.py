@@ -7,55 +7,34 @@ sample's mean H mu and its spread H C H'. With D = G W G', the adjoint of the po
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
-from isp.design.expected_error import LEAST_OPEN, Doubles, Gaussians, Noise, sample_variance
+from isp.design.expected_error import FAR, Doubles, Gaussians, Noise, opening, sample_variance
 
 
 def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[Doubles, Doubles]:
-    """Slopes of `sample_variance` by the mean and by the spread of expected electrons, where the mean is above 0."""
-    mean_e = np.maximum(mean_e, 0.0)
-    variance = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2
-    by_mean = noise.shot + 2 * noise.prnu**2 * mean_e
-    if np.all(np.isinf(noise.full_e)):
-        return by_mean, np.zeros_like(mean_e)
-    width = np.sqrt(variance + spread_e2)
-    z = (noise.full_e - mean_e) / width
-    open_share = ndtr(z)
-    # Slope of 1 / open_share by z; what is full almost surely has the least share, which doesn't move.
-    by_z = -np.exp(-(z**2) / 2) / np.sqrt(2 * np.pi) / np.maximum(open_share, LEAST_OPEN) ** 2
-    by_z = np.where(open_share > LEAST_OPEN, by_z, 0.0)
-    z_by_spread = -z / (2 * width**2)
-    by_mean = by_mean / np.maximum(open_share, LEAST_OPEN) + variance * by_z * (z_by_spread * by_mean - 1 / width)
-    return by_mean, variance * by_z * z_by_spread
-
-
-@dataclass(frozen=True, eq=False)
-class Case:
-    """Light that a patch is seen at.
-
-    Attributes
-    ----------
-    scale : float
-        Light times exposure, over the unit of the sampling.
-    noise : Noise
-    rows : (component, pixel, direction, coefficient) float64
-        R: a middle pixel's squared error is |R e|^2, e that of its coefficients.
-    """
-
-    scale: float
-    noise: Noise
-    rows: Doubles
+    """Slopes of `sample_variance` by the mean and by the spread of expected electrons."""
+    lit, mean_e = mean_e > 0, np.maximum(mean_e, 0.0)
+    total = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2 + spread_e2
+    distance = np.minimum((noise.full_e - mean_e) / np.sqrt(total), FAR)
+    share, by_distance = opening(distance)
+    # The variance is total / share - spread.
+    by_distance = -total / share**2 * by_distance
+    by_total = 1 / share - by_distance * distance / (2 * total)
+    by_mean = by_total * (noise.shot + 2 * noise.prnu**2 * mean_e) - by_distance / np.sqrt(total)
+    return by_mean * lit, by_total - 1
 
 
 def error_slopes(
-    patches: Gaussians, sampling: Doubles, middle: NDArray[np.intp], cases: Sequence[Case]
+    patches: Gaussians,
+    sampling: Doubles,
+    middle: NDArray[np.intp],
+    lights: Sequence[tuple[Doubles, Noise]],
+    rows: Sequence[Sequence[Doubles]],
 ) -> tuple[Doubles, Doubles]:
-    """Expected squared error of a middle pixel, component known, and its slope by `sampling`, of each case.
+    """Mean over scenes of the expected squared error of a middle pixel, component known, and its slope by `sampling`.
 
     Parameters
     ----------
@@ -64,36 +43,47 @@ def error_slopes(
         H: electrons of each sample from each pixel's coefficients, in unit light.
     middle : (pixel,) intp
         Pixels whose error counts.
-    cases : sequence of Case
+    lights : sequence of ((scene,) float64, Noise)
+        Light times exposure of each scene, over the unit of `sampling`, and the noise.
+    rows : sequence of sequence of (component, pixel, direction, coefficient) float64
+        R of each metric of each scene: a middle pixel's squared error is |R e|^2, e that of its coefficients.
 
     Returns
     -------
-    errors : (case,) float64
-    slopes : (case, sample, pixel, coefficient) float64
+    errors : (light, metric) float64
+    slopes : (light, metric, sample, pixel, coefficient) float64
     """
-    h = sampling.reshape(len(sampling), -1)
-    errors, slopes = np.zeros(len(cases)), np.zeros((len(cases), *h.shape))
-    for k, weight in enumerate(patches.weights):
-        mean, f, rest = patches.means[k].ravel(), patches.factors[k].reshape(h.shape[1], -1), patches.rest[k]
-        hc = (h @ f) @ f.T + rest * h
-        hch, hm = hc @ h.T, h @ mean
-        for case, one in enumerate(cases):
-            r, t = one.rows[k], one.scale
-            # R C at the middle pixels, and tr R C R'.
-            rf = np.einsum("pdc,pcf->pdf", r, patches.factors[k][middle])
-            rc = (rf @ f.T).reshape(*r.shape[:2], *sampling.shape[1:])
-            rc[np.arange(len(middle)), :, middle] += rest * r
-            rc = rc.reshape(-1, h.shape[1])
-            rcr = np.sum(rf**2) + rest * np.sum(r**2)
-            # S, G R' and D, of H in this light.
-            spread_e2 = t**2 * np.diag(hch)
-            total = t**2 * hch + np.diag(sample_variance(t * hm, spread_e2, one.noise))
-            hcr = t * h @ rc.T
-            g = np.linalg.solve(total, hcr)
-            d = g @ g.T
-            errors[case] += weight * (rcr - np.sum(g * hcr))
-            by_mean, by_spread = variance_slopes(t * hm, spread_e2, one.noise)
-            by_mean, by_spread = np.diag(d) * by_mean * (hm > 0), np.diag(d) * by_spread
-            slope = 2 * (d @ hc * t - g @ rc) + by_mean[:, None] * mean + 2 * t * by_spread[:, None] * hc
-            slopes[case] += weight * t * slope
-    return errors / len(middle), slopes.reshape(-1, *sampling.shape) / len(middle)
+    # Signals in unit light: H C, H C H', C of the middle pixels with all, and among each one's coefficients.
+    components, pixels, coefficients = patches.means.shape
+    h, means = sampling.reshape(len(sampling), -1), patches.means.reshape(components, -1)
+    f, rest = patches.factors.reshape(components, pixels * coefficients, -1), patches.rest[:, None, None]
+    chosen = (middle[:, None] * coefficients + np.arange(coefficients)).ravel()
+    hc = (h @ f) @ f.swapaxes(1, 2) + rest * h
+    at_middle = f[:, chosen] @ f.swapaxes(1, 2) + rest * np.eye(h.shape[1])[chosen]
+    hch, hm, eye = hc @ h.T, means @ h.T, np.eye(len(h))
+    cross = hc[..., chosen].reshape(components, len(h), len(middle), coefficients)
+    within = np.einsum("kpcpe->kpce", at_middle[..., chosen].reshape(components, *cross.shape[2:] * 2))
+    weights = patches.weights[:, None, None, None] / len(middle) / len(rows)
+    errors = np.zeros((len(lights), len(rows[0])))
+    # Slopes by what H C, C at the middle pixels, and mu are multiplied with.
+    by_hc, by_middle, by_mean = (np.zeros((*errors.shape, *x.shape)) for x in (hch, cross, hm))
+    for index, (scales, noise) in enumerate(lights):
+        for t, scene in zip(scales, rows, strict=True):
+            mean, spread = t * hm, t**2 * np.diagonal(hch, axis1=1, axis2=2)
+            total = t**2 * hch + sample_variance(mean, spread, noise)[..., None] * eye
+            g = np.linalg.solve(total, t * cross.reshape(*hm.shape, -1)).reshape(cross.shape)
+            left = within - np.einsum("kspc,kspe->kpce", t * cross, g, optimize=True)
+            by_noise_mean, by_noise_spread = variance_slopes(mean, spread, noise)
+            for metric, r in enumerate(scene):
+                gr = weights * np.einsum("kspc,kpdc->kspd", g, r, optimize=True)
+                errors[index, metric] += np.einsum("k,kpdc,kpce,kpde->", weights[:, 0, 0, 0], r, left, r, optimize=True)
+                by_middle[index, metric] += t * np.einsum("kspd,kpdc->kspc", gr, r, optimize=True)
+                gr = gr.reshape(*hm.shape, -1)
+                d = gr @ gr.swapaxes(1, 2) / weights[..., 0]
+                by_noise = np.diagonal(d, axis1=1, axis2=2)
+                by_hc[index, metric] += t**2 * (d + (by_noise * by_noise_spread)[..., None] * eye)
+                by_mean[index, metric] += t * by_noise * by_noise_mean
+    over, by_middle = ([2, 4], [0, 1]), by_middle.reshape(*errors.shape, *hm.shape, -1)
+    slopes = 2 * np.tensordot(by_hc, hc, over) - 2 * np.tensordot(by_middle, at_middle, over)
+    slopes += np.tensordot(by_mean, means, (2, 0))
+    return errors, slopes.reshape(*errors.shape, *sampling.shape)

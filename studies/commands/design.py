@@ -38,11 +38,13 @@ class DesignOrder:
     Attributes
     ----------
     tile : str
-        Size of the tile: 2x2, all of which are tried, or 4x4, by annealing.
+        Size of the tile: 2x2, all of which are tried, or 4x4, by annealing; or its rows, such as RG/BW.
     letters : str
         Channels to choose from; the sensor has a curve of each.
     filters : bool
         Shape the filters' transmittances too, in front of a pixel of channel W.
+    rounds : int
+        Rounds of the filters, each at the exposures that its first filters take.
     over : str
         Named levels of light, from one to another.
     weights : tuple of float
@@ -50,7 +52,7 @@ class DesignOrder:
     never_worse_than : str
         Mosaic that gains are over, by name or by rows.
     behind : float
-        Decibels that the design may lose to it at any level, in PSNR, and in a* and b*.
+        Decibels that the design may lose to it at any level, in PSNR, and in a* and b*; below 0: must gain.
     behind_in_luminance : float
         The same in luminance; half a decibel is the least that a person sees.
     light : str
@@ -68,11 +70,12 @@ class DesignOrder:
     tile: str = "4x4"
     letters: str = "RGBW"
     filters: bool = False
+    rounds: Annotated[int, (1, 100, "give 4 or so")] = 4
     over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}"
     weights: tuple[float, ...] = ()
     never_worse_than: str = "bayer"
-    behind: Annotated[float, (0.0, 100.0, "give decibels, such as 0.1")] = 0.1
-    behind_in_luminance: Annotated[float, (0.0, 100.0, "give decibels, such as 0.1")] = 0.5
+    behind: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.1
+    behind_in_luminance: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.5
     light: str = "D65"
     prior: str = "drawn"
     blur: bool = False
@@ -81,7 +84,7 @@ class DesignOrder:
 
     def __post_init__(self) -> None:
         require_fields(self)
-        if self.tile not in SIDES:
+        if self.tile not in SIDES and "/" not in self.tile:
             raise unknown("tile", self.tile, SIDES)
         count = len(self.levels)
         if self.weights and (len(self.weights) != count or min(self.weights) < 0 or not sum(self.weights)):
@@ -142,12 +145,16 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     search = search_for(goal)
     with progress(sys.stderr) as step:
         try:
-            found = best_tile(search, SIDES[order.tile], order.steps, order.seed, known, step)
+            found = (
+                best_tile(search, SIDES[order.tile], order.steps, order.seed, known, step)
+                if order.tile in SIDES
+                else vary(base, order.tile).cfa
+            )
         finally:
             write_files({tried: json.dumps({"question": question, "gains_db": known})})
         camera = with_tile(base, found, base.responses)
         if order.filters:
-            camera = best_filters(goal, found, 4, step)
+            camera = best_filters(goal, found, order.rounds, step)
     # Beside the design: mosaics of three channels or more that the sensor can have, Bayer's in one phase.
     tiles = {**MOSAICS, **{name: rows for name, (rows, _) in VARIATIONS.items()}}
     curves = set(base.responses.curves)

@@ -6,7 +6,7 @@ import numpy as np
 from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
-from isp.design.slope import Case, error_slopes
+from isp.design.slope import error_slopes
 from isp.design.spectral_prior import load_prior
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
@@ -47,7 +47,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
     lens = lens_of(goal.sensor, goal.blur)
-    scenes = [(mean, row) for mean in prior.reflectances for row in rows_of(prior, seen, mean)]
+    rows = [rows_of(prior, seen, mean) for mean in prior.reflectances]
     # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
     nm = seen.light.wavelength_nm
     curves = {
@@ -71,23 +71,15 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         """Score with the other sign, and its slope."""
         shares = transmittances(logits)
         sampling = np.einsum("st,tp,tc->spc", spread, lens, (shares @ clear_e)[places])
-        gains_db, by_sample = np.empty_like(reference_db), np.empty((*reference_db.shape, *sampling.shape))
-        for index, (light, noise) in enumerate(at):
-            if earlier := [before for before in range(index) if at[before][0] == light]:
-                gains_db[:, index], by_sample[:, index] = gains_db[:, earlier[0]], by_sample[:, earlier[0]]
-                continue
-            cases = [Case(mean * light, noise, row) for mean, row in scenes]
-            errors, slopes = error_slopes(prior.patches, sampling, middle, cases)
-            for metric in range(3):  # cases of sRGB, luminance and colour take turns
-                error, slope = errors[metric::3].mean(), slopes[metric::3].mean(axis=0)
-                gains_db[metric, index] = -10 * np.log10(error)
-                by_sample[metric, index] = -10 / np.log(10) * slope / error
-        gains_db -= reference_db
-        weights = np.zeros_like(gains_db)
-        weights[0] = goal.weights
-        over_db = gains_db + goal.behind_db[:, None]
-        if over_db.min() < 0:
-            weights[np.unravel_index(over_db.argmin(), over_db.shape)] += BEHIND
+        # At full exposure more light changes nothing.
+        first = [[light for light, _ in at].index(light) for light, _ in at]
+        lights = [(prior.reflectances * at[index][0], at[index][1]) for index in sorted(set(first))]
+        errors, slopes = error_slopes(prior.patches, sampling, middle, lights, rows)
+        level = np.searchsorted(sorted(set(first)), first)
+        gains_db = -10 * np.log10(errors[level].T) - reference_db
+        by_sample = -10 / np.log(10) * (slopes / errors[..., None, None, None])[level].swapaxes(0, 1)
+        weights = 2 * BEHIND * goal.behind(gains_db)
+        weights[0] += goal.weights
         by_sample = np.tensordot(weights, by_sample, 2)
         by_pixel = np.einsum("st,tp,spc->tc", spread, lens, by_sample, optimize=True)
         by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])

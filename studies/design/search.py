@@ -27,7 +27,7 @@ from studies.design.expect import (
     view_of,
 )
 
-BEHIND = 10.0  # what a decibel beyond the bound costs, in decibels of mean gain
+BEHIND = 100.0  # what the square of a decibel beyond the bound costs, in decibels of mean gain
 COOLING_DB = 0.05  # temperature of the first step
 Known = MutableMapping[str, list[list[float]]]  # gains of the tiles that were tried, by their rows
 Progress = Callable[[str, float], None]
@@ -66,9 +66,13 @@ class Goal:
     prior: str = "drawn"
     blur: bool = False
 
+    def behind(self, gains_db: Floats) -> Floats:
+        """How far gains lie beyond the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
+        return np.maximum(0.0, -gains_db - self.behind_db[:, None])
+
     def score(self, gains_db: Floats) -> float:
-        """Mean gain in PSNR, less what lies behind the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
-        return float(self.weights @ gains_db[0] + BEHIND * min(0.0, (gains_db + self.behind_db[:, None]).min()))
+        """Mean gain in PSNR, less what lies behind the bound."""
+        return float(self.weights @ gains_db[0] - BEHIND * (self.behind(gains_db) ** 2).sum())
 
 
 @dataclass(frozen=True, eq=False)

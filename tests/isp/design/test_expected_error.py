@@ -2,10 +2,11 @@
 
 import numpy as np
 from numpy.testing import assert_allclose
+from scipy.special import ndtr
 
 from isp.design.choice import every_channel, picked, projected
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
-from isp.design.slope import Case, error_slopes
+from isp.design.slope import error_slopes
 
 PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
 MIDDLE = np.array([2, 3])
@@ -52,7 +53,7 @@ def test_one_component_gives_textbook_lmmse() -> None:
     assert_allclose(error(prior, scale, noise), np.diag(by_pixel)[MIDDLE].mean(), rtol=1e-9)
 
 
-def test_no_estimator_of_draws_from_the_mixture_is_better_than_with_the_component_known() -> None:
+def test_draws_have_the_error_of_a_known_component_and_no_estimator_a_smaller_one() -> None:
     prior, noise, scale, draws = mixture(4), Noise(dark_e=3.0, prnu=0.0, full_e=np.inf), 5.0, 4000
     rng = np.random.default_rng(4)
     h = scale * mosaic().reshape(PIXELS, -1)
@@ -71,11 +72,13 @@ def test_no_estimator_of_draws_from_the_mixture_is_better_than_with_the_componen
         solved = np.linalg.solve(total, off.T).T
         logs.append(np.log(prior.weights[j]) - 0.5 * ((off * solved).sum(axis=1) + np.linalg.slogdet(total)[1]))
         estimates.append(means[j] + solved @ h @ covariances[j])
+    known, by_component = error(prior, scale, noise), np.array(estimates)[k, np.arange(draws)]
+    squares = ((by_component - x) ** 2).reshape(draws, PIXELS, -1).sum(axis=2)[:, MIDDLE].mean(axis=1)
+    assert_allclose(squares.mean(), known, atol=4.0 * squares.std() / np.sqrt(draws))  # a false alarm in 16 000 runs
     parts = np.exp(np.array(logs) - np.max(logs, axis=0))
     parts /= parts.sum(axis=0)
     squares = ((np.einsum("jn,jni->ni", parts, estimates) - x) ** 2).reshape(draws, PIXELS, -1).sum(axis=2)[:, MIDDLE]
     one_sided = 4.0 * squares.mean(axis=1).std() / np.sqrt(draws)  # a false alarm in 30 000 runs
-    known = error(prior, scale, noise)
     together = pooled(prior)
     samples = sampled(together, mosaic(), MIDDLE)
     linear = float(expected_error(np.ones(1), samples, np.full(PIXELS, scale), noise, unit_forms(1))[0])
@@ -114,31 +117,80 @@ def test_without_samples_the_error_is_that_of_the_prior() -> None:
     assert_allclose(error(prior, 1.0, blind), alone, rtol=1e-9)
 
 
-def test_a_full_sample_tells_nothing_and_one_at_the_well_half() -> None:
-    noise = Noise(dark_e=0.0, prnu=0.0, full_e=100.0)
-    assert_allclose(sample_variance(np.array([100.0]), np.array([50.0]), noise), 200.0)
-    assert sample_variance(np.array([1000.0]), np.array([0.0]), noise)[0] > 1e10
-    assert_allclose(sample_variance(np.array([10.0]), np.array([0.0]), noise), 10.0)
+def test_a_known_signal_has_the_information_of_a_censored_gaussian() -> None:
+    """Fisher information of a sample of known noise: the variance of the score, by quadrature."""
+    for mean_e in (80.0, 100.0, 115.0):
+        noise = Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+        y = np.linspace(mean_e - 80.0, 100.0, 20001)
+        density = np.exp(-(((y - mean_e) / 10.0) ** 2) / 2) / (10.0 * np.sqrt(2 * np.pi))
+        step = 1e-4
+        log_full = [np.log(ndtr((m - 100.0) / 10.0)) for m in (mean_e - step, mean_e + step)]
+        full = np.diff(log_full)[0] ** 2 / (2 * step) ** 2 * ndtr((mean_e - 100.0) / 10.0)
+        information = np.trapezoid(((y - mean_e) / 100.0) ** 2 * density, y) + full
+        assert_allclose(sample_variance(np.array([mean_e]), np.zeros(1), noise)[0], 1 / information, rtol=1e-5)
+
+
+def test_a_lone_sample_that_may_be_full_leaves_what_draws_leave() -> None:
+    """The variance of the signal given a sample, or given that it is full, of a million draws; five deviations."""
+    rng, spread, draws = np.random.default_rng(3), 900.0, 1_000_000
+    noise = Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+    for mean_e in (80.0, 100.0, 150.0):
+        signal = mean_e + 30.0 * rng.standard_normal(draws)
+        total = signal + 10.0 * rng.standard_normal(draws)
+        full = total > 100.0
+        estimate = np.where(full, signal[full].mean(), mean_e + (total - mean_e) * spread / (spread + 100.0))
+        squares = (signal - estimate) ** 2
+        variance = sample_variance(np.array([mean_e]), np.array([spread]), noise)[0]
+        alarm = 5 * squares.std() / np.sqrt(draws)  # in one of 1.7 million runs
+        assert_allclose(squares.mean(), spread * variance / (spread + variance), atol=alarm)
+
+
+def test_of_three_samples_that_may_be_full_the_error_is_near_that_of_draws() -> None:
+    """Exact by draws of what is hidden, for neighbours alike and unlike; the form is a quarter off at most."""
+    rng, noise = np.random.default_rng(5), Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+    for alike, means in [(0.5, (80.0, 100.0, 120.0)), (0.9, (80.0, 95.0, 110.0)), (0.9, (120.0, 120.0, 120.0))]:
+        signal, mean_e = 900.0 * (alike + (1 - alike) * np.eye(3)), np.array(means)
+        total = signal + 100.0 * np.eye(3)
+        gain = np.linalg.solve(total, signal)  # (sample, pixel)
+        left = np.trace(signal - signal @ gain)
+        exact = []
+        for z in mean_e + rng.standard_normal((150, 3)) @ np.linalg.cholesky(total).T:
+            full = z > 100.0
+            known = np.linalg.solve(total[np.ix_(~full, ~full)], total[np.ix_(~full, full)])
+            middle = mean_e[full] + (z - mean_e)[~full] @ known
+            root = np.linalg.cholesky(total[np.ix_(full, full)] - total[np.ix_(full, ~full)] @ known)
+            draws = middle + rng.standard_normal((20000, full.sum())) @ root.T
+            draws = draws[(draws > 100.0).all(axis=1)]
+            exact.append(left + ((draws @ gain[full]).var(axis=0).sum() if len(draws) > 50 else 0.0))
+        variance = sample_variance(mean_e, np.diag(signal), noise)
+        form = np.trace(signal - signal @ np.linalg.solve(signal + np.diag(variance), signal))
+        assert_allclose(form, np.mean(exact), rtol=0.25)
 
 
 def test_the_slope_is_that_of_differences() -> None:
     """Central differences, one entry of H after another; some samples are half full."""
     prior, noise, rng = mixture(3), Noise(dark_e=2.0, prnu=0.01, full_e=60.0), np.random.default_rng(7)
-    sampling = mosaic()
-    rows = rng.standard_normal((3, len(MIDDLE), 2, COEFFICIENTS))
-    forms = (rows.swapaxes(-1, -2) @ rows)[None]
+    sampling, scales = mosaic(), (40.0, 3.0)
+    rows = [[rng.standard_normal((3, len(MIDDLE), d, COEFFICIENTS)) for d in (2, 1)] for _ in scales]
 
-    def error_of(h: np.ndarray) -> float:
-        return float(expected_error(prior.weights, sampled(prior, h, MIDDLE), np.full(PIXELS, 40.0), noise, forms)[0])
+    def errors_of(h: np.ndarray) -> np.ndarray:
+        samples = sampled(prior, h, MIDDLE)
+        by_scene = [
+            expected_error(prior.weights, samples, np.full(PIXELS, scale), noise,
+                           np.stack([row.swapaxes(-1, -2) @ row for row in metrics]))
+            for scale, metrics in zip(scales, rows, strict=True)
+        ]  # fmt: skip
+        return np.mean(by_scene, axis=0)
 
-    cases = [Case(40.0, noise, rows), Case(3.0, noise, rows)]
-    (error, _), (slope, _) = error_slopes(prior, sampling, MIDDLE, cases)
-    assert_allclose(error, error_of(sampling), rtol=1e-10)
+    unlit = (np.array([0.1, 0.2]), noise)
+    errors, slopes = (x[1] for x in error_slopes(prior, sampling, MIDDLE, [unlit, (np.array(scales), noise)], rows))
+    assert_allclose(errors, errors_of(sampling), rtol=1e-10)
     for place in np.ndindex(sampling.shape):
         step = np.zeros_like(sampling)
         step[place] = 3e-5
-        difference = (error_of(sampling + step) - error_of(sampling - step)) / 6e-5
-        assert_allclose(slope[place], difference, rtol=1e-6, atol=1e-9 * np.abs(slope).max(), err_msg=str(place))
+        difference = (errors_of(sampling + step) - errors_of(sampling - step)) / 6e-5
+        atol = 1e-9 * np.abs(slopes).max()
+        assert_allclose(slopes[:, *place], difference, rtol=1e-6, atol=atol, err_msg=str(place))
 
 
 def test_a_tile_picks_its_samples() -> None:

@@ -71,7 +71,7 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
         ("--letters RGQ -o found", "letters: 'Q' is unknown"),
         ("--over noon:midnight -o found", "over: 'noon:midnight' is not a range of levels"),
         ("--weights 1 --weights 2 -o found", "for 7 levels"),
-        ("--behind -1 -o found", "behind: -1"),
+        ("--behind -101 -o found", "behind: -101"),
         ("--never-worse-than bayr -o found", "did you mean 'bayer'"),
         ("--light D66 -o found", "did you mean 'D65'"),
         ("--prior draw -o found", "did you mean 'drawn'"),
