@@ -15,6 +15,7 @@ from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.transport import Transport
 from sensor.cfa import BAYER, RGBW, Tile
+from sensor.device import Device
 from sensor.raw import RawImage
 
 BAYER_PHASES: list[Tile] = [BAYER, ("GR", "BG"), ("GB", "RG"), ("BG", "GR")]
@@ -48,6 +49,17 @@ def any_order(terms: int) -> float:
     Each addition rounds once, by up to half an eps (Higham 2002, section 4.2). A quotient of two such sums counts both.
     """
     return terms * float(np.finfo(float).eps)
+
+
+def even_device(shape: tuple[int, int]) -> Device:
+    """Chip without fixed patterns."""
+    return Device(np.ones(shape), np.zeros(shape))
+
+
+def block_means(planes: NDArray[Any], block: int = 8) -> NDArray[np.float64]:
+    """Means over blocks of pixels of (..., h, w)."""
+    h, w = planes.shape[-2] // block, planes.shape[-1] // block
+    return planes.reshape(*planes.shape[:-2], h, block, w, block).mean(axis=(-3, -1), dtype=np.float64)
 
 
 def raw_image(dn: ArrayLike, cfa: Tile = RGBW, **changes: Any) -> RawImage:

@@ -14,6 +14,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from builders import block_means
 from loop import loop
 from refusal import refusal
 from scipy.stats import chi2, norm
@@ -44,12 +45,6 @@ RAMP = spectrum_node(Spectrum(np.array([380.0, 780.0]), np.array([0.0, 1.0])))
 def bound(comparisons):
     """Standard errors that normal errors exceed, on either side, `FALSE_ALARM` of the time in all comparisons."""
     return norm.isf(FALSE_ALARM / 2 / comparisons)
-
-
-def block_means(planes):
-    """Means over blocks of pixels of (..., h, w)."""
-    h, w = planes.shape[-2] // BLOCK, planes.shape[-1] // BLOCK
-    return planes.reshape(*planes.shape[:-2], h, BLOCK, w, BLOCK).mean(axis=(-3, -1), dtype=np.float64)
 
 
 def planes_of(radiance):

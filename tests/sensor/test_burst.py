@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import even_device, raw_image
 from loop import loop
 from refusal import refusal
 
@@ -13,7 +13,7 @@ from sensor.burst import merge, merged_raw, merged_sensor
 from sensor.capture import capture
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.device import Device, draw_device
+from sensor.device import draw_device
 from sensor.presets import low_noise, preset, table1_pixel
 from sensor.readout import read_out
 
@@ -26,12 +26,8 @@ def camera(**pixel):
     return SensorConfig(replace(QUIET, **pixel), LensConfig(2.8), bits=16)
 
 
-def even(shape=SHAPE):
-    return Device(np.ones(shape), np.zeros(shape))
-
-
 def shoot(sensor, rate, exposures_s, device=None, seed=0, shape=SHAPE):
-    device = even(shape) if device is None else device
+    device = even_device(shape) if device is None else device
     rng = np.random.default_rng(seed)
     light = np.broadcast_to(np.asarray(rate, dtype=float), shape)
     return [read_out(light * t, sensor, device, t, rng) for t in exposures_s]

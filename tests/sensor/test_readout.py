@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import even_device
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from loop import loop
@@ -29,12 +30,8 @@ def rng(seed=0):
     return np.random.default_rng(seed)
 
 
-def even(shape):
-    return Device(np.ones(shape), np.zeros(shape))
-
-
 def expose(sensor, light_e, shape=(64, 64), device=None, exposure_s=0.01, seed=0):
-    device = even(shape) if device is None else device
+    device = even_device(shape) if device is None else device
     return read_out(np.broadcast_to(light_e, shape), sensor, device, exposure_s, rng(seed))
 
 
@@ -116,7 +113,7 @@ def test_half_of_the_saturated_pixels_read_under_the_top_with_the_moments_of_a_h
 
 def test_with_and_without_shot_noise_a_key_draws_one_read_noise_of_each_reading():
     """In the dark nothing else is drawn; where no reading is named it is the first."""
-    sensor, dark, chip = camera(read_noise_e=30.0), np.zeros((32, 32)), even((32, 32))
+    sensor, dark, chip = camera(read_noise_e=30.0), np.zeros((32, 32)), even_device((32, 32))
     first, second = (draw_frame(dark, sensor, chip, 0.01, 7, reading) for reading in (0, 1))
     for draw in (draw_frame, draw_mean_frame):
         np.testing.assert_array_equal(draw(dark, sensor, chip, 0.01, 7), first)
@@ -249,7 +246,7 @@ def test_full_pixels_of_weak_columns_count_as_saturated_too():
 
 def test_a_frame_of_another_size_than_the_chip_s_is_refused():
     words = ("shape (4, 6) is not the device's (6, 4)", "draw the device with the frame's shape")
-    refusal(read_out, np.ones((4, 6)), camera(), even((6, 4)), 0.01, rng(), words=words)
+    refusal(read_out, np.ones((4, 6)), camera(), even_device((6, 4)), 0.01, rng(), words=words)
 
 
 # Crosstalk: charge goes to the four neighbours, and none is lost.

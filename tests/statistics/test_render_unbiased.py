@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from builders import block_means
 from scipy.ndimage import maximum_filter
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
@@ -50,20 +51,15 @@ class Estimate:
     @staticmethod
     def of_pixels(mean, variance, passes, block):
         """Means over blocks of independent pixels of (band, h, w), whose variances come from `passes` passes."""
-        first = blocks(variance, block) / block**2
-        fourth = blocks(variance**2, block) / block**6
-        return Estimate(blocks(mean, block), first, (passes - 1) * first**2 / np.maximum(fourth, 1e-300))
+        first = block_means(variance, block) / block**2
+        fourth = block_means(variance**2, block) / block**6
+        return Estimate(block_means(mean, block), first, (passes - 1) * first**2 / np.maximum(fourth, 1e-300))
 
     @staticmethod
     def of_draws(draws):
         """Mean over draws, the first axis."""
         count = len(draws)
         return Estimate(draws.mean(0), draws.var(0, ddof=1) / count, np.full(draws.shape[1:], count - 1.0))
-
-
-def blocks(planes, block):
-    h, w = planes.shape[-2] // block, planes.shape[-1] // block
-    return planes.reshape(*planes.shape[:-2], h, block, w, block).mean(axis=(-3, -1))
 
 
 def difference(one, other):

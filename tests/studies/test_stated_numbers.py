@@ -14,8 +14,7 @@ from rodcone.jit import backend
 from sensor.presets import low_noise
 from studies.study import render_noise
 from studies.study.study import RenderLimits, SceneChoice, Study
-from studies.sweep.database import open_results, rows
-from studies.sweep.export import results_json
+from studies.sweep.export import read_rows, results_json
 
 
 def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> None:
@@ -23,8 +22,8 @@ def test_bands_and_samples_are_those_of_the_stored_render(tmp_path: Path) -> Non
     study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
     swept(study, tmp_path)
     (stored,) = (tmp_path / "renders").iterdir()  # 32 bytes of digest go before NumPy's file
-    with np.load(BytesIO(stored.read_bytes()[32:])) as render, open_results(tmp_path) as base:
-        (row,) = rows(base)
+    (row,) = read_rows(tmp_path)
+    with np.load(BytesIO(stored.read_bytes()[32:])) as render:
         assert row.bands == render["light_mean"].shape[1] == 8
         assert row.spp == 2 * (limits.spp // 2 + 1), "a half has whole points"
 
@@ -41,8 +40,7 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
         render=limits,
     )
     swept(study, tmp_path)
-    with open_results(tmp_path) as base:
-        bright, dark = sorted(rows(base), key=lambda row: -row.luminance_cd_m2)
+    bright, dark = sorted(read_rows(tmp_path), key=lambda row: -row.luminance_cd_m2)
     well = low_noise("bayer").pixel.full_well_e
     assert max(json.loads(bright.mean_electrons).values()) == pytest.approx(0.8 * well, rel=0.05)
     assert bright.exposure_s < 0.05

@@ -5,6 +5,7 @@ from operator import attrgetter
 
 import numpy as np
 import pytest
+from builders import block_means
 from scipy.stats import norm
 
 from render.engine import render
@@ -61,17 +62,11 @@ def several():
     return [made(scene, spp=16, seed=seed) for seed in range(20, 44)]
 
 
-def blocks(planes):
-    """Means over blocks of pixels of (..., h, w)."""
-    h, w = planes.shape[-2] // BLOCK, planes.shape[-1] // BLOCK
-    return planes.reshape(*planes.shape[:-2], h, BLOCK, w, BLOCK).mean(axis=(-3, -1), dtype=np.float64)
-
-
 @pytest.mark.thorough
 def test_the_sky_along_another_lights_paths_is_the_sky_by_itself(both):
     alone = made(sky_by_itself(courtyard()), spp=256, seed=8)
-    variance = blocks(both.variance[0]) + blocks(alone.variance[0])
-    z = (blocks(both.radiance[0]) - blocks(alone.radiance[0])) / np.sqrt(variance / BLOCK**2)
+    variance = block_means(both.variance[0]) + block_means(alone.variance[0])
+    z = (block_means(both.radiance[0]) - block_means(alone.radiance[0])) / np.sqrt(variance / BLOCK**2)
     # Block means of 64 pixels with 7 degrees of freedom each are close to normal.
     assert np.abs(z).max() < norm.isf(FALSE_ALARM / 2 / z.size)
     assert 0.5 < np.mean(z**2) < 1.7  # 20 blocks whose bands go together: standard error 0.32 at most

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import even_device
 from loop import loop
 from scipy import stats
 
@@ -40,13 +41,9 @@ NOISY = replace(
 EVERY_TERM = SensorConfig(NOISY, LensConfig(2.8), bits=12)
 
 
-def even(shape):
-    return Device(np.ones(shape), np.zeros(shape))
-
-
 def read(mean_e, sensor=COUNTS, shape=(1000, 1000), device=None, exposure_s=0.01, key=1):
     light = np.ascontiguousarray(np.broadcast_to(np.float32(mean_e), shape))
-    return read_frame(light, sensor, even(shape) if device is None else device, exposure_s, key)
+    return read_frame(light, sensor, even_device(shape) if device is None else device, exposure_s, key)
 
 
 # Expected electrons
@@ -217,7 +214,7 @@ def test_light_beyond_single_precision_saturates_without_a_warning(light, crosst
     weights[0] = 0.0  # a channel that doesn't see it
     expected_e = expected_electrons_single(np.full((6, 8, 3), light), weights, sensor)
     assert not np.isnan(expected_e).any()
-    dn = read_frame(expected_e, sensor, even((6, 8)), 0.01, 1)
+    dn = read_frame(expected_e, sensor, even_device((6, 8)), 0.01, 1)
     np.testing.assert_array_equal(dn[1::2], sensor.white_dn)  # rows of B and W
     if crosstalk == 0:
         np.testing.assert_array_equal(dn[::2, ::2], 0)

@@ -29,7 +29,8 @@ from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep import run_sweep as sweep_run
 from studies.sweep.cells import Cell
-from studies.sweep.database import last_run, open_results, rows
+from studies.sweep.database import last_run
+from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 from studies.sweep.run_sweep import at_work
 from studies.sweep.workers import run
@@ -49,8 +50,7 @@ def test_every_cell_gets_a_row_in_the_studys_order_and_a_second_run_makes_none(t
     study = small_study(tmp_path)
     first = swept(study, tmp_path / "out")
     assert (first.cells, first.made) == (4, 4)
-    with open_results(tmp_path / "out") as base:
-        found = [(row.level, row.seed, row.luminance_cd_m2) for row in rows(base)]
+    found = [(row.level, row.seed, row.luminance_cd_m2) for row in read_rows(tmp_path / "out")]
     assert found == [("1cd/m2", 0, 1.0), ("1cd/m2", 1, 1.0), ("25cd/m2", 0, 25.0), ("25cd/m2", 1, 25.0)]
     before = content(tmp_path / "out")
     assert swept(study, tmp_path / "out").made == 0
@@ -74,8 +74,7 @@ def test_sensors_of_one_size_get_the_same_light_and_are_compared_at_the_coarsest
     names = (str(coarse_file), "low_noise")
     study = small_study(tmp_path, sensors=names, sensor_side_um=140.8, seeds=(0,), exposures=("10ms",))
     swept(study, tmp_path / "out")
-    with open_results(tmp_path / "out") as base:
-        made = list(rows(base))
+    made = read_rows(tmp_path / "out")
     coarse, fine = ([row for row in made if row.sensor == name] for name in ("coarse.toml", "low_noise"))
     assert len(coarse) == len(fine) == 2
     for one, other in zip(coarse, fine, strict=True):
@@ -143,11 +142,6 @@ def test_a_full_disk_leaves_nothing_half_done_and_the_next_run_goes_on(
     assert len(content(tmp_path / "out")) == 2
     assert half_pictures(tmp_path / "out") == parts_left(tmp_path / "out") == []
     assert swept(study, tmp_path / "out").made == 2
-
-
-def rows_of(out: Path) -> list[Row]:
-    with open_results(out) as base:
-        return rows(base)
 
 
 def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> None:
@@ -223,7 +217,7 @@ def test_shared_files_that_are_damaged_or_gone_are_made_again(damage: str, tmp_p
     before = content(tmp_path / "out")
     for path in [path for path in (tmp_path / "out" / "frames").rglob("*") if path.is_file()]:
         path.write_text(damage, "utf-8") if path.suffix == ".json" else damage == "{" and path.unlink()
-    (tmp_path / "out" / "pictures" / rows_of(tmp_path / "out")[0].picture).unlink()
+    (tmp_path / "out" / "pictures" / read_rows(tmp_path / "out")[0].picture).unlink()
     assert swept(study, tmp_path / "out").made == 1
     assert content(tmp_path / "out") == before
 
@@ -248,8 +242,7 @@ def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured
     study = replace(plain, render=replace(limits, denoise=True))
     assert [swept(each, tmp_path).made for each in (plain, study, plain)] == [1, 1, 0]  # both stay
     assert swept(study, tmp_path).made == 0
-    with open_results(tmp_path) as base:
-        row = rows(base)[0]
+    row = read_rows(tmp_path)[0]
     model = SAMPLE.stated(study).renders[study.scenes[0]]
     bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
     transport = render(load("cornell_box"), (32, 32), **bands, spp=32, denoise=True)
@@ -270,9 +263,8 @@ def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_ane
     finer = replace(study, render=replace(limits, spp=64))
     assert [swept(each, tmp_path / "out").made for each in (study, finer, study)] == [1, 1, 0]
     assert len(list((tmp_path / "out" / "renders").iterdir())) == 1
-    with open_results(tmp_path / "out") as base:
-        assert [row.spp for row in rows(base)] == [16]  # what the last run asked for
-        coarse, fine = sorted(rows(base, everything=True), key=lambda row: row.spp)
+    assert [row.spp for row in read_rows(tmp_path / "out")] == [16]  # what the last run asked for
+    coarse, fine = sorted(read_rows(tmp_path / "out", everything=True), key=lambda row: row.spp)
     assert (coarse.spp, fine.spp) == (16, 64)
     model = SAMPLE.stated(finer).renders[study.scenes[0]]
     bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
