@@ -44,11 +44,12 @@ def _content(folder: Path) -> dict[Path, tuple[int, int]]:
     return {path: (stat.st_size, stat.st_mtime_ns) for path, stat in stats.items()}
 
 
-def in_new_python(code: str, **variables: str) -> str:
+def in_new_python(code: str, *arguments: object, folder: Path | None = None, **variables: str) -> str:
     """What `code` prints in a Python of its own, with the variable that names LLVM unset."""
     kept = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
+    command, environment = [sys.executable, "-c", code, *map(str, arguments)], kept | variables
     done = subprocess.run(
-        [sys.executable, "-c", code], env=kept | variables, capture_output=True, text=True, timeout=60, check=False
+        command, cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False
     )
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()

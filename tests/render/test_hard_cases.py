@@ -4,12 +4,9 @@ A line in a coarse grid, caustics, one pixel, 1 x N pixels, a missing mesh, no l
 in test_render_relit, test_render_unbiased, test_render_engine and test_render_scene_file.
 """
 
-import os
-import subprocess
-import sys
-
 import numpy as np
 import pytest
+from command_line import in_new_python
 from loop import loop
 from refusal import refusal
 from scipy.stats import norm
@@ -167,11 +164,6 @@ print(made.radiance.any(), made.irradiance.any())
 @pytest.mark.thorough
 @pytest.mark.skipif(backend() != "llvm", reason="threads are the LLVM backend's")
 def test_the_same_seed_gives_the_same_bits_whatever_the_number_of_threads():
-    said = []
-    for count in (1, 5):
-        command = [sys.executable, "-c", THREADS, str(count)]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=240, check=False, env=dict(os.environ))
-        assert done.returncode == 0, done.stderr
-        said.append(done.stdout)
-    assert said[0].endswith("True True\n")
+    said = [in_new_python(THREADS, count) for count in (1, 5)]
+    assert said[0].endswith("True True")
     assert said[0] == said[1]

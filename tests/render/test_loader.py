@@ -1,12 +1,11 @@
 """Loading: what light groups share, that sharing changes no bit, and that a kernel compiles once for all passes."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import in_new_python
 
 from render.engine import render
 from render.integrator.reflectance_table import STEPS, TableReader
@@ -86,7 +85,4 @@ print(mi.variant(), repr(mi.file_resolver()) == before, np.array_equal(first.rad
 
 @pytest.mark.thorough
 def test_a_users_own_variant_search_path_and_scene_are_as_they_were(tmp_path: Path) -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", GUEST], cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False
-    )
-    assert (done.returncode, done.stdout) == (0, "scalar_rgb True True\n"), done.stderr
+    assert in_new_python(GUEST, folder=tmp_path) == "scalar_rgb True True"

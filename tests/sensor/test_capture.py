@@ -1,13 +1,11 @@
 """A photograph: its exact form is its three steps bit for bit, its quick form is independent of strips and threads."""
 
 import json
-import os
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from command_line import in_new_python
 from loop import loop
 from refusal import refusal
 from scipy import stats
@@ -131,16 +129,7 @@ print(json.dumps({"engine": raw.engine, "dn": raw.dn.tolist()}))
 
 @pytest.mark.thorough
 def test_without_llvm_the_numpy_form_runs_and_the_raw_image_says_so():
-    done = subprocess.run(
-        [sys.executable, "-c", WITHOUT_LLVM],
-        env=os.environ | {"DRJIT_LIBLLVM_PATH": "/nonexistent/libLLVM.so"},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout)
+    said = json.loads(in_new_python(WITHOUT_LLVM, DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so"))
     if said["engine"] == "cuda":
         pytest.skip("a CUDA device answers here, whatever the LLVM library")
     assert said["engine"] == "numpy"

@@ -1,12 +1,11 @@
 """Strips: the same bits whatever their height, and memory that stays bounded."""
 
 import json
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from builders import RGBW_4X4, raw_image
+from command_line import in_new_python
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import make_pattern
@@ -64,8 +63,7 @@ print(json.dumps({"peak": peak, "finite": bool(np.isfinite(result).all()), "shap
 
 
 def peak_bytes(height, width, neighbourhood):
-    arguments = [sys.executable, "-c", MEASURE, str(height), str(width), str(neighbourhood)]
-    found = json.loads(subprocess.run(arguments, check=True, capture_output=True, text=True).stdout)
+    found = json.loads(in_new_python(MEASURE, height, width, neighbourhood))
     assert found["finite"]
     assert found["shape"] == [height, width, 4]
     return found["peak"]

@@ -1,13 +1,11 @@
 """What `rodcone list` says: every name that a catalogue knows, and temperatures as the spectra have them."""
 
 import json
-import subprocess
-import sys
 from importlib import import_module
 from pathlib import Path
 
 import pytest
-from command_line import call, check_refusals
+from command_line import call, check_refusals, in_new_python
 
 from isp.processors.catalogue import PROCESSORS
 from render import illuminants
@@ -75,5 +73,4 @@ def test_lists_import_no_renderer(kind: str) -> None:
         f"import sys; from studies.commands.cli import app; app('list {kind}', result_action='return_value'); "
         f"print([name for name in 'mitsuba drjit matplotlib colour scipy.ndimage'.split() if name in sys.modules])"
     )
-    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
-    assert done.stdout.splitlines()[-1] == "[]"
+    assert in_new_python(program).splitlines()[-1] == "[]"

@@ -4,8 +4,6 @@ Nothing here is timed: the clock is one that work alone moves on.
 """
 
 import json
-import os
-import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -15,6 +13,7 @@ from typing import Any
 
 import pytest
 import sweep_sample as SAMPLE
+from command_line import in_new_python
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.jit import backend
@@ -188,9 +187,6 @@ print(json.dumps(told))
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without a backend")
 def test_no_kernel_is_compiled_or_loaded_within_the_seconds_told(tmp_path: Path) -> None:
     """From darkness over some saturated pixels to all, by Dr.Jit's own history, in a process that starts without."""
-    command = [sys.executable, "-c", COMPILED, str(Path(__file__).resolve().parents[2]), str(tmp_path)]
-    done = subprocess.run(command, env=os.environ, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    told = json.loads(done.stdout.splitlines()[-1])
+    told = json.loads(in_new_python(COMPILED, Path(__file__).resolve().parents[2], tmp_path).splitlines()[-1])
     assert {step for step, made in told if len(made) == 2 and made[0]} == {"capture", "develop"}
     assert [step for step, made in told if made[-1]] == []

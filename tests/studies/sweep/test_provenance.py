@@ -3,8 +3,6 @@
 import json
 import os
 import shutil
-import subprocess
-import sys
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
@@ -13,6 +11,7 @@ from pathlib import Path
 
 import pytest
 import sweep_sample as SAMPLE
+from command_line import in_new_python
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.errors import InputError
@@ -116,11 +115,9 @@ print(json.dumps([row.threads, threads() - others, backend()]))
 @pytest.mark.skipif(not Path("/proc/self/task").is_dir(), reason="threads are counted in /proc")
 @pytest.mark.parametrize("count", [1, 3])
 def test_threads_told_are_those_that_the_working_process_has(count: int, tmp_path: Path) -> None:
-    command = [sys.executable, "-c", THREADS, str(Path(__file__).resolve().parents[2]), str(tmp_path), str(count)]
-    environment = {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
-    done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=240, check=False)
-    assert done.returncode == 0, done.stderr
-    assert json.loads(done.stdout.splitlines()[-1]) == [count, count, "llvm"]
+    tests, one = Path(__file__).resolve().parents[2], {"OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+    said = in_new_python(THREADS, tests, tmp_path, count, **one)
+    assert json.loads(said.splitlines()[-1]) == [count, count, "llvm"]
 
 
 @pytest.mark.thorough
@@ -226,8 +223,7 @@ def test_all_that_making_a_picture_imports_decides_it() -> None:
         "found = {name: module for name, module in sys.modules.items() if name.startswith('studies.')}\n"
         "print(*(module.__file__ for module in found.values() if not hasattr(module, '__path__')))"
     )
-    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
-    assert {Path(file).resolve() for file in loaded} <= set(deciding_modules())
+    assert {Path(file).resolve() for file in in_new_python(script).split()} <= set(deciding_modules())
 
 
 @pytest.mark.sample(2)
