@@ -1,4 +1,4 @@
-"""Values that many tests need, built by hand."""
+"""Values that many tests need, built by hand, and the libraries that a processor needs."""
 
 import io
 import pickle
@@ -7,9 +7,11 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+import pytest
 from numpy.typing import ArrayLike, NDArray
 
 from isp.processors import network
+from isp.processors.catalogue import NAMED, libraries
 from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
@@ -142,3 +144,9 @@ def wheel_of(weights: dict[str, np.ndarray], before: bytes = b"", packed: int = 
     with zipfile.ZipFile(out, "w", packed) as members:
         members.writestr(network.MEMBER, b"".join(parts))
     return out.getvalue()
+
+
+def require_library(name: str) -> None:
+    """Skip the test where a processor's libraries aren't installed."""
+    for library in libraries(name):
+        pytest.importorskip(library, reason=f"rodcone[{NAMED[name].extra}] is not installed")

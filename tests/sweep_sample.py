@@ -63,6 +63,13 @@ def here(cells: Sequence[Cell]) -> Iterator[Row]:
     return run(cells, InThisProcess())
 
 
+def ended_after(count: int, cells: Sequence[Cell], error: type[BaseException] = KeyboardInterrupt) -> Iterator[Row]:
+    """Run that ends with an error after so many cells, where there are any."""
+    yield from here(cells[:count])
+    if cells:
+        raise error
+
+
 def swept(study: Study, out: Path, runner: Runner = here) -> Swept:
     return sweep(study, out, stated(study), runner)
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import raw_image, require_library
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import NAMED, PROCESSORS, libraries
@@ -56,14 +56,6 @@ def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     names = channel_map(tile, level_e.shape)
     share = np.vectorize(neutral_of(name).get)(names) / neutral_of(name)[unit_of(name)]
     return raw_image(np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100), tile, white_dn=FULL_E + 100)
-
-
-def require_library(name: str) -> None:
-    extra = PROCESSORS[name].extra
-    if extra is not None:
-        library = "bm3d" if extra == "bm3d" else "colour_demosaicing"
-        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{extra}] is not installed")
-        pytest.importorskip(library, reason=f"rodcone[{extra}] is not installed")
 
 
 @pytest.mark.sample(4)

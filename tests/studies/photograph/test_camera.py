@@ -5,6 +5,7 @@ from dataclasses import replace
 import colour
 import numpy as np
 import pytest
+from builders import require_library
 
 from isp.colour.colour_fit import ColourFit, fit_matrix
 from isp.colour.white_balance import neutral_response
@@ -65,11 +66,6 @@ def patches(name: str, radiance: SpectralRadiance, view_deg: float = 0.0) -> tup
         for picture in (encode_srgb(linear), truth)
     )
     return shown.mean((2, 3)), right.mean((2, 3))
-
-
-def require_library(name: str) -> None:
-    if NAMED[name].extra is not None:
-        pytest.importorskip("colour_demosaicing", reason=f"rodcone[{NAMED[name].extra}] is not installed")
 
 
 @pytest.mark.sample(4)

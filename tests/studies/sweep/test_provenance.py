@@ -3,7 +3,7 @@
 import json
 import os
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from functools import partial
 from importlib import import_module, metadata
@@ -21,7 +21,6 @@ from studies.budget.ledger import Plan
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
-from studies.sweep.cells import Cell
 from studies.sweep.database import add, open_results
 from studies.sweep.export import read_rows
 from studies.sweep.provenance import ROOT, Provenance, code_version, deciding_modules, require_alike, versions
@@ -155,15 +154,10 @@ def test_cells_of_other_versions_are_made_anew_and_the_old_ones_removed(
 ) -> None:
     """A sweep ended after one cell, gone on with under another NumPy: no mean holds cells of both."""
     study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
-
-    def ended(cells: Sequence[Cell]) -> Iterator[Row]:
-        yield from SAMPLE.here(cells[:1])
-        raise KeyboardInterrupt
-
     with monkeypatch.context() as patched:
         versions_of_numpy(patched, "1.9")
         with pytest.raises(KeyboardInterrupt):
-            SAMPLE.swept(study, out, ended)
+            SAMPLE.swept(study, out, partial(SAMPLE.ended_after, 1))
     provenance.versions.cache_clear()
     assert [json.loads(row.versions)["numpy"] for row in read_rows(out, everything=True)] == ["1.9"]
     assert SAMPLE.swept(study, out).made == 4

@@ -40,12 +40,6 @@ content, half_pictures, here, parts_left, small_study, swept = (
 )
 
 
-def ended_after(count: int, error: type[BaseException], cells: Sequence[Cell]) -> Iterator[Row]:
-    """Run that ends with an error after so many cells."""
-    yield from here(cells[:count])
-    raise error
-
-
 def test_every_cell_gets_a_row_in_the_studys_order_and_a_second_run_makes_none(tmp_path: Path) -> None:
     study = small_study(tmp_path)
     first = swept(study, tmp_path / "out")
@@ -101,7 +95,7 @@ def test_an_ended_run_is_gone_on_with_and_ends_as_one_never_ended(error: type[Ba
     study = small_study(tmp_path)
     swept(study, tmp_path / "whole")
     with pytest.raises(error):
-        swept(study, tmp_path / "out", partial(ended_after, 3, error))
+        swept(study, tmp_path / "out", partial(SAMPLE.ended_after, 3, error=error))
     assert swept(study, tmp_path / "out").made == 1
     assert content(tmp_path / "out") == content(tmp_path / "whole")
 

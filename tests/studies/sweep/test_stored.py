@@ -2,9 +2,10 @@
 
 import random
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,6 @@ from rodcone.errors import InputError
 from studies.pages.report import render_report
 from studies.pages.report_sweep import sweep_report
 from studies.study.study import SceneChoice
-from studies.sweep.cells import Cell
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.row import Row
@@ -181,15 +181,9 @@ def test_a_sweep_of_two_scenes_ended_in_its_first_gives_a_report_that_counts_all
     SAMPLE.picture(tmp_path / "other.exr", (24, 16))
     scenes = (SceneChoice(str(tmp_path / "scene.exr"), "E"), SceneChoice(str(tmp_path / "other.exr"), "E"))
     study, out = replace(SAMPLE.small_study(tmp_path), scenes=scenes), tmp_path / "out"
-
-    def ended(cells: Sequence[Cell]) -> Iterator[Row]:
-        yield from SAMPLE.here(cells[:1])
-        if cells:
-            raise KeyboardInterrupt
-
     for made in range(1, 8):
         with pytest.raises(KeyboardInterrupt):
-            SAMPLE.swept(study, out, ended)
+            SAMPLE.swept(study, out, partial(SAMPLE.ended_after, 1))
         results, pictures = sweep_report(out)
         assert results.notes == (f"{8 - made} of 8 cells are not made yet: rodcone sweep goes on with them.",)
         assert render_report(results, pictures).lstrip().startswith("<!doctype html>")
