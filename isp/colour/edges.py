@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from isp.kernel.edges import CORRELATION, REACH, SHADING, SIDE, TINY_E, UNKNOWN, channel_noise, sharpen_frame
+from isp.kernel.edges import CORRELATION, MISSED, REACH, SHADING, SIDE, TINY_E, UNKNOWN, channel_noise, sharpen_frame
 from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.cfa import channels, mask
@@ -36,10 +36,11 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
 
         F = P + max(0, 1 - e^4 / (1 + chi^2)) (E - P).
 
-    What fills less than half of a window on black has e > 1: its colour isn't known. Nor is the light of a channel
-    whose plane is full in the share q_c of the nine pixels. Balanced by the gains g, channels rise to the brightest:
+    The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
+    the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
+    contrast, any hue where a colour is, q = min(1, e). Balanced by the gains g, channels rise to the brightest:
 
-        F'_c = F_c + max(1 - 1 / e^2, q_c) (max_d g_d F_d / g_c - F_c).
+        F'_c = F_c + max((1 - 1 / e^2) min(1, chi^2 / 30), q, q_c) (max_d g_d F_d / g_c - F_c).
 
     Parameters
     ----------
@@ -86,7 +87,8 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     to_samples = np.take_along_axis(covariance, site[..., None, :], axis=3)  # (h, w, channel, sample)
     among_samples = np.take_along_axis(to_samples, site[..., None], axis=2)  # (h, w, sample, sample)
     sample_noise = np.take_along_axis(noise, site, axis=2)
-    counted = np.where(sample >= full_e[site], UNKNOWN, sample_noise)
+    is_full = sample >= full_e[site]
+    counted = np.where(is_full, UNKNOWN, sample_noise)
     residual = sample - np.take_along_axis(mean, site, axis=2)
     weights = np.linalg.solve(CORRELATION * among_samples + counted[..., None] * np.eye(9), residual[..., None])
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
@@ -97,6 +99,8 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + chi_squared), 0.0) * (estimate - plane)
 
     # Light of unknown colour.
-    full = (near >= full_e[:, None]).mean(axis=3)
-    unknown = np.maximum(1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2, full)
+    full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
+    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * np.minimum(chi_squared / MISSED, 1.0)
+    hue = np.where(full[..., :3].any(axis=2, keepdims=True), np.minimum(contrast, 1.0), lamp)
+    unknown = np.where(full, 1.0, hue)
     return np.asarray(sharp + unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp))

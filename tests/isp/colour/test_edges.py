@@ -5,6 +5,7 @@ from itertools import product
 import numpy as np
 import pytest
 from builders import RGBW_4X4, RGBW_PHASES, raw_image
+from scipy.ndimage import gaussian_filter
 
 from isp.colour import edges
 from isp.colour.edges import sharpen
@@ -58,10 +59,12 @@ def by_hand(raw, planes, gains, row, column):
     to_pixel = np.array([[covariance[c, own[a]] * apart[4][a] for a in kept] for c in range(4)])
     estimate = mean + to_pixel @ np.linalg.inv(matrix) @ (samples - mean[own])[kept]
     on_planes = np.array([planes[place][o] for place, o in zip(places, own, strict=True)])
-    counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.mean((samples - on_planes) ** 2 / noise[own])))
+    chi_squared = np.mean((samples - on_planes) ** 2 / noise[own])
+    counts = max(0.0, 1.0 - contrast**4 / (1.0 + chi_squared))
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
-    near = planes[row - 1 : row + 2, column - 1 : column + 2]
-    unknown = np.maximum(1.0 - 1.0 / max(contrast, 1.0) ** 2, (near >= 0.95 * raw.full_well_e).mean(axis=(0, 1)))
+    full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
+    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, chi_squared / 30.0)
+    unknown = np.where(full, 1.0, max(lamp, min(1.0, contrast) * any(full[:3])))
     return sharp + unknown * ((gains * sharp).max() / gains - sharp)
 
 
@@ -126,10 +129,10 @@ def test_a_lamp_stays_where_it_is():
 
 
 def test_a_lamp_of_a_pixel_has_no_colour():
-    """Of 25 pixels one is lit: e = 24, and channels move by 575/576 to the brightest."""
+    """Of 25 pixels one is lit: e = 24, and channels move by 575/576 to the brightest; planes have half of it."""
     planes = np.zeros((16, 16, 4))
     planes[8, 8] = [3000.0, 6000.0, 1000.0, 10_000.0]
-    balanced = sharpen(frame(planes), planes, GAINS)[8, 8] * GAINS
+    balanced = sharpen(frame(2.0 * planes), planes, GAINS)[8, 8] * GAINS
     assert np.ptp(balanced) < 0.003 * balanced.max()
 
 
@@ -144,6 +147,25 @@ def test_a_full_channel_rises_to_the_brightest():
     planes = np.broadcast_to([9000.0, 15_000.0, 4000.0, 15_000.0], (16, 16, 4))
     got = sharpen(frame(planes), planes, GAINS)[8, 8]
     assert got == pytest.approx([9000.0, 18_000.0, 4000.0, 72_000.0], rel=1e-4)
+
+
+def test_a_lamp_full_in_every_colour_ends_in_white():
+    """The smallest case of a magenta lamp: green's plane, a mean with the dark around, had half of what it read."""
+    levels = np.array([0.62, 1.0, 0.36, 5.8])
+    for row, column in product((0, 1), repeat=2):
+        light = np.zeros((32, 32))
+        light[14 + row : 17 + row, 14 + column : 17 + column] = 1.0
+        light = 20.0 + 150_000.0 * gaussian_filter(light, 0.8)
+        raw = frame(np.minimum(light[..., None] * levels, 15_000.0))
+        rgb = picture_interleaved(raw, np.eye(3), balance=levels).rgb
+        assert rgb[light > 45_000.0] == pytest.approx(15_000.0), (row, column)
+
+
+def test_dark_beside_a_window_keeps_its_colour():
+    """Its light, fifty times as much, fills less than half of their 5 x 5 pixels: walls were grey for two around."""
+    planes = np.broadcast_to(0.02 * COLOUR * [1.0, 0.5, 0.2, 0.7], (24, 24, 4)).copy()
+    planes[16:, 14:] = COLOUR
+    assert sharpen(frame(planes), planes, GAINS) == pytest.approx(planes, rel=0.02)
 
 
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
