@@ -1,20 +1,20 @@
 """How quickly `rodcone dataset` makes samples: crops of 128x128 with RGB truth from drawn scenes, render included.
 
-The command runs three times, on the clock and in processor time of all its processes: whole; then, with its shards
-taken away, from the scenes' files, by one worker and by as many as there are cores. Run it on a quiet machine.
+The command runs four times, on the clock and in processor time of all its processes: whole; then, with its shards
+taken away, from the scenes' files, by each of `WORKERS`. Run it on a quiet machine.
 
     python benchmarks/bench_dataset.py            (minutes)
     python benchmarks/bench_dataset.py --scenes 1 --spp 32
 """
 
 import argparse
-import os
 import tempfile
 from pathlib import Path
 
 from bench_sweep import seconds_of_command
 from environment import print_environment
 
+WORKERS = (1, 2, 4)
 STUDY = """
 scenes = ["generated"]
 levels = ["0.036cd/m2", "0.1cd/m2", "0.5cd/m2", "2cd/m2", "6cd/m2", "25cd/m2", "100cd/m2"]
@@ -32,7 +32,6 @@ def main() -> None:
     options.add_argument("--spp", type=int, default=256)
     given = options.parse_args()
     print_environment()
-    cores = os.cpu_count() or 1
     with tempfile.TemporaryDirectory() as folder:
         study, out = Path(folder) / "study.toml", Path(folder) / "out"
         study.write_text(STUDY.format(**vars(given)))
@@ -41,7 +40,7 @@ def main() -> None:
         seconds = {"all, render included": seconds_of_command(*command)}
         shards = list((out / "set").glob("*.tar"))
         size = sum(path.stat().st_size for path in shards) / 1e9
-        for workers in (1, cores):
+        for workers in WORKERS:
             for path in shards:
                 path.unlink()
             again = seconds_of_command(*command, "--workers", str(workers))

@@ -120,7 +120,7 @@ def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_the_same_bits_over_workers(stored: Path, tmp_path: Path) -> None:
-    assert content(made(tmp_path, runner=partial(run_in_processes, workers=2))) == content(stored)
+    assert content(made(tmp_path, runner=partial(run_in_processes, workers=4))) == content(stored)
 
 
 @pytest.mark.slow
