@@ -22,7 +22,8 @@ Singles = NDArray[np.float32]
 STEP = 1.25  # of light, from one table to the next
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
 PILOT_ERROR = 0.03  # by which a coarser scale may differ from the patch, beside its variance [of the light]
-PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]; the ratio between channels depends on it
+PILOT_VARIANCE = 0.02  # typical of a coarser scale [units of noise^2]
+BRIGHTNESS = 0.98  # share of that variance that is of brightness: a coarser scale knows colour much better
 TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
 DIRECTIONS = 20  # directions in which components are told apart first
 MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
@@ -127,11 +128,12 @@ class Table:
         half = cross @ factors.swapaxes(1, 2)
         brightness = (self.average @ (electrons * steep).T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
-        scale = np.sqrt(PILOT_VARIANCE + (PILOT_ERROR * brightness) ** 2)
-        remainder = (whole - half @ half.swapaxes(1, 2)) / scale / scale[:, None]
-        self.spread, turns = np.linalg.eigh(remainder)
+        along = brightness / np.linalg.norm(brightness)
+        error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
+        white = np.linalg.inv(np.linalg.cholesky(error + np.diag((PILOT_ERROR * brightness) ** 2)))
+        self.spread, turns = np.linalg.eigh(white @ (whole - half @ half.swapaxes(1, 2)) @ white.T)
         self.spread = np.maximum(self.spread, 0.0)
-        self.turn = turns.swapaxes(1, 2) / scale  # (component, direction, channel)
+        self.turn = turns.swapaxes(1, 2) @ white  # (component, direction, channel)
         # One matrix takes samples, 1 and the pilot's means to whitened samples and the pilot's innovations.
         forecast = self.turn @ (half @ factors)
         reads = np.concatenate([factors, -forecast], axis=1)

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.linalg import block_diag
 
 from isp.ple.pick import pick
 from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
@@ -71,10 +72,8 @@ def test_with_a_pilot_the_error_varies_as_the_closed_form():
     table = Table(mixture(own_prior()), sampling(), light_e)
     values, y = drawn(table, k, light_e, count, rng)
     by = table.estimator(k)
-    scale = 1 / np.sqrt(
-        (table.turn[k].T @ table.turn[k]).diagonal()
-    )  # of the pilot's noise by channel, at a noise of 1
-    means = values @ table.average.T + rng.standard_normal((count, 4)) * scale * np.sqrt(told)
+    pilot = np.linalg.inv(table.turn[k].T @ table.turn[k])  # its error's covariance, at a noise of 1
+    means = values @ table.average.T + rng.multivariate_normal(np.zeros(4), pilot * told, count)
     told_all = np.concatenate([_with_1(y), means], axis=1)
     news = (told_all @ table.reads[k])[:, len(table.rows) :]
     spread = told + table.spread[k]
@@ -84,7 +83,9 @@ def test_with_a_pilot_the_error_varies_as_the_closed_form():
     expected = by.variance - (1 / spread) @ by.pilot_variance
     for channel in range(4):
         assert (error**2)[:, channel::4].mean() == pytest.approx(expected[channel], rel=SIGMAS * (2 / count) ** 0.5)
-    assert scale.min() ** 2 >= PILOT_VARIANCE
+    # What channels share, brightness, is most of it: colour is known better.
+    colour, brightness = np.linalg.eigvalsh(pilot)[[2, 3]]
+    assert brightness > PILOT_VARIANCE > 10 * colour
 
 
 def test_one_component_is_the_textbooks_linear_estimate():
@@ -122,15 +123,15 @@ def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
         electrons = (np.tile(GAINS, 16) * light_e * (mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)))[
             :, at
         ]
-        noise = variance(electrons)
+        noise = variance(electrons)[:, :, None] * np.eye(16)
         if pilot_noise is not None:
             seen = np.concatenate([seen, table.average])
-            pilot = pilot_noise / (table.turn[0].T @ table.turn[0]).diagonal()
-            noise = np.concatenate([noise, np.tile(pilot, (len(noise), 1))], axis=1)
+            pilot = pilot_noise * np.linalg.inv(table.turn[0].T @ table.turn[0])
+            noise = np.stack([block_diag(one, pilot) for one in noise])
         means = table.values @ seen.T
         whole = mix.covariances * table.slopes[:, :, None] * table.slopes[:, None]
         whole += table.drift[:, :, None] * table.drift[:, None]
-        covariances = seen @ whole @ seen.T + noise[:, :, None] * np.eye(len(seen))
+        covariances = seen @ whole @ seen.T + noise
         draws = [rng.multivariate_normal(*component, 20) for component in zip(means, covariances, strict=True)]
         samples = np.concatenate(draws)
         off = samples[:, None] - means
