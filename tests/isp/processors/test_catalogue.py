@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from builders import raw_image, require_library
+from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import NAMED, PROCESSORS, libraries
@@ -122,8 +123,7 @@ def test_another_mosaic_is_refused_in_one_line() -> None:
     for name in (name for name in PROCESSORS if PROCESSORS[name].mosaic != OWN):
         raw = raw_image(np.full((16, 16), 500), MOSAICS["rccc"] if "bayer" in name else BAYER)
         for matrix in (IDENTITY, fit):
-            with pytest.raises(InputError, match=r"\Araw: mosaic .* allowed here: .*\Z"):
-                PROCESSORS[name].develop(raw, matrix)
+            refusal(PROCESSORS[name].develop, raw, matrix, match=r"\Araw: mosaic .* allowed here: .*\Z")
 
 
 def test_a_missing_library_names_its_extra() -> None:
@@ -135,9 +135,7 @@ def test_a_missing_library_names_its_extra() -> None:
 def test_without_its_library_a_processor_is_refused_in_one_line(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "bm3d", None)
     raw = grey(name, tile_of(name), np.full((16, 16), 500.0))
-    with pytest.raises(InputError, match=r"^bm3d: not installed .*pip install 'rodcone\[bm3d\]'") as error:
-        PROCESSORS[name].develop(raw, IDENTITY)
-    assert "\n" not in str(error.value)
+    refusal(PROCESSORS[name].develop, raw, IDENTITY, match=r"^bm3d: not installed .*pip install 'rodcone\[bm3d\]'")
 
 
 def test_every_processor_says_what_it_is() -> None:

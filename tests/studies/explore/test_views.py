@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from explore_sample import small_transport
 from matplotlib import colormaps
+from refusal import refusal
 
 from render.photometry import photons_per_joule
-from rodcone.errors import InputError
 from sensor.readout import noise_variance, spread_charge
 from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls
@@ -67,8 +67,7 @@ def test_the_light_budget_of_a_pixel():
     assert np.sum(told["photons_nm"] * width) == pytest.approx(told["photons"], rel=1e-12)
     for channel, by_band in told["electrons_nm"].items():
         assert np.sum(by_band * width) == pytest.approx(told["electrons"][channel], rel=1e-12)
-    with pytest.raises(InputError, match="row"):
-        pixel(exposed, 40, 0)
+    refusal(pixel, exposed, 40, 0, match="row")
 
 
 def test_the_histogram_counts_every_sample_once():
@@ -93,8 +92,7 @@ def test_noise_is_grey_on_average_and_its_spread_is_the_models():
 
 def test_terms_that_belong_to_readings_are_refused_in_one_line():
     for changed in ({"pixel": {"read_noise_e": 2.0}}, {"shot_noise": False}):
-        with pytest.raises(InputError, match="dual_gain"):
-            photograph(small_transport(), Controls(sensor="dual_gain", **changed))
+        refusal(photograph, small_transport(), Controls(sensor="dual_gain", **changed), match="dual_gain")
 
 
 def test_crosstalk_is_no_noise():

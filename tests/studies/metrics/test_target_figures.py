@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from refusal import refusal
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from render.engine import render
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from rodcone.errors import InputError
 from scenes.catalog import load
 from scenes.reflectances import color_checker
 from studies.metrics.mtf import edge_response
@@ -137,7 +137,5 @@ def test_colour_error_is_that_of_the_mean_colours_whatever_the_noise() -> None:
 
 
 def test_what_has_no_patches_is_refused() -> None:
-    with pytest.raises(InputError, match=r"^scene: 'flat_field' has no patches"):
-        patch_masks(load("flat_field"), CHART_SHAPE)
-    with pytest.raises(InputError, match=r"^shape: \(12, 16\) leaves \d pixels"):
-        patch_masks(load("color_checker"), (12, 16))
+    refusal(patch_masks, load("flat_field"), CHART_SHAPE, match=r"^scene: 'flat_field' has no patches")
+    refusal(patch_masks, load("color_checker"), (12, 16), match=r"^shape: \(12, 16\) leaves \d pixels")

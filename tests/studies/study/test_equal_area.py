@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
 from studies.budget.ledger import as_stated
 from studies.budget.plan import plan
 from studies.commands.sweep import estimate
@@ -50,8 +50,7 @@ def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the
         sensor_side_um=220.0,
         render=RenderLimits(size=64),
     )
-    with pytest.raises(InputError, match=r"render\.size: 64, and low_noise has 100 pixels on 220 um; allowed: 100"):
-        open_all(asked)
+    refusal(open_all, asked, match=r"render\.size: 64, and low_noise has 100 pixels on 220 um; allowed: 100")
     need = [
         estimate(study, as_stated(study), open_all(study), 1, 0).largest_bytes
         for study in (replace(asked, render=RenderLimits(size=size)) for size in (100, 400))
@@ -61,5 +60,4 @@ def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the
 
 def test_a_plan_of_sensors_of_one_size_is_refused() -> None:
     asked = Study(scenes=(SceneChoice("flat_field"),), levels=("1cd/m2",), sensors=("low_noise",), sensor_side_um=220.0)
-    with pytest.raises(InputError, match="sensor_side_um: 220 can't be planned"):
-        plan(asked)
+    refusal(plan, asked, match="sensor_side_um: 220 can't be planned")

@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from refusal import refusal
 
 from rodcone.errors import InputError
 from studies.study.study import SceneChoice, Study
@@ -93,8 +94,7 @@ def test_wrong_keys_and_values_are_told_in_one_line(tmp_path: Path) -> None:
 def test_what_is_missing_or_unreadable_is_told(tmp_path: Path) -> None:
     assert "levels is missing" in told(tmp_path, 'scenes = ["still_life"]')
     assert "can't be read" in told(tmp_path, "levels = [")
-    with pytest.raises(InputError, match=r"rodcone new study -o FILE"):
-        read_study(tmp_path / "absent.toml")
+    refusal(read_study, tmp_path / "absent.toml", match=r"rodcone new study -o FILE")
 
 
 def test_a_likely_mistake_is_told_with_its_fix(tmp_path: Path) -> None:
@@ -104,18 +104,15 @@ def test_a_likely_mistake_is_told_with_its_fix(tmp_path: Path) -> None:
         ('scenes = "still_life"\nlevels = "1lux"\nexposures = [10]\n', 'exposures: 10 is not .*; write "10ms"'),
     ):
         (tmp_path / "study.toml").write_text(text, "utf-8")
-        with pytest.raises(InputError, match=words):
-            read_study(tmp_path / "study.toml")
+        refusal(read_study, tmp_path / "study.toml", match=words)
 
 
 def test_code_beside_a_study_runs_with_consent_alone(tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text("from isp.pipeline import picture_bayer as develop\n", "utf-8")
     changes = ['processors=["mine.py:develop", "bayer"]']
-    with pytest.raises(InputError, match=r"processors: '.*mine.py:develop' is Python code"):
-        read_study(written(tmp_path), changes)
+    refusal(read_study, written(tmp_path), changes, match=r"processors: '.*mine.py:develop' is Python code")
     for sly in ("trust_code=true", "trust_code=1"):
-        with pytest.raises(InputError, match="trust_code: no file may ask for it"):
-            read_study(written(tmp_path), [*changes, sly])
+        refusal(read_study, written(tmp_path), [*changes, sly], match="trust_code: no file may ask for it")
     study = read_study(written(tmp_path), changes, trust_code=True)
     assert study.processors == (f"{tmp_path / 'mine.py'}:develop", "bayer")
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from refusal import refusal
 from sweep_sample import ROW
 
 from rodcone.errors import InputError
@@ -92,8 +93,7 @@ def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -
     with open_results(tmp_path) as base:
         add(base, ROW)
         want(base, [ROW.key, None])
-        with pytest.raises(InputError, match="has made no cell yet"):
-            last_run(tmp_path)
+        refusal(last_run, tmp_path, match="has made no cell yet")
         for study, seconds in (('{"b": 1}', 10.0), ('{"a": 1}', 1.0), ('{"a": 1}', 100.0)):
             run = note_run(base, "2026-01-01T00:00:00+00:00", "here", study)
             note_stages(base, run, {"renders": 99.0})
@@ -101,8 +101,7 @@ def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -
         note_run(base, "2026-01-01T00:00:00+00:00", "here", '{"a": 1}')  # killed before its first cell
         assert last_run(tmp_path) == LastRun({"a": 1}, {"renders": 101.0, "other": 1.0}, 2, [ROW])
         base.execute("UPDATE runs SET stages = replace(stages, '100.0', '900.0')")
-        with pytest.raises(InputError, match="isn't what was written"):
-            last_run(tmp_path)
+        refusal(last_run, tmp_path, match="isn't what was written")
 
 
 def test_what_is_made_anew_is_forgotten_and_what_was_not_asked_for_stays(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import pytest
 import sweep_sample as SAMPLE
 from builders import any_order
 from PIL import Image
+from refusal import refusal
 
 from isp.colour.colour_fit import fit_colours
 from isp.pipeline import picture_bayer
@@ -211,12 +212,9 @@ def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path)
     cell = made(tmp_path)[0]
     with pytest.raises(InputError, match="install the same rodcone"):
         run_cell(replace(cell, made_by=replace(cell.made_by, versions='{"rodcone": "0.0.0+other"}')))
-    with pytest.raises(InputError, match="a folder that all workers see") as told:
-        run_cell(replace(cell, electrons=tmp_path / "absent.npy"))
-    assert "\n" not in str(told.value)
+    refusal(run_cell, replace(cell, electrons=tmp_path / "absent.npy"), match="a folder that all workers see")
     cell.truth.write_bytes(b"no array")
-    with pytest.raises(InputError, match="can't be read"):
-        run_cell(cell)
+    refusal(run_cell, cell, match="can't be read")
 
 
 @pytest.mark.thorough
@@ -248,8 +246,7 @@ def test_a_processor_of_ones_own_counts_by_its_bytes_and_workers_run_no_others(t
     assert row.processor == "mine.py:develop"
     assert json.loads(row.versions)["mine.py"] == digest_file(mine)
     mine.write_text(mine.read_text("utf-8") + "# changed\n", "utf-8")
-    with pytest.raises(InputError, match=r"mine.py' on .* isn't the file that the sweep began with"):
-        run_cell(cell)
+    refusal(run_cell, cell, match=r"mine.py' on .* isn't the file that the sweep began with")
     other = made(tmp_path, **asked)[0]
     assert other.key != cell.key
     assert run_cell(other).picture == row.picture
@@ -320,5 +317,4 @@ def test_a_study_holds_cameras_that_bin_or_none(tmp_path: Path) -> None:
 def test_a_picture_of_odd_size_is_refused_for_a_camera_that_bins(tmp_path: Path) -> None:
     SAMPLE.picture(tmp_path / "scene.exr", (17, 20))
     study = SAMPLE.small_study(tmp_path, sensors=(quad_file(tmp_path, "charge"),))
-    with pytest.raises(InputError, match=r"size: 17 x 20 pixels with binning"):
-        SAMPLE.made_cells(tmp_path, study)
+    refusal(SAMPLE.made_cells, tmp_path, study, match=r"size: 17 x 20 pixels with binning")
