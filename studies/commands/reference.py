@@ -37,7 +37,7 @@ def reference(
 ) -> int:
     """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
 
-    It takes hours. Whatever ends it, the same command goes on; the file so far is there after every 512 samples.
+    It may take hours. Whatever ends it, the same command goes on; the file so far is there after every 512 samples.
 
     Parameters
     ----------
