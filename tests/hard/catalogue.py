@@ -33,9 +33,6 @@ OWN = "its own"
 _BORDER = "beyond the border a lens sees the picture's mirror image, which doesn't move along"
 _CLAMP = "out of focus the image of a point, sampled once a pixel, has lobes under 0, which are cut"
 _COARSE = "a step of 3922 e⁻ hides 1000 e⁻: without noise as wide as a step, rounding isn't evened out"
-_ALIKE = (
-    "similarity of 0.001 σ takes samples that their noise made alike; nothing fades it in the dark since decision 0053"
-)
 _NEUTRAL = (
     "light of unknown colour at an edge is drawn neutral, and a neutral of this balance is 10^6 times one channel"
 )
@@ -54,7 +51,6 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
             OWN,
         ): "similarity of noisy samples takes those that noise raised alike together: 0.5 % of a sample's "
         "noise in W at 6 e⁻; from 10 e⁻ a pixel on under 0.1 %, which 48 frames don't tell from none",
-        ("sigma_s_0.001_dark", "pictures unbiased"): _ALIKE,
         ("balance_1e6", "bounded"): _NEUTRAL,
         ("largest_number", "linear"): "the readout holds means at 1e30 e⁻, over any well",
         (
