@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from isp.ple.tables import Singles, Table
 
 BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of two apart would share its places
-MOST = 24  # components that a patch is held against, of the likeliest in a few directions
+MOST = 12  # components that a patch is held against, of the likeliest in a few directions
 
 
 def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
@@ -29,13 +29,14 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
     (patch,) float32
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
     """
-    count, size = len(evidence), len(at.centre)
+    count, size = len(evidence), len(at.rows)
     best, component = np.full(count, -np.inf, np.float32), np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
     width = size if noise is None else size + 4
     # Arrays are made once: fresh memory costs as much as the sums.
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
-    candidates = _candidates(at, evidence[:, :size])
+    # Without a pilot patches are few.
+    candidates = np.ones((len(at.quick), count), bool) if noise is None else _candidates(at, evidence)
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
         np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
         read = np.matmul(block[: group.size], at.reads[k][: evidence.shape[1], :width], out=reads[: group.size])
@@ -56,14 +57,16 @@ def blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
     return (index[first : first + BLOCK] for first in range(0, len(index), BLOCK))
 
 
-def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
+def _candidates(at: Table, evidence: Singles) -> NDArray[np.bool_]:
     """Which components may be the likeliest, shape (component, patch), by the likelihood in a few directions."""
-    quick = np.empty((len(at.quick), len(y)), np.float32)
+    size = len(at.rows)
+    quick = np.empty((len(at.quick), len(evidence)), np.float32)
     count = at.directions.shape[1]
     starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
     products = np.empty((at.quick.shape[1], BLOCK), np.float32)
-    for first in range(0, len(y), BLOCK):
-        off = y[first : first + BLOCK] - at.centre
+    for first in range(0, len(evidence), BLOCK):
+        rows = evidence[first : first + BLOCK]
+        off = np.concatenate([rows[:, :size], rows[:, size + 1 :] @ at.white.T], axis=1) - at.centre
         coordinates = np.ascontiguousarray((off @ at.directions).T)
         features = products[:, : len(off)]
         for i, start in enumerate(starts[:-1]):
@@ -74,7 +77,7 @@ def _candidates(at: Table, y: Singles) -> NDArray[np.bool_]:
         quick[:, first : first + BLOCK] = at.quick @ features
     candidates = np.asarray(quick > quick.max(axis=0) - at.margin)
     crowded = np.flatnonzero(candidates.sum(axis=0, dtype=np.int8) > MOST)
-    least = np.full(len(y), -np.inf, np.float32)
+    least = np.full(len(evidence), -np.inf, np.float32)
     least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
     candidates &= quick >= least
     return candidates

@@ -131,6 +131,7 @@ class Table:
         along = brightness / np.linalg.norm(brightness)
         error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
         white = np.linalg.inv(np.linalg.cholesky(error + np.diag((PILOT_ERROR * brightness) ** 2)))
+        self.white = white.astype(np.float32)  # takes the pilot's means to errors of 1, at a noise of 1
         self.spread, turns = np.linalg.eigh(white @ (whole - half @ half.swapaxes(1, 2)) @ white.T)
         self.spread = np.maximum(self.spread, 0.0)
         self.turn = turns.swapaxes(1, 2) @ white  # (component, direction, channel)
@@ -142,15 +143,20 @@ class Table:
         turn = np.concatenate([np.zeros((len(reads), count, 4)), self.turn], axis=1)
         reads = np.concatenate([reads, offset[..., None], turn], axis=2).swapaxes(1, 2)
         self.reads = np.ascontiguousarray(reads, dtype=np.float32)
-        self.centre, self.directions, self.quick, outside = self._quick_likelihood(scatter)
+        # The quick likelihood is of samples and pilot together.
+        lean = white @ cross
+        pilot = np.concatenate([lean, white @ whole @ white.T + np.eye(4)], axis=2)
+        scatter = np.concatenate([np.concatenate([scatter, lean.swapaxes(1, 2)], axis=2), pilot], axis=1)
+        means = np.concatenate([self.values[:, at], self.values @ self.average.T @ white.T], axis=1)
+        self.centre, self.directions, self.quick, outside = self._quick_likelihood(means, scatter)
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
         signal = 1.0 - np.mean(noise[:, at]) / (np.exp(self.mix.log_weights) @ outside)
         self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
         self.estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(self, covariances: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
+    def _quick_likelihood(self, at: Doubles, covariances: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
         """Log likelihood in `DIRECTIONS` directions and the rest's length, as one matrix on products of coordinates."""
-        weights, at = np.exp(self.mix.log_weights), self.values[:, self.rows]
+        weights = np.exp(self.mix.log_weights)
         centre = weights @ at
         off = at - centre
         pooled = np.tensordot(weights, covariances, 1) + (off.T * weights) @ off
