@@ -68,6 +68,8 @@ def test_filters_are_written_as_curves_that_read_back(tmp_path: Path) -> None:
 def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
     rows = (
         ("--tile 3x3 -o found", "tile: '3x3' is unknown"),
+        ("--tile RG/B -o found", "cfa: rows of ('RG', 'B') differ in length"),
+        ("--rounds 0 -o found", "rounds: 0"),
         ("--letters RGQ -o found", "letters: 'Q' is unknown"),
         ("--over noon:midnight -o found", "over: 'noon:midnight' is not a range of levels"),
         ("--weights 1 --weights 2 -o found", "for 7 levels"),
