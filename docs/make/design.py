@@ -59,7 +59,7 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
 # By the seed of the sensor's noise; the first is Bayer.
 RUNS = {0: tuple(MOSAICS), 1: (BAYER, "rgbw", "cyym", "cygm", "cmyw")}
 FIGURES = ("psnr_db", "luminance_db", "colour")
-IN_TABLE = ("rgbw", "rgbw_sparse", "rgbw_4x4", "rccb", "BRBR/RGRG/BRBR/RGWG", "cyym", "cmyw")
+IN_TABLE = ("rgbw", "rgbw_4x4", "BRBR/RGRG/BRBR/RGWG", "cyym")
 
 
 def camera(name: str, mosaic: str) -> SensorConfig:
