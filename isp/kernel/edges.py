@@ -18,9 +18,7 @@ REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
 SIDE = 2 * REACH + 1
 SHADING = 0.7  # share of variation that goes with the mean colour: 0 loses 0.6 dB, 1 loses 0.1
 FULL = 0.95  # of the well, from which on there may be more light than was read
-MISSED = (
-    30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5 x 2 pixels a red one
-)
+MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY_E = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: standard deviation of a pixel; 0.8 loses 0.01 dB, 1.5 0.3.
@@ -95,9 +93,8 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared), 0.0) * (estimate - plane)
 
     # Light of unknown colour.
-    full = reduce(
-        or_, [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
-    )  # a bit a channel
+    channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
+    full = reduce(or_, channels_full)  # a bit a channel
     lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * dr.minimum(chi_squared / MISSED, 1.0)
     hue = dr.select((full & 0b111) > 0, dr.minimum(contrast, 1.0), lamp)
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])

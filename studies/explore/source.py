@@ -9,6 +9,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import (
     extent_of,
+    is_iset,
     is_radiance_file,
     is_reference,
     is_reflectance,
@@ -106,7 +107,11 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)
-        transport, _, notes = open_radiance_file(source, None)
+        transport, _, notes = open_radiance_file(source, LIGHT if is_iset(source) else None)
+        if is_iset(source):  # its illuminant has no name, as the page's lights have
+            notes.append(
+                f"{Path(source).name}: its colours are judged under {LIGHT}; give another light where that isn't so"
+            )
         transport = _with_its_light(transport, source)
         code = f"transport = rodcone.load_transport({source!r})\n"
         return Source(

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 from explore_sample import BANDS, small_transport
+from scipy.io import savemat
 
 import rodcone as public
 from rodcone.errors import InputError
@@ -322,3 +323,12 @@ def test_what_another_page_asked_is_not_answered_to_the_new_one():
     new.ask(session, "histogram", 2, cameras=[{}])
     session.close()
     assert [each["kind"] for each in new.headers] == ["histogram"]
+
+
+def test_an_isetcam_scene_is_judged_under_the_light_of_the_page(tmp_path):
+    """Its own illuminant has no name there, and the note doesn't say that it counts."""
+    nm = np.arange(400.0, 701.0, 10.0)
+    lamp = {"data": {"photons": 1e15 * nm}, "spectrum": {"wave": nm}}
+    savemat(tmp_path / "a.mat", {"photons": np.full((16, 16, nm.size), 1e15), "wave": nm, "illuminant": lamp})
+    notes = open_source(str(tmp_path / "a.mat"), RenderOptions()).notes
+    assert notes == ("a.mat: its colours are judged under D65; give another light where that isn't so",)
