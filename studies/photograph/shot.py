@@ -45,6 +45,7 @@ from studies.study.scene_source import (
 from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
+_LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
@@ -68,7 +69,7 @@ class Order:
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
         brightest W, auto:information for the one of the two whose samples hold more.
     level : str, optional
-        Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
+        Light, such as 25cd/m2 (mean of what is no lamp) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
         the same luminance; may be given several times. It is a name or a CSV file, such as sky=led.csv. For a file of
@@ -185,6 +186,12 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if step:
         step("exposure", 0.9)
     radiance = transport.relight(spectra, **level)
+    luminance_cd_m2 = float(radiance.luminance().mean())
+    if luminance_cd_m2 > _LAMPS_IN_VIEW * level.get("luminance_cd_m2", luminance_cd_m2):
+        notes += [
+            f"level: {order.level} is the mean of what is no lamp; with the lamps in view the picture's is "
+            f"{luminance_cd_m2:.3g} cd/m2"
+        ]
     image = form_image(radiance, sensor)
     exposure_s = exposure_by_rule_s(order.exposure, image, sensor) if exposure_s is None else exposure_s
     seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
@@ -227,7 +234,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         "exposure_s": exposure_s,
         "iso": raw.iso,
         "engine": raw.engine,
-        "luminance_cd_m2": float(radiance.luminance().mean()),
+        "luminance_cd_m2": luminance_cd_m2,
         "relative_mc_error": radiance.relative_mc_error,
         "relative_level_error": radiance.relative_level_error,
         "saturated": saturated,
