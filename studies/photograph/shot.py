@@ -260,7 +260,12 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             f"white_balance: {GRAY_WORLD!r} is found in a picture; allowed: {AS_SHOT} or an illuminant such as D65; "
             "give it to develop"
         )
-    exposure_s = _asked_exposure_s(order, channels(sensor.cfa))
+    exposure_s = parse_exposure(order.exposure, "exposure", 0.0)
+    if order.exposure == AUTO_W and "W" not in channels(sensor.cfa):
+        raise InputError(
+            f"exposure: {order.exposure!r} looks at W, which {channels(sensor.cfa)} lacks; allowed: a mosaic with W; "
+            f"give {AUTO}, or a time such as 20ms"
+        )
     if is_radiance_file(order.source):
         scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width")
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
@@ -279,19 +284,6 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     sensor.check_frame((height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
-
-
-def _asked_exposure_s(order: Order, names: tuple[str, ...]) -> float | None:
-    """Exposure time [s]; None where a rule chooses it, for which the mosaic needs the channels that it looks at."""
-    time_s = parse_exposure(order.exposure, "exposure", 0.0)
-    if time_s is not None:
-        return time_s
-    if order.exposure == AUTO_W and "W" not in names:
-        raise InputError(
-            f"exposure: {order.exposure!r} looks at W, which {names} lacks; allowed: a mosaic with W; "
-            f"give {AUTO}, or a time such as 20ms"
-        )
-    return None
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
