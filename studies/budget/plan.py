@@ -121,7 +121,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
     A picture file is its own pilot, and keeps its bands.
     """
     if opened.scene is None:
-        transport = open_radiance_file(opened.choice.source, opened.choice.light)[0]
+        transport = open_radiance_file(opened.choice.source, opened.white)[0]
         single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
         return Pilot(opened, transport, {len(single): single})
     nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)

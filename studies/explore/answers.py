@@ -26,6 +26,7 @@ from studies.explore.source import Rendered
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
 from studies.photograph.camera import calibrate, iso_speed
 from studies.study.render_noise import monte_carlo_share, noise_note
+from studies.study.scene_source import first_light
 
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
@@ -113,8 +114,7 @@ def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
     if controls.frames > 1:  # merged samples are no whole numbers as a negative's are
         raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
     exposed = expose_scene(rendered.transport, controls, memo)
-    first = next(iter(exposed.transport.groups.values()))
-    light = illuminant(controls.reference_light) if first.coloured else first.spectrum
+    light = first_light(exposed.transport.groups, illuminant(controls.reference_light))
     raw = replace(
         exposed.raw,
         camera=Path(controls.sensor).stem.encode("ascii", "replace").decode(),

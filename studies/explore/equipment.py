@@ -14,6 +14,7 @@ from sensor.presets import preset
 from sensor.variations import vary
 from studies.explore.controls import Controls, Lamp
 from studies.metrics.truth import Light, light_in_bands
+from studies.study.scene_source import first_light, replaceable_luminance
 from studies.study.study import OWN
 
 
@@ -24,9 +25,8 @@ def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light:
     level = lit.level().value
     if level <= 0:
         raise InputError("lamps: all are off; allowed: one power above 0; raise one")
-    first = next(iter(groups.values()))
-    spectrum = illuminant(reference_light) if first.coloured else first.spectrum
-    light = light_in_bands(spectrum, transport.wavelength_nm, transport.width_nm)
+    white = first_light(groups, illuminant(reference_light))
+    light = light_in_bands(white, transport.wavelength_nm, transport.width_nm)
     return lit, light, 1.0 / level
 
 
@@ -47,10 +47,7 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
     power = group.power * lamp.power
     if lamp.spectrum == OWN and not lamp.table:
         return replace(group, power=power)
-    group_luminance = spectral_luminance(group.spectrum)
-    if group.coloured or group_luminance <= 0:
-        why = "has colours of its own" if group.coloured else "is dark"
-        raise InputError(f"lamps: spectrum {lamp.spectrum!r} for a light group that {why}; allowed: {OWN}; leave it")
+    group_luminance = replaceable_luminance(group, f"lamps: {lamp.spectrum!r} for a light group that")
     spectrum = Spectrum(*np.transpose(lamp.table)) if lamp.table else illuminant(lamp.spectrum)
     luminance = spectral_luminance(spectrum)
     if luminance <= 0:

@@ -9,7 +9,6 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import (
     extent_of,
-    is_iset,
     is_radiance_file,
     is_reference,
     is_reflectance,
@@ -20,7 +19,14 @@ from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
 from rodcone.memory import memory, require_memory
-from studies.study.scene_source import LIGHT, check_radiance_file, defined, open_radiance_file, open_scene
+from studies.study.scene_source import (
+    LIGHT,
+    check_radiance_file,
+    default_white,
+    defined,
+    open_radiance_file,
+    open_scene,
+)
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
@@ -107,11 +113,8 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)
-        transport, _, notes = open_radiance_file(source, LIGHT if is_iset(source) else None)
-        if is_iset(source):  # its illuminant has no name, as the page's lights have
-            notes.append(
-                f"{Path(source).name}: its colours are judged under {LIGHT}; give another light where that isn't so"
-            )
+        # not an ISETCam scene's illuminant: that has no name, as the page's lights have
+        transport, notes = open_radiance_file(source, default_white(source))
         transport = _with_its_light(transport, source)
         code = f"transport = rodcone.load_transport({source!r})\n"
         return Source(

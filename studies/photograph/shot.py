@@ -1,6 +1,5 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -13,7 +12,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
-from render.scene import Scene, film_size
+from render.scene import film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
@@ -39,6 +38,8 @@ from studies.study.scene_source import (
     asked_level,
     asked_size,
     check_radiance_file,
+    file_white,
+    first_light,
     open_radiance_file,
     open_scene,
 )
@@ -160,14 +161,21 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if opened is None:
         light_name = order.light[0] if order.light else None
         known = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
-        transport, light, notes = open_radiance_file(order.source, known)
-        transport = under(transport, light_name) if light_name and is_reference(order.source) else transport
+        white = file_white(order.source, known)
+        transport, notes = open_radiance_file(order.source, white)
+        light = white.spectrum
+        if is_reference(order.source):
+            light = light if known else first_light(transport.groups, light)
+            transport = under(transport, light_name) if light_name else transport
         spectra: dict[str, Spectrum] = {}
         level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
     else:
         spectra = asked_spectra(opened.scene, order.light)
-        light, notes = _first_light(opened.scene, spectra)
-        notes = [*notes, *opened.notes] if balance is None else [*opened.notes]
+        name, first = next(iter(opened.scene.groups.items()))
+        light, notes = spectra.get(name, first_light(opened.scene.groups, illuminant(LIGHT))), [*opened.notes]
+        if balance is None and first.coloured:
+            assumed = f"scene {opened.scene.name}: light group {name!r} has colours of its own; white balance is set to"
+            notes.insert(0, f"{assumed} {LIGHT}, --white-balance sets it otherwise")
         level = asked_level(opened.scene, order.level)
     colour = calibrate(sensor, balance or light)
     check_place(out)  # before the render: it may take minutes
@@ -288,12 +296,3 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:
     return asked_size(film_size(opened.size, order.size), order.height, order.width)
-
-
-def _first_light(scene: Scene, spectra: Mapping[str, Spectrum]) -> tuple[Spectrum, list[str]]:
-    """First light of a scene, which the camera's colours are set to, and what had to be assumed."""
-    name, first = next(iter(scene.groups.items()))
-    if not first.coloured:
-        return spectra.get(name, first.spectrum), []
-    assumed = f"scene {scene.name}: light group {name!r} has colours of its own; white balance is set to {LIGHT}"
-    return illuminant(LIGHT), [f"{assumed}, --white-balance sets it otherwise"]

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from render.engine import render
 from render.illuminants import illuminant, spectral_luminance
 from render.loader import Film
 from render.radiance import SpectralRadiance
-from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference, stored_illuminant
+from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference
 from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
@@ -28,7 +29,17 @@ from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.render_noise import render_quietly
-from studies.study.scene_source import LIGHT, asked_level, check_radiance_file, open_radiance_file, open_scene
+from studies.study.scene_source import (
+    LIGHT,
+    AdoptedWhite,
+    asked_level,
+    check_radiance_file,
+    file_white,
+    first_light,
+    open_radiance_file,
+    open_scene,
+    replaceable_luminance,
+)
 from studies.study.study import OWN, SceneChoice, Study
 
 Progress = Callable[[float, float], None]
@@ -56,6 +67,13 @@ class OpenedScene:
     size: tuple[int, int]
     identity: str
     notes: tuple[str, ...] = ()
+
+    @cached_property
+    def white(self) -> AdoptedWhite:
+        """Light that the cameras' colours are set to under the scene's own lights, or a file's."""
+        if self.scene is None:
+            return file_white(self.choice.source, self.choice.light)
+        return AdoptedWhite(first_light(self.scene.groups, illuminant(LIGHT)))
 
 
 def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
@@ -134,7 +152,7 @@ def make_transport(
         Where Ctrl-C ended the render; what was rendered is in `cache`.
     """
     if opened.scene is None or model is None:
-        transport, _, assumed = open_radiance_file(opened.choice.source, opened.choice.light)
+        transport, assumed = open_radiance_file(opened.choice.source, opened.white)
         if study.render.size is not None:
             assumed.append(
                 f"{Path(opened.choice.source).name}: a picture keeps its own pixels; render.size is for scenes"
@@ -221,24 +239,14 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
             )
         require_keys(f"scene {scene.name}: light group", [group] if group else [], scene.groups)
         for lit_name in [group] if group else scene.groups:
-            lit = scene.groups[lit_name]
-            luminance_of_1 = spectral_luminance(lit.spectrum)
-            if lit.coloured or luminance_of_1 <= 0:
-                why = "has colours of its own" if lit.coloured else "is dark"
-                raise InputError(f"light: group {lit_name!r} of scene {scene.name} {why}; leave it as it is")
-            spectra[lit_name] = illuminant(name) * luminance_of_1
+            place = f"light: group {lit_name!r} of scene {scene.name}"
+            spectra[lit_name] = illuminant(name) * replaceable_luminance(scene.groups[lit_name], place)
     return spectra
 
 
 def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
-    """Light that the cameras' colours are set to: the scene's first, a file's own, or D65 where neither is known."""
-    if spectrum != OWN:
-        return illuminant(spectrum)
-    if opened.scene is None:
-        stored = None if opened.choice.light else stored_illuminant(opened.choice.source)
-        return stored or illuminant(opened.choice.light or LIGHT)
-    first = next(iter(opened.scene.groups.values()))
-    return illuminant(LIGHT) if first.coloured else first.spectrum
+    """Light that the cameras' colours are set to where all lights have a spectrum of the study."""
+    return opened.white.spectrum if spectrum == OWN else illuminant(spectrum)
 
 
 def lux_per_cd_m2(lit: Transport, levels: Sequence[str]) -> float | None:

@@ -1,11 +1,11 @@
 """What a study looks at: a scene by name, a Mitsuba scene of the user's own, or a spectral picture file."""
 
 import warnings
-from collections.abc import Iterable, Sequence
-from dataclasses import replace
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance
 from render.radiance_files.file_checks import require_file
 from render.radiance_files.photo import EXTENSIONS
 from render.radiance_files.radiance_source import (
@@ -16,7 +16,7 @@ from render.radiance_files.radiance_source import (
     load_picture,
     stored_illuminant,
 )
-from render.scene import Scene
+from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
 from render.user_scene.scene_file import load_scene_file
@@ -113,6 +113,58 @@ def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
 LIGHT = "D65"  # what sRGB takes for white, where nothing tells the light of the picture
 
 
+@dataclass(frozen=True)
+class AdoptedWhite:
+    """Light that colours are judged under, and what had to be assumed for it."""
+
+    spectrum: Spectrum
+    notes: tuple[str, ...] = ()
+
+
+def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum:
+    """Spectrum of a scene's first light, or `default` where that has colours of its own."""
+    first = next(iter(groups.values()))
+    return default if first.coloured else first.spectrum
+
+
+def default_white(path: str | Path) -> AdoptedWhite:
+    """Light of a picture file that nothing tells, D65; reference light tells its lamps when it is opened."""
+    use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
+    note = f"{Path(path).name}: {use} {LIGHT}; give another light where that isn't so"
+    return AdoptedWhite(illuminant(LIGHT), () if is_reference(path) else (note,))
+
+
+def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
+    """Light of a picture file: the one that was given, else the file's own, else D65.
+
+    Raises
+    ------
+    InputError
+        For an unknown light, or a ``.mat`` that can't be read.
+    """
+    if light is not None:
+        return AdoptedWhite(illuminant(light))
+    stored = stored_illuminant(path)
+    if stored is None:
+        return default_white(path)
+    return AdoptedWhite(stored, (f"{Path(path).name}: its colours are judged under the illuminant that it holds",))
+
+
+def replaceable_luminance(group: LightGroup, place: str) -> float:
+    """Luminance of a light group's spectrum, which another spectrum takes over.
+
+    Raises
+    ------
+    InputError
+        For a group that is dark or has colours of its own.
+    """
+    luminance = spectral_luminance(group.spectrum)
+    if group.coloured or luminance <= 0:
+        why = "has colours of its own" if group.coloured else "is dark"
+        raise InputError(f"{place} {why}; allowed: the light that it has; leave it as it is")
+    return luminance
+
+
 def check_radiance_file(path: str | Path, levels: Iterable[str]) -> None:
     """Raise `InputError` for a file that isn't there, or a level in lux, which has no plane to be measured on."""
     require_file(Path(path))
@@ -121,32 +173,24 @@ def check_radiance_file(path: str | Path, levels: Iterable[str]) -> None:
             raise InputError(f"level: {level!r} needs a reference plane, which a picture file hasn't; give it in cd/m2")
 
 
-def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, Spectrum, list[str]]:
-    """Transport of a picture file, the light that its colours are judged under, and what had to be assumed.
+def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport, list[str]]:
+    """Transport of a picture file, whose reflectances `white` lights, and what had to be assumed.
 
     Raises
     ------
     InputError
-        As `load_picture`, for a picture of fewer than 16 or more than 4096 pixels a side, or an unknown light.
+        As `load_picture`, and for a picture of fewer than 16 or more than 4096 pixels a side.
     """
-    spectrum = illuminant(light or LIGHT)
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
-        transport = load_picture(path, spectrum)
+        transport = load_picture(path, white.spectrum)
     name = Path(path).name
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
-    assumed = [f"{name}: {warning.message}" for warning in caught]
+    assumed = [*(f"{name}: {warning.message}" for warning in caught), *white.notes]
     if is_reference(path):
-        first = next(iter(transport.groups.values()))
         assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")
-        return transport, spectrum if light or first.coloured else first.spectrum, assumed
-    if light is None and (stored := stored_illuminant(path)):
-        spectrum = stored
-        assumed.append(f"{name}: its colours are judged under the illuminant that it holds")
-    elif light is None:
-        use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
-        assumed.append(f"{name}: {use} {LIGHT}; give another light where that isn't so")
+        return transport, assumed
     if Path(path).suffix.lower() in EXTENSIONS:
         assumed.append(
             f"{name}: a photograph doesn't tell spectra; each colour stands for the reflectance that the basis of "
@@ -157,4 +201,4 @@ def open_radiance_file(path: str | Path, light: str | None) -> tuple[Transport, 
             f"{name}: it was rendered with noise of {transport.relative_mc_error:.1%} of the value in a pixel and "
             "band; pictures of it hold that beside the sensor's noise, and no Monte Carlo share counts it"
         )
-    return transport, spectrum, assumed
+    return transport, assumed

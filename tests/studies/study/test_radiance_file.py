@@ -9,7 +9,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from rodcone.errors import InputError
 from studies.study.lit_scene import make_transport, open_choice
-from studies.study.scene_source import open_radiance_file
+from studies.study.scene_source import file_white, open_radiance_file
 from studies.study.study import RenderLimits, SceneChoice, Study
 
 NM = 385.0 + 10 * np.arange(40)
@@ -27,12 +27,13 @@ def test_what_is_assumed_of_a_file_is_told(tmp_path: Path) -> None:
     uneven = np.array([450.0, 500.0, 600.0])
     write_exr(SpectralRadiance(np.ones((16, 16, 3)), uneven, width_nm=np.ones(3)), path)
     path.write_bytes(path.read_bytes().replace(b"rodconeBands_nm", b"rodconeBandz_nm"))
-    transport, light, told = open_radiance_file(path, None)
+    white = file_white(path, None)
+    transport, notes = open_radiance_file(path, white)
     assert transport.width_nm.tolist() == [50, 75, 100]
-    assert [("half-way" in note, "D65" in note) for note in told] == [(True, False), (False, True)]
-    assert all(note.startswith("a.exr: ") for note in told)
-    assert light.band_average([450.0], [5.0]) > light.band_average([650.0], [5.0])
-    assert [note for note in open_radiance_file(path, "D65")[2] if "D65" in note] == []
+    assert [("half-way" in note, "D65" in note) for note in notes] == [(True, False), (False, True)]
+    assert all(note.startswith("a.exr: ") for note in notes)
+    assert white.spectrum.band_average([450.0], [5.0]) > white.spectrum.band_average([650.0], [5.0])
+    assert [note for note in open_radiance_file(path, file_white(path, "D65"))[1] if "D65" in note] == []
 
 
 @pytest.mark.parametrize("size", [None, 16])
@@ -46,5 +47,6 @@ def test_a_size_that_a_picture_does_not_take_is_told(tmp_path: Path, size: int |
 
 @pytest.mark.parametrize(("height", "width"), [(15, 20), (20, 4097)])
 def test_picture_of_a_size_that_no_camera_takes_is_refused(tmp_path: Path, height: int, width: int) -> None:
+    path = ramp(tmp_path / "a.exr", height, width)
     with pytest.raises(InputError, match=r"a\.exr: side"):
-        open_radiance_file(ramp(tmp_path / "a.exr", height, width), "E")
+        open_radiance_file(path, file_white(path, "E"))
