@@ -194,3 +194,8 @@ def test_no_absolute_path_of_a_machine() -> None:
 def test_tests_are_no_package() -> None:
     wrong = [name_of(path) for path in (ROOT / "tests").rglob("__init__.py")]
     assert not wrong, f"{wrong}: with --import-mode=importlib a tests package only hides what a test imports"
+
+
+def test_the_tests_of_a_fresh_environment_are_there() -> None:
+    (names,) = re.findall(r"SMOKE=\((.*?)\)", (ROOT / ".ci" / "fresh").read_text(), re.DOTALL)
+    assert [name for name in names.split() if not (ROOT / "tests" / f"{name}.py").is_file()] == []
