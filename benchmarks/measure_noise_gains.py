@@ -80,7 +80,7 @@ def pictures() -> list[TrainingPicture]:
 def take(processor: Processor, index: int, name: str, snr_db: float) -> Shot:
     """Expose a picture so that the unit's channel has an SNR in the mean."""
     picture, sensor = pictures()[index], vary(preset(name), processor.mosaic)
-    image, names = form_image(picture.radiance, sensor), channels(sensor.cfa)
+    image, names = form_image(picture.radiance, sensor), sensor.channels
     of_channels = channel_electrons(image, sensor, TIME_S)  # of 1 cd/m^2
     unit = names.index(processor.unit)
     dark = float(noise_variance(np.zeros((1, 1)), sensor, TIME_S)[0, 0])

@@ -38,7 +38,7 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
     the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
-    names, plain = channels(raw.cfa), replace(without_prnu(raw), noise_steps=())
+    names, plain = raw.channels, replace(without_prnu(raw), noise_steps=())
     values = stabilise_raw(raw.electrons, plain)
     sampled = [mask(raw.cfa, name, raw.shape) for name in names]
     low, high = np.array([np.percentile(values[at], (15.9, 84.1)) for at in sampled]).T

@@ -19,7 +19,6 @@ from rodcone.jit import Backend
 from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
 from rodcone.types import real_array
-from sensor.cfa import channels
 from sensor.raw import RawImage
 
 Image = NDArray[np.float64]
@@ -128,7 +127,7 @@ def finish(
     noise_gain : (h, w, 3) array, optional
         Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
     """
-    shape = *raw.shape, len(channels(raw.cfa))
+    shape = *raw.shape, len(raw.channels)
     if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):
         raise InputError(
             f"planes: shape {planes.shape} is not allowed; give one a channel, {shape}, noise_gain likewise"
@@ -144,8 +143,8 @@ def finish(
 
 def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the mosaic's channels, or raise `InputError` where they are others."""
-    if channels(raw.cfa) != names:
+    if raw.channels != names:
         raise InputError(
-            f"raw: mosaic {raw.cfa} holds {channels(raw.cfa)}; allowed here: {names}; use the other camera's pipeline"
+            f"raw: mosaic {raw.cfa} holds {raw.channels}; allowed here: {names}; use the other camera's pipeline"
         )
     return names

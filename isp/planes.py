@@ -158,7 +158,7 @@ def guide_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> 
 def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
     """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
     mosaic = guide_mosaic(raw.electrons, raw, distance)
-    return np.stack([fill(mosaic, raw.cfa, channel) for channel in channels(raw.cfa)])
+    return np.stack([fill(mosaic, raw.cfa, channel) for channel in raw.channels])
 
 
 def bilinear(raw: RawImage) -> NDArray[np.float64]:
@@ -167,7 +167,7 @@ def bilinear(raw: RawImage) -> NDArray[np.float64]:
     A sampled pixel keeps its sample; the frame's border is normalised by the samples that exist, so a flat field stays
     flat up to it.
     """
-    return fill_channels(raw.electrons, raw.cfa, channels(raw.cfa))
+    return fill_channels(raw.electrons, raw.cfa, raw.channels)
 
 
 def fill_channels(mosaic: Plane, tile: Tile, names: Sequence[str]) -> NDArray[np.float64]:

@@ -16,7 +16,7 @@ from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import saturated_fraction
 from isp.similarity.interpolation import certainty
 from isp.similarity.noise_distance import noise_distances
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.raw import RawImage
 
 LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the first one may be
@@ -86,7 +86,7 @@ def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
 
 
 def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
-    names, half, in_noise = channels(raw.cfa), settings.patch // 2, settings.distance == "noise"
+    names, half, in_noise = raw.channels, settings.patch // 2, settings.distance == "noise"
     noise = noise_distances(raw.cfa, settings.patch, settings.reach)
     mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
     h = np.stack([fill(mosaic, raw.cfa, name) for name in names])

@@ -58,11 +58,11 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     raw = mend(raw)
     estimate_dn = reconstruct_linear(raw).estimate / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
-    for index, channel in enumerate(channels(raw.cfa)):
+    for index, channel in enumerate(raw.channels):
         moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
         top_dn = max(raw.white_dn, raw.noise_of(channel).full_well_e / raw.gain_e_per_dn + raw.black_dn)
         dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, top_dn)).astype(dn.dtype)
-    kept = [channels(raw.cfa).index(channel) for channel in channels(tile)]
+    kept = [raw.channels.index(channel) for channel in channels(tile)]
     colour = None if raw.colour is None else raw.colour.part(kept)
     apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))
     return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart)

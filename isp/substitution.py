@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from isp.colour.colour_fit import ColourFit
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
-from sensor.cfa import channels
 from sensor.raw import RawImage
 
 # Figure 6 fixes them: Table 1 at 25 cd/m^2 substitutes at 5 ms, and not at 10 and 20 ms. The geometric mean of the
@@ -38,7 +37,7 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
     estimate : (h, w, channel) array
         Of `isp.interleaved.reconstruct` [e-].
     """
-    green = np.asarray(estimate[..., channels(raw.cfa).index("G")], dtype=np.float64)
+    green = np.asarray(estimate[..., raw.channels.index("G")], dtype=np.float64)
     noise = raw.noise_of("G")
     ratio = green / np.sqrt(noise.shot * np.maximum(green, 0.0) + noise.dark_noise_e**2)
     kept = ratio[~raw.saturated]

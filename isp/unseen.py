@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from isp.planes import tent, tent_radius
 from render.spectrum import Floats
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.raw import RawImage
 
 SIGMAS = 4.0  # of the sample, over what W allows
@@ -48,7 +48,7 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
     unseen : (h, w) bool
         Pixels whose sample is.
     """
-    names, size = channels(raw.cfa), (len(raw.cfa), len(raw.cfa[0]))
+    names, size = raw.channels, (len(raw.cfa), len(raw.cfa[0]))
     shares = neutral / neutral[names.index("W")]
     unseen, filled, reach = np.zeros(raw.shape, np.bool_), raw.dn, tent_radius(raw.cfa, "W")
     # Beyond the border, where a pixel's only W may lie, the samples a tile further in.
@@ -116,7 +116,7 @@ def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balance
     """
     if not unseen.any():
         return
-    names, row, column = channels(raw.cfa), *np.nonzero(unseen)
+    names, row, column = raw.channels, *np.nonzero(unseen)
     cells = np.array([[names.index(name) for name in line] for line in raw.cfa])
     gain = raw.gain_e_per_dn * gains[cells[row % len(cells), column % len(cells[0])]]
     height, width = raw.shape

@@ -12,7 +12,7 @@ from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_whole, unknown
-from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad
+from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
 
@@ -108,10 +108,10 @@ class SensorConfig:
         if not (all(isinstance(nm, Real) for nm in pair) and SHORTEST_NM <= pair[0] < pair[1] <= LONGEST_NM):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
-        self.responses.band_average(channels(self.cfa), [550.0], [1.0])  # every channel needs a curve
+        self.responses.band_average(self.channels, [550.0], [1.0])  # every channel needs a curve
         for apart in self.chip.channels:
-            if apart.channel not in channels(self.cfa):
-                raise unknown("channels: channel", apart.channel, channels(self.cfa))
+            if apart.channel not in self.channels:
+                raise unknown("channels: channel", apart.channel, self.channels)
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(
                 "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "
@@ -131,6 +131,16 @@ class SensorConfig:
         readings = self.chip.readings
         most = max((x.share for x in readings), default=1.0)
         return max((x.full_well_e / most for x in readings if x.share == most), default=self.pixel.full_well_e)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of `cfa`, as `sensor.cfa.channels` orders them."""
+        return channels(self.cfa)
+
+    @property
+    def unit_channel(self) -> str:
+        """Channel that exposure, white balance and a picture's scale go by (`sensor.cfa.unit_channel`)."""
+        return unit_channel(self.cfa)
 
     @property
     def site_pitch_um(self) -> float:

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import require_range, unknown
-from sensor.cfa import channels, unit_channel
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
@@ -64,10 +63,10 @@ def auto_exposure_s(
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")
-    channel = channel or unit_channel(sensor.cfa)
-    if channel not in channels(sensor.cfa):
-        raise unknown("exposure: channel", channel, channels(sensor.cfa))
-    per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., channels(sensor.cfa).index(channel)]
+    channel = channel or sensor.unit_channel
+    if channel not in sensor.channels:
+        raise unknown("exposure: channel", channel, sensor.channels)
+    per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., sensor.channels.index(channel)]
     return _share_of_well_s(per_second_e, sensor, channel, longest_s, percentile, well_share)
 
 
@@ -109,8 +108,8 @@ def exposure_of_electrons_s(
     if rule not in RULES:
         raise unknown("exposure", rule, RULES)
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
-    names = channels(sensor.cfa)
-    unit = unit_channel(sensor.cfa)
+    names = sensor.channels
+    unit = sensor.unit_channel
     for_green_s = _share_of_well_s(per_second_e[..., names.index(unit)], sensor, unit, longest_s)
     if rule == AUTO or "W" not in names:
         return for_green_s

@@ -14,7 +14,7 @@ from rodcone.errors import InputError, require_fields
 from rodcone.notebook import preview_png
 from rodcone.plots import Axes, draw_line
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
-from sensor.cfa import Tile, channels, check_covers, check_tile, mask
+from sensor.cfa import Tile, channels, check_covers, check_tile, mask, unit_channel
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 SATURATION_SIGMAS = 4.0
@@ -105,27 +105,35 @@ class RawImage:
         if levels != sorted(levels):
             raise InputError(f"noise_steps: from_e {levels} doesn't rise; put the darkest step first")
         apart = [noise.channel for noise in self.channel_noise]
-        if len(set(apart)) < len(apart) or not set(apart) <= set(channels(self.cfa)):
-            raise InputError(
-                f"channel_noise: {apart}; allowed: channels of {channels(self.cfa)}, each once; list those"
-            )
+        if len(set(apart)) < len(apart) or not set(apart) <= set(self.channels):
+            raise InputError(f"channel_noise: {apart}; allowed: channels of {self.channels}, each once; list those")
         for name, text in (("camera", self.camera), ("engine", self.engine)):
             if not (isinstance(text, str) and text.isascii() and text.isprintable() and (text or name == "engine")):
                 raise InputError(f"{name}: {text!r} is not allowed; give a name in printable ASCII")
-        if self.colour is not None and self.colour.neutral.size != len(channels(self.cfa)):
+        if self.colour is not None and self.colour.neutral.size != len(self.channels):
             raise InputError(
-                f"colour: {self.colour.neutral.size} channels don't fit the mosaic's {channels(self.cfa)}; "
+                f"colour: {self.colour.neutral.size} channels don't fit the mosaic's {self.channels}; "
                 "calibrate this camera"
             )
 
     @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
         """Draw the electrons along a row, the middle one by default, into Matplotlib's axes, by channel."""
-        planes = {x: np.where(mask(self.cfa, x, self.shape), self.electrons, np.nan) for x in channels(self.cfa)}
+        planes = {x: np.where(mask(self.cfa, x, self.shape), self.electrons, np.nan) for x in self.channels}
         return draw_line(planes, row, axes, "electrons")
 
     def _repr_png_(self) -> bytes:
         return preview_png(np.maximum(self.electrons, 0.0))
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """Channels of `cfa`, as `sensor.cfa.channels` orders them."""
+        return channels(self.cfa)
+
+    @property
+    def unit_channel(self) -> str:
+        """Channel that exposure, white balance and a picture's scale go by (`sensor.cfa.unit_channel`)."""
+        return unit_channel(self.cfa)
 
     @property
     def shape(self) -> tuple[int, int]:
@@ -214,7 +222,7 @@ class RawImage:
 
 def channel_variance(raw: RawImage, mean_e: ArrayLike) -> NDArray[np.float64]:
     """Variance of a sample of each channel at these means, PRNU left out [e-^2], shape (channel,)."""
-    noise = [raw.noise_of(name) for name in channels(raw.cfa)]
+    noise = [raw.noise_of(name) for name in raw.channels]
     shot, dark_e = np.array([(x.shot, x.dark_noise_e) for x in noise]).T
     return np.asarray(shot * mean_e + dark_e**2)
 

@@ -38,7 +38,7 @@ def electrons_per_irradiance(
     check_window(sensor.window_nm, wavelength_nm, width_nm)
     _check_covered(sensor, wavelength_nm, width_nm)
     seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)
-    response = sensor.responses.band_average(channels(sensor.cfa), wavelength_nm, width_nm)
+    response = sensor.responses.band_average(sensor.channels, wavelength_nm, width_nm)
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     return np.asarray(response * photons_per_joule(wavelength_nm) * seen_nm * area_m2 * exposure_s)
 
@@ -124,7 +124,7 @@ def lost_shares(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -
     nm, step = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
     held_nm = np.clip(np.minimum(last, edges[1:, None]) - np.maximum(first, edges[:-1, None]), 0.0, None).sum(axis=1)
-    names = channels(sensor.cfa)
+    names = sensor.channels
     electrons = sensor.responses.band_average(names, nm, step) * photons_per_joule(nm) * step
     lost = electrons @ np.clip(1 - held_nm / step, 0.0, 1.0)
     total = electrons.sum(axis=1)

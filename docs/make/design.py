@@ -28,7 +28,6 @@ from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.presets import preset
@@ -69,7 +68,7 @@ def camera(name: str, mosaic: str) -> SensorConfig:
 
 def in_places(sensor: SensorConfig, places: Mapping[str, str]) -> SensorConfig:
     """Sensor whose channels have the letters of `ple`."""
-    curves = {places.get(name, name): sensor.responses.curves[name] for name in channels(sensor.cfa)}
+    curves = {places.get(name, name): sensor.responses.curves[name] for name in sensor.channels}
     if "W" not in curves:
         curves["W"] = preset("low_noise").responses.curves["W"]
     tile = tuple("".join(places.get(letter, letter) for letter in row) for row in sensor.cfa)

@@ -16,7 +16,6 @@ from rodcone.errors import InputError
 from rodcone.files import replacing
 from scenes.catalog import load
 from sensor.cameras.emva_report import read_report
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -138,7 +137,7 @@ def parts(run: LastRun) -> tuple[dict[str, str], str, str]:
         cells = [entry.name, processor, level, f"{row.exposure_s:.4g}"]
         sensor = vary(entry.sensor, "rgbw" if processor == RGBW else "bayer")
         electrons = dict(
-            zip(channels(sensor.cfa), channel_e(sensor, light, row.luminance_cd_m2, row.exposure_s), strict=True)
+            zip(sensor.channels, channel_e(sensor, light, row.luminance_cd_m2, row.exposure_s), strict=True)
         )
         for channel in "GW":
             e = electrons.get(channel)

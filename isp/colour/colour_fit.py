@@ -20,7 +20,6 @@ from render.spectrum import Floats, band_widths
 from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
-from sensor.cfa import channels, unit_channel
 from sensor.raw import RawImage, channel_variance
 
 # Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
@@ -256,8 +255,8 @@ def relative_noise(
     -------
     (channel,) float64
     """
-    unit = unit_channel(raw.cfa)
-    green = channels(raw.cfa).index(unit)
+    unit = raw.unit_channel
+    green = raw.channels.index(unit)
     saturated = raw.saturated
     kept = ~saturated if not saturated.all() else np.ones(raw.shape, dtype=bool)
     rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from isp.kernel.edges import CORRELATION, MISSED, REACH, SHADING, SIDE, TINY_E, UNKNOWN, channel_noise, sharpen_frame
 from render.spectrum import Floats
 from rodcone.jit import backend
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.raw import RawImage
 
 STRIP_ROWS = 32  # that are computed together: 2 kB a pixel
@@ -56,7 +56,7 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
     if backend() != "numpy":
         return sharpen_frame(raw, np.ascontiguousarray(planes, dtype=np.float32), gains)
     border = (REACH, REACH), (REACH, REACH)
-    site = np.argmax([mask(raw.cfa, name, raw.shape) for name in channels(raw.cfa)], axis=0)
+    site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
     strips = (slice(first, first + STRIP_ROWS + 2 * REACH) for first in range(0, raw.shape[0], STRIP_ROWS))

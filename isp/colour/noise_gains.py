@@ -16,7 +16,7 @@ from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit
 from isp.colour.white_balance import WhiteBalance, neutral_response
 from render.spectrum import Floats
 from rodcone.toml_file import read_toml
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.curves import complementary, rgbw
 from sensor.raw import RawImage, channel_variance
 
@@ -80,7 +80,7 @@ def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit:
     """
     if fit.plain is not None:
         return fit
-    names = channels(raw.cfa)
+    names = raw.channels
     neutral = balance.neutral if balance.given is None else balance.given
     if neutral is None:
         neutral = neutral_response(names, complementary(rgbw()) if "C" in names else None)

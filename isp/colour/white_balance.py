@@ -19,7 +19,7 @@ from render.photometry import photons_per_joule
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths
 from rodcone.brief import brief
 from rodcone.errors import InputError
-from sensor.cfa import channels, colour_channels, mask, unit_channel
+from sensor.cfa import colour_channels, mask
 from sensor.curves import Responses, built_in
 from sensor.raw import RawImage, channel_variance
 
@@ -61,7 +61,7 @@ class WhiteBalance:
 
     def response(self, raw: RawImage) -> Floats:
         """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
-        return neutral_response(channels(raw.cfa)) if self.neutral is None else self.neutral
+        return neutral_response(raw.channels) if self.neutral is None else self.neutral
 
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.
@@ -85,7 +85,7 @@ class WhiteBalance:
         well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
         scene.
         """
-        names, unit, colours = channels(raw.cfa), unit_channel(raw.cfa), "".join(colour_channels(raw.cfa))
+        names, unit, colours = raw.channels, raw.unit_channel, "".join(colour_channels(raw.cfa))
         if self.given is not None:
             return self.given[names.index(unit)] / self.given, dict.fromkeys(names, "given")
         neutral = self.response(raw)
@@ -119,7 +119,7 @@ def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | No
     if values is None:
         return None
     response = np.asarray(values, dtype=np.float64)
-    names = channels(raw.cfa)
+    names = raw.channels
     if response.shape != (len(names),) or not np.all((response > 0) & np.isfinite(response)):
         raise InputError(f"{name}: {response.tolist()!r} is not allowed; give a positive response for each of {names}")
     return response

@@ -11,7 +11,6 @@ from numpy.typing import NDArray
 from isp.kernel.accumulate import larger
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
-from sensor.cfa import channels
 from sensor.raw import RawImage
 
 REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
@@ -28,13 +27,13 @@ CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
 
 def channel_noise(raw: RawImage) -> NDArray[np.float64]:
     """Electrons of variance an electron, dark variance [e-^2], and from where full [e-]: (3, channel)."""
-    noises = [raw.noise_of(name) for name in channels(raw.cfa)]
+    noises = [raw.noise_of(name) for name in raw.channels]
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
 
 def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.float64]) -> NDArray[np.float32]:
     """As `isp.colour.edges.sharpen`, with its names."""
-    jit, names, (height, width) = arrays(), channels(raw.cfa), raw.shape
+    jit, names, (height, width) = arrays(), raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
     # Mirrored at the borders: row r stands at REACH + r.
     rows, columns = (np.pad(np.arange(length, dtype=np.uint32), REACH, mode="reflect") for length in raw.shape)

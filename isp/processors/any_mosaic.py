@@ -13,7 +13,7 @@ from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from isp.substitution import COLOUR_ERROR
 from render.spectrum import Floats
-from sensor.cfa import channels, tile_of, unit_channel
+from sensor.cfa import channels, tile_of
 from sensor.raw import RawImage, renamed
 
 Plane = NDArray[np.float64]
@@ -61,18 +61,18 @@ def picture_any_mosaic(
 
 def rgb_of_channels(raw: RawImage, balanced: Plane, colours: ColourFit, noise: Floats) -> Plane:
     """Take balanced planes of a mosaic's channels to linear sRGB (h, w, 3), by a matrix that knows their noise."""
-    names = channels(raw.cfa)
+    names = raw.channels
     if colours.plain is None:
         return np.asarray(balanced @ colours.matrix(names, noise).T)
     # It knows three colours, and no noise.
-    unit = names.index(unit_channel(raw.cfa))
+    unit = names.index(raw.unit_channel)
     three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
     return np.asarray(three @ colours.plain.T)
 
 
 def _guided(raw: RawImage, settings: Settings) -> Reconstruction:
     """Reconstruction whose guide is W, or the unit of a mosaic that has neither W nor G, which then goes as W."""
-    names, unit = channels(raw.cfa), unit_channel(raw.cfa)
+    names, unit = raw.channels, raw.unit_channel
     if {"W", "G"} & set(names):
         return reconstruct_with_noise(raw, settings)
     named = renamed(raw, {unit: "W"})

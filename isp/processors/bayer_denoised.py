@@ -18,7 +18,7 @@ from isp.planes import Plane, bilinear
 from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.sub_images import Mix, bm3d, bm3d_mosaic
-from sensor.cfa import Tile, channel_map, channels
+from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
@@ -59,7 +59,7 @@ def picture_demosaicked_first(
     require_bayer(raw.cfa)
     gains, _ = balance.gains(raw, bilinear(raw))
     mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
-    names, sites = channels(raw.cfa), channel_map(raw.cfa, raw.shape)
+    names, sites = raw.channels, channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
     stable = stabilise(mosaic / gain, raw.dark_noise_e, 0.0) * np.sqrt(gain)
     planes = demosaic(stable, raw.cfa)

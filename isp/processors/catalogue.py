@@ -26,7 +26,7 @@ from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import EXTRA as BM3D
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
-from sensor.cfa import OWN, channels
+from sensor.cfa import OWN
 from sensor.raw import RawImage
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
@@ -90,7 +90,7 @@ class Processor:
         raw = mend(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
         colours = ColourFit.of(matrix)
-        if self.noise_gains is not None and set(self.colours) <= set(channels(raw.cfa)):  # others are refused below
+        if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # others are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)
         return self.picture(raw, colours, balance=white_balance, **options)
 

@@ -69,7 +69,7 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
 
     `colours` takes balanced C, Y, M, in this order, to linear sRGB. A neutral reads the electrons of a yellow pixel.
     """
-    names = channels(raw.cfa)
+    names = raw.channels
     if set(names) != set(_STANDS_FOR):
         raise InputError(f"raw: mosaic {raw.cfa} is not C, M, Y and W; allowed here: these four; use another processor")
     named = renamed(raw, _STANDS_FOR)

@@ -9,7 +9,7 @@ from isp.colour.highlights import clip_highlights, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.picture import Image
 from isp.planes import Plane, bilinear
-from sensor.cfa import channel_map, channels
+from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
@@ -39,7 +39,7 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
     gains, sources = balance.gains(raw, bilinear(raw))
     sites = channel_map(raw.cfa, raw.shape)
     factors = np.zeros(raw.shape)
-    for name, factor in zip(channels(raw.cfa), gains, strict=True):
+    for name, factor in zip(raw.channels, gains, strict=True):
         factors[sites == name] = factor
     values = electrons * factors
     clipped = saturated_nearby(raw, "RGB", 1) & (sites != "W")

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from rodcone.errors import InputError
 from rodcone.files import replacing
-from sensor.cfa import Tile, channels, is_bayer, is_rgbw, plain
+from sensor.cfa import Tile, is_bayer, is_rgbw, plain
 from sensor.raw import RawImage
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
 from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
@@ -132,7 +132,7 @@ def dng_tags(raw: RawImage) -> Tags:
         50706: ("B", bytes((1, 4, 0, 0))),  # DNGVersion
         50707: ("B", bytes((1, 1, 0, 0))),  # DNGBackwardVersion: all that is newer may be skipped
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
-        50710: ("B", bytes(_COLOURS[channel] for channel in channels(raw.cfa))),  # CFAPlaneColor
+        50710: ("B", bytes(_COLOURS[channel] for channel in raw.channels)),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
         BLACK_LEVEL: ("2I", rational(raw.black_dn)),
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
@@ -160,7 +160,7 @@ def dng_tags(raw: RawImage) -> Tags:
 
 def _noise_profile(raw: RawImage) -> tuple[float, ...]:
     """S and O of `dng_tags`, of all channels together or of each plane where some are read apart."""
-    noise = [raw.noise_of(name) for name in channels(raw.cfa)[: None if raw.channel_noise else 1]]
+    noise = [raw.noise_of(name) for name in raw.channels[: None if raw.channel_noise else 1]]
     full_e = raw.full_well_e
     return tuple(part for x in noise for part in (x.shot / full_e, (x.dark_noise_e / full_e) ** 2))
 

@@ -10,7 +10,6 @@ from rodcone.errors import InputError, require_absent, require_whole, unknown
 from rodcone.files import check_place, write_files
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
@@ -71,7 +70,7 @@ class Frames:
             require_whole("reading", self.reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
             sensor = of_reading(sensor, self.reading - 1)
         if sensor.chip.channels:
-            names = channels(sensor.cfa)
+            names = sensor.channels
             if self.channel not in names:
                 raise unknown(f"channel of {preset!r}, which reads channels apart", str(self.channel), names)
             return of_channel(sensor, self.channel)[0]

@@ -14,7 +14,7 @@ from render.photometry import photons_per_joule
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_whole, unknown
-from sensor.cfa import channel_map, channels, mask
+from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
 from sensor.readings.by_channel import at_sites, dimmed, of_channel
 from sensor.readout import as_read, noise_sources, noise_variance, spread_charge
@@ -41,9 +41,9 @@ _TINTS = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "C": (0, 
 def raw_picture(shot: Shot) -> Bytes:
     """The mosaic, each pixel in its channel's colour, encoded as sRGB; a full well is white."""
     raw = shot.exposed.raw
-    wells_e = np.array([raw.noise_of(channel).full_well_e for channel in channels(raw.cfa)])
-    tints = np.array([_TINTS.get(channel, (1, 1, 1)) for channel in channels(raw.cfa)])
-    index = np.vectorize(channels(raw.cfa).index)(channel_map(raw.cfa, raw.shape))
+    wells_e = np.array([raw.noise_of(channel).full_well_e for channel in raw.channels])
+    tints = np.array([_TINTS.get(channel, (1, 1, 1)) for channel in raw.channels])
+    index = np.vectorize(raw.channels.index)(channel_map(raw.cfa, raw.shape))
     share = np.clip(raw.electrons / wells_e[index], 0.0, 1.0)
     return _bytes(encode_srgb(share[..., None] * tints[index]))
 
@@ -192,12 +192,12 @@ def histogram(raw: RawImage) -> dict[str, Any]:
         ``edges_e`` (n + 1,); ``counts`` by channel, (n,), what lies under the first edge or over the last in the first
         and the last bin; ``well_e``; and ``floor_e``, the dark noise of a pixel.
     """
-    deepest_e = max(raw.full_well_e, *(raw.noise_of(channel).full_well_e for channel in channels(raw.cfa)))
+    deepest_e = max(raw.full_well_e, *(raw.noise_of(channel).full_well_e for channel in raw.channels))
     edges = np.geomspace(LEAST_E, 1.05 * deepest_e, BINS + 1)
     electrons = np.clip(raw.electrons, edges[0], edges[-1])
     counts = {
         channel: np.histogram(electrons[mask(raw.cfa, channel, raw.shape)], edges)[0].tolist()
-        for channel in channels(raw.cfa)
+        for channel in raw.channels
     }
     return {"edges_e": edges.tolist(), "counts": counts, "well_e": raw.full_well_e, "floor_e": raw.dark_noise_e}
 
@@ -233,7 +233,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2
     photons = irradiance * photons_per_joule(nm) * width * area_m2 * time_s
     electrons = electrons_per_irradiance(sensor, nm, width, time_s) * irradiance
-    names, channel = channels(sensor.cfa), str(channel_map(sensor.cfa, raw.shape)[row, column])
+    names, channel = sensor.channels, str(channel_map(sensor.cfa, raw.shape)[row, column])
     return {
         "row": row,
         "column": column,

@@ -14,7 +14,7 @@ from isp.planes import tent
 from isp.processors.catalogue import NAMED
 from isp.processors.fusion import MATCHED_RADIUS, combine
 from rodcone.colour_spaces import SRGB_TO_XYZ
-from sensor.cfa import MOSAICS, Tile, channels, mask
+from sensor.cfa import MOSAICS, Tile, mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import noise_variance, read_out
@@ -41,7 +41,7 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 
     Read out, the first is where half of the pixels are full, and the second follows from the SNR that W has there.
     """
-    light, names = light_of("D65"), channels(sensor.cfa)
+    light, names = light_of("D65"), sensor.channels
     per_cd_m2 = channel_e(sensor, light, 1.0, EXPOSURE_S)
     white, colour = per_cd_m2[names.index("W")], per_cd_m2[[name != "W" for name in names]].max()
     dark_cd_m2 = electrons_at_snr(1.0, sensor, EXPOSURE_S) / white
@@ -60,7 +60,7 @@ def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[
     """Noise of linear sRGB about its luminance, grey 1, on an even field: closed form, and read out."""
     sensor = Camera(reading, processor).sensor
     light, colours = light_of("D65"), NAMED[processor].colours
-    electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[channels(sensor.cfa).index(x) for x in colours]]
+    electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[sensor.channels.index(x) for x in colours]]
     matrix = colour_fit(sensor, NAMED[processor], light).matrix(colours) / electrons
     chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB less its luminance
     variance = noise_variance(electrons, sensor, EXPOSURE_S)

@@ -14,7 +14,7 @@ from isp.colour.highlights import saturated_nearby
 from isp.planes import bilinear
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
@@ -73,7 +73,7 @@ def colour_and_white(raw: RawImage, seen: View, camera: Camera) -> tuple[Image, 
     planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, seen.light, raw.exposure_s)
     matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], seen.light).matrix()
     colour = planes[..., :3] / (neutral[:3] * seen.white_cd_m2) @ matrix.T
-    index = channels(raw.cfa).index("W")
+    index = raw.channels.index("W")
     return np.asarray(colour), grey(planes[..., index], neutral[index] * seen.white_cd_m2)
 
 
@@ -145,7 +145,7 @@ def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
         float(raw.saturated[is_white].mean()),
         float(raw.saturated[~is_white].mean()),
         likeness(luminance, truth, white & ~colours),
-        likeness(bilinear(raw)[..., channels(raw.cfa).index("W")], truth, white & ~colours),
+        likeness(bilinear(raw)[..., raw.channels.index("W")], truth, white & ~colours),
         likeness(luminance, truth, white & colours),
     )
 

@@ -18,7 +18,6 @@ from isp.interleaved import reconstruct
 from isp.planes import planes
 from isp.settings import Settings
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import channels
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
@@ -75,7 +74,7 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
     columns : (h,) intp
         Of `edge_columns`.
     """
-    plane = planes(raw)[channels(raw.cfa).index("W")]
+    plane = planes(raw)[raw.channels.index("W")]
     half = PATCH // 2
     rows = np.arange(half, plane.shape[0] - AWAY - half)
     places = np.stack([rows, columns[rows] + ASIDE], axis=-1)
@@ -108,7 +107,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             edge = triplets(raw, columns)
             shares[f"{reading}, {name}"] = edge.share
             if name == next(iter(LEVELS)):
-                parts.append((reading, planes(raw)[channels(raw.cfa).index("W")], edge))
+                parts.append((reading, planes(raw)[raw.channels.index("W")], edge))
     return paper_figure("4", _drawing(parts), level=next(iter(LEVELS))), claims_4(shares)
 
 

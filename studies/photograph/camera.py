@@ -21,7 +21,6 @@ from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture as frame_of
-from sensor.cfa import channels, unit_channel
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
@@ -69,14 +68,14 @@ def iso_speed(sensor: SensorConfig) -> float | None:
 
     The exposure that fills the well with green's mean; no half stop of headroom is taken off.
     """
-    if "G" not in channels(sensor.cfa):
+    if "G" not in sensor.channels:
         return None
     neutral = neutral_electrons(sensor, _in_bands(illuminant("D65")), 1.0)
-    electrons_per_cd_m2 = float(neutral[channels(sensor.cfa).index("G")])
+    electrons_per_cd_m2 = float(neutral[sensor.channels.index("G")])
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(unit_channel(sensor.cfa))
+    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(sensor.unit_channel)
 
 
 def _in_bands(spectrum: Spectrum) -> Light:
@@ -89,7 +88,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     nm, width = light.wavelength_nm, light.width_nm
     electrons = electrons_per_irradiance(sensor, nm, width, 1.0)
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
-    names = channels(sensor.cfa)
+    names = sensor.channels
     three = list(range(min(len(names), 3)))
     collected = electrons @ light.spectrum
     if not np.all(collected > 0):
@@ -111,7 +110,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     from_srgb = fit_through_neutral(target, balanced)
     if len(three) == 3:
         from_srgb[three] = np.linalg.inv(to_srgb)
-    neutral = collected / collected[names.index(unit_channel(sensor.cfa))]
+    neutral = collected / collected[names.index(sensor.unit_channel)]
     to_xyz = np.zeros((3, len(names)))
     to_xyz[:, three] = (
         np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb
@@ -128,8 +127,8 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
-    colours = processor.colours or channels(sensor.cfa)
-    names = (*colours, *(x for x in channels(sensor.cfa) if x not in colours))
+    colours = processor.colours or sensor.channels
+    names = (*colours, *(x for x in sensor.channels if x not in colours))
     responses = sensor.responses.band_average(names, nm, width)
     return fit_colours(names, responses, nm, light.spectrum, surfaces, width)
 
@@ -177,7 +176,7 @@ def develop_to_scale(
         As the processor does.
     """
     picture = processor.develop(raw, colours, neutral=neutral, **options)
-    unit_e = float(neutral[channels(sensor.cfa).index(processor.unit or unit_channel(sensor.cfa))])
+    unit_e = float(neutral[sensor.channels.index(processor.unit or sensor.unit_channel)])
     linear = picture.rgb / (unit_e * white_cd_m2)
     if sensor.lens.horizontal_view_deg:
         linear = linear / falloff(sensor.lens, linear.shape[:2])[..., None]
@@ -202,8 +201,8 @@ def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance:
     """
     white_balance = WhiteBalance.of(raw, neutral, balance)
     gains, _ = white_balance.gains(raw, bilinear(raw))
-    balanced = dict(zip(channels(raw.cfa), gains * neutral, strict=True))
-    unit = balanced[unit_channel(raw.cfa)]
+    balanced = dict(zip(raw.channels, gains * neutral, strict=True))
+    unit = balanced[raw.unit_channel]
     names = colours.channels[:3]
     card = GREY * colours.matrix(names) @ [balanced[name] / unit for name in names]
     lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (card, np.full(3, GREY)))

@@ -20,7 +20,7 @@ from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
 from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
-from sensor.cfa import channels, is_bayer, plain
+from sensor.cfa import is_bayer, plain
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw
 from studies.study.scene_source import asked_size
@@ -45,9 +45,9 @@ def mosaic_processor(raw: RawImage) -> str:
     """Processor that the paper has for a raw image's mosaic; for others ``any_mosaic``, or ``ple`` for a known quad."""
     if is_bayer(raw.cfa):
         return "bayer"
-    if plain(raw.cfa) != raw.cfa and set(channels(raw.cfa)) <= set("RGBW"):
+    if plain(raw.cfa) != raw.cfa and set(raw.channels) <= set("RGBW"):
         return "ple"
-    return "interleaved" if channels(raw.cfa) == ("R", "G", "B", "W") else "any_mosaic"
+    return "interleaved" if raw.channels == ("R", "G", "B", "W") else "any_mosaic"
 
 
 def develop(
@@ -88,7 +88,7 @@ def develop(
         raise InputError(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
-    colours = fit_of_calibration(colour, channels(raw.cfa))
+    colours = fit_of_calibration(colour, raw.channels)
     software, response = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
     return software.develop(raw, colours, neutral=colour.neutral, balance=response)
 

@@ -20,7 +20,7 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.capture import capture
-from sensor.cfa import channels, is_bayer
+from sensor.cfa import is_bayer
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
@@ -229,7 +229,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
     if bayer is not None:
         paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
-    if not converted and "W" in channels(raw.cfa):
+    if not converted and "W" in raw.channels:
         other = f"{paths[-1].name}, re-mosaiced" if bayer is not None else "a .dng of one exposure, re-mosaiced"
         notes += [f"{out.name}: other programs read its mosaic as four colours, such as GMCY; for them give {other}"]
     facts = {
@@ -269,9 +269,9 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             "give it to develop"
         )
     exposure_s = parse_exposure(order.exposure, "exposure", 0.0)
-    if order.exposure == AUTO_W and "W" not in channels(sensor.cfa):
+    if order.exposure == AUTO_W and "W" not in sensor.channels:
         raise InputError(
-            f"exposure: {order.exposure!r} looks at W, which {channels(sensor.cfa)} lacks; allowed: a mosaic with W; "
+            f"exposure: {order.exposure!r} looks at W, which {sensor.channels} lacks; allowed: a mosaic with W; "
             f"give {AUTO}, or a time such as 20ms"
         )
     if is_radiance_file(order.source):

@@ -6,7 +6,6 @@ from math import pi
 import numpy as np
 
 from render.spectrum import Floats
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
@@ -62,7 +61,7 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
         Mean signal over the standard deviation of one pixel of one chip, fixed patterns included.
     """
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
-    names = channels(sensor.cfa)
+    names = sensor.channels
     electrons = [electrons_at_snr(ratio, sensor, exposure_s, name) for name in names]
     return [
         LightForSnr(channel, e, e / per_cd_m2, e / per_cd_m2 * pi / GREY)
@@ -73,7 +72,7 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
 def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, Floats]:
     """SNR of each channel's pixel over light; NaN where its well is full."""
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
-    electrons = dict(zip(channels(sensor.cfa), of[:, None] * luminance_cd_m2, strict=True))
+    electrons = dict(zip(sensor.channels, of[:, None] * luminance_cd_m2, strict=True))
     ratios = {}
     for name, e in electrons.items():
         alone, share = of_channel(sensor, name)

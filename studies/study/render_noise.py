@@ -11,7 +11,6 @@ from render.denoised.relight import measured_error
 from render.engine import render
 from render.scene import Scene
 from render.transport import Transport
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
@@ -56,7 +55,7 @@ def monte_carlo_share(
     if expected_e.ndim == 2:
         variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
     else:
-        parts = zip(channels(sensor.cfa), expected_e, strict=True)
+        parts = zip(sensor.channels, expected_e, strict=True)
         of_channels = [_noise_and_room(plane, sensor, exposure_s, name) for name, plane in parts]
         variance_e2, inside = (np.stack(arrays) for arrays in zip(*of_channels, strict=True))
     if not inside.any():

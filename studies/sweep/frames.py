@@ -18,7 +18,6 @@ from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest_inputs
-from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, most_informative_s
 from sensor.optics import form_image
@@ -139,7 +138,7 @@ def make_frames(
         errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
         facts = scene | {
             "auto_s": unit_exposure_s(radiances[0], preset),
-            "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in channels(sensor.cfa) else None),
+            "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in sensor.channels else None),
             "electrons": keep_array(folder, unmoved if sensor.lens.shake_um else whole),
             "errors": keep_array(folder, np.stack(errors).astype(np.float32)),
         }

@@ -18,7 +18,7 @@ from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
-from sensor.cfa import block_sums, channels, mask
+from sensor.cfa import block_sums, mask
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.response import behind_filters
@@ -130,7 +130,7 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         balance_delta_e=balance_delta_e(raw, cell.colours, neutral, **options) if picture.balance else None,
         balance=json.dumps(dict(picture.balance)),
         mean_electrons=json.dumps(
-            {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in channels(sensor.cfa)}
+            {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
         ),
         variant=cell.made_by.variant,
         readout_engine=raw.engine,

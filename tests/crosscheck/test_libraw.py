@@ -22,7 +22,7 @@ from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from scenes.reflectances import color_checker
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.device import draw_device
 from sensor.presets import low_noise, preset
 from sensor.raw import RawImage
@@ -55,7 +55,7 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
     electrons = (surfaces() * spectrum) @ weights.T * scale
     shape = (ROWS * SIDE, COLUMNS * SIDE)
     mosaic = np.zeros(shape)
-    for index, channel in enumerate(channels(sensor.cfa)):
+    for index, channel in enumerate(sensor.channels):
         plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
         mosaic[mask(sensor.cfa, channel, shape)] = plane[mask(sensor.cfa, channel, shape)]
     raw = raw_image(
@@ -112,7 +112,7 @@ def test_the_dark_has_no_tint_under_libraw_s_own_black_level(name: str, cfa: str
         assert theirs.black_level_per_channel == [sensor.black_dn] * 4
         lifted_e = (theirs.raw_image.astype(float) - theirs.black_level_per_channel[0]) * sensor.gain_e_per_dn
     spread_e = np.hypot(sensor.pixel.read_noise_e, sensor.gain_e_per_dn / np.sqrt(12))
-    for channel in channels(sensor.cfa):
+    for channel in sensor.channels:
         here = mask(sensor.cfa, channel, shape)
         # 21 comparisons within 4 standard errors: false-alarm rate 1.3e-3
         assert abs((lifted_e - device.dark_offset_e)[here].mean()) < 4 * spread_e / np.sqrt(here.sum())

@@ -25,7 +25,7 @@ from hard.light import (
 
 from isp.interleaved import reconstruct
 from render.radiance import SpectralRadiance
-from sensor.cfa import channel_map, channels
+from sensor.cfa import channel_map
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import table1_pixel
 
@@ -108,7 +108,7 @@ def _white_of_a_flat_field(situation: Situation) -> Margin:
     errors = []
     for seed in range(48):
         raw = shoot(situation, "interleaved", 300 + seed)
-        estimate = reconstruct(raw)[..., channels(raw.cfa).index("W")].astype(np.float64)
+        estimate = reconstruct(raw)[..., raw.channels.index("W")].astype(np.float64)
         errors.append(estimate.mean() - raw.electrons[names == "W"].mean())
     return bias(np.array(errors), 1.0)
 

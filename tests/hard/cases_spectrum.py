@@ -11,7 +11,7 @@ from render.illuminants import lines_nm
 from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM
-from sensor.cfa import channel_map, channels
+from sensor.cfa import channel_map
 from sensor.optics import camera_equation
 
 SODIUM = "sodium_low"
@@ -22,9 +22,7 @@ def _line_closed_form(situation: Situation) -> Margin:
     lines = np.array(lines_nm(SODIUM))
     edges = np.array([lines[0] - 0.5, lines[1] + 0.5])  # of the band: within it response and photons may differ
     sensor = situation.sensor
-    at_lines, at_edges = (
-        sensor.responses.band_average(channels(sensor.cfa), nm, np.full(2, 1e-3)) for nm in (lines, edges)
-    )
+    at_lines, at_edges = (sensor.responses.band_average(sensor.channels, nm, np.full(2, 1e-3)) for nm in (lines, edges))
     # Of 1 cd/m^2: V weighs the lines as `render.illuminants` does, so the radiance is what the picture itself holds.
     radiance = float(np.median(situation.radiance.values @ situation.radiance.widths_nm))
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
@@ -33,7 +31,7 @@ def _line_closed_form(situation: Situation) -> Margin:
     names = channel_map(sensor.cfa, situation.shape)
     found = expected(situation)
     margins = []
-    for number, channel in enumerate(channels(sensor.cfa)):
+    for number, channel in enumerate(sensor.channels):
         slack = float(np.ptp(at_edges[number]) / at_lines[number].min() + np.ptp(edges) / lines[0])
         margins.append(worst_of(found[names == channel] - exact[number], slack * exact[number], "e⁻"))
     return worse(*margins)

@@ -87,7 +87,7 @@ def develop_fixed(raw: RawImage, situation: Situation) -> Image:
     """Picture at the white balance of D65, linear in the reconstructed channels, (h, w, 3) [e-]."""
     name = camera_of(raw)
     options = keywords({**FIXED, **situation.develop}) if name == "interleaved" else {}
-    balance = options.pop("balance", neutral_response(channels(raw.cfa)))
+    balance = options.pop("balance", neutral_response(raw.channels))
     return PROCESSORS[name].develop(raw, plain_matrix(), balance=balance, **options).rgb
 
 
@@ -101,7 +101,7 @@ def develop(raw: RawImage, situation: Situation) -> Developed:
 
 def camera_of(raw: RawImage) -> str:
     """Which of `CAMERAS` took it."""
-    return "interleaved" if "W" in channels(raw.cfa) else "bayer"
+    return "interleaved" if "W" in raw.channels else "bayer"
 
 
 def to_picture(cfa: Tile, develop: Mapping[str, float]) -> Image:

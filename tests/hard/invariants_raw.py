@@ -11,7 +11,7 @@ from scipy.stats import t
 
 from isp.colour.white_balance import neutral_response
 from rodcone.colour_spaces import encode_srgb
-from sensor.cfa import channel_map, channels
+from sensor.cfa import channel_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage
 from sensor.readout import noise_variance, spread_charge
@@ -42,7 +42,7 @@ def bounded(situation: Situation) -> Margin:
 
 def _picture_bound(raw: RawImage, situation: Situation) -> Image:
     """Largest value of each colour that means of the samples can give."""
-    names = channels(raw.cfa)
+    names = raw.channels
     samples = np.abs(raw.electrons).max() * np.ones(len(names))
     matrix = to_picture(raw.cfa, situation.develop)
     bound = np.abs(matrix) @ samples
@@ -62,7 +62,7 @@ def raw_unbiased(situation: Situation) -> Margin | None:
         room = _leaves_room(mean_e, sensor, situation.exposure_s)
         names = channel_map(sensor.cfa, mean_e.shape)
         frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
-        for channel in channels(sensor.cfa):
+        for channel in sensor.channels:
             pixels = room & (names == channel)
             sound = [(raw.electrons - mean_e)[pixels & ~_defective(raw)] for raw in frames]
             errors = np.array([error.mean() for error in sound if error.size])
@@ -81,7 +81,7 @@ def pictures_unbiased(situation: Situation) -> Margin | None:
         if not _leaves_room(mean_e, sensor, level.exposure_s).all():
             continue
         names = channel_map(sensor.cfa, mean_e.shape)
-        means = np.array([mean_e[names == channel].mean() for channel in channels(sensor.cfa)])
+        means = np.array([mean_e[names == channel].mean() for channel in sensor.channels])
         shown = to_picture(sensor.cfa, level.develop) @ means
         pictures = [develop_fixed(shoot(level, name, 200 + seed), level) for seed in range(PICTURES)]
         found = np.array([picture.mean(axis=(0, 1)) for picture in pictures])

@@ -8,7 +8,7 @@ from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
-from sensor.cfa import Tile, channel_map, channels
+from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
 # The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight
@@ -75,7 +75,7 @@ def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None
 
 def _margin(error: Image, raw: RawImage, situation: Situation) -> Margin:
     """Error over what the arithmetic may differ by; the slow reference runs only where the plain bound is passed."""
-    if "W" not in channels(raw.cfa):
+    if "W" not in raw.channels:
         return _beside(error, raw, situation, DOUBLE_ROUNDINGS * float(np.abs(raw.electrons).max()))
     settings = _settings(situation)
     samples = settings.neighbourhood**2 / np.size(channel_map(raw.cfa, (len(raw.cfa), len(raw.cfa[0]))))

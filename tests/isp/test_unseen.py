@@ -8,7 +8,7 @@ from builders import RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.pipeline import picture_interleaved
 from isp.unseen import draw_unseen, without_unseen
-from sensor.cfa import RGBW, channels, mask, quad
+from sensor.cfa import RGBW, mask, quad
 
 NEUTRAL = np.array([0.1, 0.2, 0.1, 1.0])
 TILES = [*RGBW_PHASES, RGBW_4X4, quad(RGBW)]
@@ -130,4 +130,4 @@ def test_light_is_drawn_up_to_the_full_well():
     draw_unseen(raw, unseen, np.full(4, 3.0), balanced)
     assert np.array_equal(balanced[0, 0], np.full(4, 15_000.0))
     assert not balanced.reshape(-1, 4)[1:].any()
-    assert channels(raw.cfa) == tuple("RGBW")
+    assert raw.channels == tuple("RGBW")

@@ -42,7 +42,7 @@ def shaded(light):
 
 def by_hand(raw, planes, gains, row, column):
     """The formula of `sharpen` at a pixel inside the frame, sample by sample."""
-    names, cells = channels(raw.cfa), len(raw.cfa)
+    names, cells = raw.channels, len(raw.cfa)
     window = planes[row - 2 : row + 3, column - 2 : column + 3].reshape(25, 4)
     mean, dark = window.mean(axis=0), raw.dark_noise_e**2
     covariance, noise = np.cov(window.T, bias=True), mean + dark

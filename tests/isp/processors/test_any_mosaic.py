@@ -14,7 +14,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import luminance_of_srgb
 from scenes.reflectances import color_checker
-from sensor.cfa import channel_map, channels, unit_channel
+from sensor.cfa import channel_map
 from sensor.presets import preset
 from sensor.raw import RawImage
 from studies.metrics.truth import light_in_bands, neutral_electrons
@@ -29,13 +29,11 @@ def patch(mosaic: str, number: int) -> tuple[RawImage, np.ndarray, np.ndarray]:
     sensor = preset("low_noise", mosaic)
     light = replace(D65, spectrum=D65.spectrum * color_checker()[number][1].band_average(*vars_of(D65)))
     neutral, seen = neutral_electrons(sensor, D65, 1.0), neutral_electrons(sensor, light, 1.0)
-    unit = channels(sensor.cfa).index(unit_channel(sensor.cfa))
+    unit = sensor.channels.index(sensor.unit_channel)
     level_e = 1e6 / neutral[unit]
     fit = colour_fit(sensor, PROCESSORS[mosaic], D65)
-    expected = fit.matrix(channels(sensor.cfa)) @ (seen / neutral) * 1e6
-    e = np.vectorize(dict(zip(channels(sensor.cfa), seen * level_e, strict=True)).get)(
-        channel_map(sensor.cfa, (12, 12))
-    )
+    expected = fit.matrix(sensor.channels) @ (seen / neutral) * 1e6
+    e = np.vectorize(dict(zip(sensor.channels, seen * level_e, strict=True)).get)(channel_map(sensor.cfa, (12, 12)))
     quiet = {"white_dn": 60_000.0, "black_dn": 0.0, "gain_e_per_dn": 100.0, "read_noise_e": 0.0, "dsnu_e": 0.0}
     return replace(raw_image(np.zeros((12, 12)), sensor.cfa, **quiet), dn=e / 100.0), neutral, expected
 
@@ -58,7 +56,7 @@ def test_an_even_colour_is_what_the_fit_of_its_channels_says(mosaic: str, number
 def test_three_channels_give_colour_and_fewer_give_grey_of_the_same_luminance() -> None:
     for mosaic in MOSAICS:
         sensor = preset("low_noise", mosaic)
-        names = channels(sensor.cfa)
+        names = sensor.channels
         fit = colour_fit(sensor, PROCESSORS[mosaic], D65)
         matrix = fit.matrix(names)
         assert matrix.sum(axis=1) == pytest.approx(np.ones(3), abs=1e-12), mosaic

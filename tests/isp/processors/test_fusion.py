@@ -9,7 +9,7 @@ from isp.planes import fill
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.fusion import MATCHED_RADIUS, combine, with_luminance
 from rodcone.colour_spaces import luminance_of_srgb
-from sensor.cfa import RGBW, Tile, channel_map, channels
+from sensor.cfa import RGBW, Tile, channel_map
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage
 
@@ -111,7 +111,7 @@ def test_complementary_colours_come_in_the_matrix_order_c_y_m() -> None:
     # Yellow is the unit, W (balanced to 1000) the luminance; with the identity each output shows its own column.
     level = {"C": np.full((16, 16), 900.0), "M": np.full((16, 16), 350.0), "Y": np.full((16, 16), 1000.0)}
     raw = exposure({**level, "W": np.full((16, 16), 5000.0)}, ("CM", "YW"))
-    names = channels(raw.cfa)
+    names = raw.channels
     assert names == ("W", "C", "M", "Y")
     picture = PROCESSORS["cmyw_yamagami"].develop(raw, np.eye(3), balance=[5.0, 0.9, 0.7, 1.0])
     balanced = np.array([1000.0, 1000.0, 500.0])  # C, Y, M
