@@ -38,7 +38,7 @@ def of_channel(sensor: SensorConfig, channel: str | None) -> tuple[SensorConfig,
     for reading in sensor.chip.channels:
         if reading.channel == channel:
             return replace(sensor, pixel=reading.pixel_of(sensor.pixel), chip=Chip()), reading.share
-    return replace(sensor, chip=replace(sensor.chip, channels=())), 1.0
+    return (replace(sensor, chip=replace(sensor.chip, channels=())) if sensor.chip.channels else sensor), 1.0
 
 
 def wells_e(sensor: SensorConfig, shape: tuple[int, ...]) -> float | NDArray[np.float64]:
