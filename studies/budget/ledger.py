@@ -262,7 +262,8 @@ def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
     low, high = study.render.range_nm
     centres, widths = even_bands((low, high), max(1, round((high - low) / study.render.band_nm)))
-    render = RenderModel(tuple(centres.tolist()), tuple(widths.tolist()), study.render.spp, study.render.denoise)
+    bands = tuple(centres.tolist()), tuple(widths.tolist())
+    renders = {scene: RenderModel(*bands, study.most_spp(scene), study.render.denoise) for scene in study.scenes}
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
-    return Plan(renders=dict.fromkeys(study.scenes, render), images=images)
+    return Plan(renders=renders, images=images)

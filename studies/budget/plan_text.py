@@ -92,7 +92,7 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
             wanted = model.spp * noise.share / budget.monte_carlo
             yield (
                 f"{scene.label}: Monte Carlo noise reaches {percent(noise.share)} in the worst condition; "
-                f"{wanted:.2g} samples would keep the aim, and render.spp allows {study.render.spp}"
+                f"{wanted:.2g} samples would keep the aim, and spp allows {study.most_spp(scene)}"
             )
 
 

@@ -92,7 +92,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         )
     if is_radiance_file(choice.source):
         place = f"for {choice.source}, a picture without surfaces"
-        require_absent(place, extend=choice.extend, chart=choice.chart, define=choice.define)
+        require_absent(place, extend=choice.extend, chart=choice.chart, define=choice.define, spp=choice.spp)
         check_radiance_file(choice.source, study.levels)
         identity = digest_inputs(
             [

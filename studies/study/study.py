@@ -27,6 +27,7 @@ MOST_FRAMES = 64
 WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
 PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gray World belongs
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
+SPP = 1, 1 << 16, "give samples per pixel"
 FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
 
 
@@ -47,6 +48,8 @@ class SceneChoice:
         CSV file with the reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
     define : tuple of str
         ``NAME=VALUE`` of a Mitsuba scene's $parameters.
+    spp : int, optional
+        Samples a pixel, in place of `RenderLimits.spp`.
     """
 
     source: str
@@ -54,6 +57,7 @@ class SceneChoice:
     extend: str | None = None
     chart: str | None = None
     define: tuple[str, ...] = ()
+    spp: Annotated[int | None, SPP] = None
 
     @property
     def label(self) -> str:
@@ -95,7 +99,7 @@ class RenderLimits:
 
     size: Annotated[int | None, (16, 8192, "give the picture's longer side in pixels")] = None
     band_nm: Annotated[float, (1.0, 100.0, "give nanometres")] = 20.0
-    spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 512
+    spp: Annotated[int, SPP] = 512
     max_seconds: Annotated[float | None, (1e-3, 1e7, "give seconds")] = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     range_nm: tuple[float, float] = VISIBLE_NM
@@ -196,6 +200,10 @@ class Study:
         if self.sensor_side_um is None:
             return None
         return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
+
+    def most_spp(self, scene: SceneChoice) -> int:
+        """Samples a pixel of a scene, at most."""
+        return scene.spp or self.render.spp
 
 
 def default_balance(processor: str) -> str:

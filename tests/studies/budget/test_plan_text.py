@@ -75,7 +75,7 @@ def test_reasons_and_costs_are_counted_once_more() -> None:
     # a variance of 10 % at 64 samples is one of 2 % at five times as many
     assert short == (
         "still_life: Monte Carlo noise reaches 10% in the worst condition; 3.2e+02 samples would keep the aim, and "
-        "render.spp allows 64"
+        "spp allows 64"
     )
     found = plan_json(study, plan, reference)
     assert found["renders"][0]["monte_carlo_share"] == 0.1

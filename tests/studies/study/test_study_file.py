@@ -7,6 +7,8 @@ import pytest
 from refusal import refusal
 
 from rodcone.errors import InputError
+from studies.budget.ledger import as_stated
+from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
 
@@ -42,6 +44,15 @@ def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
 def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> None:
     text = TEXT.replace('{source = "desk.exr", light = "A"}', '{source = "room.xml", extend = "hold"}')
     assert read_study(written(tmp_path, text)).scenes[1] == SceneChoice(str(tmp_path / "room.xml"), extend="hold")
+
+
+def test_a_scene_may_have_samples_of_its_own(tmp_path: Path) -> None:
+    text = TEXT.replace('"still_life"', '"still_life", {source = "siemens_star", spp = 7}')
+    study = read_study(written(tmp_path, text.replace(', {source = "desk.exr", light = "A"}', "")))
+    assert [model.spp for model in as_stated(study).renders.values()] == [16, 7]
+    assert "spp: 0 is outside 1 to 65536; give samples per pixel" in told(tmp_path, text.replace("spp = 7", "spp = 0"))
+    picture = read_study(written(tmp_path, TEXT.replace('light = "A"', "spp = 7")))
+    refusal(open_all, picture, match="^spp: 7 for .*desk.exr, a picture without surfaces; leave it out$")
 
 
 def test_changes_take_toml_values_and_plain_words_and_make_tables(tmp_path: Path) -> None:
