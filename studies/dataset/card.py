@@ -1,27 +1,21 @@
 """The card of a set: what is in it, how bright and how noisy, who may use it, and how it was made."""
 
 from collections import Counter
-from collections.abc import Sequence
-from pathlib import Path
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
-from rodcone.files import write_files
 from studies.dataset.sample import PLANES
-from studies.dataset.shards import MANIFEST, read_manifest
+from studies.dataset.shards import MANIFEST
 from studies.pages.report_text import table
 from studies.study.render_noise import noise_note
 
 CARD = "README.md"
-_SNR_DB = (-np.inf, 0.0, 10.0, 20.0, 30.0, np.inf)
-_NOISE = (0.0, 0.01, 0.03, 0.1, 0.3, 1.0, np.inf)
+_SNR_DB = (0.0, 10.0, 20.0, 30.0)
+_NOISE = (0.01, 0.03, 0.1, 0.3, 1.0)
 _BAR = 30  # characters of the longest
-
-
-def write_card(folder: Path) -> None:
-    """Write the card of a set by its manifest."""
-    write_files({folder / CARD: card(read_manifest(folder))})
 
 
 def card(lines: Sequence[dict[str, Any]]) -> str:
@@ -35,6 +29,7 @@ def card(lines: Sequence[dict[str, Any]]) -> str:
                 sum(line["split"] == split for line in of_kind["scene"])]
         for split in dict.fromkeys(line["split"] for line in of_kind["shard"])
     }  # fmt: skip
+    noise = {name: [line["render_noise"][name] for line in samples] for name in ("mean", "of_95_percent")}
     parts = [
         f"# {head['name']}",
         f"{len(samples)} raw frames of simulated cameras with the truth behind them, {size:.3g} GB in "
@@ -48,26 +43,22 @@ def card(lines: Sequence[dict[str, Any]]) -> str:
         "scenes, shards with their digests, and samples.",
         "## Light, noise and the render's own noise",
         _counts("level", Counter(x["level"] for x in sorted(samples, key=lambda x: x["luminance_cd_m2"]))),
-        _counts("SNR, dB", _histogram([line["snr_db"] for line in samples], _SNR_DB)),
-        _counts("render's variance over the sensor's", _histogram([x["render_noise"] for x in samples], _NOISE)),
-        *(note for note in [noise_note(max((x["render_noise"] for x in samples), default=0.0), 0)] if note),
+        _histogram("SNR, dB", [line["snr_db"] for line in samples], _SNR_DB),
+        _histogram("render's variance over the sensor's, in 95 % of the pixels", noise["of_95_percent"], _NOISE),
+        *filter(None, [noise_note(max(noise["mean"], default=0.0), 0)]),
         "## Licences",
         table(("scenes", "licence"), [(count, text) for text, count in licences.items()]),
     ]
     return "\n\n".join(parts) + "\n"
 
 
-def _histogram(values: Sequence[float], edges: Sequence[float]) -> Counter[str]:
-    counts, _ = np.histogram(values, edges)
-    return Counter({_range(low, high): int(n) for low, high, n in zip(edges[:-1], edges[1:], counts, strict=True)})
+def _histogram(what: str, values: Sequence[float], edges: Sequence[float]) -> str:
+    between = (f"{low:g} to {high:g}" for low, high in pairwise(edges))
+    names = (f"under {edges[0]:g}", *between, f"{edges[-1]:g} and more")
+    counts = np.bincount(np.searchsorted(edges, values, side="right"), minlength=len(names))
+    return _counts(what, dict(zip(names, counts.tolist(), strict=True)))
 
 
-def _range(low: float, high: float) -> str:
-    if np.isinf(low):
-        return f"under {high:g}"
-    return f"{low:g} and more" if np.isinf(high) else f"{low:g} to {high:g}"
-
-
-def _counts(what: str, counts: Counter[str]) -> str:
+def _counts(what: str, counts: Mapping[str, int]) -> str:
     most = max(counts.values(), default=1) or 1
     return table((what, "samples", ""), [(name, n, "█" * round(_BAR * n / most)) for name, n in counts.items()])

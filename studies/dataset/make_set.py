@@ -1,10 +1,11 @@
 """From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
 
 import re
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import metadata
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,10 @@ import numpy as np
 from isp.processors.own import processor_of
 from rodcone.digests import digest
 from rodcone.errors import InputError
-from rodcone.files import is_half_written
+from rodcone.files import is_half_written, write_files
 from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import as_stated
-from studies.dataset.card import CARD, write_card
+from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
 from studies.dataset.sample import SURFACES, Sample, frame_labels
 from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
@@ -107,7 +108,7 @@ def make_set(
             standing.append(made)
             write_manifest(folder, head, standing)
             show(f"shard {count} of {len(missing)}", PREPARED + (1 - PREPARED) * count / len(missing))
-        write_card(folder)
+        write_files({folder / CARD: card(read_manifest(folder))})
     return SetMade(folder, len(samples), len(shards), len(missing))
 
 
@@ -130,7 +131,7 @@ def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Sha
         number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
         parts = [chosen[len(chosen) * i // number : len(chosen) * (i + 1) // number] for i in range(number)]
         for index, part in enumerate(parts):
-            made_from = [(x.key, x.cell.key, _file_names(x), x.planes, x.window, x.parts) for x in part]
+            made_from = [(x.key, x.cell.key, _file_names(x), x.planes, x.window, x.part) for x in part]
             key = digest([made_from, versions(), code_digests()])
             shards.append(Shard(key, (folder / f"{split}-{index:06d}.tar").resolve(), tuple(part)))
     return shards
@@ -153,10 +154,10 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
         mosaic = processor_of(cell.processor).mosaic
         parts = (*frame_labels(cell).values(), mosaic)
         frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
-        windows = list(_windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop))
+        windows = _windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop)
         if not windows:
             raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
-        for part, window in enumerate(windows):
+        for index, window in enumerate(windows):
             key = f"{frame}_s{cell.seed}" + (f"_{window[0]}-{window[1]}" if order.crop else "")
             known = samples.get(key)
             if known and frame_labels(known.cell) != frame_labels(cell):
@@ -169,20 +170,16 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
                 split=split_of(hash_of_scene),
                 truth=truth_of(job, facts, cell),
                 planes=planes,
-                part=part,
+                part=index if len(windows) > 1 else None,
                 window=window,
-                parts=len(windows) if order.crop else 1,
             )
     return list(samples.values())
 
 
-def _windows(shape: tuple[int, ...], crop: int | None) -> Iterator[tuple[int, int, int, int]]:
-    if crop is None:
-        yield 0, 0, shape[0], shape[1]
-        return
-    for row in range(0, shape[0] - crop + 1, crop):
-        for column in range(0, shape[1] - crop + 1, crop):
-            yield row, column, crop, crop
+def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:
+    height, width = (crop, crop) if crop else shape
+    corners = product(range(0, shape[0] - height + 1, height), range(0, shape[1] - width + 1, width))
+    return [(row, column, height, width) for row, column in corners]
 
 
 def _file_names(sample: Sample) -> list[str]:

@@ -77,12 +77,11 @@ class Sample:
     truth : TruthFiles
     planes : tuple of str
         Of `PLANES`.
-    part : int
-        Number among the parts of the frame.
+    part : int or None
+        Number among the parts of the frame, each exposed as a frame of its own; None of a whole frame, the sweep's to
+        the bit.
     window : (int, int, int, int)
         First row and column of the part, its height and width.
-    parts : int
-        Of the frame. A part is exposed as a frame of its own; the whole frame is the sweep's, to the bit.
     """
 
     key: str
@@ -92,9 +91,8 @@ class Sample:
     split: str
     truth: TruthFiles
     planes: tuple[str, ...]
-    part: int
+    part: int | None
     window: tuple[int, int, int, int]
-    parts: int
 
 
 def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
@@ -127,7 +125,7 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
 def _exposed(sample: Sample, sensor: SensorConfig, expected_e: NDArray[np.float64]) -> RawImage:
     cell, shape = sample.cell, (expected_e.shape[0], expected_e.shape[1])
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
-    if sample.parts > 1:
+    if sample.part is not None:
         stream = stream.spawn(sample.part + 1)[-1]
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
     return expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
@@ -145,21 +143,15 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
     alone = {name: of_channel(sensor, name) for name in mean_e}
     dark_e = {name: x.pixel.dark_current_e_per_s / share * cell.exposure_s for name, (x, share) in alone.items()}
     return {
-        "key": sample.key,
-        "split": sample.split,
-        "scene_hash": sample.scene_hash,
+        **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
         **frame_labels(cell),
         "mosaic": sample.mosaic,
         "tile": list(sensor.cfa),
         "channels": list(channels(sensor.cfa)),
         "seed": cell.seed,
         "window": list(sample.window),
-        "luminance_cd_m2": cell.luminance_cd_m2,
-        "exposure_s": cell.exposure_s,
-        "white_cd_m2": cell.white_cd_m2,
-        "black_dn": raw.black_dn,
-        "white_dn": raw.white_dn,
-        "gain_e_per_dn": raw.gain_e_per_dn,
+        **{name: getattr(cell, name) for name in ("luminance_cd_m2", "exposure_s", "white_cd_m2")},
+        **{name: getattr(raw, name) for name in ("black_dn", "white_dn", "gain_e_per_dn")},
         "noise": noise_coefficients(sensor, cell.exposure_s),
         "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
         "mean_e": mean_e,

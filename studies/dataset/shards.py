@@ -19,7 +19,7 @@ from studies.sweep.run_cell import limit_threads
 MANIFEST = "manifest.jsonl"
 # Of a sample in a manifest.
 _TOLD = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
-         "snr_db", "saturated")  # fmt: skip
+         "snr_db", "saturated", "render_noise")  # fmt: skip
 Lines = list[dict[str, Any]]
 
 
@@ -74,8 +74,7 @@ def make_shard(shard: Shard, most_threads: int | None = None) -> LinesMade:
                     np.save(file, array)
                     _add(tar, f"{sample.key}.{name}.npy", file.getvalue())
                 _add(tar, f"{sample.key}.json", json.dumps(facts).encode())
-                kept = {name: facts[name] for name in _TOLD}
-                lines.append({"kind": "sample", **kept, "render_noise": facts["render_noise"]["mean"]})
+                lines.append({"kind": "sample", **{name: facts[name] for name in _TOLD}})
         size, made = place.stat().st_size, digest_file(place)
     first = shard.samples[0]
     head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.samples)}

@@ -272,6 +272,8 @@ def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
     text = (stored / CARD).read_text("utf-8")
     assert "8 raw frames" in text
     assert "| 1cd/m2 | 4 |" in text
+    noisy = sum(line["render_noise"]["of_95_percent"] >= 1 for line in samples)
+    assert f"| 1 and more | {noisy} |" in text
     (stored.parent / MANIFEST).write_text("{}\n")
     with pytest.raises(InputError, match="no manifest of a set"):
         read_manifest(stored.parent)

@@ -46,7 +46,7 @@ def sample_of(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> Sample:
         np.save(folder / f"{name}.npy", array)
     cell = replace(cell, sensor=sensor, luminance_cd_m2=level_cd_m2, **{x: folder / f"{x}.npy" for x in files})
     truth = TruthFiles(channels=folder, lit=folder, surfaces=None, illuminants=LIGHT)
-    return Sample("key", cell, "bayer", "0" * 32, "train", truth, ("mosaic_e",), 0, (0, 0, *SIZE), 1)
+    return Sample("key", cell, "bayer", "0" * 32, "train", truth, ("mosaic_e",), None, (0, 0, *SIZE))
 
 
 def taken(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> list[Made]:
@@ -123,7 +123,7 @@ def test_parts_of_a_frame_have_noise_of_their_own_and_one_chip(tmp_path: Path) -
 
     def part(number: int) -> np.ndarray:
         window = (64 * (number // 2), 0, 64, 64)  # the ramp runs along columns: all see the same light
-        return make_sample(replace(sample, part=number, parts=4, window=window))[0]["raw"].astype(float)
+        return make_sample(replace(sample, part=number, window=window))[0]["raw"].astype(float)
 
     raws = [part(number) for number in range(4)]
     assert not any(np.array_equal(raws[0], other) for other in raws[1:])
