@@ -87,8 +87,8 @@ def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORR
             weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
             total = np.zeros((count, len(range(height)[rows]), len(range(width)[columns])))
             for number, (i, j) in enumerate(np.ndindex(down[1] - down[0], across[1] - across[0])):
-                seen = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]
-                total += weights[:, number, None, None] * seen
+                samples = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]
+                total += weights[:, number, None, None] * samples
             estimate[:, rows, columns] = total
             noise_gain[:, rows, columns] = (weights**2).sum(axis=1)[:, None, None]
     return np.moveaxis(estimate, 0, -1), np.moveaxis(noise_gain, 0, -1)

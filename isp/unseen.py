@@ -67,16 +67,16 @@ def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np
         first_dn = raw.black_dn + first_e / 2.0 / raw.gain_e_per_dn
         at = slice(phase[0], None, size[0]), slice(phase[1], None, size[1])
         samples, white = raw.dn[at], _brightest_white(padded, raw, phase, reach)
-        found = np.nonzero((samples > first_dn) & (samples > white))  # mostly few
+        sites = np.nonzero((samples > first_dn) & (samples > white))  # mostly few
         light_e, white_e, least_e = (  # an integer under black would wrap around
             np.maximum(values - float(raw.black_dn), 0.0) * raw.gain_e_per_dn
-            for values in (samples[found], white[found], _least_around(samples, found))
+            for values in (samples[sites], white[sites], _least_around(samples, sites))
         )
         share = float(shares[names.index(channel)])
         most_e = np.maximum(max(MOST_SHARE, TIMES_NEUTRAL * share) * white_e, TIMES_LEAST * least_e)
         over = light_e > most_e + SIGMAS * np.sqrt(noise.shot * light_e + noise.dark_noise_e**2)
         if over.any():
-            filled, places = filled.copy() if filled is raw.dn else filled, tuple(index[over] for index in found)
+            filled, places = filled.copy() if filled is raw.dn else filled, tuple(index[over] for index in sites)
             explained = share * white_e[over] / raw.gain_e_per_dn + raw.black_dn
             filled[at][places] = explained if filled.dtype.kind == "f" else np.rint(explained)
             unseen[at][places] = True
@@ -122,11 +122,11 @@ def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balance
     height, width = raw.shape
     light, count = np.zeros((2, height + 2, width + 2))  # one pixel of border
     light[row + 1, column + 1], count[row + 1, column + 1] = gain * (raw.dn[row, column] - raw.black_dn), 1.0
-    drawn = unseen.copy()
-    drawn[1:-1] |= unseen[:-2] & unseen[2:]
-    drawn[:, 1:-1] |= unseen[:, :-2] & unseen[:, 2:]
-    drawn &= ~mask(raw.cfa, "W", raw.shape)
-    row, column = np.nonzero(drawn)
+    mended = unseen.copy()
+    mended[1:-1] |= unseen[:-2] & unseen[2:]
+    mended[:, 1:-1] |= unseen[:, :-2] & unseen[:, 2:]
+    mended &= ~mask(raw.cfa, "W", raw.shape)
+    row, column = np.nonzero(mended)
     sums = np.zeros((2, row.size))
     for (i, j), weight in np.ndenumerate(np.outer(tent(1), tent(1))):
         sums += weight * np.stack([light[row + i, column + j], count[row + i, column + j]])

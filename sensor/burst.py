@@ -197,7 +197,8 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
     pixel = pixel_of_readings(pixel, readings) if readings else burst_of(pixel)
     apart = [(x, burst_of(x.pixel_of(sensor.pixel))) for x in sensor.chip.channels]
     channels = tuple(
-        replace(x, full_well_e=own.full_well_e, read_noise_e=own.read_noise_e, dsnu_e=own.dsnu_e) for x, own in apart
+        replace(x, full_well_e=burst.full_well_e, read_noise_e=burst.read_noise_e, dsnu_e=burst.dsnu_e)
+        for x, burst in apart
     )
     return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout, channels=channels))
 

@@ -128,15 +128,15 @@ def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:
 
 
 def _responses(table: _ResponsesTable, folder: Path) -> Responses:
-    said = table.quantum_efficiency
-    efficiency = None if said in ("included", "relative") else said
+    scale = table.quantum_efficiency
+    efficiency = None if scale in ("included", "relative") else scale
     responses = read_csv(
         folder / table.csv,
         range_nm=table.range_nm,
         ir_cut=_number_or_curve(table.ir_cut, folder),
         quantum_efficiency=_number_or_curve(efficiency, folder),
     )
-    return Responses(responses.curves, relative=said == "relative")
+    return Responses(responses.curves, relative=scale == "relative")
 
 
 def _number_or_curve(value: str | float | None, folder: Path) -> float | Spectrum | None:

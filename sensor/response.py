@@ -97,11 +97,11 @@ def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm
     low, high = window_nm
     beyond = ((low, min(VISIBLE_NM[0], high), width_nm[0]), (max(VISIBLE_NM[1], low), high, width_nm[-1]))
     for first, last, band_nm in beyond:
-        seen = _inside_nm((first, last), wavelength_nm, width_nm).sum()
-        if last - first - seen >= band_nm:
+        sum_nm = _inside_nm((first, last), wavelength_nm, width_nm).sum()
+        if last - first - sum_nm >= band_nm:
             raise InputError(
                 f"window_nm: {window_nm!r} asks for light at {first:g} to {last:g} nm and the scene's bands, "
-                f"{_reach(wavelength_nm, width_nm)}, hold {seen:g} nm of it; narrow the window or render those bands"
+                f"{_reach(wavelength_nm, width_nm)}, hold {sum_nm:g} nm of it; narrow the window or render those bands"
             )
 
 

@@ -76,13 +76,13 @@ def squared_distances(
     return [larger(total - share, 0.0) for total, share in zip(totals, noise, strict=True)] if noise else totals
 
 
-def mixed_squares(own: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
+def mixed_squares(colour: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
     """Square of eq. (5) from both squared distances, expanded: exactly one of them where alpha is 0 or 1.
 
-    (a sqrt(own) + (1 - a) sqrt(white))^2 = a^2 own + (1 - a)^2 white + 2 a (1 - a) sqrt(own white): one root serves.
+    (a sqrt(colour) + (1 - a) sqrt(white))^2 = a^2 colour + (1 - a)^2 white + 2 a (1 - a) sqrt(colour white): one root.
     """
     results = []
-    for d_own, d_white, share in zip(own, white, alpha, strict=True):
+    for d_own, d_white, share in zip(colour, white, alpha, strict=True):
         rest = 1.0 - share
         cross = share * rest * (2.0 / ROOT_SCALE) * dr.sqrt(d_own * ROOT_SCALE * (d_white * ROOT_SCALE))
         results.append(dr.fma(dr.square(share), d_own, dr.fma(dr.square(rest), d_white, cross)))

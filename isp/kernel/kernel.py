@@ -81,8 +81,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     # Where things are
     x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
     x = jit.UInt(x_row) * inputs.stride + jit.UInt(x_column)  # pixel
-    own = jit.UInt(threads.plane)
-    planes = {"W": [inputs.white], "channel": [own], "mixed": [own, inputs.white]}[shape.guide]
+    x_plane = jit.UInt(threads.plane)
+    planes = {"W": [inputs.white], "channel": [x_plane], "mixed": [x_plane, inputs.white]}[shape.guide]
     first_packets = [plane * inputs.plane_packets for plane in planes]
     pair, step = inputs.packet_rows, inputs.packet_columns
     lines = sorted({i // pair for i in window})  # of packets

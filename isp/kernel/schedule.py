@@ -122,7 +122,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
             distances = [white]
         if settings.patch == 1:
             distances = [[]] * len(distances)
-        lists += [np.stack([row, column, log_spatial, *some], axis=-1) for some in distances]
+        lists += [np.stack([row, column, log_spatial, *noise_columns], axis=-1) for noise_columns in distances]
     counts = np.array([len(table) for table in lists], dtype=np.uint32)
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):

@@ -156,6 +156,6 @@ def _convolve(values: NDArray[np.float32], weights: Weights, layer: str, step: i
     high, wide = ((size - side) // step + 1 for size in values.shape[:2])
     total = np.tile(weights[f"{layer}.bias"], (high, wide, 1))
     for row, column in product(range(side), repeat=2):
-        seen = values[row : row + step * high : step, column : column + step * wide : step]
-        total += seen @ filters[row, column]
+        samples = values[row : row + step * high : step, column : column + step * wide : step]
+        total += samples @ filters[row, column]
     return total

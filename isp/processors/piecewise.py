@@ -112,9 +112,9 @@ def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:
     Of channels `index` among R, G, B and W; G counts as sure, or the last one where there is none.
     """
     sure = index.index(LETTERS.index("G")) if LETTERS.index("G") in index else -1
-    known = np.log(prior.neutrals_e[:, index] / prior.neutrals_e[:, index[sure], None])
-    seen = np.log(neutral / neutral[sure])
-    along = known[:, None] - known
-    share = ((seen - known) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-12)
-    nearest = known + np.clip(share, 0.0, 1.0)[..., None] * along
-    return bool(np.abs(nearest - seen).max(axis=-1).min() > OTHER_CURVES)
+    prior_log = np.log(prior.neutrals_e[:, index] / prior.neutrals_e[:, index[sure], None])
+    camera_log = np.log(neutral / neutral[sure])
+    along = prior_log[:, None] - prior_log
+    share = ((camera_log - prior_log) * along).sum(axis=-1) / np.maximum((along**2).sum(axis=-1), 1e-12)
+    nearest = prior_log + np.clip(share, 0.0, 1.0)[..., None] * along
+    return bool(np.abs(nearest - camera_log).max(axis=-1).min() > OTHER_CURVES)

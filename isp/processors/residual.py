@@ -81,13 +81,13 @@ def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tup
     guide_slope, sample_slope = np.where(sampled, slopes[0], 0.0), slopes[1]
     gain = _sums(guide_slope * sample_slope, window) / (_sums(guide_slope**2, window) + _LEAST)
     count = _sums(sampled.astype(np.float64), window)
-    sample, seen = (np.where(sampled, plane, 0.0) for plane in (samples, guide))
-    mean, mean_seen = _sums(sample, window) / count, _sums(seen, window) / count
-    offset = mean - gain * mean_seen
+    sample, guides = (np.where(sampled, plane, 0.0) for plane in (samples, guide))
+    mean, mean_guide = _sums(sample, window) / count, _sums(guides, window) / count
+    offset = mean - gain * mean_guide
     # Windows count by how well they fit: one that holds a lamp, or two surfaces, says little about a pixel beside them.
     squares = _sums(sample**2, window) / count
-    product = _sums(sample * seen, window) / count - mean * mean_seen
-    missed = squares - mean**2 - 2 * gain * product + gain**2 * (_sums(seen**2, window) / count - mean_seen**2)
+    product = _sums(sample * guides, window) / count - mean * mean_guide
+    missed = squares - mean**2 - 2 * gain * product + gain**2 * (_sums(guides**2, window) / count - mean_guide**2)
     weight = 1.0 / np.sqrt(np.maximum(missed, _ROUNDING * squares + _LEAST))
     return (_sums(weight * gain, window) * guide + _sums(weight * offset, window)) / _sums(weight, window)
 

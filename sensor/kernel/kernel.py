@@ -95,10 +95,10 @@ def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> A
         for plane, weight in zip(planes[1:], row[1:], strict=True):
             total = dr.fma(plane, weight, total)
         sums.append(total)
-    chosen = sums[0]
+    result = sums[0]
     for number, total in enumerate(sums[1:], 1):
-        chosen = dr.select(channel == number, total, chosen)
-    return chosen
+        result = dr.select(channel == number, total, result)
+    return result
 
 
 def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]]:
@@ -139,10 +139,10 @@ def read_frame(
     row, column = divide(dr.arange(jit.UInt, expected_e.size), divisor(expected_e.shape[1]))
     halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
     words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
-    shot, read = normal_pair(words[0], words[1])
+    shot, read_normal = normal_pair(words[0], words[1])
     if reading:  # shot noise is the charge's, read noise the reading's own
-        others = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), dr.opaque(jit.UInt, reading)), halves)
-        _, read = normal_pair(others[0], others[1])
+        reading_words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), dr.opaque(jit.UInt, reading)), halves)
+        _, read_normal = normal_pair(reading_words[0], reading_words[1])
 
     # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
     # the mean, as in `draw_frame`. An infinite sum times a response of 0 would be NaN: the bound of the light.
@@ -163,7 +163,7 @@ def read_frame(
     read_e = jit.Float64(collected_e)
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
-    read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read)
+    read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read_normal)
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))

@@ -46,12 +46,12 @@ def _profile(path: Path) -> Floats:
         order = {b"II*\0": "<", b"MM\0*": ">"}.get(head[:4])
         if order is None or len(head) < 8:
             return np.empty(0)  # no TIFF, but a camera's own format
-        waiting, seen = list(struct.unpack(f"{order}I", head[4:])), {0}
-        while waiting and len(seen) <= _MOST_DIRECTORIES:
+        waiting, offsets = list(struct.unpack(f"{order}I", head[4:])), {0}
+        while waiting and len(offsets) <= _MOST_DIRECTORIES:
             start = waiting.pop(0)
-            if start in seen:
+            if start in offsets:
                 continue
-            seen.add(start)
+            offsets.add(start)
             try:
                 tags, following = read_directory(file, start, (NOISE_PROFILE, _SUB_DIRECTORIES), str(path), order)
             except InputError:

@@ -145,16 +145,16 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     search = search_for(goal)
     with progress(sys.stderr) as step:
         try:
-            found = (
+            tile = (
                 best_tile(search, SIDES[order.tile], order.steps, order.seed, known, step)
                 if order.tile in SIDES
                 else vary(base, order.tile).cfa
             )
         finally:
             write_files({tried: json.dumps({"question": question, "gains_db": known})})
-        camera = with_tile(base, found, base.responses)
+        camera = with_tile(base, tile, base.responses)
         if order.filters:
-            camera = best_filters(goal, found, order.rounds, step)
+            camera = best_filters(goal, tile, order.rounds, step)
     # Beside the design: mosaics of three channels or more that the sensor can have, Bayer's in one phase.
     tiles = {**MOSAICS, **{name: rows for name, (rows, _) in VARIATIONS.items()}}
     curves = set(base.responses.curves)
@@ -173,7 +173,7 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     }
     _write(out, sensor, camera, order.filters)
     write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(known))})
-    print(f"{tile_text(found)}\n{out}")
+    print(f"{tile_text(tile)}\n{out}")
 
 
 def _known(tried: Path, question: list[Any]) -> Known:

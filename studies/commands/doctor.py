@@ -100,8 +100,8 @@ def intruders(home: Path) -> dict[str, str]:
     Two wheels with one top-level name are merged into one folder, so that its path doesn't tell.
     """
     others = (item for item in metadata.distributions() if item.name.lower() != "rodcone")
-    here = [item for item in others if Path(str(item.locate_file(""))).resolve() == home.resolve()]
-    tops = {item.name: {file.parts[0] for file in item.files or []} for item in here}
+    neighbours = [item for item in others if Path(str(item.locate_file(""))).resolve() == home.resolve()]
+    tops = {item.name: {file.parts[0] for file in item.files or []} for item in neighbours}
     return {name: other for other, names in tops.items() for name in PACKAGES if name in names}
 
 

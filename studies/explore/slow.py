@@ -39,13 +39,13 @@ def stand_in(controls: Controls, pixels: int) -> Controls:
     return controls
 
 
-def begin(development: Development, done: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
+def begin(development: Development, report: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
     """Develop in a process of its own; returns what ends it.
 
     Parameters
     ----------
     development : Development
-    done : callable
+    report : callable
         Called in a thread of its own with what came of it; not where it was ended.
     """
     process = subprocess.Popen(
@@ -58,13 +58,13 @@ def begin(development: Development, done: Callable[[tuple[Image, Picture] | Inpu
         if ended.is_set():
             return
         if process.returncode:
-            done(
+            report(
                 InputError(
                     f"processor: {development.processor} ended with code {process.returncode}; see the messages above"
                 )
             )
         else:
-            done(pickle.loads(output))
+            report(pickle.loads(output))
 
     def end() -> None:
         ended.set()

@@ -182,20 +182,20 @@ def _states(
         steps.insert(0, (size, FIRST_SPP))
     if max(size) > 2 * FIRST_SIDE:
         steps.insert(0, (film_size(size, FIRST_SIDE), FIRST_SPP))
-    done: dict[tuple[int, int], Transport] = {}
+    renders: dict[tuple[int, int], Transport] = {}
     for number, (film, spp) in enumerate(steps, 1):
-        done[film] = render(
+        renders[film] = render(
             scene,
             film,
             wavelength_nm=bands[0],
             width_nm=bands[1],
             spp=spp,
             seed=options.seed,
-            resume=done.get(film),
+            resume=renders.get(film),
             progress=lambda *_: between_runs(),
         )
         call = f"transport = rodcone.render(scene, {film!r}, spp={spp}, seed={options.seed}, **bands)\n"
-        yield Rendered(done[film], code + call, number == len(steps))
+        yield Rendered(renders[film], code + call, number == len(steps))
 
 
 def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:

@@ -101,8 +101,8 @@ def _said(word: str, run: dict[str, Leads]) -> str:
     if word == "mixed":
         return f"better in part ({gained}), worse in part ({lost})"
     if word in ("level", "undecided"):
-        said = {"level": "no visible difference", "undecided": "these seeds can't tell"}[word]
-        return f"{said} ({_span(PSNR, run[PSNR.key].mean)})"
+        words = {"level": "no visible difference", "undecided": "these seeds can't tell"}[word]
+        return f"{words} ({_span(PSNR, run[PSNR.key].mean)})"
     return f"{word} ({gained or lost})"
 
 
@@ -195,13 +195,13 @@ def pair_words(group: Group) -> str:
             differ.append(f"{group.pair.levels[ours.level]} {duration(times[0])} against {duration(times[1])}")
     cameras = tuple(cells[0].camera for cells in (group.ours, group.theirs))
     reference = "bayer" in cameras and _balances(*group.ours, *group.theirs) == {GRAY_WORLD}
-    said = ["Bayer, bilinear + Gray World, is the paper's reference."] if reference else []
+    sentences = ["Bayer, bilinear + Gray World, is the paper's reference."] if reference else []
     if cameras == WHITE_PIXEL:
         alone = "" if differ else ", and the same exposure times: they differ by the mosaic alone"
-        said.append(f"One method, prior and colour rule on both mosaics{alone}.")
+        sentences.append(f"One method, prior and colour rule on both mosaics{alone}.")
     if differ:
-        said.append(f"Exposure times differ: {'; '.join(differ)}.")
-    return " ".join(said)
+        sentences.append(f"Exposure times differ: {'; '.join(differ)}.")
+    return " ".join(sentences)
 
 
 def _balances(*cells: ReportCell) -> set[str]:
@@ -246,10 +246,10 @@ def balance_words(group: Group) -> str:
             cases.append((miss, camera_name(cell.camera), group.pair.levels[level], float(lead[level])))
     if not cases:
         return ""
-    miss, camera, level_name, there = max(cases, key=lambda case: case[0])
+    miss, camera, level_name, lead_there = max(cases, key=lambda case: case[0])
     return (
         f"Gray World misses this scene's light by ΔE {fixed(miss, 1)} ({camera}, {level_name}); the lead is "
-        f"{fixed(abs(there), 1)}. It misses by more than the lead at {len(cases)} of {len(lead)} light levels."
+        f"{fixed(abs(lead_there), 1)}. It misses by more than the lead at {len(cases)} of {len(lead)} light levels."
     )
 
 
@@ -269,7 +269,7 @@ def over_groups(groups: Sequence[Group]) -> str:
         ]
         if cases:
             _, metric, size, title, level = max(cases, key=lambda case: case[0])
-            written = lead_text(metric, size) + (f"{NBSP}{metric.unit}" if metric.unit else "")
+            lead_words = lead_text(metric, size) + (f"{NBSP}{metric.unit}" if metric.unit else "")
             places = len({title for *_, title, _ in cases})
-            parts.append(f"{word} in some light in {places} (most: {metric.name} {written}, {title}, {level})")
+            parts.append(f"{word} in some light in {places} (most: {metric.name} {lead_words}, {title}, {level})")
     return f"Of {len(groups)} conditions: {'; '.join(parts) or 'in none a difference that is seen'}."

@@ -79,12 +79,12 @@ def level_view(level: ReportLevel, cell: ReportCell) -> dict[str, str]:
     luminance = text.significant(cell.luminance_cd_m2, "cd/m²")
     lux = text.significant(cell.illuminance_lux, "lux")
     words = [luminance, f"{lux} on the scene's reference plane"]
-    known = [said for said, value in zip(words, (luminance, lux), strict=True) if value not in (level.name, "—")]
+    levels = [word for word, value in zip(words, (luminance, lux), strict=True) if value not in (level.name, "—")]
     return {
         "name": level.name,
-        "light": " · ".join(known),
+        "light": " · ".join(levels),
         "source": level.source,
-        "spoken": ", ".join([level.name, *known]),
+        "spoken": ", ".join([level.name, *levels]),
     }
 
 

@@ -40,8 +40,8 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
     difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
     mean, half = difference.mean(axis=-1), half_width(difference)
     size = np.abs(mean)
-    clear, seen, unseen = size > half, size >= metric.seen, size + half < metric.seen
-    cases = [np.isnan(half), clear & seen & (mean > 0), clear & seen, clear | unseen]
+    clear, visible, invisible = size > half, size >= metric.seen, size + half < metric.seen
+    cases = [np.isnan(half), clear & visible & (mean > 0), clear & visible, clear | invisible]
     return Leads(mean, half, np.select(cases, [UNKNOWN, AHEAD, BEHIND, LEVEL], UNKNOWN))
 
 

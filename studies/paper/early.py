@@ -152,12 +152,12 @@ def claims_early(
 
 def section_2(setup: Setup) -> tuple[Claim, ...]:
     """All of them, computed."""
-    seen = view(setup, "still_life", BRIGHT_CD_M2)
+    subject = view(setup, "still_life", BRIGHT_CD_M2)
     bright: dict[str, dict[str, float]] = {name: {} for name in DESIGNS}
     for name, reading in product(DESIGNS, READINGS):
         camera = Camera(reading, name, PITCH_UM)
-        raw = exposures(camera, seen, "66ms")[0]
-        bright[name][reading] = measure_bright(raw, develop(camera, raw, seen)[0], seen).result_likeness
+        raw = exposures(camera, subject, "66ms")[0]
+        bright[name][reading] = measure_bright(raw, develop(camera, raw, subject)[0], subject).result_likeness
     lost_db, ratios = (
         {name: value for reading in READINGS for name, value in of(reading).items()}
         for of in (ranges_lost_db, colour_noise_ratios)

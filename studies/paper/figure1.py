@@ -42,13 +42,13 @@ CLAIMED_DB = 9.54  # 20 log10(6 / 2), SNR falls 3 times
 MARGIN_DB = 0.5  # 3 times to within 6 %
 
 
-def half_snr_db(seen: View, reading: str, dark: bool) -> float:
+def half_snr_db(subject: View, reading: str, dark: bool) -> float:
     """Median SNR of a green pixel in the dark (left) or the lit half [dB]."""
     sensor = sensor_of(reading, "bayer")
-    half = seen.radiance.shape[1] // 2
+    half = subject.radiance.shape[1] // 2
     columns = slice(0, half) if dark else slice(half, None)
     part = SpectralRadiance(
-        seen.radiance.values[:, columns], seen.radiance.wavelength_nm, width_nm=seen.radiance.widths_nm
+        subject.radiance.values[:, columns], subject.radiance.wavelength_nm, width_nm=subject.radiance.widths_nm
     )
     green = channel_electrons(form_image(part, sensor), sensor, LONGEST_S)[..., 1]
     inside = green[green < sensor.pixel.full_well_e]
@@ -71,11 +71,11 @@ def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tupl
 
 def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The photograph under both readings, as it is and with its dark half made as bright as the other."""
-    seen = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
-    rows, half = [], seen.radiance.shape[1] // 2
+    subject = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
+    rows, half = [], subject.radiance.shape[1] // 2
     for reading in READINGS:
         camera = Camera(reading, "bayer")
-        linear, _ = develop(camera, exposures(camera, seen, "66ms")[0], seen)
+        linear, _ = develop(camera, exposures(camera, subject, "66ms")[0], subject)
         raised = linear.copy()
         raised[:, :half] *= DARK_GAIN
         rows.append(
@@ -84,7 +84,9 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
                 (f"left half {text.significant(DARK_GAIN)} times brighter", encode_srgb(raised)),
             ]
         )
-    dark, lit = ({name: half_snr_db(seen, name, side) for name in (*READINGS, TODAY, LARGE)} for side in (True, False))
+    dark, lit = (
+        {name: half_snr_db(subject, name, side) for name in (*READINGS, TODAY, LARGE)} for side in (True, False)
+    )
     return paper_figure("1a", picture_rows(rows), dark=DARK_CD_M2, lit=LIT_CD_M2), claims_1a(dark, lit)
 
 
@@ -123,12 +125,12 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) 
 
 def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_1b.toml`, and the SNR."""
-    seen = view(setup, "still_life", LUMINANCE_CD_M2)
+    subject = view(setup, "still_life", LUMINANCE_CD_M2)
     psnr, pictures = {}, []
     for pitch in (LARGE_UM, SMALL_UM):
         camera = Camera("table1_output", "bayer", pitch)
-        developed = [develop(camera, raw, seen)[0] for raw in exposures(camera, seen, "10ms", setup.seeds)]
-        psnr[pitch] = quality_db(developed, seen.truth)
+        developed = [develop(camera, raw, subject)[0] for raw in exposures(camera, subject, "10ms", setup.seeds)]
+        psnr[pitch] = quality_db(developed, subject.truth)
         pictures.append((f"{pitch} µm, PSNR {psnr[pitch].mean():.1f} dB", encode_srgb(developed[0])))
     everything = {name: gain_db(name) for name in READINGS}
     claims = claims_1b(gain_db("table1_output", shot_alone=True), everything, psnr[LARGE_UM] - psnr[SMALL_UM])

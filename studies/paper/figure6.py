@@ -95,13 +95,13 @@ def claims_6(
 
 def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_6.toml`, each reading with its own threshold of substitution, and what that does."""
-    seen = view(setup, "still_life", LUMINANCE_CD_M2)
+    subject = view(setup, "still_life", LUMINANCE_CD_M2)
     outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}
     table = []
     for reading, processor in product(READINGS, outcomes):
         pictures: list[tuple[str, Image]] = []
         for exposure in SUBSTITUTED:
-            outcome, encoded = _photograph(setup, seen, Camera(reading, processor), exposure)
+            outcome, encoded = _photograph(setup, subject, Camera(reading, processor), exposure)
             outcomes[processor][f"{reading}, {exposure}"] = outcome
             words = {"bayer": "Bayer", PAPER: "interleaved", DEFAULT: "the default"}[processor]
             words += ", W's luminance" if outcome.substituted else ""
@@ -111,25 +111,25 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         claims_6(
             outcomes["bayer"],
             outcomes[name],
-            {reading: swap(setup, seen, Camera(reading, name)) for reading in READINGS},
+            {reading: swap(setup, subject, Camera(reading, name)) for reading in READINGS},
         )
         for name in (PAPER, DEFAULT)
     )
     return paper_figure("6", picture_rows(table)), beside(paper, default)
 
 
-def swap(setup: Setup, seen: View, camera: Camera) -> Swap:
+def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
     """Substitution at `DARKEST`, always against never."""
-    raws = exposures(camera, seen, DARKEST, setup.seeds)
-    without, with_white = ([develop(camera, raw, seen, threshold)[0] for raw in raws] for threshold in (0.0, np.inf))
+    raws = exposures(camera, subject, DARKEST, setup.seeds)
+    without, with_white = ([develop(camera, raw, subject, threshold)[0] for raw in raws] for threshold in (0.0, np.inf))
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
     return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
 
 
-def _photograph(setup: Setup, seen: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
+def _photograph(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
     """Outcome of one condition, and its first picture, encoded."""
-    made = [develop(camera, raw, seen) for raw in exposures(camera, seen, exposure, setup.seeds)]
-    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in made]  # as a screen shows them
-    decisions = [picture.substituted for _, picture in made if picture.substituted is not None]
+    developed = [develop(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
+    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # as a screen shows them
+    decisions = [picture.substituted for _, picture in developed if picture.substituted is not None]
     share = float(np.mean(decisions)) if decisions else None
-    return Outcome(noise(pictures), quality_db(pictures, seen.truth), share), encode_srgb(pictures[0])
+    return Outcome(noise(pictures), quality_db(pictures, subject.truth), share), encode_srgb(pictures[0])

@@ -68,13 +68,13 @@ class Stages:
     gain_db: Image
 
 
-def colour_and_white(raw: RawImage, seen: View, camera: Camera) -> tuple[Image, Image]:
+def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Image, Image]:
     """Figure 3's linear sRGB from R, G and B alone, balanced by calibration, through the plain matrix, and its W."""
-    planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, seen.light, raw.exposure_s)
-    matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], seen.light).matrix()
-    colour = planes[..., :3] / (neutral[:3] * seen.white_cd_m2) @ matrix.T
+    planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, subject.light, raw.exposure_s)
+    matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], subject.light).matrix()
+    colour = planes[..., :3] / (neutral[:3] * subject.white_cd_m2) @ matrix.T
     index = raw.channels.index("W")
-    return np.asarray(colour), grey(planes[..., index], neutral[index] * seen.white_cd_m2)
+    return np.asarray(colour), grey(planes[..., index], neutral[index] * subject.white_cd_m2)
 
 
 def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
@@ -90,16 +90,16 @@ def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
 
 def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Colour image, W image and result under both readings."""
-    seen = view(setup, "still_life", LOW_CD_M2)
+    subject = view(setup, "still_life", LOW_CD_M2)
     stages, rows = {name: dict[str, Stages]() for name in CAMERAS}, []
     for reading in READINGS:
-        raws = exposures(Camera(reading), seen, "20ms", setup.seeds)
-        colour, white = zip(*(colour_and_white(raw, seen, Camera(reading)) for raw in raws), strict=True)
+        raws = exposures(Camera(reading), subject, "20ms", setup.seeds)
+        colour, white = zip(*(colour_and_white(raw, subject, Camera(reading)) for raw in raws), strict=True)
         pictures = {f"{reading}: colour": colour[0], "W": white[0]}
         for name in CAMERAS:
-            result = [develop(Camera(reading, name), raw, seen)[0] for raw in raws]
+            result = [develop(Camera(reading, name), raw, subject)[0] for raw in raws]
             stages[name][reading] = Stages(
-                noise(colour), noise(white), quality_db(result, seen.truth) - quality_db(colour, seen.truth)
+                noise(colour), noise(white), quality_db(result, subject.truth) - quality_db(colour, subject.truth)
             )
             pictures[RESULT[name]] = result[0]
         rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
@@ -136,9 +136,9 @@ def likeness(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
     return float(np.corrcoef(plane[where], truth[where])[0, 1])
 
 
-def measure_bright(raw: RawImage, result: Image, seen: View) -> Bright:
+def measure_bright(raw: RawImage, result: Image, subject: View) -> Bright:
     """Measure one exposure and its result (h, w, 3), linear sRGB."""
-    truth, luminance = luminance_of_srgb(seen.truth), luminance_of_srgb(result)
+    truth, luminance = luminance_of_srgb(subject.truth), luminance_of_srgb(result)
     white, colours = saturated_nearby(raw, "W"), saturated_nearby(raw, "RGB")
     is_white = mask(raw.cfa, "W", raw.shape)
     return Bright(
@@ -168,15 +168,15 @@ def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
 
 def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """R image, W image and result under both readings."""
-    seen = view(setup, "still_life", BRIGHT_CD_M2)
+    subject = view(setup, "still_life", BRIGHT_CD_M2)
     bright, rows = {name: dict[str, Bright]() for name in CAMERAS}, []
     for reading in READINGS:
         pictures = {}
         for name in CAMERAS:
             camera = Camera(reading, name, PITCH_UM)
-            raw = exposures(camera, seen, "66ms")[0]
-            result = develop(camera, raw, seen)[0]
-            bright[name][reading] = measure_bright(raw, result, seen)
+            raw = exposures(camera, subject, "66ms")[0]
+            result = develop(camera, raw, subject)[0]
+            bright[name][reading] = measure_bright(raw, result, subject)
             pictures[RESULT[name]] = encode_srgb(result)
         planes, full_e = bilinear(raw), camera.sensor.pixel.full_well_e
         recorded = {"R": planes[..., 0], "W": planes[..., 3]}

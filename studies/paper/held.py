@@ -72,11 +72,11 @@ def blur_px(sensor: SensorConfig, exposure_s: float) -> float:
     return float(sensor.lens.shake_um / sensor.site_pitch_um * blur_variance(exposure_s) ** 0.5)
 
 
-def measure_best(setup: Setup, seen: View, camera: Camera) -> Mapping[float, Best]:
-    """Best exposure of a camera by level; `seen` at 1 cd/m^2."""
+def measure_best(setup: Setup, subject: View, camera: Camera) -> Mapping[float, Best]:
+    """Best exposure of a camera by level; `subject` at 1 cd/m^2."""
     best = {}
     for level in LEVELS_CD_M2:
-        lit = at_level(seen, level)
+        lit = at_level(subject, level)
         quality = np.stack(
             [
                 quality_db(
@@ -135,8 +135,8 @@ def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], 
 
 def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Best exposures by hand of Bayer, the paper's camera and the default, and the claims about them."""
-    seen = close_up(view(setup, "still_life", 1.0))
-    best = {name: measure_best(setup, seen, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
+    subject = close_up(view(setup, "still_life", 1.0))
+    best = {name: measure_best(setup, subject, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
     light = light_of("D65")
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
     more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice

@@ -72,25 +72,25 @@ def without_white(raw: RawImage) -> RawImage:
     return replace(raw, dn=np.where(mask(raw.cfa, "W", raw.shape), raw.dn.dtype.type(raw.white_dn), raw.dn))
 
 
-def curves(setup: Setup, seen: View, camera: Camera) -> LevelCurves:
+def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
     """Photograph a view (at 1 cd/m^2) at every level."""
-    unit_s = auto_exposure_s(form_image(seen.radiance, camera.sensor), camera.sensor, LONGEST_S * 1e6)
+    unit_s = auto_exposure_s(form_image(subject.radiance, camera.sensor), camera.sensor, LONGEST_S * 1e6)
     rows: list[list[tuple[float, ...]]] = []
     for level in LEVELS_CD_M2:
         # Once the time is under the longest, light and time cancel: brighter levels give the same electrons.
         if len(rows) > 1 and unit_s / LEVELS_CD_M2[len(rows) - 1] < LONGEST_S:
             rows.append(rows[-1])
             continue
-        lit, time = at_level(seen, level), f"{min(unit_s / level, LONGEST_S) * 1e3:.6g}ms"
+        lit, time = at_level(subject, level), f"{min(unit_s / level, LONGEST_S) * 1e3:.6g}ms"
         rows.append([_row(camera, raw, lit) for raw in exposures(camera, lit, time, setup.seeds)])
     return LevelCurves(*np.moveaxis(np.array(rows), -1, 0))
 
 
-def _row(camera: Camera, raw: RawImage, seen: View) -> tuple[float, ...]:
+def _row(camera: Camera, raw: RawImage, subject: View) -> tuple[float, ...]:
     """Fields of `LevelCurves` of one exposure."""
-    truth = encode_srgb(seen.truth)
-    linear, picture = develop(camera, raw, seen)
-    encoded, bare = (encode_srgb(x) for x in (linear, develop(camera, without_white(raw), seen, 0.0)[0]))
+    truth = encode_srgb(subject.truth)
+    linear, picture = develop(camera, raw, subject)
+    encoded, bare = (encode_srgb(x) for x in (linear, develop(camera, without_white(raw), subject, 0.0)[0]))
     quality = measure(encoded, truth)
     return (
         picture.substitution or 0.0,
@@ -129,7 +129,7 @@ def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
         "exposed for green up to 66 ms."
     )
     # Quality from level to level, and over the octave in which W fills.
-    (psnr_at, psnr), (delta_at, delta), (flip_at, seen) = (
+    (psnr_at, psnr), (delta_at, delta), (flip_at, flip_rise) = (
         largest_step(*pair) for pair in ((one.psnr_db, -1.0), (one.delta_e, 1.0), (one.flip, 1.0))
     )
     fills_at, log_levels = where_white_fills(one), np.log2(LEVELS_CD_M2)
@@ -140,7 +140,7 @@ def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
     qualities = (
         over_seeds("PSNR, largest fall from level to level", psnr, high=GAIN_DB, unit="dB"),
         over_seeds("CIEDE2000, largest rise", delta, high=SEEN_DELTA_E),
-        over_seeds("FLIP, largest rise", seen, high=SEEN_FLIP),
+        over_seeds("FLIP, largest rise", flip_rise, high=SEEN_FLIP),
         over_seeds("PSNR, fall over the octave in which W fills", before - after, high=GAIN_DB, unit="dB"),
     )
     places = {"psnr_at": psnr_at, "delta_at": delta_at, "flip_at": flip_at, "fills_at": fills_at}
@@ -171,8 +171,8 @@ def _step(values: Image) -> float:
 
 def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Curves of the paper's method and of the default, and the claims about them."""
-    seen = close_up(view(setup, "still_life", 1.0))
-    by_camera = {name: curves(setup, seen, Camera(READING, name)) for name in CAMERAS}
+    subject = close_up(view(setup, "still_life", 1.0))
+    by_camera = {name: curves(setup, subject, Camera(READING, name)) for name in CAMERAS}
     paper, default = by_camera[PAPER], by_camera[DEFAULT]
     charts = {
         "W's part, share": {"similarity": paper.similarity, "luminance": paper.weight, "W full": paper.white_full},

@@ -85,8 +85,8 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
         windows = np.lib.stride_tricks.sliding_window_view(plane, (PATCH, PATCH))
         return np.asarray(windows[places[:, 0] + down - half, places[:, 1] + across - half])
 
-    here, along, beyond = patches(0, 0), patches(AWAY, 0), patches(0, -AWAY)
-    distances = (np.sqrt(((here - other) ** 2).sum(axis=(1, 2))) for other in (along, beyond))
+    centre, along, beyond = patches(0, 0), patches(AWAY, 0), patches(0, -AWAY)
+    distances = (np.sqrt(((centre - other) ** 2).sum(axis=(1, 2))) for other in (along, beyond))
     return Triplets(places, *distances)
 
 
@@ -100,10 +100,10 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The edge with three patches, under both readings and at two levels."""
     shares, parts = {}, []
     for name, level in LEVELS.items():
-        seen = view(setup, "slanted_edge", level)
-        columns = edge_columns(seen.radiance.luminance())
+        subject = view(setup, "slanted_edge", level)
+        columns = edge_columns(subject.radiance.luminance())
         for reading in READINGS:
-            raw = exposures(Camera(reading), seen, "20ms")[0]
+            raw = exposures(Camera(reading), subject, "20ms")[0]
             edge = triplets(raw, columns)
             shares[f"{reading}, {name}"] = edge.share
             if name == next(iter(LEVELS)):

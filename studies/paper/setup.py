@@ -177,48 +177,52 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     )
 
 
-def close_up(seen: View) -> View:
+def close_up(subject: View) -> View:
     """Middle of a view, a quarter of its pixels, for what takes hundreds of pictures."""
-    rows, columns = (slice((size - side) // 2, (size + side) // 2) for size, side in _sides(seen.radiance.shape))
-    return replace(seen, radiance=replace(seen.radiance, values=seen.radiance.values[rows, columns]))
+    rows, columns = (slice((size - side) // 2, (size + side) // 2) for size, side in _sides(subject.radiance.shape))
+    return replace(subject, radiance=replace(subject.radiance, values=subject.radiance.values[rows, columns]))
 
 
 def _sides(shape: tuple[int, int]) -> list[tuple[int, int]]:
     return [(size, min(size, max(size // 4 * 2, 24))) for size in shape]
 
 
-def at_level(seen: View, luminance_cd_m2: float) -> View:
+def at_level(subject: View, luminance_cd_m2: float) -> View:
     """What a view at 1 cd/m^2 is at another mean luminance."""
-    radiance = replace(seen.radiance, values=seen.radiance.values * luminance_cd_m2)
-    white_cd_m2 = seen.white_cd_m2 * luminance_cd_m2
-    return replace(seen, level=f"{luminance_cd_m2:.6g}cd/m2", radiance=radiance, white_cd_m2=white_cd_m2)
+    radiance = replace(subject.radiance, values=subject.radiance.values * luminance_cd_m2)
+    white_cd_m2 = subject.white_cd_m2 * luminance_cd_m2
+    return replace(subject, level=f"{luminance_cd_m2:.6g}cd/m2", radiance=radiance, white_cd_m2=white_cd_m2)
 
 
-def exposures(camera: Camera, seen: View, exposure: str, count: int = 1) -> list[RawImage]:
+def exposures(camera: Camera, subject: View, exposure: str, count: int = 1) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
     sensor, exposure_s = camera.sensor, parse_exposure(exposure) or 0.0
     mosaic = NAMED[camera.processor].mosaic
-    electrons = channel_electrons(form_image(seen.radiance, sensor), sensor, exposure_s)
+    electrons = channel_electrons(form_image(subject.radiance, sensor), sensor, exposure_s)
     expected_e = behind_filters(electrons, sensor)
     name = camera.reading if camera.pitch_um is None else f"{camera.reading}_{camera.pitch_um}um"
-    condition = Condition(scene=SceneChoice(seen.scene), spectrum=OWN, level=seen.level, exposure=exposure, sensor=name)
-    made = []
+    condition = Condition(
+        scene=SceneChoice(subject.scene), spectrum=OWN, level=subject.level, exposure=exposure, sensor=name
+    )
+    raws = []
     for seed in range(count):
         device = draw_device(sensor, expected_e.shape, device_stream(name, mosaic, seed))
         stream = exposure_stream(condition, mosaic, seed)
         if sensor.lens.shake_um:
             expected_e = behind_filters(shaken(electrons, sensor, exposure_s, shake_stream(seed)), sensor)
-        made.append(expose(expected_e, sensor, exposure_s, device, stream, exact=True))
-    return made
+        raws.append(expose(expected_e, sensor, exposure_s, device, stream, exact=True))
+    return raws
 
 
 @lru_cache(maxsize=4)
-def colours_of(camera: Camera, seen: View) -> ColourFit:
+def colours_of(camera: Camera, subject: View) -> ColourFit:
     """Colours of a camera's processor, fitted under a view's light."""
-    return colour_fit(camera.sensor, NAMED[camera.processor], seen.light)
+    return colour_fit(camera.sensor, NAMED[camera.processor], subject.light)
 
 
-def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float | None = None) -> tuple[Image, Picture]:
+def develop(
+    camera: Camera, raw: RawImage, subject: View, substitution_snr: float | None = None
+) -> tuple[Image, Picture]:
     """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
 
     Parameters
@@ -230,8 +234,10 @@ def develop(camera: Camera, raw: RawImage, seen: View, substitution_snr: float |
     options = {}
     if camera.processor in CAMERAS:
         options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr
-    neutral = neutral_electrons(sensor, seen.light, raw.exposure_s)
-    return develop_to_scale(raw, processor, colours_of(camera, seen), sensor, neutral, seen.white_cd_m2, **options)
+    neutral = neutral_electrons(sensor, subject.light, raw.exposure_s)
+    return develop_to_scale(
+        raw, processor, colours_of(camera, subject), sensor, neutral, subject.white_cd_m2, **options
+    )
 
 
 def noise(pictures: Sequence[Image]) -> float:

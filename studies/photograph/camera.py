@@ -250,12 +250,12 @@ def capture(
     """
     sensor = preset("low_noise") if sensor is None else sensor
     sensor = replace(sensor, lens=held_lens(sensor.lens, shake))
-    seen: SpectralRadiance | SpectralIrradiance = radiance
+    subject: SpectralRadiance | SpectralIrradiance = radiance
     if exposure_s is None:
         image = form_image(radiance, sensor, samples_per_pixel)
         exposure_s = exposure_by_rule_s(AUTO_INFORMATION, image, sensor)
-        seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
-    raw = frame_of(seen, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
+        subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
+    raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:
         colour = calibrate(sensor, light or illuminant("D65"))
     except InputError:

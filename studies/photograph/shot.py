@@ -160,12 +160,12 @@ def take(order: Order, step: Step | None = None) -> Taken:
     # what is looked at, and the light that the camera's colours are set to
     if opened is None:
         light_name = order.light[0] if order.light else None
-        known = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
-        white = file_white(order.source, known)
+        light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
+        white = file_white(order.source, light_of_file)
         transport, notes = open_radiance_file(order.source, white)
         light = white.spectrum
         if is_reference(order.source):
-            light = light if known else first_light(transport.groups, light)
+            light = light if light_of_file else first_light(transport.groups, light)
             transport = under(transport, light_name) if light_name else transport
         spectra: dict[str, Spectrum] = {}
         level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
@@ -202,10 +202,10 @@ def take(order: Order, step: Step | None = None) -> Taken:
         ]
     image = form_image(radiance, sensor)
     exposure_s = exposure_by_rule_s(order.exposure, image, sensor) if exposure_s is None else exposure_s
-    seen = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
+    subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
-    taken = [capture(seen, sensor, exposure_s, device, rng) for _ in range(order.frames)]
+    taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
     lens, iso = sensor.lens, iso_speed(sensor)
     raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]

@@ -66,8 +66,8 @@ def open_scene(
     require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust, define=tuple(define))
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
-        read = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
-        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(read)}, or a name of rodcone list scenes")
+        files = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
+        raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(files)}, or a name of rodcone list scenes")
     options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
     scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())
@@ -181,13 +181,13 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport
     InputError
         As `load_picture`, and for a picture of fewer than 16 or more than 4096 pixels a side.
     """
-    with warnings.catch_warnings(record=True) as caught:
+    with warnings.catch_warnings(record=True) as file_warnings:
         warnings.simplefilter("always")
         transport = load_picture(path, white.spectrum)
     name = Path(path).name
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
-    assumed = [*(f"{name}: {warning.message}" for warning in caught), *white.notes]
+    assumed = [*(f"{name}: {warning.message}" for warning in file_warnings), *white.notes]
     if is_reference(path):
         assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")
         return transport, assumed

@@ -145,12 +145,12 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     with read_errors("cluster: a worker lacks rodcone", "install it there", ImportError):
         workers = client.run(_facts)
-    here, (theirs, cores_of, safe_paths) = _facts()[0], zip(*workers.values(), strict=True)
-    for worker, its in zip(workers, theirs, strict=True):
-        other = [name for name, version in here.items() if its.get(name) != version]
+    local, (remote, cores_of, safe_paths) = _facts()[0], zip(*workers.values(), strict=True)
+    for worker, its in zip(workers, remote, strict=True):
+        other = [name for name, version in local.items() if its.get(name) != version]
         if other:
             raise InputError(
-                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {here[other[0]]}; "
+                f"cluster: {worker} runs {other[0]} {its.get(other[0])}, this is {local[other[0]]}; "
                 "install the same, start it again"
             )
     if not all(safe_paths):

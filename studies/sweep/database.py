@@ -260,8 +260,8 @@ def note_render(base: sqlite3.Connection, request: str, record: RenderRecord) ->
 
 def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
     marks = ", ".join("?" * (len(values) + 1))
-    done = base.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", [*values, digest(values)])
-    return int(done.lastrowid or 0)
+    cursor = base.execute(f"INSERT OR REPLACE INTO {table} VALUES ({marks})", [*values, digest(values)])
+    return int(cursor.lastrowid or 0)
 
 
 def _is_sound(values: tuple[Any, ...]) -> bool:

@@ -77,13 +77,13 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
 
     def burst() -> RawImage:
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
-        hand, taken = shake_stream(cell.seed), []
+        hand, raws = shake_stream(cell.seed), []
         for _ in range(frames):
             frame_e = expected_e
             if sensor.lens.shake_um:
                 frame_e = behind_filters(shaken(unmoved_e, sensor, cell.exposure_s, hand), sensor)
-            taken.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
-        return merged_raw(taken)
+            raws.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
+        return merged_raw(raws)
 
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
@@ -160,11 +160,11 @@ def limit_threads(most: int) -> None:
 
 def _check_provenance(cell: Cell, processor: Processor) -> None:
     exact, name = cell.made_by.readout_engine == "numpy", cell.processor
-    here = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
+    local = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
     for name, version in in_words(cell.made_by).items():
-        if here.get(name) != version:
+        if local.get(name) != version:
             raise InputError(
-                f"worker on {platform.node()}: its {name} is {here.get(name)}, the sweep's is {version}; allowed: the "
+                f"worker on {platform.node()}: its {name} is {local.get(name)}, the sweep's is {version}; allowed: the "
                 "same; install the same rodcone with the same packages and start the worker again"
             )
 
