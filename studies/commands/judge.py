@@ -8,7 +8,7 @@ from rodcone.csv_file import csv_text
 from rodcone.files import write_files
 from studies.commands.console import print_json, print_table, require_place
 from studies.commands.sweep import Workers
-from studies.dataset.judge import MEASURED, Score
+from studies.dataset.judge import Score
 from studies.dataset.judge import judge as judge_pictures
 from studies.dataset.judge_page import judge_page
 from studies.metrics.metric import DECIDING
@@ -62,11 +62,7 @@ def _row(score: Score) -> tuple[str, ...]:
 
 
 def _csv(scores: list[Score]) -> str:
-    keys = [metric.key for metric in MEASURED]
-    halves = [f"{key}_half" for key in keys]
     head = ("camera", "level", "luminance_cd_m2", "developer", "scenes")
-    rows = (
-        [*(getattr(score, name) for name in head), *(of[key] for of in (score.means, score.halves) for key in keys)]
-        for score in scores
-    )
-    return csv_text((*head, *keys, *halves), rows)
+    figures = [score.means | {f"{key}_half": half for key, half in score.halves.items()} for score in scores]
+    places = [[getattr(score, name) for name in head] for score in scores]
+    return csv_text((*head, *figures[0]), [[*x, *y.values()] for x, y in zip(places, figures, strict=True)])
