@@ -62,7 +62,7 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
         moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
         top_dn = max(raw.white_dn, raw.noise_of(channel).full_well_e / raw.gain_e_per_dn + raw.black_dn)
         dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, top_dn)).astype(dn.dtype)
-    kept = [raw.channels.index(channel) for channel in channels(tile)]
-    colour = None if raw.colour is None else raw.colour.part(kept)
+    order = [raw.channels.index(channel) for channel in channels(tile)]
+    colour = None if raw.colour is None else raw.colour.part(order)
     apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))
     return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart)

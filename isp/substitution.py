@@ -40,8 +40,8 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
     green = np.asarray(estimate[..., raw.channels.index("G")], dtype=np.float64)
     noise = raw.noise_of("G")
     ratio = green / np.sqrt(noise.shot * np.maximum(green, 0.0) + noise.dark_noise_e**2)
-    kept = ratio[~raw.saturated]
-    return float(np.median(kept)) if kept.size else float("nan")
+    ratios = ratio[~raw.saturated]
+    return float(np.median(ratios)) if ratios.size else float("nan")
 
 
 def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) -> float:

@@ -54,8 +54,8 @@ def _array(values: np.ndarray[Any, Any]) -> str:
         return f"[{', '.join(f'{x:.6g}' if values.dtype.kind == 'f' else str(x) for x in values)}]"
     what = f"<{' x '.join(map(str, values.shape))} {values.dtype}"
     if values.ndim < 3 and 0 < values.size <= MOST_RANGED and values.dtype.kind in "iuf":
-        known = values[~np.isnan(values)]
-        return f"{what}, {known.min():.4g} to {known.max():.4g}>" if known.size else f"{what}, all NaN>"
+        numbers = values[~np.isnan(values)]
+        return f"{what}, {numbers.min():.4g} to {numbers.max():.4g}>" if numbers.size else f"{what}, all NaN>"
     return f"{what}>"
 
 

@@ -31,10 +31,10 @@ def digest_inputs(value: Any) -> str:
 
 def digest_bytes(*parts: bytes | memoryview) -> str:
     """Hash of bytes, one after the other."""
-    made = hashlib.sha256()
+    sha = hashlib.sha256()
     for part in parts:
-        made.update(part)
-    return made.hexdigest()[:_LENGTH]
+        sha.update(part)
+    return sha.hexdigest()[:_LENGTH]
 
 
 def digest_file(path: str | Path) -> str:

@@ -68,6 +68,6 @@ def draw_line(planes: Mapping[str, NDArray[np.floating]], row: int | None, axes:
     height, width = next(iter(planes.values())).shape
     row = height // 2 if row is None else row
     require_whole("row", row, 0, height - 1, "give one of the picture's rows")
-    known = {name: np.isfinite(plane[row]) for name, plane in planes.items()}
-    curves = {name: (np.flatnonzero(at), planes[name][row, at]) for name, at in known.items() if at.any()}
+    finite = {name: np.isfinite(plane[row]) for name, plane in planes.items()}
+    curves = {name: (np.flatnonzero(at), planes[name][row, at]) for name, at in finite.items() if at.any()}
     return draw_curves(curves, axes, x=f"column, in row {row}", y=y, marker="." if width <= 128 else "")

@@ -242,5 +242,5 @@ def with_channel_readings(sensor: SensorConfig, readings: Sequence[ChannelReadin
 
 def with_tile(sensor: SensorConfig, tile: Tile, responses: Responses) -> SensorConfig:
     """Camera with another mosaic: of its channels that are read apart those that the mosaic has."""
-    kept = tuple(x for x in sensor.chip.channels if x.channel in channels(tile))
-    return replace(sensor, cfa=tile, responses=responses, chip=replace(sensor.chip, channels=kept))
+    readings = tuple(x for x in sensor.chip.channels if x.channel in channels(tile))
+    return replace(sensor, cfa=tile, responses=responses, chip=replace(sensor.chip, channels=readings))

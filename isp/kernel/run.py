@@ -60,18 +60,18 @@ def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Sett
     work = list_threads(pattern, strip.shape, rows, strip.alpha, strip.origin[0], settings.reach)
     # W's threads read W's plane alone. For the others all planes are laid out, around them alone: mostly few.
     for guides in (["W"], ["channel", "mixed"]):
-        chosen: list[Guide] = [guide for guide in work if guide in guides and len(work[guide].row)]
-        if not chosen:
+        kinds: list[Guide] = [guide for guide in work if guide in guides and len(work[guide].row)]
+        if not kinds:
             continue
         first_rows, first_columns = (
-            np.concatenate([getattr(work[guide], name) for guide in chosen]) for name in ("row", "column")
+            np.concatenate([getattr(work[guide], name) for guide in kinds]) for name in ("row", "column")
         )
         region = (
             (max(int(first_rows.min()), rows[0]), min(int(first_rows.max()) + pattern.block[0], rows[1])),
             (max(int(first_columns.min()), 0), min(int(first_columns.max()) + pattern.block[1], columns[1])),
         )
-        inputs = lay_out(jit, strip, region, pattern, settings, chosen[0])
-        for guide in chosen:
+        inputs = lay_out(jit, strip, region, pattern, settings, kinds[0])
+        for guide in kinds:
             shape = Shape(
                 tile=pattern.tile, block=pattern.block, patch=settings.patch, guide=guide, running=False, noise=noise
             )

@@ -84,11 +84,11 @@ class Characterisation:
         """Draw the photon transfer, temporal noise over signal, into Matplotlib's axes, new ones by default."""
         signal_e = (self.transfer.mean_dn - self.dark_mean_dn) / self.gain_dn_per_e
         noise_e = np.sqrt(np.maximum(self.transfer.variance_dn2, 0.0)) / self.gain_dn_per_e
-        known = (signal_e > 0) & (noise_e > 0)
-        light_e = np.geomspace(signal_e[known].min(), signal_e[known].max(), 60)
+        positive = (signal_e > 0) & (noise_e > 0)
+        light_e = np.geomspace(signal_e[positive].min(), signal_e[positive].max(), 60)
         dark_e = float(np.sqrt(max(self.dark_variance_dn2, 0.0)) / self.gain_dn_per_e)
         axes = draw_curves({"shot noise, slope ½": (light_e, np.sqrt(light_e))}, axes, x="signal, e⁻", y="noise, e⁻")
-        axes.plot(signal_e[known], noise_e[known], color=BLUE, marker="o", markersize=4.0, linestyle="")
+        axes.plot(signal_e[positive], noise_e[positive], color=BLUE, marker="o", markersize=4.0, linestyle="")
         axes.axhline(dark_e, color=ORANGE, linestyle="--", label="dark noise")
         axes.set(xscale="log", yscale="log")
         axes.legend(frameon=False)

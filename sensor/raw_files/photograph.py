@@ -134,8 +134,8 @@ def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
     """Calibration from LibRaw's matrix, camera to sRGB for daylight, and the as-shot balance."""
     matrix = np.array(opened.color_matrix, dtype=np.float64)[:, :3]
     sums = matrix.sum(axis=1, keepdims=True)
-    known = bool(np.all(np.isfinite(matrix)) and np.all(sums > 0) and np.linalg.cond(matrix) < 1e6)
-    to_srgb = matrix / sums if known and not np.array_equal(matrix, np.eye(3)) else np.eye(3)
+    regular = bool(np.all(np.isfinite(matrix)) and np.all(sums > 0) and np.linalg.cond(matrix) < 1e6)
+    to_srgb = matrix / sums if regular and not np.array_equal(matrix, np.eye(3)) else np.eye(3)
     daylight = _neutral(opened.daylight_whitebalance)
     shot = _neutral(opened.camera_whitebalance)
     neutral = shot if shot is not None else daylight if daylight is not None else np.ones(3)

@@ -140,18 +140,18 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
     question = [repr(base), list(goal.reference), order.light, order.prior, order.blur, levels]
-    known = _known(tried, question)
+    tried_gains_db = _known(tried, question)
 
     search = search_for(goal)
     with progress(sys.stderr) as step:
         try:
             tile = (
-                best_tile(search, SIDES[order.tile], order.steps, order.seed, known, step)
+                best_tile(search, SIDES[order.tile], order.steps, order.seed, tried_gains_db, step)
                 if order.tile in SIDES
                 else vary(base, order.tile).cfa
             )
         finally:
-            write_files({tried: json.dumps({"question": question, "gains_db": known})})
+            write_files({tried: json.dumps({"question": question, "gains_db": tried_gains_db})})
         camera = with_tile(base, tile, base.responses)
         if order.filters:
             camera = best_filters(goal, tile, order.rounds, step)
@@ -172,7 +172,7 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
         name: expect(one, at_cd_m2, order.light, prior=order.prior, blur=order.blur) for name, one in cameras.items()
     }
     _write(out, sensor, camera, order.filters)
-    write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(known))})
+    write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(tried_gains_db))})
     print(f"{tile_text(tile)}\n{out}")
 
 
@@ -184,10 +184,10 @@ def _known(tried: Path, question: list[Any]) -> Known:
     fix = "allowed: that, or no such file; move it away"
     with read_errors(f"out: {str(tried)!r} isn't what rodcone design wrote", fix, damage):
         held = json.loads(read_bounded(tried, MOST_BYTES))
-        known: Known = held["gains_db"] if held["question"] == json.loads(json.dumps(question)) else {}
-        if any(np.shape(gains) != (3, len(question[-1])) for gains in known.values()):
+        tried_gains_db: Known = held["gains_db"] if held["question"] == json.loads(json.dumps(question)) else {}
+        if any(np.shape(gains) != (3, len(question[-1])) for gains in tried_gains_db.values()):
             raise ValueError("gains of another shape")
-    return known
+    return tried_gains_db
 
 
 def _write(out: Path, sensor: str, camera: SensorConfig, filters: bool) -> None:

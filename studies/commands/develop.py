@@ -25,9 +25,9 @@ def capture(order: Annotated[Order, Parameter(name="*")], *, json: bool = False)
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     with progress(sys.stderr) as step:
-        taken = take(order, step)
-    say(*taken.notes)
-    print_result("\n".join(map(str, taken.paths)), taken.facts, json=json)
+        result = take(order, step)
+    say(*result.notes)
+    print_result("\n".join(map(str, result.paths)), result.facts, json=json)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -136,8 +136,8 @@ def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Find
     origin = "the system or DRJIT_LIBLLVM_PATH"
     if wheel:
         origin = LLVM_WHEEL if library.resolve() in wheel else "DRJIT_LIBLLVM_PATH"
-    known = f"version {version}" if version else "version not in its name"
-    return Finding("LLVM", f"{library}, {known}, from {origin}")
+    words = f"version {version}" if version else "version not in its name"
+    return Finding("LLVM", f"{library}, {words}, from {origin}")
 
 
 def engine_findings() -> list[Finding]:

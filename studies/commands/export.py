@@ -49,10 +49,10 @@ def table(
         AXIS=VALUE to keep, such as level=10lux; may be given several times.
     """
     axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
-    chosen = {}
+    values = {}
     for text in where or ():
         axis, equals, value = text.partition("=")
         if not equals:
             raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
-        chosen[axis] = value
-    print(markdown(lines(read_rows(folder), folder, axes, figures, chosen), axes, figures))
+        values[axis] = value
+    print(markdown(lines(read_rows(folder), folder, axes, figures, values), axes, figures))

@@ -31,6 +31,6 @@ def paper(
     setup = Setup(out, size, spp, seeds=seeds)
     out.mkdir(parents=True, exist_ok=True)  # a folder that can't be written fails before the first render
     with progress(sys.stderr) as step:
-        made = make(replace(setup, step=step))
-    page = write(made, out)
-    print_result(page, as_json(made), json=json)
+        results = make(replace(setup, step=step))
+    page = write(results, out)
+    print_result(page, as_json(results), json=json)

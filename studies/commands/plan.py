@@ -40,9 +40,9 @@ def plan(
     task = read_study(study, set or (), trust_code=trust_code)
     everything = reference_plan(task)
     with progress(sys.stderr) as step:
-        chosen = plan_study(task, cache=cache, step=step)
+        cheapest = plan_study(task, cache=cache, step=step)
     if json:
-        print_json(plan_json(task, chosen, everything))
+        print_json(plan_json(task, cheapest, everything))
         return
-    Console(width=None if sys.stdout.isatty() else 100).print(plan_table(chosen))
-    print("\n".join(reasons(task, chosen, everything)))
+    Console(width=None if sys.stdout.isatty() else 100).print(plan_table(cheapest))
+    print("\n".join(reasons(task, cheapest, everything)))

@@ -63,7 +63,7 @@ def reference(
     opened, model = open_choice(choice, study), as_stated(study).renders[choice]
     film, folder = film_of(opened, model), out or next(reference_folders())
     assert opened.scene is not None
-    path, wanted = reference_path(folder, opened.scene, film), STEP_SPP
+    path, most_samples = reference_path(folder, opened.scene, film), STEP_SPP
     transport: Transport | None = None
     # Go on until the noise is low enough, and keep the file after each step
     with progress(sys.stderr) as step:
@@ -74,7 +74,7 @@ def reference(
                 opened.size,
                 wavelength_nm=film.wavelength_nm,
                 width_nm=film.width_nm,
-                max_spp=wanted,
+                max_spp=most_samples,
                 max_seconds=max_seconds,
                 seed=SEED,
                 cache=folder / "renders",
@@ -95,7 +95,7 @@ def reference(
             say(f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}")
             if now <= until or transport.stopped_by != "samples":
                 break
-            wanted = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
+            most_samples = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
     print(path)
     return INTERRUPTED if transport.stopped_by == "interrupt" else 0
 

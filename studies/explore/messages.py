@@ -86,9 +86,9 @@ def _missing(processor: str) -> bool:
 
 def unsent(pictures: Sequence[Bytes], sent: list[Bytes]) -> list[bytes]:
     """Bytes of pictures, none of those that the page has already; `sent`, what it has, is brought up to date."""
-    known = [len(sent) > place and np.array_equal(sent[place], picture) for place, picture in enumerate(pictures)]
+    repeats = [len(sent) > place and np.array_equal(sent[place], picture) for place, picture in enumerate(pictures)]
     sent[:] = pictures
-    return [b"" if same else picture.tobytes() for same, picture in zip(known, pictures, strict=True)]
+    return [b"" if same else picture.tobytes() for same, picture in zip(repeats, pictures, strict=True)]
 
 
 def read_message(text: str) -> Header:

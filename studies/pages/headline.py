@@ -108,14 +108,14 @@ def _said(word: str, run: dict[str, Leads]) -> str:
 
 def _span(metric: Metric, lead: NDArray[np.float64]) -> str:
     """Write the leads of a run of levels as differences of the figure itself, such as "FLIP lower by 0.02 to 0.03"."""
-    known = np.sort(lead[np.isfinite(lead)])
-    if not known.size:
+    sizes = np.sort(lead[np.isfinite(lead)])
+    if not sizes.size:
         return f"{metric.name} unknown"
     name, unit = metric.name.replace(",", ""), f"{NBSP}{metric.unit}" if metric.unit else ""
     if metric.higher:
-        return f"{name} {_to(metric, known)}{unit}"
-    by = _to(metric, np.sort(np.abs(known))).replace("+", "")
-    return f"{name} {'lower' if known[0] > 0 else 'higher'} by {by}{unit}"
+        return f"{name} {_to(metric, sizes)}{unit}"
+    by = _to(metric, np.sort(np.abs(sizes))).replace("+", "")
+    return f"{name} {'lower' if sizes[0] > 0 else 'higher'} by {by}{unit}"
 
 
 def _to(metric: Metric, rising: NDArray[np.float64]) -> str:
@@ -146,8 +146,8 @@ def in_light(pair: Pair) -> str:
     Nothing is said where nothing is seen at any level, nor where the sweep can't tell, its levels don't rise or one
     isn't known.
     """
-    known = [light for light in pair.light_cd_m2 if light]
-    if len(known) < max(2, len(pair.levels)) or known != sorted(set(known)):
+    lights = [light for light in pair.light_cd_m2 if light]
+    if len(lights) < max(2, len(pair.levels)) or lights != sorted(set(lights)):
         return ""
     outcomes = pair.leads[PSNR.key].outcome.tolist()
     ours, theirs = pair.ours[PSNR.key], pair.theirs[PSNR.key]
@@ -157,7 +157,7 @@ def in_light(pair: Pair) -> str:
         (BEHIND, pair.names[::-1], (theirs, ours)),
     ):
         times = []
-        for name, here, ratio in zip(pair.levels, outcomes, light_ratio(known, *curves).tolist(), strict=True):
+        for name, here, ratio in zip(pair.levels, outcomes, light_ratio(lights, *curves).tolist(), strict=True):
             if here == outcome and ratio[0] > 1:
                 mean, *ends = (significant(value, digits=2) for value in ratio)
                 interval = f" ({' to '.join(ends)})" if len(set(ends)) > 1 else ""

@@ -109,8 +109,8 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     """
     box = axes.transLimits
     high = CHART[1] * 0.7  # of the axes, about [points]
-    wanted = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
-    for (name, _, colour), height in zip(ends, spread(wanted, LABEL_GAP, 0.0, high), strict=True):
+    heights = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
+    for (name, _, colour), height in zip(ends, spread(heights, LABEL_GAP, 0.0, high), strict=True):
         axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)
 
 
@@ -141,17 +141,17 @@ def tick_text(value: float) -> str:
     return text.replace("-", "\N{MINUS SIGN}")
 
 
-def spread(wanted: Sequence[float], gap: float, low: float, high: float) -> list[float]:
+def spread(heights: Sequence[float], gap: float, low: float, high: float) -> list[float]:
     """Move label positions apart until neighbours are `gap` from each other, within `low`..`high` where that fits."""
-    order = sorted(range(len(wanted)), key=lambda index: wanted[index])
-    placed = list(wanted)
+    order = sorted(range(len(heights)), key=lambda index: heights[index])
+    placed = list(heights)
     for before, after in pairwise(order):
         placed[after] = max(placed[after], placed[before] + gap)
     over = max((placed[index] for index in order), default=low) - high
     if over > 0:
         placed = [position - over for position in placed]
         for before, after in pairwise(order[::-1]):
-            placed[after] = min(max(wanted[after], low), placed[before] - gap)
+            placed[after] = min(max(heights[after], low), placed[before] - gap)
     return placed
 
 
@@ -255,5 +255,5 @@ def transfer_svg(result: Characterisation, title: str) -> str:
 
 def _draw(axes: Axes, x: np.ndarray, y: np.ndarray) -> None:
     """Draw measured points, those that are not finite left out."""
-    known = np.isfinite(x) & np.isfinite(y)
-    axes.plot(x[known], y[known], color=BLUE, marker="o", markersize=4.0, linestyle="")
+    finite = np.isfinite(x) & np.isfinite(y)
+    axes.plot(x[finite], y[finite], color=BLUE, marker="o", markersize=4.0, linestyle="")

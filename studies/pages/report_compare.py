@@ -120,19 +120,19 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
 
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
     """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
-    drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
-    rest, means = len(groups) // len(drawn), []
+    is_generated = [scene.name.startswith(DRAWN) for scene in report.scenes]
+    rest, means = len(groups) // len(is_generated), []
     for words, kind in (("named", False), ("drawn", True)):
-        chosen = [scene for scene, is_drawn in enumerate(drawn) if is_drawn == kind]
-        for place in range(rest) if len(chosen) > 1 else ():
-            pairs = [groups[scene * rest + place].pair for scene in chosen]
+        members = [scene for scene, is_drawn in enumerate(is_generated) if is_drawn == kind]
+        for place in range(rest) if len(members) > 1 else ():
+            pairs = [groups[scene * rest + place].pair for scene in members]
             ours, theirs = (
                 {key: np.mean([getattr(pair, side)[key] for pair in pairs], axis=0) for key in pairs[0].ours}
                 for side in ("ours", "theirs")
             )
             after = groups[place].title.removeprefix(report.scenes[0].name)
             means.append(
-                Group(f"mean of {len(chosen)} {words} scenes{after}", replace(pairs[0], ours=ours, theirs=theirs))
+                Group(f"mean of {len(members)} {words} scenes{after}", replace(pairs[0], ours=ours, theirs=theirs))
             )
     return means
 

@@ -81,9 +81,9 @@ def lead_cells(metric: Metric, lead: Leads) -> list[str]:
     """Write leads as cells of a table: a loss that is seen in bold, what isn't seen or isn't decided in brackets."""
     cells = []
     for mean, half, outcome in zip(lead.mean, lead.half, lead.outcome, strict=True):
-        shown = MISSING if isnan(mean) else lead_text(metric, float(mean))
-        shown += "" if isnan(half) else f" ± {fixed(float(half), metric.digits)}"
-        cells.append({BEHIND: f"**{shown}**", AHEAD: shown}.get(str(outcome), f"({shown})"))
+        words = MISSING if isnan(mean) else lead_text(metric, float(mean))
+        words += "" if isnan(half) else f" ± {fixed(float(half), metric.digits)}"
+        cells.append({BEHIND: f"**{words}**", AHEAD: words}.get(str(outcome), f"({words})"))
     return cells
 
 

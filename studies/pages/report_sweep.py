@@ -49,16 +49,16 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         made by different versions, variants or engines, or a picture is gone.
     """
     run = last_run(folder)
-    study, made = run.study, run.rows
-    require_alike(made)
+    study, rows = run.study, run.rows
+    require_alike(rows)
 
     names = [label(choice["source"]) for choice in study["scenes"]]
-    of_views = {(row.scene, row.spectrum): row.truth for row in made}
+    of_views = {(row.scene, row.spectrum): row.truth for row in rows}
     truths = [of_views.get(view) for view in product(names, study["spectra"])]
-    cells = _cells(study, made, names)
+    cells = _cells(study, rows, names)
     true = {name: opened(read_whole(folder / PICTURES, name)) for name in dict.fromkeys(truths) if name}
     sizes = [_size(true.get(truths[index * len(study["spectra"])] or "")) for index in range(len(names))]
-    missing = run.wanted - len(made)
+    missing = run.wanted - len(rows)
     unmade = [f"{missing} of {run.wanted} cells are not made yet: rodcone sweep goes on with them."] if missing else []
     data = ReportData(
         rodcone=metadata.version("rodcone"),
@@ -76,13 +76,13 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         seeds=tuple(study["seeds"]),
         cells=tuple(cells),
         truths=tuple(truths),
-        renders=tuple(render_of(made, name) for name in names),
+        renders=tuple(render_of(rows, name) for name in names),
         stages=run.stages,
-        environment=environment_of(made),
+        environment=environment_of(rows),
         configuration=configuration(study),
         exposure_rule=_exposure_rules(study),
-        left_out=lenses_left_out(made, study["sensors"]),
-        notes=(*dict.fromkeys(note for row in made for note in _further(row).get("notes", ())), *unmade),
+        left_out=lenses_left_out(rows, study["sensors"]),
+        notes=(*dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())), *unmade),
         denoised=study["render"]["denoise"],
         looked_at=next((busiest(truth) for truth in true.values()), (0, 0)),
     )
@@ -94,13 +94,13 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
     return replace(data, cells=tuple(shown), pictures_left_out=left_out), pictures
 
 
-def _cells(study: Mapping[str, Any], made: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
+def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
     """Return a cell for each combination that was asked for; one that isn't made yet has no row."""
     by_place = {
         (r.scene, r.spectrum, r.sensor, (r.exposure, r.frames), r.white_balance, r.level, r.processor, r.seed): r
-        for r in made
+        for r in row_list
     }
-    light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in made}
+    light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in row_list}
     levels, sensors = study["levels"], [label(name) for name in study["sensors"]]
     axes = (study["spectra"], sensors, _ways(study), study["white_balances"], levels, study["processors"])
     cells = []

@@ -43,8 +43,8 @@ def significant(value: float | None, unit: str = "", digits: int = 3) -> str:
 
 def lead_text(metric: Metric, lead: float) -> str:
     """Write a lead with its sign, without its unit; one that is written as 0 has no sign."""
-    shown = fixed(abs(lead), metric.digits)
-    return shown if not float(shown) else ("+" if lead > 0 else "\N{MINUS SIGN}") + shown
+    digits = fixed(abs(lead), metric.digits)
+    return digits if not float(digits) else ("+" if lead > 0 else "\N{MINUS SIGN}") + digits
 
 
 def level_text(level: str) -> str:

@@ -15,8 +15,8 @@ LEAST_SHARE = 1e-5  # that is told as a figure
 
 def bench_page(results: Mapping[str, Any]) -> str:
     """Return the HTML of a bench's results as `rodcone bench --json` prints them."""
-    drawn = [(stage, svg_address(svg_text(plane(stage)))) for stage in results["stages"]]
-    return write_out("bench.html.j2", results=results, stages=drawn, text=text, least=LEAST_SHARE)
+    charts = [(stage, svg_address(svg_text(plane(stage)))) for stage in results["stages"]]
+    return write_out("bench.html.j2", results=results, stages=charts, text=text, least=LEAST_SHARE)
 
 
 @rc_context(STYLE)

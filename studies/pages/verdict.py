@@ -107,11 +107,11 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
     return np.asarray(np.exp(np.stack([mean, mean - half, mean + half], axis=1)))
 
 
-def _offset(x: Floats, curve: Floats, wanted: float, level: int, rises: NDArray[np.bool_]) -> float:
+def _offset(x: Floats, curve: Floats, target: float, level: int, rises: NDArray[np.bool_]) -> float:
     """Distance in log light from a level to the nearest place where a curve has a value; NaN where there is none."""
     places = [
-        x[i] + (wanted - curve[i]) / (curve[i + 1] - curve[i]) * (x[i + 1] - x[i])
+        x[i] + (target - curve[i]) / (curve[i + 1] - curve[i]) * (x[i + 1] - x[i])
         for i in np.flatnonzero(rises)
-        if curve[i] <= wanted <= curve[i + 1] and curve[i] < curve[i + 1]
+        if curve[i] <= target <= curve[i + 1] and curve[i] < curve[i + 1]
     ]
     return min((place - x[level] for place in places), key=abs, default=float("nan"))

@@ -71,7 +71,7 @@ def claims_6(
     swaps : mapping
         By reading.
     """
-    wanted = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
+    switch = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
     return (
         claim(19, (at_most(name, one.noise / bayer[name].noise, 1.0, "×") for name, one in interleaved.items())),
         claim(
@@ -84,7 +84,7 @@ def claims_6(
         claim(
             21,
             (
-                near(f"{name}, {'on' if wanted[name] else 'off'}", one.substituted or 0.0, float(wanted[name]), 0.0)
+                near(f"{name}, {'on' if switch[name] else 'off'}", one.substituted or 0.0, float(switch[name]), 0.0)
                 for name, one in interleaved.items()
             ),
         ),

@@ -124,15 +124,15 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
             min(max(at - side // 2, 0), size - side) for at, size in zip((row, column), plane.shape, strict=True)
         )
         low, high = np.percentile(plane, [1, 99])
-        shown = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
-        show_picture(axes["plane"], shown[top:, left:][:side, :side], reading)
+        grey = encode_srgb(np.repeat(np.clip((plane - low) / (high - low), 0.0, 1.0)[..., None] ** 2.2, 3, axis=-1))
+        show_picture(axes["plane"], grey[top:, left:][:side, :side], reading)
         words = {"x": "x", "y": f"y, {edge.to_y[middle]:.1f} away", "z": f"z, {edge.to_z[middle]:.1f} away"}
         for name, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
             i, j = row + down - PATCH // 2, column + across - PATCH // 2
             corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates
             axes["plane"].add_patch(Rectangle(corner, PATCH, PATCH, fill=False, edgecolor=ORANGE, linewidth=1.6))
             axes["plane"].text(*corner, name, color=ORANGE, weight="bold", va="top")
-            show_picture(axes[name], shown[i : i + PATCH, j : j + PATCH])
+            show_picture(axes[name], grey[i : i + PATCH, j : j + PATCH])
             distance = axes[name].text(1.1, 0.5, words[name], va="center", transform=axes[name].transAxes)
             distance.set_in_layout(False)  # the empty column holds it
     return figure

@@ -250,8 +250,8 @@ def noise(pictures: Sequence[Image]) -> float:
     pictures : sequence of (h, w, 3) float64
         Linear sRGB, two or more exposures by different chips.
     """
-    shown = np.stack([luminance_of_srgb(picture) for picture in pictures])
-    return float(np.sqrt(shown.var(axis=0, ddof=1).mean()))
+    luminances = np.stack([luminance_of_srgb(picture) for picture in pictures])
+    return float(np.sqrt(luminances.var(axis=0, ddof=1).mean()))
 
 
 def quality_db(pictures: Sequence[Image], truth: Image) -> Image:

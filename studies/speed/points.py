@@ -112,10 +112,10 @@ def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[
 
 def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
     """Last result and times of each call; without repeats the first call counts."""
-    made = {}
+    points = {}
     for name, (result, seconds) in laps(calls, repeats).items():
-        made[name] = result, Times(float(seconds[0, 0]), *np.median(seconds[min(repeats, 1) :], axis=0).tolist())
-    return made
+        points[name] = result, Times(float(seconds[0, 0]), *np.median(seconds[min(repeats, 1) :], axis=0).tolist())
+    return points
 
 
 def share_of_noise_variance(point: Measured, stage: Stage) -> float:

@@ -191,11 +191,11 @@ def _stage(
     question: str,
     reference: str,
     noise_e: float,
-    made: Mapping[str, tuple[T, Times]],
+    timings: Mapping[str, tuple[T, Times]],
     error_e: Callable[[T], float],
 ) -> Stage:
     """Measure each choice's error; the last choice's times are the reference's."""
-    points = tuple(Measured(choice, times, error_e(result)) for choice, (result, times) in made.items())
+    points = tuple(Measured(choice, times, error_e(result)) for choice, (result, times) in timings.items())
     return Stage(name, question, reference, noise_e, points, points[-1].times)
 
 

@@ -193,10 +193,10 @@ def render_quietly(
     **options
         Of `render.engine.render`: bands, seed, cache, progress.
     """
-    transport, wanted = None, min(FIRST_SPP, max_spp)
+    transport, most_samples = None, min(FIRST_SPP, max_spp)
     while True:
-        transport = render(scene, size, max_spp=wanted, max_seconds=max_seconds, resume=transport, **options)
+        transport = render(scene, size, max_spp=most_samples, max_seconds=max_seconds, resume=transport, **options)
         now = share(transport)
         if now <= most_share or transport.stopped_by != "samples" or transport.spp >= max_spp:
             return transport
-        wanted = min(max_spp, int(np.ceil(transport.spp * min(MARGIN * now / most_share, MOST_GROWTH))))
+        most_samples = min(max_spp, int(np.ceil(transport.spp * min(MARGIN * now / most_share, MOST_GROWTH))))

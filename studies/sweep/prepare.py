@@ -159,10 +159,10 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
             for (under_spectrum, *_), sensors in _imaged(job, opened).items()
             if under_spectrum == spectrum
         }
-        wanted = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
-        if wanted:
+        absent = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
+        if absent:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            make_frames(folder, under(transport, spectrum), light, wanted, job.study)
+            make_frames(folder, under(transport, spectrum), light, absent, job.study)
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:

@@ -92,10 +92,10 @@ def provenance(
 def versions(processor: str | None = None) -> dict[str, str]:
     """Versions of all that makes numbers, of the backend in use and of a processor's own libraries too."""
     names = (*_PACKAGES, *(libraries(processor) if processor else ()))
-    made = {"rodcone": code_version(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
+    result = {"rodcone": code_version(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
     if backend() != "numpy":
-        made[backend()] = compiler_version()
-    return made
+        result[backend()] = compiler_version()
+    return result
 
 
 def threads() -> int:

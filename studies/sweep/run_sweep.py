@@ -148,16 +148,16 @@ def sweep(
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         number = note_run(base, now, platform.node(), json.dumps(_noted(study)))
-        known = [known_cells(job, opened) for opened in scenes.values()]
+        cell_lists = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         keys: list[Sequence[str | None]] = [
-            [cell.key for cell in cells] if cells else [None] * count for cells in known
+            [cell.key for cell in cells] if cells else [None] * count for cells in cell_lists
         ]
         want(base, chain.from_iterable(keys))
         count_made, notes = 0, dict[str, None]()
         for index, opened in enumerate(scenes.values()):
             part = _part(show, index, len(scenes))
-            cells = known[index] or scene_cells(job, opened, _rendering(part))
+            cells = cell_lists[index] or scene_cells(job, opened, _rendering(part))
             asked_keys = [cell.key for cell in cells]
             notes.update(dict.fromkeys(cells[0].render.notes))
             keys[index] = asked_keys
