@@ -2,28 +2,32 @@
 
 Ten scenes are drawn from HASH, a commit's, lit by D65, photographed at seven levels with two seeds of noise, and
 developed by `ple`, whose prior is trained anew for the cameras found, docs/filters/. Radiance, priors and rows are
-kept in out/filters; the page's table and docs/results/filters.csv are written from them.
+kept in out/filters; the page's table and picture and docs/results/filters.csv are written from them.
 """
 
 import json
 import sys
 from dataclasses import asdict, replace
-from functools import partial
+from functools import cache, partial
 from itertools import product
 from math import log10
 from pathlib import Path
 
 import numpy as np
 from design import PAGE, developed
+from numpy.typing import NDArray
 from page_parts import RESULTS, csv_text, fill
+from PIL import Image
 
-from isp.ple.prior import load_prior, own_prior, save_prior
+from isp.ple.prior import Prior, load_prior, own_prior, save_prior
 from isp.processors.catalogue import NAMED
 from isp.processors.piecewise import picture_ple
 from render.engine import render
+from render.transport import Transport
 from rodcone.colour_spaces import luminance_of_srgb
 from scenes.catalog import load
 from scenes.levels import DEMO_LEVELS
+from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.metrics.appearance import flip, true_picture
@@ -35,7 +39,44 @@ FOUND = {name: Path(__file__).resolve().parents[1] / "filters" / f"{name}.toml" 
 FOLDER = Path("out/filters")
 SCENES, SEEDS, SIDE, SPP = 10, 2, 96, 256
 IN_TABLE = ("moonlight", "street", "classroom", "sunlit day")
+PICTURE, SHOWN = PAGE.parent / "pictures" / "filters" / "cameras.webp", ("bayer", "rgbw", "strict")
+PICTURED = 1  # of the ten scenes
 FIGURES = {"psnr_db": (1, 2), "luminance_db": (1, 2), "delta_e_median": (-1, 2), "flip_mean": (-1, 3)}
+
+
+@cache
+def cameras() -> dict[str, tuple[SensorConfig, Prior]]:
+    """Sensors, with the priors that `ple` has for their curves."""
+    result = {"bayer": (vary(preset("low_noise"), "bayer"), own_prior()), "rgbw": (preset("low_noise"), own_prior())}
+    for camera, file in FOUND.items():
+        sensor, trained = preset(file), FOLDER / f"{camera}.npz"
+        if not trained.exists():
+            save_prior(train_prior(replace(sensor, cfa=("RG", "BW")), file.name, 1), trained)
+        result[camera] = (sensor, load_prior(trained))
+    return result
+
+
+def transport_of(name: str) -> Transport:
+    """Light of a drawn scene."""
+    return render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
+
+
+def pictures(transport: Transport, camera: str, luminance_cd_m2: float, seeds: list[int]) -> list[NDArray[np.float64]]:
+    """Picture of a scene by a camera, and the truth, encoded."""
+    sensor, prior = cameras()[camera]
+    processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior))
+    rng = np.random.default_rng([seeds[0], list(cameras()).index(camera), seeds[1]])
+    return [true_picture(x).encoded for x in developed(transport, luminance_cd_m2, sensor, processor, rng)]
+
+
+def show(commit: str) -> None:
+    """Write the page's picture: a scene by the cameras, the truth last; a row for each level of the table."""
+    transport, rows = transport_of(f"generated-{int(commit, 16) + PICTURED:x}"), []
+    for level in (x for x in DEMO_LEVELS if x.name in IN_TABLE):
+        pairs = [pictures(transport, camera, level.luminance_cd_m2, [PICTURED, 0]) for camera in SHOWN]
+        rows.append(np.hstack([*(shown for shown, _ in pairs), pairs[0][1]]))
+    PICTURE.parent.mkdir(parents=True, exist_ok=True)
+    Image.fromarray((np.clip(np.vstack(rows), 0, 1) * 255).round().astype(np.uint8)).save(PICTURE, quality=85, method=6)
 
 
 def rows_of(commit: str, number: int) -> list[dict[str, str | float]]:
@@ -44,20 +85,11 @@ def rows_of(commit: str, number: int) -> list[dict[str, str | float]]:
     path = FOLDER / f"{name}.json"
     if path.exists():
         return json.loads(path.read_text())
-    cameras = {"bayer": (vary(preset("low_noise"), "bayer"), own_prior()), "rgbw": (preset("low_noise"), own_prior())}
-    for camera, file in FOUND.items():
-        sensor, trained = preset(file), FOLDER / f"{camera}.npz"
-        if not trained.exists():
-            save_prior(train_prior(replace(sensor, cfa=("RG", "BW")), file.name, 1), trained)
-        cameras[camera] = (sensor, load_prior(trained))
-    transport, rows = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders"), []
-    for camera, (sensor, prior) in cameras.items():
-        processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior))
+    transport, rows = transport_of(name), []
+    for camera in cameras():
         for level in DEMO_LEVELS:
             for seed in range(SEEDS):
-                rng = np.random.default_rng([number, list(cameras).index(camera), seed])
-                pictures = developed(transport, level.luminance_cd_m2, sensor, processor, rng)
-                shown, truth = (true_picture(picture).encoded for picture in pictures)
+                shown, truth = pictures(transport, camera, level.luminance_cd_m2, [number, seed])
                 rows.append({
                     "scene": name, "camera": camera, "level": level.name, "seed": seed,
                     **asdict(measure(shown, truth)), "flip_mean": float(flip(shown, truth).mean()),
@@ -106,4 +138,5 @@ def write(lines: list[list[str]]) -> None:
 
 if __name__ == "__main__":
     FOLDER.mkdir(parents=True, exist_ok=True)
+    show(sys.argv[1])
     write(leads([row for number in range(SCENES) for row in rows_of(sys.argv[1], number)]))
