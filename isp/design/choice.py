@@ -5,24 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.design.expected_error import Doubles, Gaussians, Samples, sampled
-
-
-def every_channel(patches: Gaussians, responses: Doubles, middle: NDArray[np.intp], lens: Doubles) -> Samples:
-    """Samples of each channel at each pixel, in the order (channel, pixel).
-
-    Parameters
-    ----------
-    patches : Gaussians
-    responses : (channel, coefficient) float64
-        Electrons of a channel from a coefficient of 1.
-    middle : (pixel,) intp
-        Pixels whose error counts.
-    lens : (pixel, pixel) float64
-        Share of one pixel's light (second axis) that falls on another (first axis).
-    """
-    sampling = np.einsum("nc,sp->nspc", responses, lens)
-    return sampled(patches, sampling.reshape(-1, *sampling.shape[2:]), middle)
+from isp.design.expected_error import Doubles, Samples
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,11 +29,13 @@ def projected(samples: Samples, *rows: Doubles) -> Projected:
     every = np.concatenate(rows, axis=2)
     metric = np.repeat(np.arange(len(rows)), [row.shape[2] for row in rows])
     forms = np.stack([np.diag((metric == number).astype(np.float64)) for number in range(len(rows))])
+    cross = np.einsum("kspc,kpdc->kspd", samples.cross, every, optimize=True)
     return Projected(
         Samples(
             means=samples.means,
             signal=samples.signal,
-            cross=np.einsum("kspc,kpdc->kspd", samples.cross, every, optimize=True),
+            cross=cross,
+            beside=cross,
             within=every @ samples.within @ every.swapaxes(-1, -2),
         ),
         np.broadcast_to(forms[:, None, None], (len(rows), *every.shape[:2], len(metric), len(metric))),
@@ -63,7 +48,7 @@ def picked(every: Samples, channel: NDArray[np.intp], spread: Doubles | None = N
     Parameters
     ----------
     every : Samples
-        Of `every_channel`.
+        Of each channel at each pixel, in the order (channel, pixel).
     channel : (pixel,) intp
         Channel of each pixel.
     spread : (pixel, pixel) float64, optional
@@ -74,4 +59,4 @@ def picked(every: Samples, channel: NDArray[np.intp], spread: Doubles | None = N
     if spread is not None:
         means, signal = means @ spread.T, spread @ signal @ spread.T
         cross = np.einsum("st,ktpd->kspd", spread, cross, optimize=True)
-    return Samples(means=means, signal=signal, cross=cross, within=every.within)
+    return Samples(means=means, signal=signal, cross=cross, beside=cross, within=every.within)

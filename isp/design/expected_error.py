@@ -9,7 +9,10 @@ the estimate of the least squared error is linear, and its error has the covaria
 so that the expected error is sum_k pi_k tr(W_k P_k), W_k the metric about the component's mean. No estimator knows the
 component, so a real one does worse. One that uses mean and covariance of all patches together, and so is linear in the
 samples, does better than nothing: its error, by the same formula for one Gaussian, is the other end. Both are
-expectations over the prior: an easy scene lies under them.
+expectations over the prior: an easy scene lies under them. A lens L makes them those of the estimate of L x, a picture
+whose blur nobody undoes, beside x: with V_k = C_k - P_k, what the samples tell,
+
+    C_k + L V_k L' - V_k L' - L V_k + (L mu_k - mu_k)(L mu_k - mu_k)'
 """
 
 from dataclasses import dataclass
@@ -122,18 +125,21 @@ class Samples:
     signal : (component, sample, sample) float64
         H C_k H'.
     cross : (component, sample, pixel, coefficient) float64
-        H C_k at the middle pixels.
+        H C_k L' at the middle pixels.
+    beside : (component, sample, pixel, coefficient) float64
+        H C_k (2 - L)' there: `cross` without a lens.
     within : (component, pixel, coefficient, coefficient) float64
-        C_k of each middle pixel's coefficients.
+        C_k of each middle pixel's coefficients, and the square of what the lens does to its mean.
     """
 
     means: Doubles
     signal: Doubles
     cross: Doubles
+    beside: Doubles
     within: Doubles
 
 
-def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp]) -> Samples:
+def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens: Doubles | None = None) -> Samples:
     """Sample a prior's patches.
 
     Parameters
@@ -143,17 +149,31 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp]) -> Sa
         H: electrons of each sample from each pixel's coefficients.
     middle : (pixel,) intp
         Pixels whose error counts: the others lack neighbours.
+    lens : (pixel, pixel) float64, optional
+        L: share of one pixel's light (second axis) that falls on another (first axis); `sampling` has it too.
     """
     loadings = np.einsum("spc,kpcd->ksd", sampling, prior.factors, optimize=True)
     factors, rest = prior.factors[:, middle], prior.rest
     plain = sampling.reshape(len(sampling), -1)
+
+    def cross(lens: Doubles) -> Doubles:
+        factors = np.einsum("pq,kqcd->kpcd", lens, prior.factors, optimize=True)
+        plain = np.einsum("sqc,pq->spc", sampling, lens, optimize=True)
+        return np.asarray(
+            np.einsum("ksd,kpcd->kspc", loadings, factors, optimize=True) + rest[:, None, None, None] * plain
+        )
+
+    sharp = np.eye(sampling.shape[1])[middle]
+    blurred = sharp if lens is None else lens[middle]
+    off = np.einsum("pq,kqc->kpc", blurred - sharp, prior.means)
     return Samples(
         means=np.einsum("spc,kpc->ks", sampling, prior.means, optimize=True),
         signal=loadings @ loadings.swapaxes(1, 2) + rest[:, None, None] * (plain @ plain.T),
-        cross=np.einsum("ksd,kpcd->kspc", loadings, factors, optimize=True)
-        + rest[:, None, None, None] * sampling[:, middle],
+        cross=cross(blurred),
+        beside=cross(2 * sharp - blurred),
         within=np.einsum("kpcd,kped->kpce", factors, factors, optimize=True)
-        + rest[:, None, None, None] * np.eye(sampling.shape[2]),
+        + rest[:, None, None, None] * np.eye(sampling.shape[2])
+        + off[..., :, None] * off[..., None, :],
     )
 
 
@@ -174,7 +194,7 @@ def expected_error(weights: Doubles, samples: Samples, scale: Doubles, noise: No
     signal = samples.signal * scale[:, None] * scale
     spread = np.diagonal(signal, axis1=1, axis2=2)
     total = signal + np.eye(len(scale)) * sample_variance(samples.means * scale, spread, noise)[:, None]
-    cross = samples.cross * scale[:, None, None]
+    cross, beside = samples.cross * scale[:, None, None], samples.beside * scale[:, None, None]
     gain = np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1)).reshape(cross.shape)
-    left = samples.within - np.einsum("kspc,kspe->kpce", cross, gain, optimize=True)
+    left = samples.within - np.einsum("kspc,kspe->kpce", beside, gain, optimize=True)  # W leaves its even part
     return np.asarray(np.einsum("k,mkpce,kpce->m", weights, forms, left, optimize=True) / left.shape[1])

@@ -59,8 +59,6 @@ class DesignOrder:
         Illuminant; the camera knows it.
     prior : str
         Prior over patches: drawn or photographs.
-    blur : bool
-        Count what the lens spreads: its diffraction and defocus, at 550 nm.
     steps : int
         Tiles of 4x4 to look at.
     seed : int
@@ -78,7 +76,6 @@ class DesignOrder:
     behind_in_luminance: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.5
     light: str = "D65"
     prior: str = "drawn"
-    blur: bool = False
     steps: int = 500
     seed: int = 0
 
@@ -113,7 +110,6 @@ class DesignOrder:
             letters=self.letters,
             light=self.light,
             prior=self.prior,
-            blur=self.blur,
         )
 
 
@@ -136,22 +132,20 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     """
     base, levels = preset(sensor), order.levels
     goal = order.goal(base)
+    search = search_for(goal)
+    tile = () if order.tile in SIDES else vary(base, order.tile).cfa
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
-    question = [repr(base), list(goal.reference), order.light, order.prior, order.blur, levels]
+    question = [repr(base), list(goal.reference), order.light, order.prior, levels]
     tried_gains_db = _known(tried, question)
 
-    search = search_for(goal)
     with progress(sys.stderr) as step:
-        try:
-            tile = (
-                best_tile(search, SIDES[order.tile], order.steps, order.seed, tried_gains_db, step)
-                if order.tile in SIDES
-                else vary(base, order.tile).cfa
-            )
-        finally:
-            write_files({tried: json.dumps({"question": question, "gains_db": tried_gains_db})})
+        if not tile:
+            try:
+                tile = best_tile(search, SIDES[order.tile], order.steps, order.seed, tried_gains_db, step)
+            finally:
+                write_files({tried: json.dumps({"question": question, "gains_db": tried_gains_db})})
         camera = with_tile(base, tile, base.responses)
         if order.filters:
             camera = best_filters(goal, tile, order.rounds, step)
@@ -168,9 +162,7 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     cameras = {order.never_worse_than: vary(base, order.never_worse_than), "design": camera}
     cameras |= {name: vary(base, name) for name in names if name != order.never_worse_than}
     at_cd_m2 = goal.levels_cd_m2.tolist()
-    by_camera = {
-        name: expect(one, at_cd_m2, order.light, prior=order.prior, blur=order.blur) for name, one in cameras.items()
-    }
+    by_camera = {name: expect(one, at_cd_m2, order.light, prior=order.prior) for name, one in cameras.items()}
     _write(out, sensor, camera, order.filters)
     write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(tried_gains_db))})
     print(f"{tile_text(tile)}\n{out}")

@@ -58,7 +58,7 @@ def expect(
     prior
         Prior over patches: drawn (shapes and photographs) or photographs (alone).
     blur
-        Count what the lens spreads: its diffraction and defocus, at 550 nm.
+        Count the lens's diffraction and defocus, at 550 nm, as a blur that the picture keeps.
     out
         Table with every figure (.csv), or plot of the gain over the first camera (.svg).
     json

@@ -182,7 +182,7 @@ def expect(
     prior : str
         One of `isp.design.spectral_prior.PRIORS`.
     blur : bool
-        Whether diffraction and defocus of the sensor's lens spread the light, at 550 nm.
+        Whether diffraction and defocus of the sensor's lens spread the light, at 550 nm, and nobody undoes it.
 
     Raises
     ------
@@ -196,7 +196,8 @@ def expect(
     responses = responses_e(sensor, seen)
     sampling, drawn = sampling_of(sensor, responses, blur), drawn_pixels(prior) @ responses.T
     known, linear = (
-        sampled(patches, sampling, middle_pixels()) for patches in (spectral.patches, pooled_patches(prior))
+        sampled(patches, sampling, middle_pixels(), lens_of(sensor, blur))
+        for patches in (spectral.patches, pooled_patches(prior))
     )
     result = []
     for level_cd_m2 in levels_cd_m2:
@@ -247,8 +248,10 @@ def drawn_pixels(prior: str) -> Floats:
     coefficients = spectral.patches.means[component, pixel] + np.einsum(
         "ncd,nd->nc", factors, rng.standard_normal((count, factors.shape[-1]))
     )
-    reflectances = spectral.reflectances[rng.integers(len(spectral.reflectances), size=count)]
-    return np.asarray((coefficients * reflectances[:, None]).reshape(METERED, METERED, -1))
+    coefficients *= spectral.reflectances[rng.integers(len(spectral.reflectances), size=count), None]
+    # No surface reflects more light of any wavelength than falls on it: a deep colour is no bright one.
+    coefficients /= np.maximum(1.0, (coefficients @ spectral.spectra.T).max(axis=1, keepdims=True))
+    return np.asarray(coefficients.reshape(METERED, METERED, -1))
 
 
 def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise, forms: Floats) -> list[float]:

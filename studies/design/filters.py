@@ -13,7 +13,7 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from studies.design.expect import lens_of, middle_pixels, sites_of, spread_of, unit_response_e, view_of
+from studies.design.expect import middle_pixels, sites_of, spread_of, unit_response_e, view_of
 from studies.design.search import BEHIND, Goal, Progress, moments, rows_of, search_for, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
@@ -46,7 +46,6 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     reference_db = tile_db(search, goal.reference)
     places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
-    lens = lens_of(goal.sensor, goal.blur)
     rows = [rows_of(prior, seen, mean) for mean in prior.reflectances]
     # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
     nm = seen.light.wavelength_nm
@@ -70,7 +69,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     def cost(logits: Floats, at: list[tuple[float, Noise]]) -> tuple[float, Floats]:
         """Score with the other sign, and its slope."""
         shares = transmittances(logits)
-        sampling = np.einsum("st,tp,tc->spc", spread, lens, (shares @ clear_e)[places])
+        sampling = spread[..., None] * (shares @ clear_e)[places]
         # At full exposure more light changes nothing.
         first = [[light for light, _ in at].index(light) for light, _ in at]
         lights = [(prior.reflectances * at[index][0], at[index][1]) for index in sorted(set(first))]
@@ -81,7 +80,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         weights = 2 * BEHIND * goal.behind(gains_db)
         weights[0] += goal.weights
         by_sample = np.tensordot(weights, by_sample, 2)
-        by_pixel = np.einsum("st,tp,spc->tc", spread, lens, by_sample, optimize=True)
+        by_pixel = np.einsum("st,stc->tc", spread, by_sample)
         by_response = np.stack([by_pixel[places == index].sum(axis=0) for index in range(len(names))])
         by_logit = (by_response @ clear_e.T * shares * (1 - shares))[free] @ bumps
         return -goal.score(gains_db), -by_logit.ravel()

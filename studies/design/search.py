@@ -6,8 +6,8 @@ from itertools import product
 
 import numpy as np
 
-from isp.design.choice import Projected, every_channel, picked, projected
-from isp.design.expected_error import Noise, expected_error
+from isp.design.choice import Projected, picked, projected
+from isp.design.expected_error import Noise, expected_error, sampled
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.spectrum import Floats
 from rodcone.errors import unknown
@@ -17,7 +17,6 @@ from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from studies.design.expect import (
     LitPrior,
     drawn_pixels,
-    lens_of,
     metric_rows,
     middle_pixels,
     noise_at,
@@ -51,7 +50,7 @@ class Goal:
         How far a design may fall behind the reference at any level in PSNR, in luminance, and in a* and b*.
     letters : str
         Channels to choose from.
-    light, exposure, prior, blur
+    light, exposure, prior
         As `studies.design.expect.expect` takes them.
     """
 
@@ -64,7 +63,6 @@ class Goal:
     light: str = "D65"
     exposure: str = AUTO_INFORMATION
     prior: str = "drawn"
-    blur: bool = False
 
     def behind(self, gains_db: Floats) -> Floats:
         """How far gains lie beyond the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
@@ -111,7 +109,8 @@ def search_for(goal: Goal) -> Search:
     # A tile of one row lists its channels in an order of its own.
     sensor = with_tile(goal.sensor, (letters,), goal.sensor.responses)
     responses = responses_e(sensor, seen)[[channels(sensor.cfa).index(letter) for letter in letters]]
-    samples = every_channel(prior.patches, responses, middle_pixels(), lens_of(sensor, goal.blur))
+    sampling = np.einsum("nc,sp->nspc", responses, np.eye(PATCH**2)).reshape(-1, PATCH**2, responses.shape[1])
+    samples = sampled(prior.patches, sampling, middle_pixels())
     scenes = [rows_of(prior, seen, reflectance) for reflectance in prior.reflectances]
     return Search(goal, letters, responses, tuple(projected(samples, *rows) for rows in scenes))
 

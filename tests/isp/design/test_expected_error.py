@@ -1,10 +1,11 @@
 """The closed form against textbook LMMSE, against signals drawn from the prior, and in its limits."""
 
 import numpy as np
+import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
-from isp.design.choice import every_channel, picked, projected
+from isp.design.choice import picked, projected
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
 from isp.design.slope import error_slopes
 
@@ -42,15 +43,22 @@ def error(prior: Gaussians, scale: float, noise: Noise) -> float:
     return float(expected_error(prior.weights, samples, np.full(PIXELS, scale), noise, forms)[0])
 
 
-def test_one_component_gives_textbook_lmmse() -> None:
+@pytest.mark.parametrize("spread", [0.0, 0.3])
+def test_one_component_gives_textbook_lmmse_and_the_blur_that_a_picture_keeps(spread: float) -> None:
     prior, noise, scale = mixture(1), Noise(dark_e=2.0, prnu=0.01, full_e=np.inf), 50.0
-    c = covariance(prior, 0)
-    h = scale * mosaic().reshape(PIXELS, -1)
-    mean_e = h @ prior.means[0].ravel()
+    c, mean = covariance(prior, 0), prior.means[0].ravel()
+    lens = np.eye(PIXELS) + spread * np.random.default_rng(9).random((PIXELS, PIXELS))
+    sampling, blur = np.einsum("spc,pq->sqc", mosaic(), lens), np.kron(lens, np.eye(COEFFICIENTS))
+    h = scale * sampling.reshape(PIXELS, -1)
+    mean_e = h @ mean
     n = np.diag(mean_e + 2.0**2 + (0.01 * mean_e) ** 2)
-    left = c - c @ h.T @ np.linalg.inv(h @ c @ h.T + n) @ h @ c
-    by_pixel = np.trace(left.reshape(PIXELS, COEFFICIENTS, PIXELS, COEFFICIENTS), axis1=1, axis2=3)
-    assert_allclose(error(prior, scale, noise), np.diag(by_pixel)[MIDDLE].mean(), rtol=1e-9)
+    gain = blur @ c @ h.T @ np.linalg.inv(h @ c @ h.T + n)
+    # The picture less the patch, in the patch's spread, the noise and the mean (Joseph's form).
+    signal, off = gain @ h - np.eye(len(c)), (blur - np.eye(len(c))) @ mean
+    left = np.diag(signal @ c @ signal.T + gain @ n @ gain.T) + off**2
+    samples = sampled(prior, sampling, MIDDLE, lens)
+    expected = expected_error(prior.weights, samples, np.full(PIXELS, scale), noise, unit_forms(1))
+    assert_allclose(expected, left.reshape(PIXELS, -1).sum(axis=1)[MIDDLE].mean(), rtol=1e-9)
 
 
 def test_draws_have_the_error_of_a_known_component_and_no_estimator_a_smaller_one() -> None:
@@ -203,7 +211,8 @@ def test_a_tile_picks_its_samples() -> None:
     more = rng.standard_normal((2, len(MIDDLE), 1, COEFFICIENTS))
     forms = np.stack([row.swapaxes(-1, -2) @ row for row in (rows, more)])
     plain = expected_error(prior.weights, sampled(prior, sampling, MIDDLE), np.full(PIXELS, 30.0), noise, forms)
-    chosen = projected(every_channel(prior, responses, MIDDLE, np.eye(PIXELS)), rows, more)
+    every = np.einsum("nc,sp->nspc", responses, np.eye(PIXELS)).reshape(-1, PIXELS, COEFFICIENTS)
+    chosen = projected(sampled(prior, every, MIDDLE), rows, more)
     samples = picked(chosen.samples, channel, spread)
     assert_allclose(
         expected_error(prior.weights, samples, np.full(PIXELS, 30.0), noise, chosen.forms), plain, rtol=1e-10
