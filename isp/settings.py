@@ -7,7 +7,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 from rodcone.jit import Backend
 from sensor.cfa import Tile
 
@@ -71,8 +71,7 @@ class Settings:
             value = getattr(self, name)
             if not value >= SMALLEST_SIGMA:  # written so that NaN fails
                 raise InputError(f"{name}: {value!r} isn't allowed; give {SMALLEST_SIGMA:g} to inf")
-        if self.distance not in get_args(Distance):
-            raise unknown("distance", self.distance, get_args(Distance))
+        require_name("distance", self.distance, get_args(Distance))
 
     def check_reaches(self, tile: Tile) -> None:
         """Raise `InputError` where Omega, cut at a corner of the frame, may hold no sample of some channel."""

@@ -12,7 +12,7 @@ from render.published_spectra import optical_constant
 from render.spectrum import Spectrum
 from rodcone.brief import brief
 from rodcone.doors import method
-from rodcone.errors import InputError, one_line, require_fields, unknown
+from rodcone.errors import InputError, one_line, require_fields, require_keys, unknown
 from rodcone.plots import draw_curves, png_of
 from rodcone.types import Floats
 
@@ -105,9 +105,7 @@ class Scene:
         require_fields(self)
         grouped = [path for group in self.groups.values() for path in group.emitters]
         present = emitter_paths(self.geometry)
-        for path in grouped:
-            if path not in present:
-                raise unknown(f"scene {self.name}: emitter", path, present)
+        require_keys(f"scene {self.name}: emitter", grouped, present)
         tinted = {path for group in self.groups.values() if group.coloured for path in group.emitters}
         for path, kind in present.items():
             if kind in _REFUSED_EMITTERS:

@@ -1,6 +1,6 @@
 """The one exception for bad input: a single line with the name, the value, what is allowed and the likely fix."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Collection, Iterable, Iterator
 from contextlib import contextmanager
 from difflib import get_close_matches
 from functools import cache
@@ -98,12 +98,16 @@ def require_absent(place: str, **options: object) -> None:
             raise InputError(f"{name.replace('_', '-')}: {value!r} {place}; leave it out")
 
 
-def require_keys(what: str, given: Iterable[str], allowed: Iterable[str]) -> None:
-    """Raise `InputError` for the first key of `given` that is not in `allowed`."""
-    allowed = list(allowed)
-    for key in given:
-        if key not in allowed:
-            raise unknown(what, key, allowed)
+def require_name(what: str, value: object, allowed: Collection[str]) -> None:
+    """Raise `InputError` for a name that is not in `allowed`."""
+    if value not in allowed:
+        raise unknown(what, value, allowed)
+
+
+def require_keys(what: str, keys: Iterable[str], allowed: Collection[str]) -> None:
+    """Raise `InputError` for the first key that is not in `allowed`."""
+    for key in keys:
+        require_name(what, key, allowed)
 
 
 def require_fields(value: object, place: str = "") -> None:

@@ -6,7 +6,7 @@ from math import hypot
 from typing import Annotated
 
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
+from rodcone.errors import InputError, require_fields, require_name, require_range, require_whole
 
 CHARGE, DIGITAL = BINNINGS = ("charge", "digital")
 MERGED, SWITCHED = "merged", "switched"  # what is done with several readings
@@ -179,8 +179,7 @@ class ChannelReading:
 
 def check_readings(readings: Sequence[Reading], readout: str) -> None:
     """Raise `InputError` for readings that no pixel has, or a readout that they can't have."""
-    if readout not in (MERGED, SWITCHED):
-        raise unknown("readout", readout, (MERGED, SWITCHED))
+    require_name("readout", readout, (MERGED, SWITCHED))
     if not readings:
         if readout == SWITCHED:
             raise InputError(f"readout: {SWITCHED!r} without readings; allowed: with two or more; add [[readings]]")

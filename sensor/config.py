@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.brief import brief
 from rodcone.doors import method
-from rodcone.errors import InputError, require_fields, require_whole, unknown
+from rodcone.errors import InputError, require_fields, require_keys, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
@@ -109,9 +109,7 @@ class SensorConfig:
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(self.channels, [550.0], [1.0])  # every channel needs a curve
-        for apart in self.chip.channels:
-            if apart.channel not in self.channels:
-                raise unknown("channels: channel", apart.channel, self.channels)
+        require_keys("channels: channel", (apart.channel for apart in self.chip.channels), self.channels)
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(
                 "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "

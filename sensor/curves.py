@@ -15,7 +15,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
 from rodcone.brief import brief
 from rodcone.csv_file import read_columns
 from rodcone.doors import method
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_keys, require_range
 from rodcone.plots import Axes, draw_curves
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
@@ -74,9 +74,7 @@ class Responses:
         InputError
             Where a channel has no curve.
         """
-        for channel in channels:
-            if channel not in self.curves:
-                raise unknown("responses: channel", channel, self.curves)
+        require_keys("responses: channel", channels, self.curves)
         return np.array([self.curves[channel].band_average(wavelength_nm, width_nm) for channel in channels])
 
 

@@ -7,7 +7,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import require_range, unknown
+from rodcone.errors import require_name, require_range
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
@@ -64,8 +64,7 @@ def auto_exposure_s(
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")
     channel = channel or sensor.unit_channel
-    if channel not in sensor.channels:
-        raise unknown("exposure: channel", channel, sensor.channels)
+    require_name("exposure: channel", channel, sensor.channels)
     per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., sensor.channels.index(channel)]
     return _share_of_well_s(per_second_e, sensor, channel, longest_s, percentile, well_share)
 
@@ -105,8 +104,7 @@ def exposure_of_electrons_s(
     InputError
         As `exposure_by_rule_s`.
     """
-    if rule not in RULES:
-        raise unknown("exposure", rule, RULES)
+    require_name("exposure", rule, RULES)
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = sensor.channels
     unit = sensor.unit_channel

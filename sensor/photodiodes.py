@@ -12,7 +12,7 @@ from math import hypot, inf, lcm, sqrt
 
 import numpy as np
 
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 from sensor.cfa import Tile, channel_map
 from sensor.chip import BINNINGS, CHARGE, DIGITAL, Binning
 from sensor.config import SensorConfig
@@ -35,8 +35,7 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
         For another way than "charge" and "digital", a mosaic whose 2x2 pixels aren't of one channel, several readings,
         or a sum of more bits than a raw image holds.
     """
-    if way not in BINNINGS:
-        raise unknown("binning", way, BINNINGS)
+    require_name("binning", way, BINNINGS)
     pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
     tile = binned_tile(sensor.cfa)
     if way == DIGITAL and sensor.bits > MOST_BITS_SUMMED:

@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rodcone.errors import unknown
+from rodcone.errors import require_name
 from sensor.config import LensConfig, SensorConfig
 from sensor.random import NoiseTerm, draw_key, normals
 
@@ -45,8 +45,7 @@ def held_lens(lens: LensConfig, shake: str | None) -> LensConfig:
     """
     if shake is None:
         return lens
-    if shake not in SHAKES:
-        raise unknown("shake", shake, SHAKES)
+    require_name("shake", shake, SHAKES)
     return replace(lens, shake_um=SHAKES[shake])
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 
 
 @dataclass(frozen=True)
@@ -41,8 +41,7 @@ def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float
     InputError
         For an encoding that is not in `ENCODINGS`.
     """
-    if encoding not in ENCODINGS:
-        raise unknown("encoding", encoding, ENCODINGS)
+    require_name("encoding", encoding, ENCODINGS)
     if encoding == "srgb":
         return encode_srgb(linear_srgb)
     from_srgb = np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ SRGB_TO_XYZ

@@ -13,7 +13,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.envi import open_envi
 from render.radiance_files.file_checks import bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from rodcone.errors import InputError, in_place, read_errors, require_range, unknown
+from rodcone.errors import InputError, in_place, read_errors, require_name, require_range
 from rodcone.toml_file import read_toml, strict_converter, structured
 from rodcone.types import Floats
 
@@ -43,8 +43,7 @@ class Description:
     scale: float | None = None
 
     def __post_init__(self) -> None:
-        if self.holds not in KINDS:
-            raise unknown("holds", self.holds, KINDS)
+        require_name("holds", self.holds, KINDS)
         if self.scale is not None:
             require_range("scale", self.scale, 1e-30, 1e30, "give what a stored 1 is worth")
 

@@ -20,7 +20,7 @@ from render.user_scene.allowed_plugins import require_allowed
 from render.user_scene.mesh_files import check_mesh_file
 from render.user_scene.scene_parts import SceneFile, assemble
 from render.user_scene.scene_paths import find_file, screen, search_path
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 
 # Numbers that may be below 0: angles, offsets in a picture, the depth of bumps, paths without a limit (-1). Points and
 # directions are vectors.
@@ -154,8 +154,7 @@ def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: l
         if key in ("type", "id") or key in result:
             raise InputError(f"property name {name!r} is not allowed here; rename it")
         if kind == "Reference":
-            if value.id() not in index_of:
-                raise unknown("ref", value.id(), index_of)
+            require_name("ref", value.id(), index_of)
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":

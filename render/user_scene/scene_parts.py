@@ -8,7 +8,7 @@ from render.scene import Keys, Node, Scene, walk
 from render.user_scene.allowed_plugins import ALLOWED, CAMERAS, METER, kind_of
 from render.user_scene.scene_lights import attach_area_lights, light_groups, type_of
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_whole, unknown
+from rodcone.errors import InputError, require_name, require_whole
 
 FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states none
 DEEPEST = 1 << 16  # paths of integrators without a limit; Russian roulette ends them long before
@@ -162,8 +162,7 @@ def _check_references(name: str, geometry: Node) -> dict[str, Node]:
             in_emitters.add(id(node))
     for path, node in walk(geometry):
         if node["type"] == "ref":
-            if node.get("id") not in parts:
-                raise unknown(f"scene {name}: {'/'.join(path)}: ref", node.get("id"), parts)
+            require_name(f"scene {name}: {'/'.join(path)}: ref", node.get("id"), parts)
             if id(parts[node["id"]]) in in_emitters:
                 raise InputError(f"scene {name}: ref {node['id']!r} points into a light; define it outside of it")
     _height(name, geometry, parts, {}, 0)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 
 from render.spectrum import Spectrum
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_keys
 from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
 from sensor.chip import PixelConfig
@@ -108,9 +108,7 @@ def lent_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curve
     assert numbers.efficiency is not None  # the callers' choice
     value, at_nm = numbers.efficiency
     theirs = sensor.responses.curves
-    for channel in channels(numbers.cfa) if numbers.cfa else ():
-        if channel not in theirs:
-            raise unknown(f"preset {name}: channel", channel, theirs)
+    require_keys(f"preset {name}: channel", channels(numbers.cfa) if numbers.cfa else (), theirs)
     first_nm, last_nm = next(iter(theirs.values())).wavelength_nm[[0, -1]]
     nm = np.arange(first_nm, last_nm + 1e-6, _STEP_NM)
     shape = {

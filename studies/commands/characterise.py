@@ -6,7 +6,7 @@ from typing import Annotated, Any
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, require_absent, require_whole, unknown
+from rodcone.errors import InputError, require_absent, require_name, require_whole
 from rodcone.files import check_place, write_files
 from sensor.cameras.frames import frame_numbers, measure_files
 from sensor.cameras.numbers import preset_text
@@ -70,10 +70,9 @@ class Frames:
             require_whole("reading", self.reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
             sensor = of_reading(sensor, self.reading - 1)
         if sensor.chip.channels:
-            names = sensor.channels
-            if self.channel not in names:
-                raise unknown(f"channel of {preset!r}, which reads channels apart", str(self.channel), names)
-            return of_channel(sensor, self.channel)[0]
+            channel = str(self.channel)
+            require_name(f"channel of {preset!r}, which reads channels apart", channel, sensor.channels)
+            return of_channel(sensor, channel)[0]
         if self.channel is not None:
             raise InputError(f"channel: {self.channel!r} of {preset!r}, whose channels are read alike; leave it out")
         return sensor

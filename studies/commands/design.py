@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
-from rodcone.errors import InputError, read_errors, require_fields, unknown
+from rodcone.errors import InputError, read_errors, require_fields, require_keys, unknown
 from rodcone.files import read_bounded, write_files
 from rodcone.progress import progress
 from rodcone.toml_file import read_toml
@@ -97,9 +97,7 @@ class DesignOrder:
     def goal(self, base: SensorConfig) -> Goal:
         """Goal of a search with a camera's pixel, lens and responses."""
         reference = vary(base, self.never_worse_than).cfa
-        for letter in self.letters + "".join(reference):
-            if letter not in base.responses.curves:
-                raise unknown("letters", letter, base.responses.curves)
+        require_keys("letters", self.letters + "".join(reference), base.responses.curves)
         share = np.array(self.weights or [1.0] * len(self.levels))
         return Goal(
             sensor=base,

@@ -4,7 +4,7 @@ import json as notation
 from pathlib import Path
 
 from isp.ple.prior import save_prior
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 from rodcone.files import check_place
 from sensor.presets import preset
 from studies.commands.console import print_result, require_ending
@@ -38,8 +38,7 @@ def train(
     if (sensor is None) == (spectral is None):
         raise InputError("sensor: allowed: either --sensor or --spectral; give one")
     if spectral is not None:
-        if spectral not in KINDS_OF:
-            raise unknown("spectral", spectral, KINDS_OF)
+        require_name("spectral", spectral, KINDS_OF)
         check_place(out)
         source = train_spectral_prior(spectral, seed, out)
         print_result(out, {"path": str(out), **notation.loads(source)}, json=json)

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, is_light_file
-from rodcone.errors import InputError, require_fields, require_keys, require_range, unknown
+from rodcone.errors import InputError, require_fields, require_keys, require_name, require_range
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
@@ -117,20 +117,15 @@ class Controls:
 
     def __post_init__(self) -> None:
         require_fields(self)
-        known = (
-            ("exposure", self.exposure, (*RULES, TIME)),
-            ("processor", self.processor, PROCESSORS),
-            ("white_balance", self.white_balance, WHITE_BALANCES),
-            ("mosaic", self.mosaic, (*MOSAICS, *VARIATIONS, OWN_MOSAIC)),
-        )
-        for name, value, allowed in known:
-            if value not in allowed:
-                raise unknown(name, value, allowed)
+        require_name("exposure", self.exposure, (*RULES, TIME))
+        require_name("processor", self.processor, PROCESSORS)
+        require_name("white_balance", self.white_balance, WHITE_BALANCES)
+        require_name("mosaic", self.mosaic, (*MOSAICS, *VARIATIONS, OWN_MOSAIC))
         illuminant(self.reference_light)
         for name, lamp in self.lamps.items():
             require_fields(lamp, f"lamps[{name!r}].")
-        for what, given, allowed in (("lens", self.lens, LENS), ("pixel", self.pixel, PIXEL)):
-            require_keys(what, given, allowed)
+        require_keys("lens", self.lens, LENS)
+        require_keys("pixel", self.pixel, PIXEL)
         require_keys("settings", self.settings, SETTINGS if self.processor in ADJUSTABLE else ())
         options_of(self)
         if self.mosaic not in mosaics_of(PROCESSORS[self.processor]):
@@ -190,8 +185,7 @@ def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
                 "file on the page, as a table"
             )
     controls = controls_of(content, "send what the page is told first")
-    if controls.sensor not in (known := (*names(), *dropped)):
-        raise unknown("sensor", controls.sensor, known)
+    require_name("sensor", controls.sensor, (*names(), *dropped))
     for name, lamp in controls.lamps.items():
         if len(lamp.table) > MOST_POINTS:
             raise InputError(f"lamps[{name!r}].table: {len(lamp.table)} points; allowed: {MOST_POINTS}; thin it out")

@@ -10,7 +10,7 @@ import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, libraries
 from render.illuminants import names as illuminants
-from rodcone.errors import InputError, require_keys, require_whole, unknown
+from rodcone.errors import InputError, require_keys, require_name, require_whole
 from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.exposure import RULES
@@ -101,8 +101,7 @@ def read_message(text: str) -> Header:
         raise InputError("message: it is no JSON; allowed: an object; send one") from None
     if not isinstance(message, dict) or not isinstance(message.get("kind"), str):
         raise InputError("message: it has no kind; allowed: an object with a kind; send one")
-    if message["kind"] not in KINDS:
-        raise unknown("message: kind", message["kind"], KINDS)
+    require_name("message: kind", message["kind"], KINDS)
     keys = ("kind", "number", *KINDS[message["kind"]])
     require_keys("message", message, (*keys, "page"))
     page = message.get("page", "")

@@ -18,7 +18,7 @@ from types import MappingProxyType
 from typing import Any, TypeAlias
 
 from isp.picture import Picture
-from rodcone.errors import InputError, cut, one_line, unknown
+from rodcone.errors import InputError, cut, one_line, require_name
 from studies.explore.answers import Answer, shown, take_sensor, written
 from studies.explore.chain import Image, development_of, expose_scene
 from studies.explore.controls import Controls, controls_from
@@ -241,8 +241,7 @@ class Session:
         return [controls_from(content, self._dropped) for content in message["cameras"]]
 
     def _choose_scene(self, name: Any) -> None:
-        if name not in tuple(self._scenes):
-            raise unknown("scene", name, self._scenes)
+        require_name("scene", name, tuple(self._scenes))
         source = self._scenes[name]()
         with self._changed:
             self._begin_page(self._page)

@@ -13,7 +13,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from render.photometry import photons_per_joule
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from rodcone.errors import require_whole, unknown
+from rodcone.errors import require_name, require_whole
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
 from sensor.readings.by_channel import at_sites, dimmed, of_channel
@@ -121,8 +121,8 @@ def explorer_view(transport: Transport, view: str = "picture", **controls: Any) 
         For an unknown view or control, or a value that the chain refuses.
     """
     place = re.fullmatch(r"pixel (\d{1,9}) (\d{1,9})", view)
-    if not place and view not in (known := (*VIEWS, "histogram", "pixel ROW COLUMN")):
-        raise unknown("view", view, known)
+    if not place:
+        require_name("view", view, (*VIEWS, "histogram", "pixel ROW COLUMN"))
     settings = controls_of(controls, "see help(rodcone.explorer_view)")
     if view in VIEWS:
         return VIEWS[view](photograph(transport, settings))

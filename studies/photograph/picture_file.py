@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from isp.colour.encoding import ENCODINGS, quantise
 from isp.picture import Picture
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_name
 from rodcone.files import write_files
 
 DATA = Path(__file__).parents[1] / "data"
@@ -70,8 +70,7 @@ def check_picture_file(path: Path, bits: int, encoding: str) -> None:
         raise InputError(f"out: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
     if bits not in BITS:
         raise InputError(f"bits: {bits!r} is not allowed; give 8 or 16")
-    if encoding not in ENCODINGS:
-        raise unknown("encoding", encoding, ENCODINGS)
+    require_name("encoding", encoding, ENCODINGS)
 
 
 def default_path(raw: Path) -> Path:

@@ -5,7 +5,7 @@ from difflib import get_close_matches
 
 from render.illuminants import illuminant, lines_nm
 from render.spectrum import VISIBLE_NM
-from rodcone.errors import InputError, require_range, unknown
+from rodcone.errors import InputError, require_name, require_range
 from rodcone.time_text import parse_time
 from scenes.levels import DEMO_LEVELS
 from sensor.exposure import RULES
@@ -35,8 +35,7 @@ def parse_level(text: str) -> tuple[float, str]:
     unit = match[2].replace("²", "2")
     if not unit:
         raise InputError(f"level: {text.strip()!r} has no unit; allowed: {' or '.join(UNITS)}; write {text.strip()}lux")
-    if unit not in UNITS:
-        raise unknown("level: unit", unit, UNITS)
+    require_name("level: unit", unit, UNITS)
     require_range("level", value, 1e-9, 1e12, f"give a level above 0, such as 25{unit}")
     return value, unit
 

@@ -11,7 +11,7 @@ from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_fields, require_range, require_whole, unknown
+from rodcone.errors import InputError, require_fields, require_keys, require_range, require_whole, unknown
 from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
@@ -266,9 +266,7 @@ def _check_axes(study: Study) -> None:
 
 def _check_cameras(study: Study) -> None:
     """Check white balances and processors, and sensors with the mosaics that these take."""
-    for balance in study.white_balances:
-        if balance not in WHITE_BALANCES:
-            raise unknown("white_balances", balance, WHITE_BALANCES)
+    require_keys("white_balances", study.white_balances, WHITE_BALANCES)
     for name in study.processors:
         require_consent("processors", name, study.trust_code)
         processor_of(name)

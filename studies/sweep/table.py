@@ -13,7 +13,7 @@ from PIL import Image
 
 from render.illuminants import is_light_file
 from rodcone.colour_spaces import decode_srgb
-from rodcone.errors import InputError, unknown
+from rodcone.errors import InputError, require_keys, unknown
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
 from studies.metrics.chart_colours import daylight_delta_e, pair_delta_e, true_pair_delta_e
@@ -70,9 +70,7 @@ def lines(
         For an unknown axis or figure, a figure that the scene doesn't have, or lines whose cells differ in more than
         their seeds: a mean over lights, cameras or versions says nothing.
     """
-    for axis in (*by, *where):
-        if axis not in AXES:
-            raise unknown("axis", axis, AXES)
+    require_keys("axis", (*by, *where), AXES)
     for name in show:
         if name not in (*FIGURES, *CHARTS, TRUE_PAIRS) and not name.startswith(ELECTRONS):
             raise unknown("show", name, (*FIGURES, *CHARTS, TRUE_PAIRS, f"{ELECTRONS}W"))
