@@ -21,9 +21,9 @@ from sensor.config import SensorConfig, with_tile
 from sensor.presets import preset, preset_file
 from sensor.variations import VARIATIONS, vary
 from studies.commands.expect import levels_between
-from studies.design.expect import expect
+from studies.design.expect import ExpectedError, expect
 from studies.design.filters import best_filters
-from studies.design.search import Goal, Known, best_tile, search_for
+from studies.design.search import Goal, Known, best_tile
 from studies.pages.design_page import design_page, tile_text
 
 SIDES = {"2x2": 2, "4x4": 4}
@@ -130,8 +130,12 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     """
     base, levels = preset(sensor), order.levels
     goal = order.goal(base)
-    search = search_for(goal)
     tile = () if order.tile in SIDES else vary(base, order.tile).cfa
+
+    def errors(camera: SensorConfig) -> list[ExpectedError]:
+        return expect(camera, goal.levels_cd_m2, order.light, prior=order.prior)
+
+    by_camera = {order.never_worse_than: errors(vary(base, order.never_worse_than))}
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
@@ -141,7 +145,7 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
     with progress(sys.stderr) as step:
         if not tile:
             try:
-                tile = best_tile(search, SIDES[order.tile], order.steps, order.seed, tried_gains_db, step)
+                tile = best_tile(goal, SIDES[order.tile], order.steps, order.seed, tried_gains_db, step)
             finally:
                 write_files({tried: json.dumps({"question": question, "gains_db": tried_gains_db})})
         camera = with_tile(base, tile, base.responses)
@@ -157,10 +161,8 @@ def design(sensor: str, /, order: Annotated[DesignOrder, Parameter(name="*")] = 
         and not name.startswith("bayer_")
         and (curves >= set("RGBW") or curves >= {*"".join(rows)})
     ]
-    cameras = {order.never_worse_than: vary(base, order.never_worse_than), "design": camera}
-    cameras |= {name: vary(base, name) for name in names if name != order.never_worse_than}
-    at_cd_m2 = goal.levels_cd_m2.tolist()
-    by_camera = {name: expect(one, at_cd_m2, order.light, prior=order.prior) for name, one in cameras.items()}
+    by_camera["design"] = errors(camera)
+    by_camera |= {name: errors(vary(base, name)) for name in names if name != order.never_worse_than}
     _write(out, sensor, camera, order.filters)
     write_files({out / "design.html": design_page(goal, camera, levels, by_camera, len(tried_gains_db))})
     print(f"{tile_text(tile)}\n{out}")

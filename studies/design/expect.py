@@ -199,6 +199,7 @@ def expect(
         sampled(patches, sampling, middle_pixels(), lens_of(sensor, blur))
         for patches in (spectral.patches, pooled_patches(prior))
     )
+    by_light: dict[str, tuple[list[float], float]] = {}
     result = []
     for level_cd_m2 in levels_cd_m2:
         white_cd_m2 = float(level_cd_m2) / spectral.reflectances.mean()
@@ -209,8 +210,11 @@ def expect(
         )
         noise = noise_at(sensor, time_s, np.maximum(drawn, 0.0) * (white_cd_m2 * time_s))
         scales = spectral.reflectances * white_cd_m2 * time_s
-        errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
-        linear_error = _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
+        key = f"{white_cd_m2 * time_s:.9g} {noise}"  # at full exposure more light changes nothing
+        if key not in by_light:
+            errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
+            by_light[key] = errors, _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
+        errors, linear_error = by_light[key]
         result.append(
             ExpectedError(
                 luminance_cd_m2=float(level_cd_m2),

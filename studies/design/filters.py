@@ -1,20 +1,29 @@
 """Filters of the least expected error for a tile, by the slope of the closed form."""
 
-from dataclasses import replace
-
 import numpy as np
 from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
 from isp.design.slope import error_slopes
-from isp.design.spectral_prior import load_prior
+from isp.design.spectral_prior import SpectralPrior, load_prior
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from studies.design.expect import middle_pixels, sites_of, spread_of, unit_response_e, view_of
-from studies.design.search import BEHIND, Goal, Progress, moments, rows_of, search_for, tile_db
+from sensor.exposure import exposure_of_electrons_s
+from studies.design.expect import (
+    LitPrior,
+    drawn_pixels,
+    metric_rows,
+    middle_pixels,
+    noise_at,
+    sites_of,
+    spread_of,
+    unit_response_e,
+    view_of,
+)
+from studies.design.search import BEHIND, Goal, Progress, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
 
@@ -41,9 +50,8 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     if "W" not in goal.sensor.responses.curves:
         raise InputError("curves: the sensor has no W, the response without a filter; add W to its responses")
     # What all rounds share.
-    search = search_for(replace(goal, letters=goal.letters + "W"))
     prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
-    reference_db = tile_db(search, goal.reference)
+    reference_db = tile_db(goal, goal.reference)
     places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
     rows = [rows_of(prior, seen, mean) for mean in prior.reflectances]
@@ -97,3 +105,23 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         if number < rounds:
             logits = minimize(cost, logits, (at,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
     return sensor_of(best[1])
+
+
+def rows_of(prior: SpectralPrior, seen: LitPrior, reflectance: float) -> tuple[Floats, ...]:
+    """R of encoded sRGB, of encoded luminance, and of a* and b*."""
+    srgb, luminance, _, colour = metric_rows(prior, seen, reflectance)
+    return srgb, luminance, colour
+
+
+def moments(goal: Goal, sensor: SensorConfig, responses: Floats) -> list[tuple[float, Noise]]:
+    """Luminance times exposure of reflectance 1 [cd s m^-2], and the noise, at each level by the goal's rule.
+
+    `responses` are those of the sensor's channels, shape (channel, coefficient).
+    """
+    per_second_e = np.maximum(drawn_pixels(goal.prior) @ responses.T, 0.0)
+    result = []
+    for white_cd_m2 in goal.levels_cd_m2 / load_prior(goal.prior).reflectances.mean():
+        time_s = exposure_of_electrons_s(goal.exposure, per_second_e * white_cd_m2, sensor)
+        light = float(white_cd_m2 * time_s)
+        result.append((light, noise_at(sensor, time_s, per_second_e * light)))
+    return result

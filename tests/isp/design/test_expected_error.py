@@ -5,7 +5,6 @@ import pytest
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
-from isp.design.choice import picked, projected
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
 from isp.design.slope import error_slopes
 
@@ -199,21 +198,3 @@ def test_the_slope_is_that_of_differences() -> None:
         difference = (errors_of(sampling + step) - errors_of(sampling - step)) / 6e-5
         atol = 1e-9 * np.abs(slopes).max()
         assert_allclose(slopes[:, *place], difference, rtol=1e-6, atol=atol, err_msg=str(place))
-
-
-def test_a_tile_picks_its_samples() -> None:
-    prior, rng = mixture(2), np.random.default_rng(8)
-    responses, channel = rng.uniform(0.5, 1.0, (3, COEFFICIENTS)), rng.integers(3, size=PIXELS)
-    spread = np.eye(PIXELS) + 0.1 * rng.random((PIXELS, PIXELS))
-    rows = rng.standard_normal((2, len(MIDDLE), 2, COEFFICIENTS))
-    noise = Noise(dark_e=2.0, prnu=0.01, full_e=60.0)
-    sampling = spread[:, :, None] * responses[channel]
-    more = rng.standard_normal((2, len(MIDDLE), 1, COEFFICIENTS))
-    forms = np.stack([row.swapaxes(-1, -2) @ row for row in (rows, more)])
-    plain = expected_error(prior.weights, sampled(prior, sampling, MIDDLE), np.full(PIXELS, 30.0), noise, forms)
-    every = np.einsum("nc,sp->nspc", responses, np.eye(PIXELS)).reshape(-1, PIXELS, COEFFICIENTS)
-    chosen = projected(sampled(prior, every, MIDDLE), rows, more)
-    samples = picked(chosen.samples, channel, spread)
-    assert_allclose(
-        expected_error(prior.weights, samples, np.full(PIXELS, 30.0), noise, chosen.forms), plain, rtol=1e-10
-    )
