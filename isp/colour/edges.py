@@ -29,18 +29,19 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
     Of the light's variation 0.7 is shading of the mean colour: C' = 0.3 C + 0.7 e m m^T. Samples S_y of channels o_y,
     at distances of r pixels, are correlated by exp(-r^2 / 2). Their best linear estimate of the channels is
 
-        E_c = m_c + sum_yz C'(c, o_y) exp(-r_y^2 / 2) [C'(o_y, o_z) exp(-r_yz^2 / 2) + N_o_y delta_yz]^-1 (S_z - m_o_z),
+        E_c = m_c + sum_yz C'(c, o_y) exp(-r_y^2 / 2) [C'(o_y, o_z) exp(-r_yz^2 / 2) + N_y delta_yz]^-1 (S_z - m_o_z),
 
-    without samples that are full. It counts less where contrast is a lamp's and the samples lie on their
-    planes, by chi^2, their mean squared distance over N:
+    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. It counts less where
+    contrast is a lamp's and the samples lie on their planes, by chi^2, their mean squared distance over N_y:
 
         F = P + max(0, 1 - e^4 / (1 + chi^2)) (E - P).
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
-    the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
-    contrast, any hue where a colour is, q = min(1, e). Balanced by the gains g, channels rise to the brightest:
+    the samples, u = min(1, chi^2 / 30), or one of the nine is full, u = 1; nor the light of that channel, q_c = 1; nor,
+    as far as there is contrast, any hue where a colour is, q = min(1, e). Balanced by the gains g, channels rise to the
+    brightest:
 
-        F'_c = F_c + max((1 - 1 / e^2) min(1, chi^2 / 30), q, q_c) (max_d g_d F_d / g_c - F_c).
+        F'_c = F_c + max((1 - 1 / e^2) u, q, q_c) (max_d g_d F_d / g_c - F_c).
 
     Parameters
     ----------
@@ -84,9 +85,10 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     covariance = (1.0 - SHADING) * covariance + SHADING * shading
 
     # The best linear estimate.
+    value = np.take_along_axis(near, site[..., None, :], axis=2)[:, :, 0]
     to_samples = np.take_along_axis(covariance, site[..., None, :], axis=3)  # (h, w, channel, sample)
     among_samples = np.take_along_axis(to_samples, site[..., None], axis=2)  # (h, w, sample, sample)
-    sample_noise = np.take_along_axis(noise, site, axis=2)
+    sample_noise = np.maximum(shot[site] * np.maximum(value, 0.0) + dark[site], TINY_E)
     is_full = sample >= full_e[site]
     counted = np.where(is_full, UNKNOWN, sample_noise)
     residual = sample - np.take_along_axis(mean, site, axis=2)
@@ -94,13 +96,13 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
     # As far as an edge was missed.
-    value = np.take_along_axis(near, site[..., None, :], axis=2)[:, :, 0]
     chi_squared = ((sample - value) ** 2 / sample_noise).mean(axis=2, keepdims=True)
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + chi_squared), 0.0) * (estimate - plane)
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
-    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * np.minimum(chi_squared / MISSED, 1.0)
+    missed = np.where(full.any(axis=2, keepdims=True), 1.0, np.minimum(chi_squared / MISSED, 1.0))
+    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
     hue = np.where(full[..., :3].any(axis=2, keepdims=True), np.minimum(contrast, 1.0), lamp)
     unknown = np.where(full, 1.0, hue)
     return np.asarray(sharp + unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp))

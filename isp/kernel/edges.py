@@ -77,7 +77,9 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     among_samples = [
         [float(CORRELATION[y, z]) * _pick([*to_samples[y]], site[z]) for z in range(y + 1)] for y in range(9)
     ]
-    sample_noise = [_pick([*noise], s) for s in site]
+    value = [_pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
+    noises = [(_pick([*shot], s), _pick([*dark], s)) for s in site]
+    sample_noise = [larger(k * larger(v, 0.0) + d, TINY_E) for v, (k, d) in zip(value, noises, strict=True)]
     is_full = [e >= _pick([*full_e], s) for e, s in zip(sample, site, strict=True)]
     counted = [dr.select(f, UNKNOWN, n) for f, n in zip(is_full, sample_noise, strict=True)]
     residual = [e - _pick([*mean], s) for e, s in zip(sample, site, strict=True)]
@@ -86,7 +88,6 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     estimate = mean + sum(terms[1:], terms[0])
 
     # As far as an edge was missed.
-    value = [_pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
     squares = [dr.square(e - v) / n for e, v, n in zip(sample, value, sample_noise, strict=True)]
     chi_squared = sum(squares[1:], squares[0]) / 9.0
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared), 0.0) * (estimate - plane)
@@ -94,17 +95,13 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     # Light of unknown colour.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
     full = reduce(or_, channels_full)  # a bit a channel
-    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * dr.minimum(chi_squared / MISSED, 1.0)
+    missed = dr.select(full > 0, 1.0, dr.minimum(chi_squared / MISSED, 1.0))
+    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
     hue = dr.select((full & 0b111) > 0, dr.minimum(contrast, 1.0), lamp)
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
-    brightest = reduce(larger, [*(sharp * balance)])
+    risen = sharp + unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
     result = dr.empty(jit.Float, planes.size)
-    dr.scatter(
-        result,
-        sharp + unknown * (brightest / balance - sharp),
-        dr.arange(jit.UInt, height * width),
-        mode=dr.ReduceMode.NoConflicts,
-    )
+    dr.scatter(result, risen, dr.arange(jit.UInt, height * width), mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
     return np.asarray(result.numpy().reshape(planes.shape))
 

@@ -53,17 +53,16 @@ def by_hand(raw, planes, gains, row, column):
     apart = [[np.exp(-((i - k) ** 2 + (j - m) ** 2) / 2.0) for k, m in places] for i, j in places]
     samples = np.array([raw.electrons[place] for place in places])
     kept = np.flatnonzero(samples < 0.95 * raw.full_well_e)
-    matrix = np.array(
-        [[covariance[own[a], own[b]] * apart[a][b] + noise[own[a]] * (a == b) for b in kept] for a in kept]
-    )
+    on_planes = np.array([planes[place][o] for place, o in zip(places, own, strict=True)])
+    read = on_planes + dark  # noise of a sample on its plane
+    matrix = np.array([[covariance[own[a], own[b]] * apart[a][b] + read[a] * (a == b) for b in kept] for a in kept])
     to_pixel = np.array([[covariance[c, own[a]] * apart[4][a] for a in kept] for c in range(4)])
     estimate = mean + to_pixel @ np.linalg.inv(matrix) @ (samples - mean[own])[kept]
-    on_planes = np.array([planes[place][o] for place, o in zip(places, own, strict=True)])
-    chi_squared = np.mean((samples - on_planes) ** 2 / noise[own])
+    chi_squared = np.mean((samples - on_planes) ** 2 / read)
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + chi_squared))
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
-    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, chi_squared / 30.0)
+    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * (1.0 if any(full) else min(1.0, chi_squared / 30.0))
     unknown = np.where(full, 1.0, max(lamp, min(1.0, contrast) * any(full[:3])))
     return sharp + unknown * ((gains * sharp).max() / gains - sharp)
 
@@ -134,6 +133,14 @@ def test_a_lamp_of_a_pixel_has_no_colour():
     planes[8, 8] = [3000.0, 6000.0, 1000.0, 10_000.0]
     balanced = sharpen(frame(2.0 * planes), planes, GAINS)[8, 8] * GAINS
     assert np.ptp(balanced) < 0.003 * balanced.max()
+
+
+def test_a_lamp_that_red_and_blue_miss_is_white():
+    """On a column of G and W, which is full, planes are as the samples are: the lamp was green."""
+    levels, light = np.array([0.5, 1.0, 0.5, 4.8]), np.full((32, 32), 20.0)
+    light[15:18, 15] = 6000.0
+    rgb = picture_interleaved(frame(np.minimum(light[..., None] * levels, 15_000.0)), np.eye(3), balance=levels).rgb
+    assert np.ptp(rgb[16, 15]) < 0.1 * rgb[16, 15].max()
 
 
 def test_what_fills_half_of_a_window_keeps_its_colour():
