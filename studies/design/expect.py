@@ -194,7 +194,7 @@ def expect(
     spectral, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     responses = responses_e(sensor, seen)
-    sampling, drawn = sampling_of(sensor, responses, blur), drawn_pixels(prior) @ responses.T
+    sampling, frame_e = sampling_of(sensor, responses, blur), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
     known, linear = (
         sampled(patches, sampling, middle_pixels(), lens_of(sensor, blur))
         for patches in (spectral.patches, pooled_patches(prior))
@@ -203,12 +203,7 @@ def expect(
     result = []
     for level_cd_m2 in levels_cd_m2:
         white_cd_m2 = float(level_cd_m2) / spectral.reflectances.mean()
-        time_s = (
-            exposure_of_electrons_s(exposure, np.maximum(drawn, 0.0) * white_cd_m2, sensor)
-            if isinstance(exposure, str)
-            else exposure
-        )
-        noise = noise_at(sensor, time_s, np.maximum(drawn, 0.0) * (white_cd_m2 * time_s))
+        time_s, noise = exposed(sensor, frame_e * white_cd_m2, exposure)
         scales = spectral.reflectances * white_cd_m2 * time_s
         key = f"{white_cd_m2 * time_s:.9g} {noise}"  # at full exposure more light changes nothing
         if key not in by_light:
@@ -265,10 +260,14 @@ def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise,
     return [float(error) for error in np.mean(errors, axis=0)]
 
 
-def noise_at(sensor: SensorConfig, exposure_s: float, frame_e: Floats) -> Noise:
-    """Noise of a sample in a frame of given electrons behind every filter, by which channels may be read apart."""
-    camera = as_metered(sensor, behind_filters(frame_e, sensor)) if sensor.chip.channels else sensor
-    return noise_of(camera, exposure_s)
+def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -> tuple[float, Noise]:
+    """Exposure of a frame by a rule or a time [s], and the noise of a sample; channels may be read apart by the frame.
+
+    `per_second_e` are electrons behind every filter, shape (h, w, channel).
+    """
+    time_s = exposure_of_electrons_s(exposure, per_second_e, sensor) if isinstance(exposure, str) else exposure
+    metered = as_metered(sensor, behind_filters(per_second_e * time_s, sensor)) if sensor.chip.channels else sensor
+    return time_s, noise_of(metered, time_s)
 
 
 def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:

@@ -5,19 +5,17 @@ from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
 from isp.design.slope import error_slopes
-from isp.design.spectral_prior import SpectralPrior, load_prior
+from isp.design.spectral_prior import load_prior
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from sensor.exposure import exposure_of_electrons_s
 from studies.design.expect import (
-    LitPrior,
     drawn_pixels,
+    exposed,
     metric_rows,
     middle_pixels,
-    noise_at,
     sites_of,
     spread_of,
     unit_response_e,
@@ -54,7 +52,9 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     reference_db = tile_db(goal, goal.reference)
     places = sites_of(tile, names)
     spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
-    rows = [rows_of(prior, seen, mean) for mean in prior.reflectances]
+    rows = [[every[metric] for metric in (0, 1, 3)] for every in
+            (metric_rows(prior, seen, mean) for mean in prior.reflectances)]  # fmt: skip
+    whites_cd_m2 = goal.levels_cd_m2 / prior.reflectances.mean()
     # Electrons of a channel from each coefficient: transmittance times `clear_e`, which has the clear pixel's response.
     nm = seen.light.wavelength_nm
     curves = {
@@ -98,30 +98,12 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     logits = np.linalg.lstsq(bumps, np.log(start / (1 - start)).T, rcond=1e-6)[0].T.ravel()
     best = (np.inf, logits)
     for number in range(rounds + 1):
-        at = [(round(light, 9), noise) for light, noise in
-              moments(goal, sensor_of(logits), transmittances(logits) @ clear_e)]  # fmt: skip
+        sensor = sensor_of(logits)
+        frame_e = np.maximum(drawn_pixels(goal.prior) @ (transmittances(logits) @ clear_e).T, 0.0)
+        exposures = [exposed(sensor, frame_e * white_cd_m2, goal.exposure) for white_cd_m2 in whites_cd_m2]
+        at = [(round(white * time_s, 9), noise) for white, (time_s, noise) in zip(whites_cd_m2, exposures, strict=True)]
         best = min(best, (cost(logits, at)[0], logits), key=lambda pair: pair[0])
         progress(f"filters {-best[0]:+.2f} dB", number / (rounds + 1))
         if number < rounds:
             logits = minimize(cost, logits, (at,), "L-BFGS-B", jac=True, options={"maxiter": 8}).x
     return sensor_of(best[1])
-
-
-def rows_of(prior: SpectralPrior, seen: LitPrior, reflectance: float) -> tuple[Floats, ...]:
-    """R of encoded sRGB, of encoded luminance, and of a* and b*."""
-    srgb, luminance, _, colour = metric_rows(prior, seen, reflectance)
-    return srgb, luminance, colour
-
-
-def moments(goal: Goal, sensor: SensorConfig, responses: Floats) -> list[tuple[float, Noise]]:
-    """Luminance times exposure of reflectance 1 [cd s m^-2], and the noise, at each level by the goal's rule.
-
-    `responses` are those of the sensor's channels, shape (channel, coefficient).
-    """
-    per_second_e = np.maximum(drawn_pixels(goal.prior) @ responses.T, 0.0)
-    result = []
-    for white_cd_m2 in goal.levels_cd_m2 / load_prior(goal.prior).reflectances.mean():
-        time_s = exposure_of_electrons_s(goal.exposure, per_second_e * white_cd_m2, sensor)
-        light = float(white_cd_m2 * time_s)
-        result.append((light, noise_at(sensor, time_s, per_second_e * light)))
-    return result
