@@ -121,7 +121,7 @@ def finish(
     planes : (h, w, 3) float64
         Demosaicked channels [e-].
     matrix, neutral, balance
-        As `isp.pipeline.picture_interleaved`.
+        As `isp.processors.catalogue.Processor.develop`.
     engine : "cuda", "llvm" or "numpy"
         What made the planes.
     noise_gain : (h, w, 3) array, optional

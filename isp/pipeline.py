@@ -1,7 +1,5 @@
 """The two cameras' pipelines: raw image in, scene-linear RGB out."""
 
-from numpy.typing import ArrayLike
-
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.edges import sharpen
 from isp.colour.highlights import clip_highlights
@@ -18,10 +16,9 @@ from sensor.raw import RawImage
 
 def picture_interleaved(
     raw: RawImage,
-    matrix: ArrayLike | ColourFit,
+    colours: ColourFit,
     *,
-    neutral: ArrayLike | None = None,
-    balance: ArrayLike | WhiteBalance | None = None,
+    balance: WhiteBalance,
     settings: Settings = DEFAULTS,
     substitution_snr: float = SUBSTITUTION_SNR,
     octaves: float = OCTAVES,
@@ -32,16 +29,11 @@ def picture_interleaved(
     ----------
     raw : RawImage
         Mosaic with R, G, B and W.
-    matrix : (3, 3) array_like or ColourFit
-        From balanced R, G, B to linear sRGB (`isp.colour.colour_fit.fit_matrix`). A fit of all channels
-        (`isp.colour.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as far as the noise
-        asks.
-    neutral : (channel,) array_like, optional
-        Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that are
-        too dark for Gray World. The project's own curves under D65 by default.
-    balance : (channel,) array_like, optional
-        Response to what should come out neutral, such as a file's as-shot neutral, in place of Gray World's means. Or
-        both as one `WhiteBalance`.
+    colours : ColourFit
+        A fit of all channels (`isp.colour.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as
+        far as the noise asks; one of a plain matrix (`ColourFit.of`) doesn't.
+    balance : WhiteBalance
+        Gray World's, or a response to what should come out neutral, such as a file's as-shot neutral.
     settings : Settings
         Of `isp.interleaved.reconstruct`.
     substitution_snr : float
@@ -57,18 +49,16 @@ def picture_interleaved(
     Raises
     ------
     InputError
-        For a mosaic with other channels, or a matrix, neutral or balance of another shape.
+        For a mosaic with other channels.
     """
     require_letters(raw, ("R", "G", "B", "W"))
-    colours = ColourFit.of(matrix)
-    white_balance = WhiteBalance.of(raw, neutral, balance)
 
     # The paper's own method stays as it is.
     ours, everything = settings.distance == "noise", raw
     if ours:
-        raw, unseen = without_unseen(raw, white_balance.response(raw))
+        raw, unseen = without_unseen(raw, balance.response(raw))
     result = reconstruct_with_noise(raw, settings)
-    gains, sources = white_balance.gains(raw, result.estimate)
+    gains, sources = balance.gains(raw, result.estimate)
     noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
     snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr, octaves)
@@ -88,10 +78,9 @@ def picture_interleaved(
 
 def picture_interleaved_paper(
     raw: RawImage,
-    matrix: ArrayLike | ColourFit,
+    colours: ColourFit,
     *,
-    neutral: ArrayLike | None = None,
-    balance: ArrayLike | WhiteBalance | None = None,
+    balance: WhiteBalance,
     settings: Settings = PAPER,
     substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
@@ -102,8 +91,7 @@ def picture_interleaved_paper(
     """
     return picture_interleaved(
         raw,
-        ColourFit.of(matrix).matrix(),
-        neutral=neutral,
+        ColourFit.of(colours.matrix()),
         balance=balance,
         settings=settings,
         substitution_snr=substitution_snr,
@@ -111,13 +99,7 @@ def picture_interleaved_paper(
     )
 
 
-def picture_bayer(
-    raw: RawImage,
-    matrix: ArrayLike | ColourFit,
-    *,
-    neutral: ArrayLike | None = None,
-    balance: ArrayLike | WhiteBalance | None = None,
-) -> Picture:
+def picture_bayer(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a Bayer raw image: bilinear demosaicking, Gray World, matrix; parameters as `picture_interleaved`."""
     require_letters(raw, ("R", "G", "B"))
-    return finish(raw, bilinear(raw), matrix, neutral=neutral, balance=balance)
+    return finish(raw, bilinear(raw), colours, balance=balance)

@@ -73,17 +73,22 @@ class Processor:
         matrix: ArrayLike | ColourFit,
         *,
         neutral: ArrayLike | None = None,
-        balance: ArrayLike | None = None,
+        balance: ArrayLike | WhiteBalance | None = None,
         **options: Any,
     ) -> Picture:
         """Develop a raw image; no processor sees defective pixels: they are replaced first.
 
         Parameters
         ----------
-        raw, neutral, balance
-            As `isp.pipeline.picture_interleaved`.
+        raw : RawImage
         matrix : (3, 3) array_like or ColourFit
-            From the balanced channels `colours` to linear sRGB.
+            From the balanced channels `colours` to linear sRGB (`isp.colour.colour_fit.fit_matrix`, `fit_colours`).
+        neutral : (channel,) array_like, optional
+            Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that
+            are too dark for Gray World. The project's own curves under D65 by default.
+        balance : (channel,) array_like or WhiteBalance, optional
+            Response to what should come out neutral, such as a file's as-shot neutral, in place of Gray World's means.
+            Or both as one `WhiteBalance`.
         **options
             The processor's own, such as `substitution_snr`.
         """

@@ -8,7 +8,7 @@ from builders import BAYER_PHASES, RGBW_PHASES, raw_image
 
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct
-from isp.pipeline import picture_bayer, picture_interleaved
+from isp.processors.catalogue import NAMED
 from isp.settings import DEFAULTS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
@@ -16,6 +16,7 @@ from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, Tile, channels, mask
 from sensor.raw import RawImage
 
+INTERLEAVED, CONVENTIONAL = NAMED["interleaved"].develop, NAMED["bayer"].develop
 IDENTITY = np.eye(3)
 
 
@@ -30,7 +31,7 @@ def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32)
 
 def test_a_flat_field_stays_flat_to_the_border_in_every_phase() -> None:
     levels, shape = {"R": 500, "G": 1000, "B": 400, "W": 5000}, (30, 33)
-    for tiles, develop, rel in ((RGBW_PHASES, picture_interleaved, 1e-5), (BAYER_PHASES, picture_bayer, 1e-9)):
+    for tiles, develop, rel in ((RGBW_PHASES, INTERLEAVED, 1e-5), (BAYER_PHASES, CONVENTIONAL, 1e-9)):
         for cfa in tiles:
             picture = develop(raw(cfa, levels, shape), IDENTITY)
             assert picture.rgb == pytest.approx(np.full((*shape, 3), 1000.0), rel=rel), cfa
@@ -39,37 +40,37 @@ def test_a_flat_field_stays_flat_to_the_border_in_every_phase() -> None:
 def test_both_pipelines_agree_on_a_flat_field() -> None:
     levels = {"R": 300, "G": 800, "B": 250, "W": 4000}
     matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
-    ours = picture_interleaved(raw(RGBW, levels), matrix)
-    theirs = picture_bayer(raw(BAYER, levels), matrix)
+    ours = INTERLEAVED(raw(RGBW, levels), matrix)
+    theirs = CONVENTIONAL(raw(BAYER, levels), matrix)
     assert ours.rgb.mean(axis=(0, 1)) == pytest.approx(theirs.rgb.mean(axis=(0, 1)), rel=1e-5)
 
 
 def test_interleaved_says_which_engine_ran() -> None:
-    assert picture_interleaved(raw(RGBW, dict.fromkeys("RGBW", 100.0)), IDENTITY).engine == backend()
+    assert INTERLEAVED(raw(RGBW, dict.fromkeys("RGBW", 100.0)), IDENTITY).engine == backend()
 
 
 def test_substitution_follows_its_threshold() -> None:
     image = raw(RGBW, {"R": 10, "G": 20, "B": 8, "W": 100}, noise_e=20.0)
-    picture = picture_interleaved(image, IDENTITY)
+    picture = INTERLEAVED(image, IDENTITY)
     assert picture.snr is not None
     assert picture.snr < 4.95
     assert picture.substituted is True
-    assert picture_interleaved(image, IDENTITY, substitution_snr=0.0).substituted is False
+    assert INTERLEAVED(image, IDENTITY, substitution_snr=0.0).substituted is False
     bright = raw(RGBW, {"R": 500, "G": 1000, "B": 400, "W": 5000})
-    assert picture_interleaved(bright, IDENTITY).substituted is False
+    assert INTERLEAVED(bright, IDENTITY).substituted is False
 
 
 def test_substitution_lowers_luminance_noise_a_lot() -> None:
     image = raw(RGBW, {"R": 10, "G": 20, "B": 8, "W": 100}, (96, 96), noise_e=20.0)
     small = replace(DEFAULTS, neighbourhood=5)
-    noisy = luminance_of_srgb(picture_interleaved(image, IDENTITY, substitution_snr=0.0, settings=small).rgb).std()
-    clean = luminance_of_srgb(picture_interleaved(image, IDENTITY, settings=small).rgb).std()
+    noisy = luminance_of_srgb(INTERLEAVED(image, IDENTITY, substitution_snr=0.0, settings=small).rgb).std()
+    clean = luminance_of_srgb(INTERLEAVED(image, IDENTITY, settings=small).rgb).std()
     assert clean < noisy / 3  # W has five times green's signal at the same noise
 
 
 def test_dark_frame_is_balanced_by_calibration_and_says_so() -> None:
     image = raw(RGBW, {"R": 0.0, "G": 0.1, "B": 0.0, "W": 0.5}, noise_e=20.0)
-    picture = picture_interleaved(image, IDENTITY)
+    picture = INTERLEAVED(image, IDENTITY)
     assert set(picture.balance.values()) == {"calibrated"}
     assert np.all(np.isfinite(picture.rgb))
 
@@ -77,7 +78,7 @@ def test_dark_frame_is_balanced_by_calibration_and_says_so() -> None:
 def test_clipped_highlight_stays_neutral() -> None:
     image = raw(BAYER, {"R": 500, "G": 1000, "B": 400})
     image.dn[8:16, 8:16] = 15_100
-    patch = picture_bayer(image, IDENTITY).rgb[10:14, 10:14]
+    patch = CONVENTIONAL(image, IDENTITY).rgb[10:14, 10:14]
     assert patch == pytest.approx(np.full((4, 4, 3), 15_000.0), rel=1e-9)
 
 
@@ -89,16 +90,16 @@ def test_saturated_w_does_not_shift_the_colours_balance() -> None:
     gains, _ = WhiteBalance.of(image, None).gains(image, planes)
     assert (planes * gains)[..., :3].mean(axis=(0, 1)) == pytest.approx([3000.0] * 3, rel=1e-4)
     # Away from the seam, whose sharpening moves the frame's mean, the picture has these gains.
-    picture, half = picture_interleaved(image, IDENTITY), (planes * gains)[..., :3]
+    picture, half = INTERLEAVED(image, IDENTITY), (planes * gains)[..., :3]
     for columns in (slice(0, 12), slice(20, 32)):
         assert picture.rgb[:, columns] == pytest.approx(half[:, columns], rel=1e-3)
 
 
 def test_wrong_mosaic_is_refused() -> None:
     with pytest.raises(InputError, match=r"^raw: mosaic .* allowed here: .*; use the other camera's pipeline"):
-        picture_interleaved(raw(BAYER, {"R": 1, "G": 1, "B": 1}), IDENTITY)
+        INTERLEAVED(raw(BAYER, {"R": 1, "G": 1, "B": 1}), IDENTITY)
     with pytest.raises(InputError, match=r"^raw: mosaic"):
-        picture_bayer(raw(RGBW, dict.fromkeys("RGBW", 1.0)), IDENTITY)
+        CONVENTIONAL(raw(RGBW, dict.fromkeys("RGBW", 1.0)), IDENTITY)
 
 
 def test_a_given_balance_takes_the_place_of_gray_world() -> None:
@@ -108,15 +109,15 @@ def test_a_given_balance_takes_the_place_of_gray_world() -> None:
     # response 1 : 2 : 1 (: 4): R and B doubled, so that balanced signals are 1000, 1000 and 800
     expected = [1000.0, 1000.0, 800.0]
     for picture, names in (
-        (picture_interleaved(four, matrix, balance=[1, 2, 1, 4]), "RGBW"),
-        (picture_bayer(three, matrix, neutral=[7, 1, 7], balance=[1, 2, 1]), "RGB"),
+        (INTERLEAVED(four, matrix, balance=[1, 2, 1, 4]), "RGBW"),
+        (CONVENTIONAL(three, matrix, neutral=[7, 1, 7], balance=[1, 2, 1]), "RGB"),
     ):
         assert picture.rgb == pytest.approx(np.full((32, 32, 3), expected), rel=1e-5)
         assert picture.balance == dict.fromkeys(names, "given")
 
 
 def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
-    linear = picture_bayer(raw(BAYER, {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
+    linear = CONVENTIONAL(raw(BAYER, {"R": 500, "G": 1000, "B": 400}, (16, 18)), IDENTITY)
     assert linear.shape == (16, 18, 3)
     assert np.asarray(linear) is linear.rgb
     assert np.asarray(linear, dtype=np.float32).dtype == np.float32
@@ -128,11 +129,11 @@ def test_a_picture_is_its_linear_rgb_to_numpy() -> None:
 def test_wrong_matrix_or_neutral_is_refused() -> None:
     image = raw(BAYER, {"R": 1, "G": 1, "B": 1})
     with pytest.raises(InputError, match=r"^matrix: shape \(2, 3\)"):
-        picture_bayer(image, np.ones((2, 3)))
+        CONVENTIONAL(image, np.ones((2, 3)))
     with pytest.raises(InputError, match=r"^neutral: \[1.0, 0.0, 1.0\]"):
-        picture_bayer(image, IDENTITY, neutral=[1, 0, 1])
+        CONVENTIONAL(image, IDENTITY, neutral=[1, 0, 1])
     with pytest.raises(InputError, match=r"^balance: \[1.0, inf, 1.0\]"):
-        picture_bayer(image, IDENTITY, balance=[1, np.inf, 1])
+        CONVENTIONAL(image, IDENTITY, balance=[1, np.inf, 1])
 
 
 def test_gray_world_leaves_saturated_pixels_out() -> None:
@@ -140,5 +141,5 @@ def test_gray_world_leaves_saturated_pixels_out() -> None:
     shape, levels = (32, 64), {"R": 500.0, "G": 1000.0, "B": 400.0}
     left = raw(BAYER, levels, shape)
     bright = raw(BAYER, {channel: 30 * value for channel, value in levels.items()}, shape)
-    picture = picture_bayer(replace(left, dn=np.where(np.arange(64) < 32, left.dn, bright.dn)), IDENTITY)
+    picture = CONVENTIONAL(replace(left, dn=np.where(np.arange(64) < 32, left.dn, bright.dn)), IDENTITY)
     assert picture.rgb[:, :28] == pytest.approx(np.full((32, 28, 3), 1000.0), rel=1e-9)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import RGBW_4X4, RGBW_PHASES, raw_image
 
-from isp.pipeline import picture_interleaved
+from isp.processors.catalogue import NAMED
 from isp.unseen import draw_unseen, without_unseen
 from sensor.cfa import RGBW, mask, quad
 
@@ -107,7 +107,7 @@ def test_a_lamp_of_one_pixel_is_drawn_there_alone_and_neutral():
         electrons = np.random.default_rng(3).normal(0.0, 1.5, (32, 32))
         place = 16 + at[0], 16 + at[1]
         electrons[place] = 15_000.0
-        rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
+        rgb = NAMED["interleaved"].develop(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
         assert rgb[place] == pytest.approx(15_000.0, rel=1e-3), at
         rgb[place] = 0.0
         assert np.abs(rgb).max() < 3.0, at
@@ -117,7 +117,7 @@ def test_a_line_goes_on_through_a_colour_that_it_has_little_of():
     """Sodium light on a column of R and B: B is within what W allows, and was dark between white dots."""
     electrons = np.zeros((40, 20))
     electrons[10:31:2, 10] = 4000.0
-    rgb = picture_interleaved(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
+    rgb = NAMED["interleaved"].develop(exposure(electrons), np.eye(3), balance=np.ones(4)).rgb
     assert rgb[10:31, 10] == pytest.approx(np.full((21, 3), 4000.0), rel=1e-6)
     assert np.abs(rgb[10:31, [9, 11]]).max() < 3.0
 

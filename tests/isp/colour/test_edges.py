@@ -9,7 +9,7 @@ from scipy.ndimage import gaussian_filter
 
 from isp.colour import edges
 from isp.colour.edges import sharpen
-from isp.pipeline import picture_interleaved
+from isp.processors.catalogue import NAMED
 from rodcone.jit import backend
 from sensor.cfa import RGBW, channels, mask, quad
 
@@ -139,7 +139,11 @@ def test_a_lamp_that_red_and_blue_miss_is_white():
     """On a column of G and W, which is full, planes are as the samples are: the lamp was green."""
     levels, light = np.array([0.5, 1.0, 0.5, 4.8]), np.full((32, 32), 20.0)
     light[15:18, 15] = 6000.0
-    rgb = picture_interleaved(frame(np.minimum(light[..., None] * levels, 15_000.0)), np.eye(3), balance=levels).rgb
+    rgb = (
+        NAMED["interleaved"]
+        .develop(frame(np.minimum(light[..., None] * levels, 15_000.0)), np.eye(3), balance=levels)
+        .rgb
+    )
     assert np.ptp(rgb[16, 15]) < 0.1 * rgb[16, 15].max()
 
 
@@ -164,7 +168,7 @@ def test_a_lamp_full_in_every_colour_ends_in_white():
         light[14 + row : 17 + row, 14 + column : 17 + column] = 1.0
         light = 20.0 + 150_000.0 * gaussian_filter(light, 0.8)
         raw = frame(np.minimum(light[..., None] * levels, 15_000.0))
-        rgb = picture_interleaved(raw, np.eye(3), balance=levels).rgb
+        rgb = NAMED["interleaved"].develop(raw, np.eye(3), balance=levels).rgb
         assert rgb[light > 45_000.0] == pytest.approx(15_000.0), (row, column)
 
 
@@ -217,5 +221,5 @@ def test_a_small_full_patch_shows_no_tile():
         for name, level in levels.items():
             electrons[mask(RGBW, name, shape)] = level * light[mask(RGBW, name, shape)]
         raw = raw_image(np.minimum(np.rint(electrons), 15_000) + 100)
-        rgb = picture_interleaved(raw, np.eye(3), balance=np.array(list(levels.values()))).rgb
+        rgb = NAMED["interleaved"].develop(raw, np.eye(3), balance=np.array(list(levels.values()))).rgb
         assert np.ptp(rgb, axis=2).max() < 0.25 * 8000.0, (size, row, column)

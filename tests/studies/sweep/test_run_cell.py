@@ -16,8 +16,7 @@ from PIL import Image
 from refusal import refusal
 
 from isp.colour.colour_fit import fit_colours
-from isp.pipeline import picture_bayer
-from isp.processors.catalogue import PROCESSORS
+from isp.processors.catalogue import NAMED, PROCESSORS
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
@@ -74,7 +73,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.condition, "bayer", cell.seed))
     neutral = neutral_electrons(sensor, light, exposure_s)
     white = float(np.percentile(radiance.luminance(), 99.0, method="inverted_cdf")) / 0.9
-    linear = picture_bayer(raw, colours, balance=neutral).rgb / (neutral[1] * white)
+    linear = NAMED["bayer"].develop(raw, colours, balance=neutral).rgb / (neutral[1] * white)
     truth = true_srgb(radiance, light, white)
     encoded = encode_srgb(linear)
     quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, encoded, true_picture(truth), white)
