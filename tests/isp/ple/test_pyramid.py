@@ -63,6 +63,22 @@ def test_a_sample_far_under_0_leaves_no_dark_speck(tile, level_e, most):
     assert np.count_nonzero(shown < truth - 0.25) <= most
 
 
+def test_a_dark_detail_is_as_bright_as_its_signals_root_says():
+    # Its reading lies on the tangent at its surroundings' mean, so under 0 although the root isn't.
+    bend, size, place = 13.0, 64, (32, 31)
+    for root in (0.4, 0.8):
+        plane = np.ones((size, size - 1), np.float32)
+        for _ in range(20):  # the detail is part of the mean
+            mean = (plane[30:38, 28:36].clip(0).sum()) / 64
+            slope = (np.sqrt(mean * 1.001**2 + bend) - np.sqrt(mean * 0.999**2 + bend)) / (0.002 * mean**0.5)
+            plane[place] = (np.sqrt(mean + bend) + slope * (root - mean**0.5)) ** 2 - bend
+        assert plane[place] < root**2 - 0.03
+        for dark, expected in ((2.0, root**2), (0.0, plane[place])):
+            straight = plane.copy()
+            pyramid.straighten(straight, dark, bend)
+            assert straight[place] == pytest.approx(expected, abs=1e-3)
+
+
 @pytest.mark.thorough
 @pytest.mark.parametrize("tile", [RGBW, BAYER, RGBW_4X4, QUAD_BAYER, QUAD_RGBW])
 @pytest.mark.parametrize("side", [1, 4])
