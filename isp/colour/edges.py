@@ -37,11 +37,11 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
         F = P + max(0, 1 - e^4 / (1 + chi^2)) (E - P).
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
-    the samples, u = min(1, chi^2 / 30), or one of the nine is full, u = 1; nor the light of that channel, q_c = 1; nor,
-    as far as there is contrast, any hue where a colour is, q = min(1, e). Balanced by the gains g, channels rise to the
-    brightest:
+    the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
+    contrast, any hue where a colour is, q = min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels
+    rise to the brightest:
 
-        F'_c = F_c + max((1 - 1 / e^2) u, q, q_c) (max_d g_d F_d / g_c - F_c).
+        F'_c = F_c + max((1 - 1 / e^2) min(1, chi^2 / 30), q, q_c) (max_d g_d F_d / g_c - F_c).
 
     Parameters
     ----------
@@ -101,8 +101,8 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
-    missed = np.where(full.any(axis=2, keepdims=True), 1.0, np.minimum(chi_squared / MISSED, 1.0))
-    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
-    hue = np.where(full[..., :3].any(axis=2, keepdims=True), np.minimum(contrast, 1.0), lamp)
+    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * np.minimum(chi_squared / MISSED, 1.0)
+    black = np.minimum(contrast, 1.0)
+    hue = np.where(full[..., :3].any(axis=2, keepdims=True), black, np.where(full[..., 3:], black**4, lamp))
     unknown = np.where(full, 1.0, hue)
     return np.asarray(sharp + unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp))

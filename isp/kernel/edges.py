@@ -95,9 +95,9 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     # Light of unknown colour.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
     full = reduce(or_, channels_full)  # a bit a channel
-    missed = dr.select(full > 0, 1.0, dr.minimum(chi_squared / MISSED, 1.0))
-    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
-    hue = dr.select((full & 0b111) > 0, dr.minimum(contrast, 1.0), lamp)
+    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * dr.minimum(chi_squared / MISSED, 1.0)
+    black = dr.minimum(contrast, 1.0)
+    hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
     risen = sharp + unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
     result = dr.empty(jit.Float, planes.size)

@@ -62,8 +62,8 @@ def by_hand(raw, planes, gains, row, column):
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + chi_squared))
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
-    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * (1.0 if any(full) else min(1.0, chi_squared / 30.0))
-    unknown = np.where(full, 1.0, max(lamp, min(1.0, contrast) * any(full[:3])))
+    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, chi_squared / 30.0)
+    unknown = np.where(full, 1.0, min(1.0, contrast) ** (1 if any(full[:3]) else 4) if any(full) else lamp)
     return sharp + unknown * ((gains * sharp).max() / gains - sharp)
 
 
