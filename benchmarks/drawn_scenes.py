@@ -1,6 +1,6 @@
 """How like photographs drawn scenes are: contrasts, edges, textures, depths and colours of both.
 
-    rodcone dataset benchmarks/small_network.toml -o out/drawn --generated 19 --seed 4 --crop 128
+    rodcone dataset benchmarks/small_network.toml -o out/drawn --generated 19 --diorama 5 --seed 4 --crop 128
     pip download --no-deps -d wheels scikit-learn
     python benchmarks/drawn_scenes.py out/drawn wheels
 
@@ -50,13 +50,16 @@ def main() -> None:
             parts = drawn.setdefault(facts["scene"], {})
             parts.setdefault(tuple(facts["window"]), (arrays["rgb"].astype(float), arrays["depth"].astype(float)))
     photographs = [_windows(decode_srgb(picture)) for picture in _photographs(given.wheels)]
-    of_drawn = [statistics([rgb for rgb, _ in parts.values()]) for parts in drawn.values()]
-    of_photographs = [statistics(parts) for parts in photographs]
-    rows = [[name, *_range(of_drawn, name), *_range(of_photographs, name)] for name in of_drawn[0]]
-    of_depth = [depth_statistics([depth for _, depth in parts.values()]) for parts in drawn.values()]
+    families = {scene.partition("-")[0]: list[dict[str, float]]() for scene in drawn}
+    for scene, parts in drawn.items():
+        figures = statistics([rgb for rgb, _ in parts.values()])
+        figures |= depth_statistics([depth for _, depth in parts.values()])
+        families[scene.partition("-")[0]].append(figures)
     pair = depth_statistics([_photographed_depth()])
-    rows += [[name, *_range(of_depth, name), *3 * [f"{pair[name]:.3g}"]] for name in pair]
-    kinds = f"{len(of_drawn)} drawn scenes", f"{len(of_photographs)} photographs"
+    of_photographs = [statistics(parts) | pair for parts in photographs]
+    kinds = [f"{len(family)} {name}" for name, family in families.items()] + [f"{len(photographs)} photographs"]
+    columns = [*families.values(), of_photographs]
+    rows = [[name, *(word for column in columns for word in _range(column, name))] for name in of_photographs[0]]
     head = ["", *(f"{kind}, {word}" for kind in kinds for word in ("median", "least", "most"))]
     print(csv_text(head, rows))
     write_files({RESULTS: csv_text(head, rows)})

@@ -24,6 +24,7 @@ QUALITY = 80  # of the pictures, as WebP counts it
 SHOWN = {
     "color_checker": "--level 500lux",
     "cornell_box": "--level 300lux",
+    "diorama": "--level 200cd/m2",
     "flat_field": "--level 25cd/m2",
     "furnace": "--level 25cd/m2",
     "generated": "--level 200cd/m2",
@@ -51,8 +52,7 @@ def scenes_page() -> str:
     sheet = "\n".join(f"[![{name}]({name}.webp)](#{name})" for name in names)
     return f"""# Scenes
 
-What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`; `rodcone list
-scenes` prints the same. {MADE}
+What can be photographed by name, in `rodcone capture NAME`, `render`, `explore` and a study's `scenes`. {MADE}
 The camera is `low_noise` with its RGBW mosaic. A scene of your own: [how to](../how_to/own_scene.md).
 
 {sheet}

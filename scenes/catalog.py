@@ -12,6 +12,7 @@ from rodcone.errors import require_keys, unknown
 _NAMES = (
     "color_checker",
     "cornell_box",
+    "diorama",
     "flat_field",
     "furnace",
     "generated",
@@ -23,6 +24,7 @@ _NAMES = (
     "still_life",
     "still_life_outdoor",
 )
+DRAWN = ("diorama", "generated")  # from a number, in hexadecimal after a dash
 
 
 def names() -> tuple[str, ...]:
@@ -36,7 +38,8 @@ def load(name: str, **options: Any) -> Scene:
     Parameters
     ----------
     name : str
-        One of `names()`; ``generated-1f3a`` is `scenes.generated.generated` with that seed, in hexadecimal.
+        One of `names()`; ``generated-1f3a`` is `scenes.generated.generated` with that seed, in hexadecimal, and
+        ``diorama-1f3a`` is `scenes.diorama.diorama`.
     **options
         The builder's own parameters, such as ``light="A"``.
 
@@ -45,9 +48,8 @@ def load(name: str, **options: Any) -> Scene:
     InputError
         For an unknown name or option; the nearest allowed one is named.
     """
-    drawn = re.fullmatch("generated-([0-9a-f]{1,40})", name)
-    if drawn:
-        name, options = "generated", {**options, "seed": int(drawn[1], 16)}
+    if drawn := re.fullmatch(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})", name):
+        name, options = drawn[1], {**options, "seed": int(drawn[2], 16)}
     if name not in _NAMES:
         raise unknown("scene", name, _NAMES)
     builder = getattr(import_module(f"scenes.{name}"), name)

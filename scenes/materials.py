@@ -40,15 +40,32 @@ def metal(material: str, roughness: float) -> Node:
     return {"type": "twosided", "bsdf": {"type": "roughconductor", **index, "alpha": roughness}}
 
 
-def checks(first: Spectrum, second: Spectrum, columns: float, rows: float) -> Node:
-    """Matte cloth of small checks; `columns` and `rows` count pairs over the shape."""
+def checks(first: Spectrum, second: Spectrum, columns: float, rows: float, turn_deg: float = 0.0) -> Node:
+    """Matte cloth of small checks; `columns` and `rows` count pairs over the shape, under half a row makes stripes."""
     texture = {
         "type": "checkerboard",
         "color0": spectrum_node(first),
         "color1": spectrum_node(second),
-        "to_uv": to_world(scale(columns, rows, 1.0)),
+        "to_uv": to_world(scale(columns, rows, 1.0), rotate((0, 0, 1), turn_deg)),
     }
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": texture}}
+
+
+def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn_deg: float = 0.0) -> Node:
+    """Matte surface that carries a grey picture of scikit-image's wheel, a mixture of two reflectances at each point.
+
+    The share of `bright` is the picture's stored value, 0 to 1. `repeats` count over the shape, every other one
+    mirrored.
+    """
+    share = {
+        "type": "bitmap",
+        "filename": f"skimage/data/{picture}.png",  # from the folder of wheels: the same wherever that is
+        "raw": True,
+        "wrap_mode": "mirror",
+        "to_uv": to_world(scale(repeats, repeats, 1.0), rotate((0, 0, 1), turn_deg)),
+    }
+    dark_side, bright_side = ({"type": "diffuse", "reflectance": spectrum_node(x)} for x in (dark, bright))
+    return {"type": "twosided", "bsdf": {"type": "blendbsdf", "weight": share, "a": dark_side, "b": bright_side}}
 
 
 def panel(pose: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:

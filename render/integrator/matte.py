@@ -16,19 +16,20 @@ def matte_surface(mi: Any) -> Any:
     """Build the BSDF class for the variant that is set; register it as ``matte``.
 
     Properties of the plug-in: ``reflectance`` (a texture), ``twosided``; where its reflectance stands in the table also
-    ``row``, and for a checkerboard ``other_row`` and ``which``, a texture that is 1 where the other row holds.
+    ``row``, and for a checkerboard ``other_row`` and ``which``, a texture that is 1 where the other row holds. A
+    blend of two holds the second reflectance as ``other``, and the texture of its share as ``weight``.
     """
 
     class Matte(mi.BSDF):  # type: ignore[misc]
         def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.reflectance = props.get_texture("reflectance")
+            self.other, self.weight = (props.get(x, None) for x in ("other", "weight"))
             self.twosided = bool(props.get("twosided", False))
             # As data of the surface: written into the code, each would be compiled apart.
             self.row = dr.opaque(mi.UInt32, int(props["row"])) if "row" in props else None
-            self.other_row, self.which = None, None
-            if "which" in props:
-                self.other_row, self.which = dr.opaque(mi.UInt32, int(props["other_row"])), props["which"]
+            self.other_row = dr.opaque(mi.UInt32, int(props["other_row"])) if "other_row" in props else None
+            self.which = props.get("which", None)
             sides = mi.BSDFFlags.FrontSide | (mi.BSDFFlags.BackSide if self.twosided else mi.BSDFFlags.Empty)
             self.m_components = [mi.BSDFFlags.DiffuseReflection | sides]
             self.m_flags = self.m_components[0]
@@ -47,19 +48,23 @@ def matte_surface(mi: Any) -> Any:
             """Give a sampled direction and its weights, which are the reflectance."""
             sample = _sampled(mi, si.wi, angle, self.twosided)
             if self.row is not None and table is not None:
-                return sample, table.read(_row_at(self, si), step, sample.pdf > 0)
+                weights = table.read(_row_at(self, si), step, sample.pdf > 0)
+                if self.weight is not None:
+                    share, others = _share_at(self, si), table.read(self.other_row, step, sample.pdf > 0)
+                    weights = [dr.lerp(one, other, share) for one, other in zip(weights, others, strict=True)]
+                return sample, weights
             weights = []
             for group in wavelengths:
                 si.wavelengths = group
-                weights.append(self.reflectance.eval(si) & (sample.pdf > 0))
+                weights.append(_reflectance_at(self, si) & (sample.pdf > 0))
             return sample, weights
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             sample = _sampled(mi, si.wi, sample2, self.twosided)
-            return sample, self.reflectance.eval(si, active) & (active & (sample.pdf > 0))
+            return sample, _reflectance_at(self, si, active) & (active & (sample.pdf > 0))
 
         def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
-            return self.reflectance.eval(si, active) * _density(si.wi, wo, self.twosided)
+            return _reflectance_at(self, si, active) * _density(si.wi, wo, self.twosided)
 
         def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
             return _density(si.wi, wo, self.twosided)
@@ -71,6 +76,17 @@ def _row_at(surface: Any, si: Any) -> Any:
     if surface.which is None:
         return surface.row
     return dr.select(surface.which.eval(si)[0] > 0.5, surface.other_row, surface.row)
+
+
+def _reflectance_at(surface: Any, si: Any, active: Any = True) -> Any:
+    one = surface.reflectance.eval(si, active)
+    if surface.weight is None:
+        return one
+    return dr.lerp(one, surface.other.eval(si, active), _share_at(surface, si))
+
+
+def _share_at(surface: Any, si: Any) -> Any:
+    return dr.clip(surface.weight.eval_1(si), 0, 1)
 
 
 def _density(wi: Any, wo: Any, twosided: bool) -> Any:
@@ -91,7 +107,7 @@ def _sampled(mi: Any, wi: Any, angle: Any, twosided: bool) -> Any:
 
 
 def with_matte_surfaces(node: Node) -> Node:
-    """Copy of a scene's dict in which Lambertian surfaces, one- or two-sided, are ``matte``."""
+    """Copy of a scene's dict in which Lambertian surfaces, one- or two-sided, and bitmaps' blends are ``matte``."""
     return {key: _as_matte(value) if isinstance(value, dict) else value for key, value in node.items()}
 
 
@@ -99,6 +115,12 @@ def _as_matte(node: Node) -> Node:
     if node.get("type") == "diffuse" and isinstance(node.get("reflectance"), dict):
         return {**node, "type": "matte"}
     inner = [key for key, value in node.items() if isinstance(value, dict)]
+    weight = node.get("weight")
+    if node.get("type") == "blendbsdf" and isinstance(weight, dict) and weight.get("type") == "bitmap":
+        parts = [_as_matte(node[key]) for key in inner if key != "weight"]
+        plain = all(part["type"] == "matte" and part.keys() == {"type", "reflectance"} for part in parts)
+        if plain and len(parts) == 2 and node.keys() == {"type", *inner}:
+            return {**parts[0], "other": parts[1]["reflectance"], "weight": weight}
     if node.get("type") == "twosided" and len(inner) == 1:
         surface = _as_matte(node[inner[0]])
         if surface["type"] == "matte":

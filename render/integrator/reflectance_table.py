@@ -54,8 +54,9 @@ class TableReader:
 def with_rows(node: Node) -> tuple[Node, tuple[Spectrum, ...]]:
     """Copy of a scene's dict in which matte surfaces name the rows of the table; and its curves.
 
-    A surface of one tabulated spectrum gets ``row``, a checkerboard of two ``row``, ``other_row`` and ``which``, a
-    texture of 0 and 1. Others, such as bitmaps, stay as they are, and are evaluated wavelength by wavelength.
+    A surface of one tabulated spectrum gets ``row``, a blend of two ``other_row`` as well, a checkerboard of two
+    ``row``, ``other_row`` and ``which``, a texture of 0 and 1. Others, such as bitmaps of colours, stay as they are,
+    and are evaluated wavelength by wavelength.
     """
     curves: dict[bytes, Spectrum] = {}
     made = _with_rows(node, curves)
@@ -68,7 +69,10 @@ def _with_rows(node: Node, curves: dict[bytes, Spectrum]) -> Node:
     if node.get("type") != "matte" or not isinstance(texture, dict):
         return made
     if (table := table_of(texture)) is not None:
-        return {**made, "row": _row(table, curves)}
+        if "other" not in node:
+            return {**made, "row": _row(table, curves)}
+        second = table_of(node["other"])
+        return {**made, "row": _row(table, curves), "other_row": _row(second, curves)} if second else made
     if texture.get("type") == "checkerboard":
         colours = [texture.get(colour) for colour in ("color0", "color1")]
         tables = [table_of(colour) if isinstance(colour, dict) else None for colour in colours]

@@ -8,6 +8,7 @@ only reads, goes first.
 import os
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any, NoReturn
 from xml.parsers import expat
@@ -54,13 +55,16 @@ def find_file(name: str, bases: list[Path], folder: Path | None) -> Path:
 
 
 def search_path(mi: Any, *folders: Path) -> Any:
-    """Mitsuba's search path of the given folders and its own.
+    """Mitsuba's search path of the given folders, its own, and the one that holds scikit-image and its pictures.
 
     Not the working directory, which Mitsuba puts first: a ``plugins/diffuse.so`` in it would be loaded as native code.
     """
     resolver = mi.FileResolver()
     resolver.clear()
-    for folder in (*folders, Path(mi.__file__).parent):
+    package = find_spec("skimage")
+    assert package
+    assert package.origin
+    for folder in (*folders, Path(mi.__file__).parent, Path(package.origin).parents[1]):
         resolver.append(str(folder))
     return resolver
 

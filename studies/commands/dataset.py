@@ -25,6 +25,7 @@ def dataset(
     out: Path = Path("out/dataset"),
     set: tuple[str, ...] = (),
     generated: int = 0,
+    diorama: int = 0,
     seed: int = 0,
     truth: str = ",".join(PLANES),
     shards: int = 64,
@@ -44,7 +45,9 @@ def dataset(
     set
         KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
     generated
-        Number of drawn scenes, beside the file's own.
+        Number of drawn tables under a softbox, beside the file's own scenes.
+    diorama
+        Number of drawn streets, rooms and tables by day, dusk and night.
     seed
         Seed of the drawn scenes.
     truth
@@ -58,10 +61,12 @@ def dataset(
     """
     order = SetOrder(planes=tuple(name.strip() for name in truth.split(",")), shards=shards, crop=crop)
     task = read_study(study, set)
-    task = replace(task, scenes=(*task.scenes, *generated_scenes(generated, seed)))
+    drawn = (*generated_scenes(generated, seed), *generated_scenes(diorama, seed, "diorama"))
+    task = replace(task, scenes=(*task.scenes, *drawn))
     check_memory(task, out, reference=False, workers=workforce.processes, force=workforce.force)
     changes = [word for change in set for word in ("--set", change)]
     numbers = {"--generated": generated, "--seed": seed, "--truth": truth, "--shards": shards, "--crop": crop}
+    numbers |= {"--diorama": diorama or None}
     words = [word for name, value in numbers.items() if value is not None for word in (name, str(value))]
     command = join(["rodcone", "dataset", study.name, *changes, *words])
     with workforce.runner() as runner, saying_what_is_kept(out), progress(sys.stderr) as step:

@@ -50,10 +50,10 @@ class SetOrder:
         require_fields(self)
 
 
-def generated_scenes(count: int, seed: int) -> tuple[SceneChoice, ...]:
-    """Scenes drawn by `scenes.generated.generated`, their hashes counted from a seed."""
-    require_whole("generated", count, 0, MOST_GENERATED, "give a number of scenes")
-    return tuple(SceneChoice(f"generated-{digest([seed, index])[:12]}") for index in range(count))
+def generated_scenes(count: int, seed: int, family: str = "generated") -> tuple[SceneChoice, ...]:
+    """Scenes drawn by one of `scenes.catalog.DRAWN`, their hashes counted from a seed."""
+    require_whole(family, count, 0, MOST_GENERATED, "give a number of scenes")
+    return tuple(SceneChoice(f"{family}-{digest([seed, index])[:12]}") for index in range(count))
 
 
 def check_cameras(study: Study, order: SetOrder) -> None:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.catalog import DRAWN
 from studies.metrics.metric import METRICS, Metric
 from studies.pages import report_text as text
 from studies.pages.headline import (
@@ -31,7 +32,6 @@ SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
 ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
 ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
 RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes and lights are what it is chosen for
-DRAWN = "generated"  # how the names of scenes begin that are drawn from a number
 
 
 @dataclass(frozen=True)

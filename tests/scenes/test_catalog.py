@@ -7,8 +7,8 @@ from refusal import refusal
 
 from render.engine import render
 from render.scene import Scene
-from rodcone.digests import digest
-from scenes.catalog import load, names
+from rodcone.digests import digest, digest_inputs
+from scenes.catalog import DRAWN, load, names
 from scenes.levels import DEMO_LEVELS
 from scenes.materials import metal
 from scenes.reflectances import color_checker
@@ -20,7 +20,7 @@ LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "metamers", "siemen
 
 
 def test_names_are_the_scenes_in_order():
-    others = ("furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor")
+    others = ("diorama", "furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor")
     assert names() == tuple(sorted((*LIT_BY_NAME, *others)))
 
 
@@ -42,6 +42,7 @@ def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material
     assert grids == {("regular", 380.0, 1100.0, 144) if far else ("regular", 380.0, 780.0, 80)}
     kinds = {node["type"] for node in nodes(load(name).geometry)}
     plugins = {"twosided", "diffuse", "roughplastic", "roughconductor", "dielectric", "checkerboard"}
+    plugins |= {"blendbsdf", "bitmap"}
     shapes = {"rectangle", "cube", "sphere", "cylinder", "disk"}
     assert kinds <= plugins | shapes | {"scene", "perspective", "hdrfilm", "regular", "area", "constant"}
 
@@ -65,13 +66,19 @@ def test_every_scene_of_one_light_takes_it_by_name(name):
     assert warm.power == cold.power
 
 
-def test_a_generated_scene_is_its_seed_s_and_no_other():
-    assert digest(load("generated-1f3a").geometry) == digest(load("generated", seed=0x1F3A).geometry)
-    assert load("generated-1f3a").name == "generated-1f3a"
-    assert digest(load("generated-1f3a").geometry) != digest(load("generated-1f3b").geometry)
+@loop("family", DRAWN)
+def test_a_drawn_scene_is_its_seed_s_and_no_other(family):
+    assert digest(load(f"{family}-1f3a")) == digest(load(family, seed=0x1F3A))
+    assert load(f"{family}-1f3a").name == f"{family}-1f3a"
+    assert digest(load(f"{family}-1f3a").geometry) != digest(load(f"{family}-1f3b").geometry)
     hashed = "c0ffee" * 6 + "abcd"  # as long as a commit's hash
-    assert load(f"generated-{hashed}").name == f"generated-{hashed}"
-    assert "'generated-c0ffeeh'" in refusal(load, "generated-c0ffeeh")
+    assert load(f"{family}-{hashed}").name == f"{family}-{hashed}"
+    assert f"'{family}-c0ffeeh'" in refusal(load, f"{family}-c0ffeeh")
+    assert refusal(load, family, seed=-1).startswith("seed: -1 is outside 0 to")
+
+
+def test_a_generated_scene_is_the_one_that_the_benchmark_froze():
+    assert digest_inputs(load("generated-1f3a").geometry) == "0c75ef3c3496cec384c6af89eea862af"
 
 
 @loop(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
