@@ -1,6 +1,7 @@
-"""How like photographs drawn scenes are: contrasts, edges, textures, depths and colours of both.
+r"""How like photographs drawn scenes are: contrasts, edges, textures, depths and colours of both.
 
-    rodcone dataset benchmarks/small_network.toml -o out/drawn --generated 19 --diorama 5 --seed 4 --crop 128
+    rodcone dataset benchmarks/small_network.toml -o out/drawn --set 'scenes=["generated", "diorama"]' \
+        --generated 19 --diorama 5 --seed 4 --crop 128 --truth rgb,depth
     pip download --no-deps -d wheels scikit-learn
     python benchmarks/drawn_scenes.py out/drawn wheels
 
@@ -34,6 +35,7 @@ PHOTOGRAPHS = {
     "matplotlib/mpl-data/sample_data": ("grace_hopper.jpg",),
 }
 RESULTS = Path(__file__).parents[1] / "docs" / "results" / "drawn_scenes.csv"
+PICTURE = RESULTS.parents[1] / "pictures" / "drawn_scenes.webp"
 LARGEST, SIDE = 256, 128
 TO_Y = np.array([0.2126, 0.7152, 0.0722])
 Picture = NDArray[np.float64]
@@ -63,6 +65,14 @@ def main() -> None:
     head = ["", *(f"{kind}, {word}" for kind in kinds for word in ("median", "least", "most"))]
     print(csv_text(head, rows))
     write_files({RESULTS: csv_text(head, rows)})
+    dioramas = [_shown(parts) for scene, parts in drawn.items() if scene.startswith("diorama")]
+    Image.fromarray(np.concatenate(dioramas[:6], axis=1)).save(PICTURE, quality=80)
+
+
+def _shown(parts: Mapping[tuple[int, ...], tuple[Picture, Picture]]) -> NDArray[np.uint8]:
+    """Scene's colours, its mean luminance a grey of 18 %."""
+    whole = np.block([[[parts[row, column, SIDE, SIDE][0]] for column in (0, SIDE)] for row in (0, SIDE)])
+    return np.asarray(255 * encode_srgb(np.clip(whole * 0.18 / (whole @ TO_Y).mean(), 0, 1)), np.uint8)
 
 
 def _range(figures: Sequence[Mapping[str, float]], name: str) -> list[str]:
