@@ -48,11 +48,7 @@ def matte_surface(mi: Any) -> Any:
             """Give a sampled direction and its weights, which are the reflectance."""
             sample = _sampled(mi, si.wi, angle, self.twosided)
             if self.row is not None and table is not None:
-                weights = table.read(_row_at(self, si), step, sample.pdf > 0)
-                if self.weight is not None:
-                    share, others = _share_at(self, si), table.read(self.other_row, step, sample.pdf > 0)
-                    weights = [dr.lerp(one, other, share) for one, other in zip(weights, others, strict=True)]
-                return sample, weights
+                return sample, _weights_at(self, si, table, step, sample.pdf > 0)
             weights = []
             for group in wavelengths:
                 si.wavelengths = group
@@ -76,6 +72,14 @@ def _row_at(surface: Any, si: Any) -> Any:
     if surface.which is None:
         return surface.row
     return dr.select(surface.which.eval(si)[0] > 0.5, surface.other_row, surface.row)
+
+
+def _weights_at(surface: Any, si: Any, table: TableReader, step: Any, active: Any) -> list[Any]:
+    ones = table.read(_row_at(surface, si), step, active)
+    if surface.weight is None:
+        return ones
+    share, others = _share_at(surface, si), table.read(surface.other_row, step, active)
+    return [dr.lerp(one, other, share) for one, other in zip(ones, others, strict=True)]
 
 
 def _reflectance_at(surface: Any, si: Any, active: Any = True) -> Any:
