@@ -101,12 +101,14 @@ def straighten(plane: Singles, dark: float, bend: float) -> None:
     ends = [-(-length // STRIDE) * STRIDE - length + PATCH - STRIDE for length in plane.shape]
     sides = [((PATCH - STRIDE) // 2, end - (PATCH - STRIDE) // 2) for end in ends]
     sums = _sums(np.pad(np.clip(plane, 0.0, dark), sides, mode="symmetric"), STRIDE, PATCH)
-    for row, line in enumerate(plane):
-        mean = np.repeat(sums[row // STRIDE], STRIDE)[: len(line)] / PATCH**2
-        at = np.flatnonzero((line < mean) & (mean > 1e-6))
-        root = np.sqrt(mean[at] + bend)
-        share = 1.0 + (np.sqrt(np.maximum(line[at] + bend, 0.0)) - root) * root / mean[at]
-        line[at] = mean[at] * np.square(np.maximum(share, 0.0))
+    for first in range(0, len(plane), TOGETHER):
+        part = plane[first : first + TOGETHER]
+        rows = sums[first // STRIDE : (first + TOGETHER) // STRIDE] / PATCH**2
+        mean = np.repeat(np.repeat(rows, STRIDE, 0), STRIDE, 1)[: part.shape[0], : part.shape[1]]
+        at = (part < mean) & (mean > 1e-6)
+        level, root = mean[at], np.sqrt(mean[at] + bend)
+        share = 1.0 + (np.sqrt(np.maximum(part[at] + bend, 0.0)) - root) * root / level
+        part[at] = level * np.square(np.maximum(share, 0.0))
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
