@@ -1,6 +1,7 @@
 """The command `rodcone sweep`, and what a run will take, before anything is computed."""
 
 import errno
+import json
 import sys
 from collections.abc import Callable, Generator, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -32,6 +33,7 @@ from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import PILOTS
+from studies.sweep.provenance import code_version
 from studies.sweep.run_sweep import Runner, Swept, at_work
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
@@ -50,7 +52,8 @@ class Estimate:
     Attributes
     ----------
     cells, kept, renders, workers : int
-        `kept` cells are in the results database from an earlier run; `renders` counts scenes, not files of radiance.
+        `kept` cells at most are in the results database from a run of this code; `renders` counts scenes, not files of
+        radiance.
     seconds : float
         With so many workers; renders and cells that exist already are counted too.
     bytes : float
@@ -245,12 +248,14 @@ def make_all(
 def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
     """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
     plan = reference_plan(study) if reference else plan_as_stated(study)
-    return estimate(study, plan, open_all(study), workers, len(read_rows(out)) if (out / FILE).is_file() else 0)
+    rows = read_rows(out) if (out / FILE).is_file() else []
+    kept = sum(json.loads(row.versions).get("rodcone") == code_version() for row in rows)
+    return estimate(study, plan, open_all(study), workers, kept)
 
 
 def _words(sizes: Estimate) -> str:
     return (
-        f"{sizes.cells} cells, {sizes.kept} kept from the last run; {sizes.renders} to render\n"
+        f"{sizes.cells} cells, at most {sizes.kept} kept from the last run; {sizes.renders} to render\n"
         f"about {duration(sizes.seconds)} with {sizes.workers} workers, at most {sizes.bytes / 1e9:.1f} GB of memory; "
         "renders and cells that exist already are counted too"
     )

@@ -110,7 +110,7 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
     code, text, err = call(command)
     assert (code, err) == (0, "")
-    assert text.startswith("6 cells, 0 kept from the last run; 0 to render\nabout ")
+    assert text.startswith("6 cells, at most 0 kept from the last run; 0 to render\nabout ")
     assert not out.exists()
     still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
     code, text, _ = call([*command, *still])
@@ -121,6 +121,16 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     larger = json.loads(call([*command, *still, "--set", "render.size=1024"])[1])
     fixed = 3 * 350e6 + 2**27  # this process and two workers, and a run of one light; the rest goes with the pixels
     assert larger["bytes"] - fixed == pytest.approx(16 * (facts["bytes"] - fixed), rel=1e-9)
+
+
+def test_dry_run_counts_cells_of_this_code_alone_as_kept(
+    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--json"]
+    made = json.loads(call([*command, "--workers", "1", "--as-stated"])[1])["made"]
+    assert json.loads(call([*command, "--dry-run"])[1])["kept"] == made > 0
+    monkeypatch.setattr("studies.commands.sweep.code_version", lambda: "0.2.0+other")
+    assert json.loads(call([*command, "--dry-run"])[1])["kept"] == 0
 
 
 def test_faults_are_one_line_and_nothing_is_begun(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
