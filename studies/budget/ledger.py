@@ -15,7 +15,7 @@ from sensor.readings.by_channel import as_metered, wells_e
 from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel
-from studies.study.study import Condition, SceneChoice, Study, conditions, label
+from studies.study.study import Condition, SceneChoice, Study, conditions, label, most_spp
 
 # Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
 # predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations (Cantelli).
@@ -263,7 +263,7 @@ def as_stated(study: Study) -> Plan:
     low, high = study.render.range_nm
     centres, widths = even_bands((low, high), max(1, round((high - low) / study.render.band_nm)))
     bands = tuple(centres.tolist()), tuple(widths.tolist())
-    renders = {scene: RenderModel(*bands, study.most_spp(scene), study.render.denoise) for scene in study.scenes}
+    renders = {scene: RenderModel(*bands, most_spp(study, scene), study.render.denoise) for scene in study.scenes}
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
     return Plan(renders=renders, images=images)

@@ -24,7 +24,7 @@ from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, RenderModel, unit_exposure_s
 from studies.study.scene_source import open_radiance_file
-from studies.study.study import OWN, Study, conditions, mosaics
+from studies.study.study import OWN, Study, conditions, mosaics, most_spp
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
@@ -84,7 +84,7 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
         pilot = make_pilot(opened, study, None if cache is None else Path(cache))
         rows = list(_weigh_all(pilot, study))
         sizes = {count: len(groups) for count, groups in pilot.groups.items()}
-        choice = choose(rows, sizes, study.budget, study.most_spp(opened.choice) if pilot.rendered else 0)
+        choice = choose(rows, sizes, study.budget, most_spp(study, opened.choice) if pilot.rendered else 0)
         if pilot.rendered:
             nm, width_nm = wide_bands(
                 pilot.transport.wavelength_nm, pilot.transport.width_nm, pilot.groups[choice.count]
@@ -108,7 +108,7 @@ def reference_plan(study: Study) -> Plan:
     for opened in open_all(study).values():
         if opened.scene is not None:
             nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
-            spp = min(REFERENCE_SAMPLES * study.most_spp(opened.choice), 1 << 16)
+            spp = min(REFERENCE_SAMPLES * most_spp(study, opened.choice), 1 << 16)
             renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
         for condition in conditions(study, opened.choice):
             images[condition] = ImageModel(full_lens(study, preset(condition.sensor).lens, opened))
@@ -133,7 +133,7 @@ def make_pilot(opened: OpenedScene, study: Study, cache: Path | None = None) -> 
         wavelength_nm=nm,
         width_nm=width_nm,
         seed=study.render.seed + PILOT_SEED,
-        max_spp=min(study.most_spp(opened.choice), PILOT_SPP),
+        max_spp=min(most_spp(study, opened.choice), PILOT_SPP),
         cache=cache,
     )
     return Pilot(opened, transport, {count: groups_of(width_nm, count) for count in counts(width_nm)})

@@ -9,7 +9,7 @@ from rich.table import Table
 from studies.budget.choice import image_ns, render_ns
 from studies.budget.ledger import KERNEL, LEAST_SHOWN, MONTE_CARLO, Plan, Term, condition_words, figures, percent
 from studies.budget.terms import LENS_TERMS
-from studies.study.study import SceneChoice, Study
+from studies.study.study import SceneChoice, Study, most_spp
 
 LEVEL = 2  # place of the level in a condition's words
 
@@ -92,7 +92,7 @@ def reasons(study: Study, plan: Plan, reference: Plan) -> Iterator[str]:
             wanted = model.spp * noise.share / budget.monte_carlo
             yield (
                 f"{scene.label}: Monte Carlo noise reaches {percent(noise.share)} in the worst condition; "
-                f"{wanted:.2g} samples would keep the aim, and spp allows {study.most_spp(scene)}"
+                f"{wanted:.2g} samples would keep the aim, and spp allows {most_spp(study, scene)}"
             )
 
 

@@ -201,10 +201,6 @@ class Study:
             return None
         return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
 
-    def most_spp(self, scene: SceneChoice) -> int:
-        """Samples a pixel of a scene, at most."""
-        return scene.spp or self.render.spp
-
 
 def default_balance(processor: str) -> str:
     """White balance of a processor where none is stated: as shot, Gray World with the paper's method."""
@@ -216,6 +212,11 @@ def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition
     scenes = study.scenes if scene is None else (scene,)
     axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances, study.frames)
     return [Condition(*place) for place in product(*axes)]
+
+
+def most_spp(study: Study, scene: SceneChoice) -> int:
+    """Samples a pixel of a scene, at most."""
+    return scene.spp or study.render.spp
 
 
 def mosaics(study: Study) -> tuple[str, ...]:

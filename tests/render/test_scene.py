@@ -11,6 +11,7 @@ from render.geometry import look_at, to_world
 from render.loader import mitsuba_module, variant
 from render.scene import LightGroup, Scene, spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat
+from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError
 from rodcone.jit import Matrix4
 from scenes.catalog import load, names
@@ -54,6 +55,8 @@ def test_a_description_holds_plain_values_alone(name):
 @pytest.mark.parametrize("name", names())
 def test_mitsuba_loads_a_description_in_the_scalar_and_the_active_variant(name):
     mi, description = mitsuba_module(), load(name).description
+    resolver = mi.file_resolver()
+    mi.set_file_resolver(search_path(mi))  # as the loader does
     try:
         for kind in ("scalar_spectral", variant()):
             mi.set_variant(kind)
@@ -61,6 +64,7 @@ def test_mitsuba_loads_a_description_in_the_scalar_and_the_active_variant(name):
             assert len(loaded.sensors()) == 1
             assert loaded.emitters()
     finally:
+        mi.set_file_resolver(resolver)
         mi.set_variant(variant())
 
 
