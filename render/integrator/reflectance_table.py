@@ -73,7 +73,7 @@ def _with_rows(node: Node, curves: dict[bytes, Spectrum]) -> Node:
             return {**made, "row": _row(table, curves)}
         second = table_of(node["other"])
         return {**made, "row": _row(table, curves), "other_row": _row(second, curves)} if second else made
-    if texture.get("type") == "checkerboard":
+    if texture.get("type") == "checkerboard" and "other" not in node:
         colours = [texture.get(colour) for colour in ("color0", "color1")]
         tables = [table_of(colour) if isinstance(colour, dict) else None for colour in colours]
         if tables[0] and tables[1]:

@@ -8,7 +8,7 @@ from render.integrator.matte import with_matte_surfaces
 from render.integrator.reflectance_table import TableReader, reflectance_table, with_rows
 from render.loader import as_guest, mitsuba_module
 from rodcone.jit import dr
-from scenes.materials import printed
+from scenes.materials import checks, printed
 from scenes.reflectances import edge, grey
 
 RAMP = {"type": "regular", "wavelength_min": 380.0, "wavelength_max": 780.0, "values": "0.1,0.8"}
@@ -110,6 +110,23 @@ def test_a_picture_mixes_two_reflectances_as_mitsuba_s_blend_does(situation):
     (value,), _, _, _ = surface.scatter_bands(si, wo, numbers, [si.wavelengths], reader, mi.UInt32(step))
     assert np.asarray(value) == pytest.approx(expected, rel=1e-4, abs=2e-6)
     assert np.asarray(surface.eval(mi.BSDFContext(), si, wo)) == pytest.approx(expected, rel=1e-4, abs=2e-6)
+
+
+@as_guest()
+def test_a_picture_over_checks_mixes_them_with_the_other_reflectance(situation):
+    mi, (si, wo, numbers) = mitsuba_module(), situation
+    stock = printed("camera", grey(0.05), grey(0.8), 3.0, 20.0)
+    stock["bsdf"]["a"] = checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]
+    node, curves = with_rows(with_matte_surfaces({"bsdf": stock}))
+    assert node["bsdf"]["type"] == "matte"
+    nm, step = np.array([[450.0, 500.0, 600.0, 700.0]] * 16), np.zeros(COUNT, np.uint32)
+    si.uv = mi.Point2f(*np.random.default_rng(3).random((2, COUNT)).astype(np.float32))
+    si.wavelengths = mi.Spectrum(450.0, 500.0, 600.0, 700.0)
+    surface, blend = mi.load_dict(node["bsdf"]), mi.load_dict(stock)
+    reader = TableReader(mi, reflectance_table(curves or (grey(0.5),), nm))
+    (value,), _, _, _ = surface.scatter_bands(si, wo, numbers, [si.wavelengths], reader, mi.UInt32(step))
+    expected = np.asarray(blend.eval(mi.BSDFContext(), si, wo))
+    assert np.asarray(value) == pytest.approx(expected, rel=1e-4, abs=2e-6)
 
 
 def test_lambertian_surfaces_become_it_wherever_they_stand():
