@@ -9,11 +9,10 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from page_parts import RESULTS, csv_text, fill
+from page_parts import RESULTS, csv_text, write_page
 from real_cameras import REPORTS
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
 from scenes.catalog import load
 from sensor.cameras.emva_report import read_report
 from sensor.config import SensorConfig
@@ -233,10 +232,7 @@ def main(arguments: Sequence[str]) -> None:
         content, figure, cells = parts(last_run(Path(arguments[0])))
     except InputError as error:
         raise SystemExit(f"five_cameras: {error}") from error
-    with replacing(PAGE, PAGE.with_suffix(".svg"), RESULTS / "five_cameras.csv") as (page, drawing, file):
-        page.write_text(fill(PAGE.read_text("utf-8"), content), "utf-8")
-        drawing.write_text(figure, "utf-8")
-        file.write_text(cells, "utf-8")
+    write_page(PAGE, content, figure, cells)
 
 
 if __name__ == "__main__":

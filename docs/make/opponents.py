@@ -5,10 +5,9 @@ import sys
 from collections.abc import Iterable, Sequence
 
 import numpy as np
-from page_parts import RESULTS, csv_text, fill
+from page_parts import RESULTS, csv_text, write_page
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
 from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
 from studies.pages.plots import light_charts, svg_text
 from studies.pages.report_text import significant, table
@@ -89,6 +88,7 @@ def parts(rows: Iterable[Row], version: str) -> tuple[dict[str, str], str, str]:
                 for level in levels
             ]
             for name in LINES
+            if name in (OURS, *names)
         }
         for balance in balances
     }
@@ -118,10 +118,7 @@ def main(arguments: Sequence[str]) -> None:
         content, figure, cells = parts(rows, json.loads(rows[0].versions)["rodcone"] if rows else "")
     except InputError as error:
         raise SystemExit(f"opponents: {error}") from error
-    with replacing(PAGE, PAGE.with_suffix(".svg"), RESULTS / "opponents.csv") as (page, drawing, file):
-        page.write_text(fill(PAGE.read_text("utf-8"), content), "utf-8")
-        drawing.write_text(figure, "utf-8")
-        file.write_text(cells, "utf-8")
+    write_page(PAGE, content, figure, cells)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ from functools import partial
 from pathlib import Path
 
 from rodcone.csv_file import csv_text as csv_of
+from rodcone.files import replacing
 
 csv_text = partial(csv_of, line_end="\n")  # as git keeps the results' tables
 RESULTS = Path(__file__).resolve().parents[1] / "results"
@@ -25,3 +26,11 @@ def fill(text: str, parts: Mapping[str, str]) -> str:
         if count != 1:
             raise KeyError(name)
     return text
+
+
+def write_page(page: Path, parts: Mapping[str, str], figure: str, cells: str) -> None:
+    """Write a page's parts, its figure (SVG) beside it, and its table (CSV) of the same name, all or none."""
+    with replacing(page, page.with_suffix(".svg"), RESULTS / f"{page.stem}.csv") as (to_page, to_figure, to_cells):
+        to_page.write_text(fill(page.read_text("utf-8"), parts), "utf-8")
+        to_figure.write_text(figure, "utf-8")
+        to_cells.write_text(cells, "utf-8")

@@ -14,11 +14,10 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
-from page_parts import RESULTS, csv_text, fill
+from page_parts import csv_text, write_page
 from PIL import Image
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
 from studies.pages.headline import WHITE_PIXEL
@@ -191,10 +190,7 @@ def main(arguments: Sequence[str]) -> None:
         content, figure, cells = parts(rows, json.loads(rows[0].versions)["rodcone"] if rows else "")
     except InputError as error:
         raise SystemExit(f"white_pixel: {error}") from error
-    with replacing(PAGE, PAGE.with_suffix(".svg"), RESULTS / "white_pixel.csv") as (page, drawing, file):
-        page.write_text(fill(PAGE.read_text("utf-8"), content), "utf-8")
-        drawing.write_text(figure, "utf-8")
-        file.write_text(cells, "utf-8")
+    write_page(PAGE, content, figure, cells)
 
 
 if __name__ == "__main__":
