@@ -12,7 +12,7 @@ from rodcone.progress import progress
 from studies.commands.console import print_result
 from studies.commands.sweep import WORKERS, Workers, check_memory, saying_what_is_kept
 from studies.dataset.make_set import make_set
-from studies.dataset.order import SetOrder, generated_scenes
+from studies.dataset.order import SetOrder, drawn_scenes
 from studies.dataset.sample import PLANES
 from studies.study.study_file import read_study
 
@@ -61,7 +61,7 @@ def dataset(
     """
     order = SetOrder(planes=tuple(name.strip() for name in truth.split(",")), shards=shards, crop=crop)
     task = read_study(study, set)
-    drawn = (*generated_scenes(generated, seed), *generated_scenes(diorama, seed, "diorama"))
+    drawn = (*drawn_scenes(generated, seed), *drawn_scenes(diorama, seed, "diorama"))
     task = replace(task, scenes=(*task.scenes, *drawn))
     check_memory(task, out, reference=False, workers=workforce.processes, force=workforce.force)
     changes = [word for change in set for word in ("--set", change)]

@@ -50,7 +50,7 @@ class SetOrder:
         require_fields(self)
 
 
-def generated_scenes(count: int, seed: int, family: str = "generated") -> tuple[SceneChoice, ...]:
+def drawn_scenes(count: int, seed: int, family: str = "generated") -> tuple[SceneChoice, ...]:
     """Scenes drawn by one of `scenes.catalog.DRAWN`, their hashes counted from a seed."""
     require_whole(family, count, 0, MOST_GENERATED, "give a number of scenes")
     return tuple(SceneChoice(f"{family}-{digest([seed, index])[:12]}") for index in range(count))

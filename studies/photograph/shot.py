@@ -70,7 +70,7 @@ class Order:
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
         brightest W, auto:information for the one of the two whose samples hold more.
     level : str, optional
-        Light, such as 25cd/m2 (mean of what is no lamp) or 500lux (on its reference plane); the scene's own by default.
+        Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
         the same luminance; may be given several times. It is a name or a CSV file, such as sky=led.csv. For a file of

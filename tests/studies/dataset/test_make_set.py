@@ -22,7 +22,7 @@ from rodcone.errors import InputError
 from studies.dataset import order as order_module
 from studies.dataset.card import CARD
 from studies.dataset.make_set import make_set, split_of
-from studies.dataset.order import SetOrder, generated_scenes
+from studies.dataset.order import SetOrder, drawn_scenes
 from studies.dataset.shards import MANIFEST, LinesMade, Shard, read_manifest, read_shard
 from studies.study.lit_scene import open_all
 from studies.sweep.cluster import on_cluster
@@ -280,7 +280,7 @@ def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
 
 
 def test_drawn_scenes_are_counted_from_a_seed() -> None:
-    first, more, other = generated_scenes(3, 0), generated_scenes(5, 0), generated_scenes(3, 1)
+    first, more, other = drawn_scenes(3, 0), drawn_scenes(5, 0), drawn_scenes(3, 1)
     assert more[:3] == first
     assert not {x.source for x in first} & {x.source for x in other}
     assert len({x.source for x in more}) == 5
