@@ -24,7 +24,7 @@ def matte_surface(mi: Any) -> Any:
         def __init__(self, props: Any) -> None:
             super().__init__(props)
             self.reflectance = props.get_texture("reflectance")
-            self.other, self.weight = (props.get(x, None) for x in ("other", "weight"))
+            self.other, self.weight = (props.get_texture(x) if x in props else None for x in ("other", "weight"))
             self.twosided = bool(props.get("twosided", False))
             # As data of the surface: written into the code, each would be compiled apart.
             self.row = dr.opaque(mi.UInt32, int(props["row"])) if "row" in props else None

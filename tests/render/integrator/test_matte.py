@@ -112,11 +112,15 @@ def test_a_picture_mixes_two_reflectances_as_mitsuba_s_blend_does(situation):
     assert np.asarray(surface.eval(mi.BSDFContext(), si, wo)) == pytest.approx(expected, rel=1e-4, abs=2e-6)
 
 
+OCHRE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.3, 0.1]}}
+
+
+@loop("surface_key, part", [("a", checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]), ("a", OCHRE), ("b", OCHRE)])
 @as_guest()
-def test_a_picture_over_checks_mixes_them_with_the_other_reflectance(situation):
+def test_a_picture_mixes_checks_or_an_rgb_colour_with_the_other_reflectance(surface_key, part, situation):
     mi, (si, wo, numbers) = mitsuba_module(), situation
     stock = printed("camera", grey(0.05), grey(0.8), 3.0, 20.0)
-    stock["bsdf"]["a"] = checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]
+    stock["bsdf"][surface_key] = part
     node, curves = with_rows(with_matte_surfaces({"bsdf": stock}))
     assert node["bsdf"]["type"] == "matte"
     nm, step = np.array([[450.0, 500.0, 600.0, 700.0]] * 16), np.zeros(COUNT, np.uint32)
