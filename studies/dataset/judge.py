@@ -121,10 +121,9 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     _check_encoding(rows)
     result = scores(rows, developer)
     at = {(score.camera, score.level) for score in result}
-    own_rows = [vars(row) for row in read_rows(out)] if (out / FILE).is_file() else []
-    for name in dict.fromkeys(row["processor"] for row in own_rows if row["processor"] in NAMED):
-        of_own = [row | {"mosaic": NAMED[name].mosaic} for row in own_rows if row["processor"] == name]
-        result += [score for score in scores(of_own, name) if (score.camera, score.level) in at]
+    scenes = {line["scene"] for line in samples}
+    swept = [vars(row) for row in read_rows(out) if row.scene in scenes] if (out / FILE).is_file() else []
+    result += [score for score in scores_of_sweep(swept) if (score.camera, score.level) in at]
     result += expected([line for line in samples if _condition(line) in at])
     return manifest[0], sorted(result, key=lambda score: (score.camera, score.luminance_cd_m2))
 
@@ -217,6 +216,17 @@ def scores(rows: Sequence[Row], developer: str) -> list[Score]:
             halves = {key: float(half_width(values)) for key, values in figures.items()}
         result.append(Score(camera, level, developer, luminance, len(by_scene), means, halves))
     return result
+
+
+def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
+    """Scores of each processor by a sweep's single frames; of each white balance apart where there are several."""
+    single = [row for row in rows if row["processor"] in NAMED and row["frames"] == 1]
+    several = len({row["white_balance"] for row in single}) > 1
+    developers: dict[str, list[Row]] = {}
+    for row in single:
+        name = f"{row['processor']}, {row['white_balance']}" if several else row["processor"]
+        developers.setdefault(name, []).append(row | {"mosaic": NAMED[row["processor"]].mosaic})
+    return [score for name, its_rows in developers.items() for score in scores(its_rows, name)]
 
 
 def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:

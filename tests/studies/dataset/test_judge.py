@@ -17,7 +17,7 @@ from command_line import call
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError
 from sensor.presets import low_noise, preset_file
-from studies.dataset.judge import MEASURED, Score, judge
+from studies.dataset.judge import MEASURED, Score, judge, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
 from studies.dataset.shards import read_shard
@@ -108,6 +108,17 @@ def test_a_sweeps_pictures_are_judged_as_the_sweep_measured_them(out: Path, tmp_
         )
         for key, bound in (("psnr_db", 0.05), ("ssim", 0.01), ("flip_mean", 0.005), ("delta_e_median", 0.3)):
             assert copied.means[key] == pytest.approx(own.means[key], abs=bound)
+
+
+def test_white_balances_and_bursts_of_a_sweep_are_not_averaged(out: Path) -> None:
+    rows = [vars(row) for row in read_rows(out)]
+    grey = [row | {"white_balance": "gray-world", "psnr_db": row["psnr_db"] - 1} for row in rows]
+    burst = [row | {"frames": 4, "psnr_db": 99.0} for row in rows]
+    plain, both = scores_of_sweep(rows + burst), scores_of_sweep(rows + grey)
+    shot, world = of(both, "bayer, as-shot"), of(both, "bayer, gray-world")
+    for alone, first, second in zip(of(plain, "bayer"), shot, world, strict=True):
+        assert alone.means == first.means
+        assert first.means["psnr_db"] - second.means["psnr_db"] == pytest.approx(1)
 
 
 @pytest.mark.thorough
