@@ -15,6 +15,7 @@ from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError, one_line
 from rodcone.optional import quietly_imported
 from sensor.presets import names, preset
+from sensor.variations import vary
 from studies.dataset.make_set import Runner
 from studies.dataset.shards import Lines, LinesMade, read_manifest, read_shard, shards_of, stands
 from studies.design.expect import expect
@@ -145,7 +146,8 @@ def expected(samples: Lines) -> list[Score]:
     for (camera, level), line in conditions.items():
         light = line["luminance_cd_m2"]
         exposure = parse_exposure(line["exposure"]) or line["exposure"]
-        error = expect(preset(known[line["sensor"]], line["tile"]), [light], EXPECTED_UNDER, exposure)[0]
+        sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # with its filters, of which a tile doesn't tell
+        error = expect(sensor, [light], EXPECTED_UNDER, exposure)[0]
         nothing = {metric.key: math.nan for metric in MEASURED}
         means = nothing | {"psnr_db": error.psnr_db}
         result.append(Score(camera, level, f"expect, {EXPECTED_UNDER}", light, 0, means, nothing))

@@ -17,7 +17,8 @@ from command_line import call
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError
 from sensor.presets import low_noise, preset_file
-from studies.dataset.judge import MEASURED, Score, judge, scores_of_sweep
+from sensor.variations import vary
+from studies.dataset.judge import MEASURED, Score, expected, judge, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
 from studies.dataset.shards import read_shard
@@ -131,6 +132,11 @@ def test_the_closed_form_stands_beside_sensors_of_this_package(tmp_path: Path) -
     assert [dark.means["psnr_db"], light.means["psnr_db"]] == pytest.approx([error.psnr_db for error in errors])
     assert np.isnan(dark.means["ssim"])
     assert dark.scenes == 0
+    # behind filters of its own, of which the tile alone doesn't tell
+    line = {"sensor": "low_noise", "mosaic": "cmyw", "tile": ["CM", "YW"], "spectrum": "own", "level": "5cd/m2"}
+    (score,) = expected([line | {"luminance_cd_m2": 5.0, "exposure": "20ms"}])
+    (error,) = expect(vary(low_noise(), "cmyw"), [5.0], "D65", 0.02)
+    assert score.means["psnr_db"] == pytest.approx(error.psnr_db)
 
 
 @pytest.mark.parametrize(
