@@ -31,7 +31,7 @@ from studies.sweep.run_cell import limit_threads
 
 MEASURED = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
 EXPECTED_UNDER = "D65"
-SENSORS = Path(__file__).parents[1] / "configs" / "sensors"
+FROZEN_LIST, SENSORS = "benchmark", Path(__file__).parents[1] / "configs" / "sensors"
 ENDINGS = (".png", ".tif", ".tiff", ".npy")
 _OVERSHOOT = 0.01  # of values in an array, beyond 0 to 1
 # What is often mistaken, and what would undo it: pictures that come this much nearer to the truth by it are refused.
@@ -125,7 +125,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     scenes = {line["scene"] for line in samples}
     swept = [vars(row) for row in read_rows(out) if row.scene in scenes] if (out / FILE).is_file() else []
     result += [score for score in scores_of_sweep(swept) if (score.camera, score.level) in at]
-    result += expected([line for line in samples if _condition(line) in at])
+    result += expected([line for line in samples if _condition(line) in at], manifest[0]["name"])
     return manifest[0], sorted(result, key=lambda score: (score.camera, score.luminance_cd_m2))
 
 
@@ -138,9 +138,11 @@ def _condition(row: Row) -> tuple[str, str]:
     return ", ".join(camera), level
 
 
-def expected(samples: Lines) -> list[Score]:
-    """PSNR that `rodcone expect` computes of each condition; without sensors that aren't this package's."""
-    known = {name: name for name in names()} | {path.name: str(path) for path in SENSORS.glob("*.toml")}
+def expected(samples: Lines, study: str) -> list[Score]:
+    """PSNR that `rodcone expect` computes of each condition: of presets, and of the frozen list's sensor files."""
+    known = {name: name for name in names()}
+    if study == FROZEN_LIST:  # another study's file of the same name is another sensor
+        known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
     conditions = {_condition(line): line for line in samples if line["sensor"] in known}
     result = []
     for (camera, level), line in conditions.items():

@@ -134,9 +134,13 @@ def test_the_closed_form_stands_beside_sensors_of_this_package(tmp_path: Path) -
     assert dark.scenes == 0
     # behind filters of its own, of which the tile alone doesn't tell
     line = {"sensor": "low_noise", "mosaic": "cmyw", "tile": ["CM", "YW"], "spectrum": "own", "level": "5cd/m2"}
-    (score,) = expected([line | {"luminance_cd_m2": 5.0, "exposure": "20ms"}])
+    line |= {"luminance_cd_m2": 5.0, "exposure": "20ms"}
+    (score,) = expected([line], "mine")
     (error,) = expect(vary(low_noise(), "cmyw"), [5.0], "D65", 0.02)
     assert score.means["psnr_db"] == pytest.approx(error.psnr_db)
+    # a file of one's own is not the frozen list's of the same name
+    of_file = line | {"sensor": "low_noise_rgbw.toml", "mosaic": "own"}
+    assert [len(expected([of_file], study)) for study in ("mine", "benchmark")] == [0, 1]
 
 
 @pytest.mark.parametrize(
