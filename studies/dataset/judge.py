@@ -183,9 +183,10 @@ def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
         For a file that can't be read, of another size or with values beyond.
     """
     try:
-        if path.suffix == ".npy":
+        ending = path.suffix.lower()
+        if ending == ".npy":
             values = np.load(path, allow_pickle=False)
-        elif path.suffix == ".png":
+        elif ending == ".png":
             if path.read_bytes()[24:25] == b"\x10":
                 raise ValueError("16 bits a channel, of which its reader keeps 8; write a TIFF or an array")
             with Image.open(path, formats=("PNG",)) as image:
@@ -235,7 +236,13 @@ def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
 
 def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:
     """Files by the set's keys: of each condition all or none."""
-    files = {path.stem: path for path in sorted(folder.glob("*")) if path.suffix.lower() in ENDINGS}
+    paths = [path for path in sorted(folder.glob("*")) if path.suffix.lower() in ENDINGS]
+    files = {path.stem: path for path in paths}
+    if twice := [path for path in paths if files[path.stem] != path]:
+        also = files[twice[0].stem].name
+        raise InputError(
+            f"pictures: {twice[0].name!r} and {also!r} are of one key; allowed: one file; remove the other"
+        )
     keys = {line["key"] for line in samples}
     if unknown := sorted(files.keys() - keys):
         raise InputError(f"pictures: {unknown[0]!r} is no key of the set; allowed: such as {min(keys)!r}; rename it")

@@ -180,6 +180,7 @@ def _rename(folder: Path, key: str) -> None:
 
 def _sixteen(folder: Path, key: str) -> None:
     write_picture(np.load(folder / f"{key}.npy"), folder / f"{key}.png", bits=16)
+    (folder / f"{key}.png").rename(folder / f"{key}.PNG")
     _remove(folder, key)
 
 
@@ -196,6 +197,7 @@ BAD = {
     "NaN": (_put(lambda x: np.where(x > x.mean(), np.nan, x)), "not finite"),
     "whole numbers": (_put(lambda x: (255 * x).astype(np.int32)), "values of type int32"),
     "cut": (lambda folder, key: (folder / f"{key}.npy").write_bytes(b"\x93NUMPY"), "it is no picture of this set"),
+    "twice": (lambda folder, key: (folder / f"{key}.png").touch(), r"npy' and '.*png' are of one key; allowed: one"),
     "16 bits": (_sixteen, "16 bits a channel, of which its reader keeps 8; write a TIFF or an array"),
 }
 
