@@ -110,6 +110,12 @@ class SensorConfig:
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
         self.responses.band_average(self.channels, [550.0], [1.0])  # every channel needs a curve
         require_keys("channels: channel", (apart.channel for apart in self.chip.channels), self.channels)
+        time_shares = [x.time_share for x in self.chip.readings] + [x.time_share for x in self.chip.channels]
+        if self.lens.shake_um and min(time_shares, default=1.0) < 1:
+            raise InputError(
+                f"shake_um: {self.lens.shake_um:g} for a camera that reads some charge after a part of the time, which "
+                "the hand would blur less; allowed: 0; leave the shake out, or give every reading the whole time"
+            )
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(
                 "pixel: its full_well_e, read_noise_e or dsnu_e is not that of its readings; allowed: "

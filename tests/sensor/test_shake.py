@@ -5,6 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import scipy
+from loop import loop
+from refusal import refusal
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -111,6 +113,21 @@ def test_energy_of_every_channel_is_kept_and_nothing_is_negative(time_s):
 def test_unknown_way_to_hold_a_camera_is_refused():
     with pytest.raises(InputError, match="shake: 'tripod' is unknown; allowed: hand"):
         held_lens(LensConfig(2.8), "tripod")
+
+
+@loop("name, time_s", [("staggered", 0.001), ("white_apart", 0.01)])
+def test_a_hand_s_blur_of_the_whole_time_is_given_to_no_shorter_reading(name, time_s):
+    still = preset(name)
+    light = SpectralRadiance(np.full((8, 8, NM.size), 0.01), NM)
+    shaky = LensConfig(2.8, shake_um=5.0)
+    refusal(lambda: capture(light, replace(still, lens=shaky), time_s), match="shake_um: 5 .*after a part of the time")
+    capture(light, replace(still, lens=LensConfig(2.8)), time_s)
+
+
+def test_a_channel_that_takes_the_whole_time_shakes_as_the_others_do():
+    light = SpectralRadiance(np.full((8, 8, NM.size), 1e-6), NM)
+    sensor = replace(preset("white_apart"), lens=LensConfig(2.8, shake_um=5.0))
+    assert capture(light, sensor, 0.01).noise_of("W").shot == 1.0
 
 
 def test_frames_of_a_held_camera_differ_by_their_paths_and_repeat_with_the_seed():
