@@ -3,39 +3,32 @@
 python tests/faults/mutants.py --count 300    results are kept in out/mutants.json, so it can go on
 
 Code and tests are the last commit's, and so is the seed, if none is given: its first eight digits. The operators are
-cosmic-ray's (``pip install cosmic-ray coverage``). A place in a file is drawn first, then what stands there instead;
-arithmetic becomes other arithmetic, since bits of floats fail at once. Annotations are left alone, and a mutant that
-can't be imported counts for nothing: another is drawn. A package's tests run once, line by line under coverage; of a
-mutant only those that reach its lines run, the fastest first, and after them the rest of their files, which may share a
-fixture with them. Prints the survivors and a table.
+cosmic-ray's (``pip install cosmic-ray``). A place in a file is drawn first, then what stands there instead; arithmetic
+becomes other arithmetic, since bits of floats fail at once. Annotations are left alone, and a mutant that can't be
+imported counts for nothing: another is drawn. The file's own tests run first, then the others of its package. Prints
+the survivors and a table.
 """
 
 import argparse
 import ast
 import difflib
-import importlib
 import json
-import multiprocessing
-import os
 import random
 import re
 import subprocess
-import sys
 import tempfile
 import time
 from collections import Counter
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-import pytest
 from cosmic_ray.ast import Visitor, get_ast
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.operators.provider import OperatorProvider
-from coverage import Coverage
-from plant_faults import MAKE_TEST, ROOT
+from plant_faults import MAKE_TEST, ROOT, run_tests
 
 TESTS = {  # below tests/
     "sensor/readout.py": "sensor",
@@ -50,8 +43,6 @@ TESTS = {  # below tests/
     "docs/make/white_pixel.py": "docs/test_white_pixel.py",
 }
 LEFT_OUT = re.compile(r".*_(RShift|LShift|BitOr|BitAnd|BitXor)_.*|.*_(RShift|LShift|BitOr|BitAnd|BitXor)")
-# Loaded once; Dr.Jit and Mitsuba not, whose threads a fork would lose.
-LIBRARIES = ("colour", "matplotlib.pyplot", "scipy.signal", "scipy.stats", "skimage.metrics", "tifffile")
 NEEDS_ARGUMENTS = ("VariableInserter", "VariableReplacer")
 
 
@@ -114,108 +105,24 @@ def difference(text: str, code: str) -> str:
     return " ".join(re.sub(r"^@@ -(\d+).*", r"line \1:", line) for line in lines)
 
 
-class Reach:
-    """Pytest's plugin: writes the tests that reach each line of some files, and the seconds of each that passes."""
-
-    def __init__(self, files: list[str]) -> None:
-        self.coverage, self.seconds = Coverage(data_file=None, include=files), dict[str, float]()
-        self.coverage.start()
-
-    @pytest.hookimpl(tryfirst=True)
-    def pytest_runtest_protocol(self, item: pytest.Item) -> None:
-        self.coverage.switch_context(item.nodeid)
-
-    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
-        if report.when == "call" and report.passed:
-            self.seconds[report.nodeid] = report.duration
-
-    def pytest_sessionfinish(self) -> None:
-        self.coverage.stop()
-        data = self.coverage.get_data()
-        lines = {os.path.relpath(file): data.contexts_by_lineno(file) for file in data.measured_files()}
-        Path("reach.json").write_text(json.dumps([self.seconds, lines]))
-
-
-def reached(copy: Path, known: dict[str, Any]) -> dict[str, tuple[dict[str, float], dict[str, list[str]]]]:
-    """Of each file: the seconds of its package's tests, and the tests that reach each line; kept in `known`."""
-    result = {}
-    for tests in dict.fromkeys(TESTS.values()):
-        files = [file for file in TESTS if TESTS[file] == tests]
-        kept = " ".join(git("rev-parse", *(f"HEAD:{path}" for path in (f"tests/{tests}", *files))).decode().split())
-        if kept not in known:
-            log = run_tests(copy, ["-q", "-m", MAKE_TEST, f"tests/{tests}"], 3600, files)[1]
-            print(
-                tests,
-                *re.findall("^(?:FAILED|ERROR) .*", log, re.MULTILINE),
-                log.splitlines()[-1],
-                sep="\n",
-                flush=True,
-            )
-            known[kept] = json.loads((copy / "reach.json").read_text())
-        seconds, lines = known[kept]
-        result |= {file: (seconds, lines.get(file, {})) for file in files}
-    return result
-
-
-def git(*words: str) -> bytes:
-    return subprocess.check_output(["git", *words], cwd=ROOT)
-
-
-def reaching(text: str, line: int, lines: dict[str, list[str]]) -> set[str]:
-    """The tests that reach the statement at a line; of code that runs at import, all that reach the file."""
-    nodes = (node for node in ast.walk(ast.parse(text)) if isinstance(node, ast.stmt))
-    around = [node for node in nodes if node.lineno <= line <= (node.end_lineno or 0)]  # the outermost first
-    in_function = any(isinstance(node, ast.FunctionDef) for node in around[:-1])
-    numbers = map(str, range(around[-1].lineno, (around[-1].end_lineno or 0) + 1)) if in_function else lines
-    return {test for number in numbers for test in lines.get(number, ())}
-
-
-def tried(mutant: Mutant, copy: Path, seconds: dict[str, float], lines: dict[str, list[str]]) -> dict[str, Any]:
-    """What its tests make of a mutant: those of one file after another, the quickest first, then the files' others."""
+def tried(mutant: Mutant, copy: Path) -> dict[str, Any]:
+    """What its package's tests make of a mutant, those of its own file first."""
     file, text, start = copy / mutant.file, (copy / mutant.file).read_text("utf-8"), time.perf_counter()
-    near = reaching(text, int(mutant.change.split()[1].rstrip(":")), lines) & seconds.keys()
-    of_file = {test: test.partition("::")[0] for test in seconds}
-    spent = Counter[str]()
-    for test in near:
-        spent[of_file[test]] += seconds[test]  # type: ignore[assignment]
-    tests = sorted(
-        (test for test in seconds if of_file[test] in spent),
-        key=lambda test: (test not in near, spent[of_file[test]], of_file[test], seconds[test]),
-    )
+    folder = copy / "tests" / TESTS[mutant.file]
+    tests = [*map(str, folder.rglob(f"test_{file.stem}.py")), str(folder)]
     try:
         file.write_text(mutant.code, "utf-8")
-        most_s = 120 + 4 * sum(seconds[test] for test in tests)
-        code, log = run_tests(copy, ["-x", "-q", *tests], most_s) if tests else (0, "not reached")
+        code, test = run_tests(copy, tests, MAKE_TEST)
+    except subprocess.TimeoutExpired:
+        code, test = 1, "::it never ends"
     finally:
         file.write_text(text, "utf-8")
-    failed = re.search(r"^(?:FAILED|ERROR) (\S+)", log, re.MULTILINE)
-    test = failed[1] if failed else log[-400:]
     result = "survived" if code == 0 else "caught" if code == 1 and "::" in test else "not importable"
     return {"file": mutant.file, "result": result, "by": test, "seconds": round(time.perf_counter() - start, 1)}
 
 
-def run_tests(copy: Path, arguments: list[str], seconds: float, reach: Sequence[str] = ()) -> tuple[int, str]:
-    """Exit code of pytest and what it printed; in a fork, which has the libraries loaded."""
-    log = copy / "log"
-    child = multiprocessing.get_context("fork").Process(target=_pytest, args=(copy, arguments, reach, log))
-    child.start()
-    child.join(seconds)
-    if child.is_alive():
-        child.kill()
-        return 1, "FAILED ::it never ends"
-    return child.exitcode or 0, log.read_text()
-
-
-def _pytest(copy: Path, arguments: list[str], reach: Sequence[str], log: Path) -> None:
-    os.chdir(copy)
-    os.environ["PYTHONPATH"] = str(copy)
-    sys.path.insert(0, str(copy))
-    sys.dont_write_bytecode = not reach
-    with log.open("w") as out:
-        os.dup2(out.fileno(), 1)
-        os.dup2(out.fileno(), 2)
-    plugins = [Reach([str(copy / file) for file in reach])] if reach else []
-    os._exit(int(pytest.main(["-p", "no:cacheprovider", *arguments], plugins=plugins)))
+def git(*words: str) -> bytes:
+    return subprocess.check_output(["git", *words], cwd=ROOT)
 
 
 def main() -> int:
@@ -233,13 +140,10 @@ def main() -> int:
     with tempfile.TemporaryDirectory(prefix="mutants-") as folder:
         copy = Path(folder)
         subprocess.run(["tar", "-x", "-C", folder], input=git("archive", commit), check=True)
-        for library in LIBRARIES:
-            importlib.import_module(library)
-        reach = reached(copy, known.setdefault("reach", {}))
         for mutant in drawn(options.seed, copy):
             key = f"{mutant.file} {mutant.change}"
             if key not in results:
-                results[key] = tried(mutant, copy, *reach[mutant.file])
+                results[key] = tried(mutant, copy)
                 options.results.write_text(json.dumps(known))
             if results[key]["result"] != "not importable":
                 counted.append(results[key])
