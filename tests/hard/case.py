@@ -98,15 +98,17 @@ class Case:
         Makes the situation.
     own : callable or None
         Measures what this case must keep besides the invariants of all cases.
-    promise : str
-        The same in words.
     """
 
     name: str
     setup: str
     situation: Callable[[], Situation]
     own: Measure | None = None
-    promise: str = ""
+
+    @property
+    def promise(self) -> str:
+        """What `own` measures: the first line of its docstring."""
+        return (self.own.__doc__ or "").split(".\n")[0].rstrip(".") if self.own else ""
 
 
 def worst_of(error: ArrayLike, allowed: ArrayLike, unit: str) -> Margin:

@@ -54,7 +54,7 @@ def _one_pixel(inside: float, outside: float) -> SpectralRadiance:
 
 
 def _dim_alone(situation: Situation) -> Margin:
-    """Dim pixels beside bright ones expect what they expect without them."""
+    """Dim pixels expect what they expect alone."""
     dim = checkerboard(1) == 1.0
     both = expected(situation)[dim]
     alone = expected(replace(situation, radiance=times(situation.radiance, 1.0 * dim)))[dim]
@@ -62,7 +62,7 @@ def _dim_alone(situation: Situation) -> Margin:
 
 
 def _glint_alone(situation: Situation) -> Margin:
-    """The glint changes its own pixel and no other."""
+    """No other pixel changes."""
     others = np.ones(situation.radiance.shape)
     others[MIDDLE, MIDDLE] = 0.0
     both = expected(situation)[others > 0]
@@ -71,7 +71,10 @@ def _glint_alone(situation: Situation) -> Margin:
 
 
 def _light_kept(situation: Situation) -> Margin:
-    """The lens moves light and loses none: the frame's sum behind one filter is that of the lens without the term."""
+    """The lens loses no light.
+
+    The frame's sum behind one filter is that of the lens without the term.
+    """
     sharp = replace(situation.sensor, lens=LensConfig(situation.sensor.lens.f_number), cfa=("W",))
     spread = replace(situation.sensor, cfa=("W",))
     with_term = expected(replace(situation, sensor=spread)).sum()
@@ -80,7 +83,10 @@ def _light_kept(situation: Situation) -> Margin:
 
 
 def _all_saturated(situation: Situation) -> Margin:
-    """Every pixel counts as saturated (all but 1e-3 of them), and highlights are neutral."""
+    """All pixels saturated, highlights neutral.
+
+    All but 1e-3 of them.
+    """
     margins = []
     for name in CAMERAS:
         made = develop(shoot(situation, name), situation)
@@ -91,7 +97,10 @@ def _all_saturated(situation: Situation) -> Margin:
 
 
 def _dark(situation: Situation) -> Margin:
-    """No electron is expected, none is drawn."""
+    """Not one electron.
+
+    None is expected, none is drawn.
+    """
     drawn = [np.abs(shoot(situation, name).electrons).max() for name in CAMERAS]
     return worst_of(max(*drawn, expected(situation).max()), 1e-9, "e⁻")
 
@@ -103,7 +112,10 @@ def _finer() -> SpectralRadiance:
 
 
 def _white_of_a_flat_field(situation: Situation) -> Margin:
-    """Over 48 frames the mean of the reconstructed W is that of W's samples."""
+    """W without bias over 48 frames.
+
+    The mean of the reconstructed W is that of W's samples.
+    """
     names = channel_map(situation.sensor.cfa, situation.shape)
     errors = []
     for seed in range(48):
@@ -127,13 +139,7 @@ LIGHT_CASES = (
     Case("starlight_1h", "1e-4 cd/m² for an hour", lambda: Situation(at_level(STARLIGHT_CD_M2), exposure_s=3600.0)),
     Case("moonlight_table1", "0.036 cd/m² for 66 ms", lambda: Situation(at_level(0.036), table1_pixel(), 0.066)),
     Case("one_photon", "0.01 e⁻ a pixel, a pixel without noise", lambda: _exactly(0.01)),
-    Case(
-        "even_2_e",
-        "an even field, 2 e⁻ a pixel and 6 in W",
-        lambda: _even_light(2.0),
-        _white_of_a_flat_field,
-        "W without bias over 48 frames",
-    ),
+    Case("even_2_e", "an even field, 2 e⁻ a pixel and 6 in W", lambda: _even_light(2.0), _white_of_a_flat_field),
     Case("under_30_e", "29.9 e⁻: the last mean drawn from a table", lambda: _exactly(29.9)),
     Case("over_30_e", "30.1 e⁻: the first mean drawn as a quantile", lambda: _exactly(30.1)),
     Case("at_the_well", "every pixel's mean near the full well", lambda: _exactly(14_000.0)),
@@ -143,49 +149,42 @@ LIGHT_CASES = (
         "one pixel of 1e9 cd/m² in a scene of 5000",
         lambda: Situation(with_glint(at_level(5e3), MIDDLE, MIDDLE), exposure_s=1e-3),
         _glint_alone,
-        "no other pixel changes",
     ),
     Case(
         "glint_by_starlight",
         "one pixel of 1e9 cd/m² in a scene of 1e-4: 10^13 in a frame",
         lambda: Situation(with_glint(at_level(STARLIGHT_CD_M2), MIDDLE, MIDDLE), exposure_s=0.066),
         _glint_alone,
-        "no other pixel changes",
     ),
     Case(
         "glint_with_glare",
         "one pixel of 1e9 cd/m² in a scene of 5000, 1 % of veiling glare",
         lambda: Situation(with_glint(at_level(5e3), MIDDLE, MIDDLE), _lens(veiling_glare=0.01), 1e-4),
         _light_kept,
-        "the lens loses no light",
     ),
     Case(
         "glint_with_diffraction",
         "one pixel of 1e9 cd/m² in a scene of 5000, diffraction at f/2.8",
         lambda: Situation(with_glint(at_level(5e3), MIDDLE, MIDDLE), _lens(diffraction=1.0), 1e-4),
         _light_kept,
-        "the lens loses no light",
     ),
     Case(
         "glint_with_diffraction_4",
         "the same on 32 × 32 pixels, each imaged from 4 × 4 samples",
         lambda: Situation(_finer(), _lens(diffraction=1.0), 1e-4, samples_per_pixel=4),
         _light_kept,
-        "the lens loses no light",
     ),
     Case(
         "glint_out_of_focus",
         "one pixel of 1e9 cd/m² in a scene of 5000, a disc of 20 µm",
         lambda: Situation(with_glint(at_level(5e3), MIDDLE, MIDDLE), _lens(defocus_um=20.0), 1e-4),
         _light_kept,
-        "the lens loses no light",
     ),
     Case(
         "neighbours_1e8",
         "each pixel 10^8 times its neighbours, or a 10^8th",
         lambda: Situation(times(even(1e-2), checkerboard(1))),
         _dim_alone,
-        "dim pixels expect what they expect alone",
     ),
     Case(
         "neighbours_1e8_tiles",
@@ -204,24 +203,11 @@ LIGHT_CASES = (
         "10^8 between tiles, diffraction at f/2.8",
         lambda: Situation(times(even(1e-2), checkerboard(2)), _lens(diffraction=1.0)),
         _light_kept,
-        "the lens loses no light",
     ),
     Case("all_black", "no light at all", lambda: Situation(even(0.0))),
     Case("all_black_table1", "no light, 153 e⁻ of read noise", lambda: Situation(even(0.0), table1_pixel())),
-    Case(
-        "all_black_quiet",
-        "no light on a sensor without dark noise",
-        lambda: Situation(even(0.0), _quiet()),
-        _dark,
-        "not one electron",
-    ),
-    Case(
-        "all_saturated",
-        "1e9 cd/m² everywhere",
-        lambda: Situation(even(GLINT_CD_M2)),
-        _all_saturated,
-        "all pixels saturated, highlights neutral",
-    ),
+    Case("all_black_quiet", "no light on a sensor without dark noise", lambda: Situation(even(0.0), _quiet()), _dark),
+    Case("all_saturated", "1e9 cd/m² everywhere", lambda: Situation(even(GLINT_CD_M2)), _all_saturated),
     Case(
         "half_saturated",
         "black on the left, 1e9 cd/m² on the right",

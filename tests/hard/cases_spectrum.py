@@ -18,7 +18,10 @@ SODIUM = "sodium_low"
 
 
 def _line_closed_form(situation: Situation) -> Margin:
-    """Electrons of a doublet: its power times the response and the photons per joule at the lines themselves."""
+    """Electrons as the response at the lines says.
+
+    A doublet's power times the response and the photons per joule at the lines themselves.
+    """
     lines = np.array(lines_nm(SODIUM))
     edges = np.array([lines[0] - 0.5, lines[1] + 0.5])  # of the band: within it response and photons may differ
     sensor = situation.sensor
@@ -38,7 +41,10 @@ def _line_closed_form(situation: Situation) -> Margin:
 
 
 def _parts_add(situation: Situation) -> Margin:
-    """Odd bands and even bands alone add up to all bands."""
+    """Bands add up.
+
+    Odd bands and even bands alone.
+    """
     every = situation.radiance
     halves = [_only(every, np.arange(every.wavelength_nm.size) % 2 == odd) for odd in (0, 1)]
     both = expected(situation)
@@ -73,7 +79,6 @@ SPECTRUM_CASES = (
         "an even field under the same lamp, 10 cd/m²",
         lambda: Situation(even_lines(SODIUM, 10.0)),
         _line_closed_form,
-        "electrons as the response at the lines says",
     ),
     Case("fluorescent", "F11: narrow peaks in bands of 20 nm", lambda: Situation(at_level(10.0, "F11"))),
     Case("led_rgb", "three LEDs as white", lambda: Situation(at_level(10.0, "LED-RGB1"))),
@@ -81,7 +86,5 @@ SPECTRUM_CASES = (
     Case("red_alone", "light in one band at 770 nm alone", lambda: Situation(_some_bands(770.0))),
     Case("one_band", "one band of 400 nm", lambda: Situation(in_bands((580.0,), (400.0,)))),
     Case("one_narrow_band", "one band of 1 nm at 555 nm", lambda: Situation(_one_narrow())),
-    Case(
-        "bands_401", "401 bands, 1 nm each: a render of its own", lambda: Situation(_fine()), _parts_add, "bands add up"
-    ),
+    Case("bands_401", "401 bands, 1 nm each: a render of its own", lambda: Situation(_fine()), _parts_add),
 )

@@ -102,9 +102,7 @@ def catalogue(results: Sequence[Result]) -> list[list[str]]:
     for result in results:
         shares = [share_text(result.margins[name]) for name in COLUMNS]
         kept = "no" if result.broken else "yes"
-        rows.append(
-            [result.case.name, result.case.setup, *shares, kept, result.case.promise if result.case.own else ""]
-        )
+        rows.append([result.case.name, result.case.setup, *shares, kept, result.case.promise])
     return rows
 
 
