@@ -158,7 +158,9 @@ def spread(heights: Sequence[float], gap: float, low: float, high: float) -> lis
 COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; width of all, and height of the highest [points]
 BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
-LINES = ("-", "--", ":", "-.")  # a sensor each, in turn
+# a sensor each, in turn
+LINES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)), (0, (9, 3)), (0, (3, 1)))
+MOST_NAMES = 20  # one above the other in a plot
 LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # starlight to sunlit snow
 SNR = 10.0  # 20 dB
 
@@ -209,11 +211,14 @@ def snr_svg(sensors: Mapping[str, SensorConfig], light: str, exposure_s: float, 
         for channel, ratio in snr_at(luminance, sensor, light, exposure_s).items():
             colour = CHANNEL_COLOURS.get(channel, SOFT)
             line, label = LINES[index % len(LINES)], f"{name} {channel}".replace("$", r"\$")  # a formula's sign
-            axes.semilogx(luminance, 20 * np.log10(ratio), line, color=colour, label=label)
+            axes.semilogx(luminance, 20 * np.log10(ratio), ls=line, color=colour, label=label)
     axes.axhline(20 * np.log10(mark), color=SOFT, linewidth=0.8)
     axes.set(title=f"SNR of a pixel [dB], {light}, {1e3 * exposure_s:g} ms", xlabel="cd/m²", ylim=(-20, None))
     plain_ticks(axes)
-    axes.legend(fontsize=8)
+    if (names := len(axes.lines) - 1) > MOST_NAMES:
+        figure.legend(fontsize=8, loc="outside right upper", ncols=ceil(names / MOST_NAMES))
+    else:
+        axes.legend(fontsize=8)
     return svg_text(figure)
 
 

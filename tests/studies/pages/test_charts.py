@@ -110,5 +110,18 @@ def test_charts_over_light_hold_the_lines_that_are_given_and_a_log_scale_where_t
     assert ends["A"] > ends["B"]
 
 
+def test_names_of_eight_sensors_stay_on_the_sheet_and_beside_the_lines(drawn: Drawn) -> None:
+    (axes,) = drawn(plots.snr_svg, {f"sensor {x}": preset("low_noise") for x in range(8)}, "D65", 0.033, 10.0)
+    figure = axes.get_figure()
+    figure.draw_without_rendering()
+    (legend,) = figure.legends
+    box, plot = legend.get_window_extent(), axes.get_window_extent()
+    assert box.x0 > plot.x1
+    assert plot.height > figure.bbox.height / 2
+    assert figure.bbox.containsx(box.x1)
+    assert figure.bbox.containsy(box.y0)
+    assert len({str(line._dash_pattern) for line in axes.lines[:-1]}) == 8
+
+
 def test_a_sensors_name_is_no_formula() -> None:
     assert "a$^b$.toml W" in plots.snr_svg({"a$^b$.toml": preset("low_noise")}, "D65", 0.033, 10.0)
