@@ -85,9 +85,9 @@ class SharedPaths:
         emitted : (group, band) float64
         variance : (group, band, h, w) float32
         """
-        one, other = self.groups
-        factor = (2 * emitted[one] * emitted[other]).astype(np.float32)[:, None, None]
-        return np.asarray(factor * self.correlation * np.sqrt(variance[one]) * np.sqrt(variance[other]))
+        first, second = self.groups
+        factor = (2 * emitted[first] * emitted[second]).astype(np.float32)[:, None, None]
+        return np.asarray(factor * self.correlation * np.sqrt(variance[first]) * np.sqrt(variance[second]))
 
 
 def pooled(planes: Planes) -> Planes:
@@ -158,9 +158,9 @@ def shared_paths(
     groups: tuple[int, int], errors: Sequence[GroupError], variance: Planes, rates: NDArray[np.uint32]
 ) -> SharedPaths:
     """Correlation of the errors of two groups, whose variance is known."""
-    one, other = groups
-    deviations = np.sqrt(variance[one]) * np.sqrt(variance[other])
-    products = errors[one].covariance(errors[other], rates)
+    first, second = groups
+    deviations = np.sqrt(variance[first]) * np.sqrt(variance[second])
+    products = errors[first].covariance(errors[second], rates)
     correlation = np.divide(products, deviations, out=np.zeros_like(deviations), where=deviations > 0)
     return SharedPaths(groups, np.clip(correlation, -1, 1, out=correlation))
 

@@ -36,18 +36,18 @@ def relight_denoised(
     InputError
         As `Transport.relight`, and for a transport that wasn't rendered with ``denoise=True``.
     """
-    made = transport.denoised
-    if made is None:
+    denoised_light = transport.denoised
+    if denoised_light is None:
         raise InputError("denoised: the render has none; allowed: a render with denoise=True; render it so")
-    folded = replace(transport, light=made.folds)
-    denoised = replace(transport, light=Halves(made.radiance, transport.light.difference))
+    folded = replace(transport, light=denoised_light.folds)
+    denoised = replace(transport, light=Halves(denoised_light.radiance, transport.light.difference))
     level: dict[str, Any] = {"powers": powers, "luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
     picture = denoised.relight(spectra, **level)
-    one, other = folded.relight_halves(spectra, **level)
+    first, second = folded.relight_halves(spectra, **level)
     luminance = picture.luminance()
-    upper = measured_error(luminance - one.luminance(), luminance - other.luminance(), np.ones(picture.shape)).upper
+    upper = measured_error(luminance - first.luminance(), luminance - second.luminance(), np.ones(picture.shape)).upper
     mean = float(luminance.mean())
-    return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), one, other
+    return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), first, second
 
 
 BLOCK = 16  # pixels on a side: errors of a denoiser are alike in neighbours

@@ -30,17 +30,17 @@ def design_page(
     reference, design, *_ = by_camera.values()
     given_up = [
         f"{level}: {figure} {loss:.2f} {unit}"
-        for level, one, other in zip(levels, design, reference, strict=True)
+        for level, error, compared in zip(levels, design, reference, strict=True)
         for figure, loss, unit in (
-            ("PSNR", other.psnr_db - one.psnr_db, "dB"),
-            ("luminance", other.luminance_db - one.luminance_db, "dB"),
-            ("a*, b*", one.colour - other.colour, "in Lab"),
+            ("PSNR", compared.psnr_db - error.psnr_db, "dB"),
+            ("luminance", compared.luminance_db - error.luminance_db, "dB"),
+            ("a*, b*", error.colour - compared.colour, "in Lab"),
         )
         if loss > 0.005
     ]
     rows = [
-        (name, [f"{one.psnr_db - other.psnr_db:+.2f}" for one, other in zip(errors, reference, strict=True)],
-         [f"{other.colour - one.colour:+.2f}" for one, other in zip(errors, reference, strict=True)])
+        (name, [f"{error.psnr_db - compared.psnr_db:+.2f}" for error, compared in zip(errors, reference, strict=True)],
+         [f"{compared.colour - error.colour:+.2f}" for error, compared in zip(errors, reference, strict=True)])
         for name, errors in list(by_camera.items())[1:]
     ]  # fmt: skip
     return write_out(

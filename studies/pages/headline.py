@@ -91,7 +91,7 @@ def _seen(run: dict[str, Leads], outcome: str) -> str:
             if (here := run[metric.key].outcome == outcome).any()
         }
         if sizes:
-            metric = max(sizes, key=lambda one: sizes[one])
+            metric = max(sizes, key=lambda metric: sizes[metric])
             named.append(_span(metric, run[metric.key].mean[run[metric.key].outcome == outcome]))
     return ", ".join(named)
 

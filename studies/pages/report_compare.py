@@ -188,7 +188,7 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
             if a < b:
                 counted = [counts(x.pair.ours, x.pair.theirs) for x in groups]
                 across["counts"][key] = {
-                    metric.key: [sum(one[metric.key][outcome] for one in counted) for outcome in OUTCOMES]
+                    metric.key: [sum(count[metric.key][outcome] for count in counted) for outcome in OUTCOMES]
                     for metric in metrics
                 }
                 across["means"][key] = [

@@ -69,7 +69,7 @@ def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
     for other in (value for value in range(len(names)) if value != a):
         groups = groups_of(report, axis, a, other)
         counted = [counts(group.pair.ours, group.pair.theirs)[metric.key] for group in groups]
-        last = " / ".join(str(sum(one[outcome] for one in counted)) for outcome in OUTCOMES)
+        last = " / ".join(str(sum(count[outcome] for count in counted)) for outcome in OUTCOMES)
         for group in (*groups, *means_over_scenes(report, groups)):
             title = f"{code(names[other])}, {code(group.title)}" if group.title else code(names[other])
             rows.append([title, *lead_cells(metric, group.pair.leads[metric.key]), last])

@@ -132,13 +132,13 @@ def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, .
     """Claims computed by the paper's own method, with the values of the same claims computed by the default."""
     return tuple(
         replace(
-            one,
+            claim,
             checks=tuple(
                 replace(check, default=None if default_check.value == check.value else default_check.value)
-                for check, default_check in zip(one.checks, other.checks, strict=True)
+                for check, default_check in zip(claim.checks, default.checks, strict=True)
             ),
         )
-        for one, other in zip(claims, defaults, strict=True)
+        for claim, default in zip(claims, defaults, strict=True)
     )
 
 

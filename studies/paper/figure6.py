@@ -73,19 +73,19 @@ def claims_6(
     """
     switch = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
     return (
-        claim(19, (at_most(name, one.noise / bayer[name].noise, 1.0, "×") for name, one in interleaved.items())),
+        claim(19, (at_most(name, camera.noise / bayer[name].noise, 1.0, "×") for name, camera in interleaved.items())),
         claim(
             20,
             (
-                over_seeds(name, one.psnr_db - bayer[name].psnr_db, low=0.0, unit="dB")
-                for name, one in interleaved.items()
+                over_seeds(name, camera.psnr_db - bayer[name].psnr_db, low=0.0, unit="dB")
+                for name, camera in interleaved.items()
             ),
         ),
         claim(
             21,
             (
-                near(f"{name}, {'on' if switch[name] else 'off'}", one.substituted or 0.0, float(switch[name]), 0.0)
-                for name, one in interleaved.items()
+                near(f"{name}, {'on' if switch[name] else 'off'}", camera.substituted or 0.0, float(switch[name]), 0.0)
+                for name, camera in interleaved.items()
             ),
         ),
         claim(22, (at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()), exposure=DARKEST),

@@ -81,10 +81,10 @@ def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
     """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
     light = {"cd_m2": LOW_CD_M2, "ms": LOW_S * 1e3}
     noises = (
-        at_most(f"{name}, W's noise over the colours'", one.white_noise / one.colour_noise, 0.5, "×")
-        for name, one in stages.items()
+        at_most(f"{name}, W's noise over the colours'", step.white_noise / step.colour_noise, 0.5, "×")
+        for name, step in stages.items()
     )
-    gains = (over_seeds(f"{name}, PSNR gained", one.gain_db, low=GAIN_DB, unit="dB") for name, one in stages.items())
+    gains = (over_seeds(f"{name}, PSNR gained", step.gain_db, low=GAIN_DB, unit="dB") for name, step in stages.items())
     return claim(14, noises, **light), claim(15, gains, **light)
 
 
@@ -153,15 +153,15 @@ def measure_bright(raw: RawImage, result: Image, subject: View) -> Bright:
 def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
     """W partly full and the result whole, by reading."""
     return (
-        claim(17, (ClaimCheck(name, one.white_full, *PARTLY, "of its pixels") for name, one in bright.items())),
+        claim(17, (ClaimCheck(name, shot.white_full, *PARTLY, "of its pixels") for name, shot in bright.items())),
         claim(
             18,
             (
-                *(at_least(f"{name}, colours not full", one.result_likeness, WHOLE) for name, one in bright.items()),
-                *(at_least(f"{name}, a colour full too", one.full_likeness, WHOLE) for name, one in bright.items()),
+                *(at_least(f"{name}, colours not full", shot.result_likeness, WHOLE) for name, shot in bright.items()),
+                *(at_least(f"{name}, a colour full too", shot.full_likeness, WHOLE) for name, shot in bright.items()),
             ),
-            white=" and ".join(f"{one.white_likeness:.2f} ({name})" for name, one in bright.items()),
-            full=" and ".join(f"{one.colours_full:.0%}" for one in bright.values()),
+            white=" and ".join(f"{shot.white_likeness:.2f} ({name})" for name, shot in bright.items()),
+            full=" and ".join(f"{shot.colours_full:.0%}" for shot in bright.values()),
         ),
     )
 

@@ -116,13 +116,13 @@ def largest_step(values: Image, sign: float) -> tuple[float, Image]:
     return float(LEVELS_CD_M2[index + 1]), sizes[index]
 
 
-def where_white_fills(one: LevelCurves) -> float:
+def where_white_fills(curves: LevelCurves) -> float:
     """Level at which half as many of W's pixels are full as at most [cd/m^2]; the brightest where none ever is."""
-    full = one.white_full.mean(axis=1)
+    full = curves.white_full.mean(axis=1)
     return float(LEVELS_CD_M2[int((full >= full.max() / 2).argmax()) if full.any() else -1])
 
 
-def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
+def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
     """Steps of quality, steps of W's part, and what W gains."""
     how = (
         f"still_life, {READING}, {len(LEVELS_CD_M2)} levels from {LEVELS_CD_M2[0]:g} to {LEVELS_CD_M2[-1]:g} cd/m², "
@@ -130,11 +130,11 @@ def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
     )
     # Quality from level to level, and over the octave in which W fills.
     (psnr_at, psnr), (delta_at, delta), (flip_at, flip_rise) = (
-        largest_step(*pair) for pair in ((one.psnr_db, -1.0), (one.delta_e, 1.0), (one.flip, 1.0))
+        largest_step(*pair) for pair in ((curves.psnr_db, -1.0), (curves.delta_e, 1.0), (curves.flip, 1.0))
     )
-    fills_at, log_levels = where_white_fills(one), np.log2(LEVELS_CD_M2)
+    fills_at, log_levels = where_white_fills(curves), np.log2(LEVELS_CD_M2)
     before, after = (
-        np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in one.psnr_db.T])
+        np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in curves.psnr_db.T])
         for side in (-0.5, 0.5)
     )
     qualities = (
@@ -146,20 +146,20 @@ def claims_levels(one: LevelCurves) -> tuple[Claim, ...]:
     places = {"psnr_at": psnr_at, "delta_at": delta_at, "flip_at": flip_at, "fills_at": fills_at}
     # W's part
     parts = (
-        at_most("share of similarity by W, largest step", _step(one.similarity), SMOOTH),
-        at_most("substitution's weight, largest step", _step(one.weight), SMOOTH),
-        ClaimCheck("share of similarity by W, in starlight", float(one.similarity[0].mean()), 0.95, 1.0),
-        at_most("share of similarity by W, in full sun", float(one.similarity[-1].mean()), 0.5),
+        at_most("share of similarity by W, largest step", _step(curves.similarity), SMOOTH),
+        at_most("substitution's weight, largest step", _step(curves.weight), SMOOTH),
+        ClaimCheck("share of similarity by W, in starlight", float(curves.similarity[0].mean()), 0.95, 1.0),
+        at_most("share of similarity by W, in full sun", float(curves.similarity[-1].mean()), 0.5),
     )
     # What W gains
-    means, margins = one.gain_db.mean(axis=1), half_width(one.gain_db)
-    best, least = one.gain_db[(means - margins).argmax()], one.gain_db[(means + margins).argmin()]
+    means, margins = curves.gain_db.mean(axis=1), half_width(curves.gain_db)
+    best, least = curves.gain_db[(means - margins).argmax()], curves.gain_db[(means + margins).argmin()]
     gains = (
         over_seeds("gain over the frame without W, largest", best, low=GAIN_DB, unit="dB"),
         over_seeds("gain over the frame without W, least", least, low=-LEVEL_DB, unit="dB"),
     )
     return (
-        claim(24, qualities, how=how, gain_db=_step(one.psnr_db), **places),
+        claim(24, qualities, how=how, gain_db=_step(curves.psnr_db), **places),
         claim(25, parts, how=how),
         claim(26, gains, how=how),
     )

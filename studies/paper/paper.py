@@ -56,18 +56,18 @@ def make(setup: Setup) -> Paper:
         "Figure A": figure_a,
         "Figure B": figure_b,
     }
-    made = []
+    results = []
     for index, (name, maker) in enumerate(makers.items()):
 
         def step(what: str, share: float, name: str = name, index: int = index) -> None:
             setup.step(f"{name}: {what}", (index + share) / len(makers))
 
         step("begins", 0.0)
-        made.append(maker(replace(setup, step=step)))
+        results.append(maker(replace(setup, step=step)))
     numbers = number_claims(view(setup, "still_life", 1.0))
-    claims = (*numbers, *(claim for _, of_figure in made for claim in of_figure), *section_2(setup), *section_3_1())
+    claims = (*numbers, *(claim for _, of_figure in results for claim in of_figure), *section_2(setup), *section_3_1())
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
-    return Paper(tuple(figure for figure, _ in made), claims, facts | {"environment": environment()})
+    return Paper(tuple(figure for figure, _ in results), claims, facts | {"environment": environment()})
 
 
 def write(paper: Paper, folder: Path) -> Path:
@@ -78,7 +78,7 @@ def write(paper: Paper, folder: Path) -> Path:
     files["paper.csv"] = as_csv(paper).encode()
     page = write_out(
         "paper.html.j2",
-        figures=[(one, address("svg+xml", files[f"figure_{one.name}.svg"])) for one in paper.figures],
+        figures=[(figure, address("svg+xml", files[f"figure_{figure.name}.svg"])) for figure in paper.figures],
         claims=paper.claims,
         facts=paper.facts,
         verdicts=VERDICTS,

@@ -187,16 +187,16 @@ def yardstick(
     """Fix exposure, noise and pixels by two references; `lamps` (h, w) are pixels that see a light directly."""
     images = [form_image(reference, sensor) for reference in references]
     exposure_s = float(np.mean([auto_exposure_s(image, sensor) for image in images]))
-    one, other = (electrons(reference, sensor, exposure_s) for reference in references)
-    expected = (one + other) / 2
+    first, second = (electrons(reference, sensor, exposure_s) for reference in references)
+    expected = (first + second) / 2
     noise_e2 = np.stack([noise_variance(plane, sensor, exposure_s) for plane in expected])
-    return Yardstick(sensor, exposure_s, (one, other), noise_e2, (expected < sensor.pixel.full_well_e) & ~lamps)
+    return Yardstick(sensor, exposure_s, (first, second), noise_e2, (expected < sensor.pixel.full_well_e) & ~lamps)
 
 
 def share_map(image_e: Image, yard: Yardstick) -> Image:
     """Squared error over the sensor's noise variance, (channel, h, w): pooled over 3x3 pixels, NaN outside."""
-    one, other = yard.references
-    return pooled_share((image_e - one) * (image_e - other), yard)
+    first, second = yard.references
+    return pooled_share((image_e - first) * (image_e - second), yard)
 
 
 def pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
@@ -208,7 +208,7 @@ def pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
 
 def mean_error(image_e: Image, yard: Yardstick) -> tuple[float, float]:
     """Return the RMS error [e-] and the mean share, over pixels and channels; 0 where noise leaves less than that."""
-    one, other = yard.references
-    squared_e2 = float(((image_e - one) * (image_e - other))[yard.inside].mean())
+    first, second = yard.references
+    squared_e2 = float(((image_e - first) * (image_e - second))[yard.inside].mean())
     share = float(np.nanmean(share_map(image_e, yard)))
     return float(np.sqrt(max(squared_e2, 0.0))), max(share, 0.0)

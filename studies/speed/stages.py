@@ -108,23 +108,23 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
         first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
         widths = np.array([width_nm[group].sum() for group in groups])
         calls[f"{count} bands"] = _render(bench, scene, first + widths / 2, widths, bench.samples[0], bench.seed)
-    made = timed(calls, bench.repeats)
-    finest, _ = made[f"{MOST_BANDS} bands"]
+    results = timed(calls, bench.repeats)
+    finest, _ = results[f"{MOST_BANDS} bands"]
     error_e, noise_e = _render_errors(bench, sensor, finest)
     question = f"How many bands? {bench.scene}, {bench.size}x{bench.size}, {bench.samples[0]} samples a pixel"
-    return finest, _stage("bands", question, f"{MOST_BANDS} bands of the same paths", noise_e, made, error_e)
+    return finest, _stage("bands", question, f"{MOST_BANDS} bands of the same paths", noise_e, results, error_e)
 
 
 def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     """Render with ever more samples, against two references whose own noise falls out of the mean."""
     call = partial(_render, bench, scene, *even_bands(VISIBLE_NM, 8))
-    made = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
+    results = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
     most = 2 * bench.samples[-1]
-    (one, reference_times), (other, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
-    relit = [rendered.relight(luminance_cd_m2=bench.level_cd_m2) for rendered in (one, other)]
-    yard = yardstick((relit[0], relit[1]), (one.coverage.mean > 0) | (other.coverage.mean > 0), sensor)
+    (first, reference_times), (second, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
+    relit = [rendered.relight(luminance_cd_m2=bench.level_cd_m2) for rendered in (first, second)]
+    yard = yardstick((relit[0], relit[1]), (first.coverage.mean > 0) | (second.coverage.mean > 0), sensor)
     points = []
-    for choice, (transport, times) in made.items():
+    for choice, (transport, times) in results.items():
         image_e = electrons(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor, yard.exposure_s)
         points.append(Measured(choice, times, *mean_error(image_e, yard)))
     question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
@@ -149,14 +149,14 @@ def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposu
     times = {name: times for name, (_, times) in timed(calls, bench.repeats + 1).items()}
     images = {name: _electrons(radiance, lens_sensor, exposure_s) for name, lens_sensor in sensors.items()}
     truth = list(images.values())[-1]
-    made = {name: (image, times[name]) for name, image in images.items()}
+    results = {name: (image, times[name]) for name, image in images.items()}
     question = f"What does the lens do? Captures, {bench.picture}x{bench.picture}, {MOST_BANDS} bands"
     noise_e = _noise_e(truth, sensor, exposure_s)
-    return _stage("lens", question, "the whole lens", noise_e, made, lambda image: _rms_e(image, truth, sensor))
+    return _stage("lens", question, "the whole lens", noise_e, results, lambda image: _rms_e(image, truth, sensor))
 
 
 def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
-    """Compare the fast readout with the exact one."""
+    """Compare the fast readout with the exact first."""
     calls = {name: _capture(bench, sensor, radiance, exposure_s, exact=name == "exact") for name in ("fast", "exact")}
     frames = timed(calls, bench.repeats + 1)
     # The two draw different frames of the same statistics: only the mean over the frame can be compared.
@@ -180,9 +180,9 @@ def _reconstruction(bench: Bench, sensor: SensorConfig, radiance: SpectralRadian
     }
     question = f"How far does the reconstruction look? {bench.picture}x{bench.picture}"
     reference = "the noise-free channels; times: of the largest neighbourhood and patch"
-    made = timed(calls, bench.repeats)
+    results = timed(calls, bench.repeats)
     return _stage(
-        "neighbourhood and patch", question, reference, noise_e, made, lambda image: _rms_e(image, truth, sensor)
+        "neighbourhood and patch", question, reference, noise_e, results, lambda image: _rms_e(image, truth, sensor)
     )
 
 

@@ -134,8 +134,8 @@ def make_frames(
         if area is not None:
             radiances = tuple(area.view(view, *grid(sensor)) for view in views)
         unmoved, *halves = (channel_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
-        whole, one, other = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
-        errors = [(one - other) / 2] if transport.denoised is None else [whole - one, whole - other]
+        whole, first, second = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
+        errors = [(first - second) / 2] if transport.denoised is None else [whole - first, whole - second]
         facts = scene | {
             "auto_s": unit_exposure_s(radiances[0], preset),
             "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in sensor.channels else None),

@@ -175,7 +175,7 @@ def _noise_notes(cells: Sequence[Row]) -> list[str]:
     """For each scene whose render's noise exceeds a sensor's, where it does so most."""
     worst: dict[str, Row] = {}
     for row in cells:
-        worst[row.scene] = max(worst.get(row.scene, row), row, key=lambda one: one.mc_share)
+        worst[row.scene] = max(worst.get(row.scene, row), row, key=lambda row: row.mc_share)
     notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst.values()]
     return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
 

@@ -29,7 +29,7 @@ SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean
 ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
 TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
-FIGURES = tuple(one.name for one in fields(Row) if "float" in str(one.type) or one.name == "substitution")
+FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")
 
 
 @dataclass(frozen=True)
