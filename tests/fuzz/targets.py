@@ -5,7 +5,7 @@ import sys
 import tempfile
 import zipfile
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
@@ -30,7 +30,6 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM
 from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load
 from scenes.reflectances import read_reflectances
-from sensor.calibration import ColourCalibration
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import read_camera
 from sensor.config_file import read_sensor
@@ -41,7 +40,6 @@ from sensor.raw_files.noise_profile import read_noise_profile
 from sensor.raw_files.photograph import read_photograph
 from sensor.raw_files.raw_file import write_raw
 from sensor.raw_files.raw_tiff import read_tiff
-from sensor.raw_files.tiff import CFA, text, write_mosaic
 from studies.study.study_file import read_study
 from studies.sweep.database import add, open_results, want
 from studies.sweep.export import read_rows
@@ -50,6 +48,7 @@ from studies.sweep.row import Row
 sys.path.append(str(Path(__file__).resolve().parents[1]))
 
 from builders import random_weights, transport_of, wheel_of
+from file_samples import REPORT, REPORT_HEAD, camera_json, envi_header, exposure, other_camera
 
 Sample = Mapping[str, bytes]  # files by name; the first is the one that is read
 
@@ -134,58 +133,25 @@ def _mat_samples() -> list[Sample]:
     ]
 
 
-def _raw(cfa: tuple[str, ...], count: int) -> RawImage:
-    rng = np.random.default_rng(3)
-    shapes = [(count,), (3, 3), (count, 3), (count, 3), (3, count), (3, count)]
-    colour = ColourCalibration(*(rng.uniform(0.2, 1.0, shape) for shape in shapes))
-    dn = rng.integers(0, 1023, (24, 26)).astype(np.uint16)
-    numbers = {"black_dn": 64.0, "white_dn": 1023.0, "gain_e_per_dn": 9.5, "read_noise_e": 2.0, "dsnu_e": 1.0}
-    return RawImage(
-        dn,
-        cfa,
-        **numbers,
-        prnu=0.01,
-        exposure_s=0.01,
-        f_number=2.8,
-        iso=100.0,
-        colour=colour,
-        defects=np.array([[1, 2], [3, 4]]),
-    )
+def _raw(cfa: tuple[str, ...]) -> RawImage:
+    return replace(exposure(cfa, (24, 26), 10), defects=np.array([[1, 2], [3, 4]]))
 
 
 def _dng_samples() -> list[Sample]:
     return [
         _made(lambda folder, raw=raw: write_raw(raw, folder / "a.dng"))
-        for raw in (_raw(("RG", "GB"), 3), _raw(("RG", "BW"), 4))
+        for raw in (_raw(("RG", "GB")), _raw(("RG", "BW")))
     ]
 
 
 def _tiff_samples() -> list[Sample]:
-    return [_made(lambda folder: write_raw(_raw(("RG", "BW"), 4), folder / "a.tif"))]
+    return [_made(lambda folder: write_raw(_raw(("RG", "BW")), folder / "a.tif"))]
 
 
 def _camera_samples() -> list[Sample]:
     """Digital negatives of another camera, with a noise profile and colours."""
-    tags: dict[int, Any] = {
-        254: ("I", (0,)),
-        271: text("Other"),
-        272: text("Model X"),
-        33421: ("H", (2, 2)),
-        33422: ("B", bytes((0, 1, 1, 2))),
-        50706: ("B", bytes((1, 4, 0, 0))),
-        50708: text("Other Model X"),
-        50710: ("B", bytes((0, 1, 2))),
-        50713: ("H", (2, 2)),
-        50714: ("H", (64, 64, 64, 64)),
-        50717: ("I", (1023,)),
-        50721: ("2i", (9, 10, -3, 10, -1, 10, -4, 10, 12, 10, 2, 10, -5, 100, 15, 100, 6, 10)),
-        50728: ("2I", (1, 2, 1, 1, 7, 10)),
-        50778: ("H", (21,)),
-        51041: ("d", (1e-4, 1e-8)),
-    }
-    dn = _raw(("RG", "GB"), 3).dn
-    exif: dict[int, Any] = {33434: ("2I", (1, 100)), 33437: ("2I", (4, 1))}
-    return [_made(lambda folder: write_mosaic(folder / "a.dng", dn, CFA, tags, exif))]
+    dn = _raw(("RG", "GB")).dn
+    return [_made(lambda folder: other_camera(folder / "a.dng", dn, noise=(1e-4, 1e-8)))]
 
 
 def _study_samples() -> list[Sample]:
@@ -245,17 +211,6 @@ ir_cut = "filter.csv"
 
 
 _CUBE = b'holds = "reflectance"\nwavelength_nm = [420, 630]\n'
-_ENVI = b"""ENVI
-samples = 5
-lines = 4
-bands = 4
-header offset = 0
-data type = 4
-interleave = bil
-byte order = 0
-wavelength units = Nanometers
-wavelength = {420, 490, 560, 630}
-"""
 
 
 def _cube_samples() -> list[Sample]:
@@ -267,7 +222,7 @@ def _cube_samples() -> list[Sample]:
     return [
         _made(lambda folder: np.save(folder / "a.npy", values)) | {"a.toml": _CUBE},
         _made(lambda folder: np.save(folder / "a.npy", coded)) | {"a.toml": _CUBE + b"scale=3.9e-3"},
-        {"a.hdr": _ENVI, "a.img": values.astype("<f4").tobytes(), "a.toml": b'holds = "radiance"'},
+        {"a.hdr": envi_header().encode(), "a.img": bytes(4 * 5 * 6 * 7), "a.toml": b'holds = "radiance"'},
         _made(lambda folder: savemat(folder / "a.mat", {"ref": values})) | {"a.toml": named},
     ]
 
@@ -408,34 +363,6 @@ def _read_wheel(path: Path) -> object:
     return processor_of(f"{path}:bayer_net")
 
 
-_REPORT = b"""camera = "X"
-maker = "M"
-source = "report"
-date = "2020-01-02"
-bits = 12
-black_level_dn = 64
-[report]
-pixel_pitch_um = 3.45
-K = 0.4
-sigma_d = 2.5
-mu_I = 3.0
-exposure_s = 0.1
-DSNU1288 = 1.5
-PRNU1288 = 0.6
-eta = 64
-lambda_nm = 529
-mu_e_sat = 9500
-"""
-
-
-def _camera_json_samples() -> list[Sample]:
-    header = {"manufacturer": "A", "model": "B", "document_creator": "lab", "document_creation_date": "2025-01-01"}
-    rows = {str(nm): [nm / 780, 1.0, 0.5] for nm in range(380, 785, 5)}
-    data = {"units": "relative", "index": {"main": ["R", "G", "B"]}, "data": {"main": rows}}
-    content = {"header": {**header, "license": "Apache-2.0"}, "spectral_data": data}
-    return [{"camera.json": json.dumps(content).encode()}]
-
-
 TARGETS: dict[str, Target] = {
     "exr": Target(_exr_samples, {".exr": any_bytes}, read_exr),
     "mat": Target(_mat_samples, {".mat": mat_elements}, read_iset_scene, in_child=True),
@@ -446,9 +373,15 @@ TARGETS: dict[str, Target] = {
     "study": Target(_study_samples, {".toml": any_text}, read_study),
     "sensor": Target(_sensor_samples, {".toml": any_text, ".csv": any_text}, read_sensor),
     "report": Target(
-        lambda: [{"report.toml": _REPORT}], {".toml": any_text}, lambda path: numbers_of(read_report(path))
+        lambda: [{"report.toml": (REPORT_HEAD + REPORT).encode()}],
+        {".toml": any_text},
+        lambda path: numbers_of(read_report(path)),
     ),
-    "library": Target(_camera_json_samples, {".json": json_values}, lambda path: read_camera(path).responses),
+    "library": Target(
+        lambda: [{"camera.json": json.dumps(camera_json()).encode()}],
+        {".json": json_values},
+        lambda path: read_camera(path).responses,
+    ),
     "cube": Target(
         _cube_samples,
         {".npy": any_bytes, ".toml": any_text, ".hdr": any_text, ".img": any_bytes, ".mat": mat_elements},

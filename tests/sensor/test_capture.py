@@ -1,11 +1,9 @@
 """A photograph: its exact form is its three steps bit for bit, its quick form is independent of strips and threads."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
-from command_line import in_new_python
 from loop import loop
 from refusal import refusal
 from scipy import stats
@@ -109,31 +107,6 @@ def test_both_forms_see_the_light_that_the_lens_gives(samples, lens):
         z = (mean_e - expected_e) / np.sqrt((expected_e + 1.5**2 + sensor.gain_e_per_dn**2 / 12) / 25)
         # 1584 pixels: the sum of squares within its 1e-5 quantiles
         assert stats.chi2.ppf(1e-5, z.size) < np.sum(z**2) < stats.chi2.isf(1e-5, z.size)
-
-
-WITHOUT_LLVM = """
-import json
-import numpy as np
-from render.radiance import SpectralRadiance
-from sensor.capture import capture
-from sensor.device import draw_device
-from sensor.presets import preset
-
-nm = np.arange(385.0, 780.0, 10.0)
-radiance = SpectralRadiance(np.random.default_rng(1).uniform(0, 0.006, (33, 48, 40)).astype(np.float32), nm)
-device = draw_device(preset("low_noise"), (33, 48), np.random.default_rng(2))
-raw = capture(radiance, preset("low_noise"), 0.02, device, np.random.default_rng(3))
-print(json.dumps({"engine": raw.engine, "dn": raw.dn.tolist()}))
-"""
-
-
-@pytest.mark.thorough
-def test_without_llvm_the_numpy_form_runs_and_the_raw_image_says_so():
-    said = json.loads(in_new_python(WITHOUT_LLVM, DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so"))
-    if said["engine"] == "cuda":
-        pytest.skip("a CUDA device answers here, whatever the LLVM library")
-    assert said["engine"] == "numpy"
-    np.testing.assert_array_equal(said["dn"], shoot(scene(), preset("low_noise"), exact=True).dn)
 
 
 @pytest.mark.skipif(backend() != "llvm", reason="threads are LLVM's")

@@ -1,7 +1,5 @@
 """One chip: its fixed patterns."""
 
-from dataclasses import replace
-
 import numpy as np
 from loop import loop
 
@@ -10,8 +8,8 @@ from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 
 
-def camera(prnu=0.02, dsnu_e=5.0):
-    return SensorConfig(PixelConfig(2.2, 0.9, 15_000.0, 3.0, dsnu_e, prnu), LensConfig(2.8))
+def camera(prnu=0.02, dsnu_e=5.0, **terms):
+    return SensorConfig(PixelConfig(2.2, 0.9, 15_000.0, 3.0, dsnu_e, prnu, **terms), LensConfig(2.8))
 
 
 def test_patterns_have_the_stated_mean_and_spread():
@@ -28,6 +26,7 @@ def test_zero_switches_each_pattern_off_exactly_and_leaves_the_other():
     even = draw_device(camera(prnu=0.0), (16, 16), np.random.default_rng(2))
     np.testing.assert_array_equal(even.photo_response, 1.0)
     np.testing.assert_array_equal(even.dark_offset_e, both.dark_offset_e)
+    assert (both.column_gain, both.hot) == (None, None)
     level = draw_device(camera(dsnu_e=0.0), (16, 16), np.random.default_rng(2))
     np.testing.assert_array_equal(level.dark_offset_e, 0.0)
     np.testing.assert_array_equal(level.photo_response, both.photo_response)
@@ -52,33 +51,13 @@ def test_one_seed_makes_one_chip_and_two_seeds_make_two():
         assert abs(np.corrcoef(one.ravel(), two.ravel())[0, 1]) < 4.5 / 256
 
 
-def test_a_smaller_chip_of_the_same_seed_is_the_larger_one_s_corner():
-    large, small = (draw_device(camera(), shape, np.random.default_rng(7)) for shape in ((20, 30), (6, 11)))
-    np.testing.assert_array_equal(small.photo_response, large.photo_response[:6, :11])
-    np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])
-    assert small.shape == (6, 11)
-
-
 # Columns and hot pixels
 
 REAL = {"column_gain_spread": 0.01, "column_offset_e": 3.0, "hot_pixel_share": 0.02}
 
 
-def chip(shape=(512, 512), seed=1, dsnu_e=0.0, **terms):
-    sensor = camera(prnu=0.0, dsnu_e=dsnu_e)
-    sensor = replace(sensor, pixel=replace(sensor.pixel, **terms))
-    return draw_device(sensor, shape, np.random.default_rng(seed))
-
-
-def test_zero_leaves_columns_and_hot_pixels_out_and_the_other_patterns_alone():
-    plain, real = (draw_device(one, (64, 64), np.random.default_rng(1)) for one in (camera(), replaced(**REAL)))
-    assert plain.column_gain is None
-    assert plain.hot is None
-    np.testing.assert_array_equal(real.photo_response, plain.photo_response)
-
-
-def replaced(**terms):
-    return replace(camera(), pixel=replace(camera().pixel, **terms))
+def chip(shape=(512, 512), **terms):
+    return draw_device(camera(**{"prnu": 0.0, "dsnu_e": 0.0, **terms}), shape, np.random.default_rng(1))
 
 
 def test_column_patterns_are_one_number_a_column_with_the_stated_spread():
@@ -111,14 +90,15 @@ def test_all_pixels_can_be_hot_and_more_hot_pixels_hold_the_fewer():
 
 
 def test_hot_pixels_lie_apart_from_the_other_patterns():
-    sensor = replaced(hot_pixel_share=0.3, column_offset_e=3.0)
-    device = draw_device(sensor, (512, 512), np.random.default_rng(1))
+    device = chip(prnu=0.02, dsnu_e=5.0, hot_pixel_share=0.3, column_offset_e=3.0)
     for pattern in (device.photo_response, device.dark_offset_e):
         assert abs(np.corrcoef(device.hot.ravel(), pattern.ravel())[0, 1]) < 4.5 / 512  # twice 7e-6
 
 
-def test_a_smaller_chip_s_columns_and_hot_pixels_are_the_larger_one_s_corner():
-    large, small = (chip(shape, **REAL) for shape in ((20, 30), (6, 11)))
+def test_a_smaller_chip_of_the_same_seed_is_the_larger_one_s_corner():
+    large, small = (chip(shape, prnu=0.02, dsnu_e=5.0, **REAL) for shape in ((20, 30), (6, 11)))
+    assert small.shape == (6, 11)
+    np.testing.assert_array_equal(small.photo_response, large.photo_response[:6, :11])
     np.testing.assert_array_equal(small.column_gain, large.column_gain[:11])
     np.testing.assert_array_equal(small.hot, large.hot[:6, :11])
     np.testing.assert_array_equal(small.dark_offset_e, large.dark_offset_e[:6, :11])

@@ -9,7 +9,14 @@ from loop import loop
 from refusal import refusal
 
 from sensor.config import LONGEST_S
-from sensor.exposure import RULES, auto_exposure_s, exposure_by_rule_s, information_bits, most_informative_s
+from sensor.exposure import (
+    RULES,
+    auto_exposure_s,
+    exposure_by_rule_s,
+    exposure_of_electrons_s,
+    information_bits,
+    most_informative_s,
+)
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
 from sensor.response import channel_electrons
@@ -138,12 +145,7 @@ def test_rules_by_name():
 
 @loop("rule", ["auto", "auto:W", "auto:information"])
 def test_electrons_that_are_there_already_give_the_rules_time(rule):
-    from sensor.exposure import exposure_by_rule_s, exposure_of_electrons_s
-    from sensor.optics import SpectralIrradiance
-    from sensor.presets import low_noise
-    from sensor.response import channel_electrons
-
-    rng, sensor = np.random.default_rng(4), low_noise()
+    rng, sensor = np.random.default_rng(4), preset("low_noise")
     light = SpectralIrradiance(rng.random((16, 16, 40)) * 1e-3, np.arange(385.0, 780.0, 10.0), 2.2)
     per_second_e = channel_electrons(light, sensor, 1.0)
     assert exposure_of_electrons_s(rule, per_second_e, sensor) == exposure_by_rule_s(rule, light, sensor)

@@ -4,6 +4,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from file_samples import ENVI_NM as NM
+from file_samples import envi_header
 from loop import loop
 from refusal import refusal
 from scipy.io import savemat
@@ -13,22 +15,8 @@ from render.photometry import luminance
 from render.radiance_files.cube import read_cube
 from render.radiance_files.radiance_source import extent_of, files_of, is_reflectance, load_picture, load_radiance
 
-NM = np.arange(400.0, 701.0, 50.0)
 CUBE = np.random.default_rng(4).uniform(0.05, 0.95, (5, 6, NM.size))
 PLAIN = 'holds = "reflectance"\nwavelength_nm = [400, 700]\n'
-HEADER = """ENVI
-description = { of a desk,
-  in two lines }
-samples = 6
-lines = 5
-bands = 7
-header offset = {offset}
-data type = {kind}
-interleave = {order}
-byte order = {big}
-wavelength units = {unit}
-wavelength = { {nm} }
-"""
 
 
 def npy(folder: Path, cube: np.ndarray = CUBE, text: str = PLAIN) -> Path:
@@ -38,11 +26,7 @@ def npy(folder: Path, cube: np.ndarray = CUBE, text: str = PLAIN) -> Path:
 
 
 def envi(folder: Path, more: str = "", **changes: object) -> Path:
-    asked = {"offset": 0, "kind": 4, "order": "bsq", "big": 0, "unit": "Nanometers", "nm": ",\n ".join(map(str, NM))}
-    text = HEADER
-    for name, value in (asked | changes).items():
-        text = text.replace(f"{{{name}}}", str(value))
-    (folder / "desk.hdr").write_text(text + more, "utf-8")
+    (folder / "desk.hdr").write_text(envi_header(**changes) + more, "utf-8")
     (folder / "desk.toml").write_text('holds = "reflectance"\n', "utf-8")
     return folder / "desk.hdr"
 

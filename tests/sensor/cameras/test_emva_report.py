@@ -5,6 +5,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from file_samples import REPORT as WHOLE
+from file_samples import REPORT_HEAD as HEAD
 from loop import loop
 from refusal import refusal
 
@@ -13,22 +15,6 @@ from sensor.cameras.numbers import curves_csv, missing, preset_text
 from sensor.config_file import read_sensor
 
 REPORTS = sorted((Path(__file__).parents[3] / "sensor" / "cameras" / "reports").glob("*.toml"))
-HEAD = 'camera = "X1"\nmaker = "M"\nsource = "report 7"\ndate = "2020-01-02"\n'
-WHOLE = """bits = 12
-black_level_dn = 95
-[report]
-pixel_pitch_um = 3.5
-K = 0.4
-sigma_d = 5.0
-DSNU1288 = 2.0
-PRNU1288 = 0.5
-mu_e_sat = 9500
-mu_I = 100.0
-exposure_s = 0.09
-eta = 60
-lambda_nm = 530
-SNR_max_dB = 39.8
-"""
 
 
 def write(folder: Path, text: str) -> Path:

@@ -6,38 +6,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from file_samples import LIBRARY_NM as NM
+from file_samples import camera_json
 from loop import loop
 from refusal import refusal
 
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from sensor.cameras.library import VARIABLE, measured_camera, measured_cameras, read_library
-
-NM = np.arange(380, 785, 5)
-
-
-def camera_json(**changes):
-    """One camera as rawtoaces-data has it: bell curves, of equal power, green's greatest 1."""
-    peaks = {"R": (600, 0.6), "G": (540, 1.0), "B": (460, 0.8)}
-    curves = [peak * np.exp(-(((NM - at) / 40) ** 2)) for at, peak in peaks.values()]
-    header = {
-        "manufacturer": "Maker",
-        "model": "Model One",
-        "document_creator": "lab",
-        "document_creation_date": "2025-11-09T20:35:04Z",
-        "license": "Apache-2.0",
-        "measurement_equipment": "double monochromator",
-    }
-    rows = {str(nm): [float(curve[index]) for curve in curves] for index, nm in enumerate(NM)}
-    data = {"units": "relative", "index": {"main": ["R", "G", "B"]}, "data": {"main": rows}}
-    content = {"header": header, "spectral_data": data}
-    for path, value in changes.items():
-        part = content
-        *parents, key = path.split("__")
-        for parent in parents:
-            part = part[parent]
-        part[key] = value
-    return content
 
 
 def copy_of(folder: Path, *cameras) -> Path:

@@ -7,58 +7,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
+from file_samples import CAMERA_BLACK as BLACK
+from file_samples import CAMERA_MATRIX as MATRIX
+from file_samples import CAMERA_WHITE as WHITE
+from file_samples import other_camera
 from loop import loop
 from refusal import refusal
 
-from sensor.raw_files.dng import rational
 from sensor.raw_files.noise_profile import read_noise_profile
 from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_photograph
 from sensor.raw_files.raw_file import open_raw, read_raw
-from sensor.raw_files.tiff import CFA, Values, text, write_mosaic
 
 rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
 
 SHAPE = (40, 60)
-BLACK = (512.0, 514.0, 510.0, 520.0)  # of the tile's sites, row by row
-WHITE = 16_000
-MATRIX = np.array([[0.9, -0.3, -0.1], [-0.4, 1.2, 0.2], [-0.05, 0.15, 0.6]])  # XYZ under D65 to the camera
-
-
-def other_camera(
-    path: Path,
-    dn: np.ndarray,
-    *,
-    pattern: tuple[int, ...] = (0, 1, 1, 2),
-    repeat: tuple[int, int] = (2, 2),
-    orientation: int = 1,
-    noise: tuple[float, ...] | None = None,
-    colours: bool = True,
-) -> Path:
-    """Digital negative of some camera: a black level a site, no word from rodcone."""
-    tags: dict[int, tuple[str, Values]] = {
-        254: ("I", (0,)),
-        271: text("Other"),
-        272: text("Model X"),
-        274: ("H", (orientation,)),
-        33421: ("H", repeat),
-        33422: ("B", bytes(pattern)),
-        50706: ("B", bytes((1, 4, 0, 0))),
-        50707: ("B", bytes((1, 1, 0, 0))),
-        50708: text("Other Model X"),
-        50710: ("B", bytes((0, 1, 2))),
-        50711: ("H", (1,)),
-        50713: ("H", (2, 2)),
-        50714: ("2I", rational(BLACK)),
-        50717: ("I", (WHITE,)),
-    }
-    if colours:
-        tags[50721] = ("2i", rational(MATRIX))
-        tags[50728] = ("2I", rational((0.5, 1.0, 0.7)))
-        tags[50778] = ("H", (21,))
-    if noise is not None:
-        tags[51041] = ("d", noise)
-    write_mosaic(path, dn, CFA, dict(sorted(tags.items())), {33434: ("2I", rational(0.01)), 33437: ("2I", rational(4))})
-    return path
 
 
 def levels(electrons: np.ndarray) -> np.ndarray:

@@ -15,7 +15,6 @@ from sensor.chip import ChannelReading, Reading
 from sensor.config import SensorConfig, with_channel_readings, with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
-from sensor.emva1288.characterise import characterise
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, preset_file
@@ -186,18 +185,6 @@ def test_light_for_an_snr_is_that_of_the_site_over_its_share():
         electrons = electrons_at_snr(10.0, sensor, TIME_S, "W")
         variance = noise_variance(np.array([electrons]), sensor, TIME_S, "W")
         assert electrons / np.sqrt(variance) == pytest.approx(10.0, rel=1e-6), reading
-
-
-def test_emva_1288_gives_the_channel_s_numbers_back():
-    sensor = camera(
-        replace(WAYS[1], full_well_e=9000.0), column_gain_spread=0.0, dark_current_e_per_s=0.0, column_offset_e=0.0
-    )
-    for channel, numbers in {"W": (20.0, 12.0, 9000.0), "G": (1.5, 1.0, 15_000.0)}.items():
-        figures = {x.name: x for x in characterise(of_channel(sensor, channel)[0], (128, 160), 3, 0.01).figures}
-        for name, number in zip(("dark noise", "DSNU", "full well"), numbers, strict=True):
-            figure = figures[name]
-            assert figure.configured == pytest.approx(number, rel=0.02), (channel, name)  # with the rounding
-            assert abs(figure.measured - figure.configured) < 5 * figure.error, (channel, name)
 
 
 def test_a_burst_keeps_each_channel_s_noise_and_well():
