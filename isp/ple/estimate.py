@@ -27,13 +27,14 @@ from threadpoolctl import ThreadpoolController
 from isp.ple.overlap import STRIDE, Patches, overlapped
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
-from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
+from isp.ple.tables import PILOT_VARIANCE, STEP, Doubles, Sampling, Singles, Table, table, window
 
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 COARSE_STEPS = 2  # of light from table to table where a scale only tells the finer one
 DOUBT = 2.0  # power by which a patch that its component explains badly counts less
 INFLATE = 2.0  # of the pilot's variance: it has seen the same samples
+ROUNDS = 4  # in which a patch under black is brought to the curve
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
 
 
@@ -146,6 +147,7 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
                 sums[start : start + len(part)] += part
             noise.append(patch_noise)
     total /= weight[..., None]
+    total += scale.samplings[0][0].black
     variance /= cells[..., None]
     edge = size - STRIDE
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
@@ -205,7 +207,7 @@ def _solve(
             )
             _solve_by_light(prior, blind, y[:, colours], steps, pilot, clipped, patches)
             weight = window(sampling.size).ravel()[rows // 4] * patches.weight[clipped, None]
-            guess = patches.values[np.ix_(clipped, rows)] / weight
+            guess = patches.values[np.ix_(clipped, rows)] / weight + sampling.black[rows % 4]
             y[clipped] = np.where(full[clipped], np.maximum(y[clipped], guess), y[clipped])
         _solve_by_light(prior, sampling, y, steps, pilot, among, patches)
     return patches
@@ -232,7 +234,7 @@ def _solve_one_light(
     at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
-    noise = None
+    noise = sure = None
     parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
     if pilot is not None:
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
@@ -261,7 +263,31 @@ def _solve_one_light(
                 (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32),
             )
             rows *= weight[:, None]
+            over = np.matmul(rows, linear, out=values[: group.size])
+            if sure is not None and at.mix.size == PATCH:
+                under = np.flatnonzero(over.min(axis=1) < 0.0)
+                over[under] = weight[under, None] * _on_the_curve(at, k, evidence[group[under]], sure[under])
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[place] = variance * (by.noise / by.variance)
-            patches.values[place] = np.matmul(rows, linear, out=values[: group.size])
+            patches.values[place] = over
+
+
+def _on_the_curve(at: Table, k: int, evidence: Singles, sure: Doubles) -> Singles:
+    """Estimate patches by component k where its straight line falls under black; over black, times the window.
+
+    Samples read t(m g u^2), a component knows t along a line in u. Each sample, and the pilot, is moved by the line
+    less the curve at the last estimate of u, 0 or more: there the line is right. The patch is t at the last u.
+    """
+    count, taper = len(at.rows), np.repeat(window(at.mix.size).ravel(), 4)
+    line = at.values[k] - np.tile(at.sampling.black, at.mix.size**2)
+    linear, bend = at.estimator(k).linear / taper, np.zeros((len(evidence), taper.size), np.float32)
+    for _ in range(ROUNDS + 1):
+        rows = evidence.copy()
+        rows[:, :count] += bend[:, at.rows]
+        rows[:, -4:] += bend @ at.average.T
+        rows[:, -4:] = rows @ at.reads[k][:, -4:] * sure
+        straight = rows @ linear
+        over = at.over_black(np.maximum(at.mix.means[k] + (straight - line) / at.slopes[k], 0.0))
+        bend = straight - over
+    return np.asarray(over * taper, np.float32)

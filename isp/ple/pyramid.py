@@ -24,7 +24,7 @@ from isp.ple.mosaic import (
 from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import PILOT_ERROR, Sampling, Singles
-from isp.ple.units import LIFT, readings
+from isp.ple.units import readings
 from sensor.raw import RawImage
 
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on
@@ -84,32 +84,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
         rows[...] = readings(raw.dark_noise_e).electrons(rows)
         for (c, _), plane in zip(apart, counted, strict=True):
             rows[..., c] = plane
-    for c, i in enumerate(cells.index):
-        straighten(planes[..., c], 0.9 * shot[i] * dark_e[i], shot[i] * ((LIFT * dark_e[i]) ** 2 + 0.125))
     return planes, estimates.noise[list(cells.index)]
-
-
-def straighten(plane: Singles, dark: float, bend: float) -> None:
-    """Take electrons e under their surroundings' mean m to m (1 + (r(e) - r(m)) r(m) / m)^2, r(e) = sqrt(e + bend).
-
-    Components are Gaussians over readings, straight in u, the root of the signal, about their means; from there on a
-    dark detail's square lies over the straight line, which in the dark falls under 0: a speck. Surroundings are 8x8
-    pixels, each counted up to `dark`, 0.9 times the dark noise: where a sample's SNR is under 0.8 it is the component
-    that tells, beyond it the sample, and a lamp beside lifts no black.
-    """
-    if not (plane < dark).any():
-        return
-    ends = [-(-length // STRIDE) * STRIDE - length + PATCH - STRIDE for length in plane.shape]
-    sides = [((PATCH - STRIDE) // 2, end - (PATCH - STRIDE) // 2) for end in ends]
-    sums = _sums(np.pad(np.clip(plane, 0.0, dark), sides, mode="symmetric"), STRIDE, PATCH)
-    for first in range(0, len(plane), TOGETHER):
-        part = plane[first : first + TOGETHER]
-        rows = sums[first // STRIDE : (first + TOGETHER) // STRIDE] / PATCH**2
-        mean = np.repeat(np.repeat(rows, STRIDE, 0), STRIDE, 1)[: part.shape[0], : part.shape[1]]
-        at = (part < mean) & (mean > 1e-6)
-        level, root = mean[at], np.sqrt(mean[at] + bend)
-        share = 1.0 + (np.sqrt(np.maximum(part[at] + bend, 0.0)) - root) * root / level
-        part[at] = level * np.square(np.maximum(share, 0.0))
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:

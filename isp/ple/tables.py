@@ -8,6 +8,7 @@ one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 import scipy
@@ -55,6 +56,11 @@ class Sampling:
     dark_e: tuple[float, ...]
     prnu: float
 
+    @property
+    def black(self) -> Singles:
+        """Mean reading of a sample without light, by channel [units of noise]."""
+        return np.array([readings(dark_e).mean(np.zeros(1))[0] for dark_e in self.dark_e], np.float32)
+
 
 @dataclass(frozen=True, eq=False)
 class Estimator:
@@ -63,7 +69,8 @@ class Estimator:
     Attributes
     ----------
     linear : (sample + 5, value) float32
-        On the samples, 1, and the pilot's innovation over its variance in each of its four directions.
+        On the samples, 1, and the pilot's innovation over its variance in each of its four directions; it gives
+        readings over `Sampling.black`.
     variance, noise : (4,) float64
         Posterior variance of a pixel, mean by channel, and the same over the variance of a sample's noise.
     inner : (4,) float64
@@ -94,16 +101,16 @@ class Table:
     """All components at one light; the estimators are made when they are first asked for."""
 
     def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
-        self.mix, self.rows = mix, np.array(sampling.rows)
+        self.mix, self.sampling, self.rows = mix, sampling, np.array(sampling.rows)
         pixels, count = mix.size**2, len(sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
-        curves = [readings(dark_e) for dark_e in sampling.dark_e]
+        self.unit_e = gains * light  # electrons of a signal of 1
         # The components in units of noise: values t, their slope in u, and their slope in the light.
         variances = np.diagonal(mix.covariances, axis1=1, axis2=2)
         electrons = gains * light * (mix.means**2 + variances)
         self.values, steep, noise = np.empty((3, *electrons.shape))
-        for channel, curve in enumerate(curves):
-            places = (slice(None), slice(channel, None, 4))
+        for channel, dark_e in enumerate(sampling.dark_e):
+            places, curve = (slice(None), slice(channel, None, 4)), readings(dark_e)
             self.values[places] = curve.mean(electrons[places])
             steep[places], noise[places] = curve.slope(electrons[places]), curve.variance(electrons[places])
         noise += (sampling.prnu * electrons * steep) ** 2
@@ -184,6 +191,13 @@ class Table:
         middle[size // 4 : -(size // 4), size // 4 : -(size // 4)] = 1.0
         return np.asarray((middle.ravel()[:, None, None] * np.eye(4)).reshape(-1, 4).T / middle.sum())
 
+    def over_black(self, roots: NDArray[Any]) -> Singles:
+        """Mean readings of roots of signals (patch, value), over those of black."""
+        electrons, over = self.unit_e * np.square(roots), np.empty(roots.shape, np.float32)
+        for channel, (dark_e, black) in enumerate(zip(self.sampling.dark_e, self.sampling.black, strict=True)):
+            over[:, channel::4] = readings(dark_e).mean(electrons[:, channel::4]) - black
+        return over
+
     def estimator(self, k: int) -> Estimator:
         """Estimator of component k."""
         if k not in self.estimators:
@@ -202,7 +216,7 @@ class Table:
         inner = ((self.inner @ covariance) * self.inner).sum(axis=1) - ((self.inner @ half) ** 2).sum(axis=1)
         pilot = self.turn[k] @ (self.average @ covariance - (self.average @ half) @ half.T)
         taper = np.repeat(window(self.mix.size).ravel(), 4)
-        offset = self.values[k] - linear @ self.values[k, at]
+        offset = self.values[k] - linear @ self.values[k, at] - np.tile(self.sampling.black, self.mix.size**2)
         return Estimator(
             linear=(np.concatenate([linear.T, offset[None], pilot]) * taper).astype(np.float32),
             variance=variance,

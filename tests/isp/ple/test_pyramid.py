@@ -63,25 +63,22 @@ def test_a_sample_far_under_0_leaves_no_dark_speck(tile, level_e, most):
     assert np.count_nonzero(shown < truth - 0.25) <= most
 
 
-def test_a_dark_detail_is_as_bright_as_its_signals_root_says():
-    # Its reading lies on the tangent at its surroundings' mean, so under 0 although the root isn't.
-    bend, size, place = 13.0, 64, (32, 31)
-    for root in (0.4, 0.8):
-        plane = np.ones((size, size - 1), np.float32)
-        for _ in range(20):  # the detail is part of the mean
-            mean = (plane[30:38, 28:36].clip(0).sum()) / 64
-            slope = (np.sqrt(mean * 1.001**2 + bend) - np.sqrt(mean * 0.999**2 + bend)) / (0.002 * mean**0.5)
-            plane[place] = (np.sqrt(mean + bend) + slope * (root - mean**0.5)) ** 2 - bend
-        assert plane[place] < root**2 - 0.03
-        for dark, expected in ((2.0, root**2), (0.0, plane[place])):
-            straight = plane.copy()
-            pyramid.straighten(straight, dark, bend)
-            assert straight[place] == pytest.approx(expected, abs=1e-3)
+@pytest.mark.parametrize("tile", [BAYER, RGBW])
+def test_thin_black_lines_in_grey_are_as_dark_as_the_root_of_the_signal_says(tile):
+    # Three pixels wide, of 2 %: along a component's straight line they fall under 0 (errors of 0.13 and 0.14).
+    lines = (np.arange(96) % 12 < 3) | (np.arange(96)[:, None] % 11 < 3)
+    truth, grey_e, noise_e = np.where(lines, 0.02, 1.0), 1500.0, 30.0
+    rng, expected_e = np.random.default_rng(5), grey(grey_e, tile) * truth
+    held = rng.poisson(expected_e) + rng.normal(0, noise_e, truth.shape)
+    raw = RawImage(held + 200, tile, 200.0, 200 + FULL_E, 1.0, noise_e, 0.0, 0.0, 0.01)
+    shown = reconstruct(raw)[0][..., :3] / own_prior().neutral_e[:3] / grey_e
+    error = encode_srgb(shown) - encode_srgb(truth)[..., None]
+    assert np.sqrt(np.square(error[lines]).mean()) < 0.105
 
 
 @pytest.mark.sample(1)
 def test_black_beside_grey_stays_black_behind_noise_of_the_1_e_and_of_the_30_e_kind():
-    # Squares of 8 pixels, black of 5 %: where samples say what is dark, no component's line is bent (8.9 % by 30 e-).
+    # Squares of 8 pixels, black of 5 %: where samples say what is dark, it isn't lifted (8.9 % by 30 e- once).
     squares = np.kron(np.indices((12, 12)).sum(axis=0) % 2, np.ones((8, 8)))
     inside = np.kron(np.ones((12, 12)), np.pad(np.ones((4, 4)), 2)) * (1 - squares) > 0
     neutral = own_prior().neutral_e[:3]

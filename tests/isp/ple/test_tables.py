@@ -57,7 +57,8 @@ def test_over_signals_drawn_from_the_prior_the_error_is_0_in_the_mean_and_varies
     for k in (0, 17, 40):
         values, y = drawn(table, k, light_e, count, rng)
         by = table.estimator(k)
-        error = (_with_1(y) @ by.linear[: len(table.rows) + 1]) / np.repeat(window(PATCH).ravel(), 4) - values
+        over = (_with_1(y) @ by.linear[: len(table.rows) + 1]) / np.repeat(window(PATCH).ravel(), 4)
+        error = over + np.tile(table.sampling.black, PATCH**2) - values
         deviation = error.std(axis=0)
         assert np.abs(error.mean(axis=0) / deviation).max() < SIGMAS / np.sqrt(count) + 0.01
         for channel in range(4):
@@ -79,7 +80,7 @@ def test_with_a_pilot_the_error_varies_as_the_closed_form():
     spread = told + table.spread[k]
     assert (news**2).mean(axis=0) == pytest.approx(spread, rel=SIGMAS * (2 / count) ** 0.5)
     error = np.concatenate([_with_1(y), news / spread], axis=1) @ by.linear
-    error = error / np.repeat(window(PATCH).ravel(), 4) - values
+    error = error / np.repeat(window(PATCH).ravel(), 4) + np.tile(table.sampling.black, PATCH**2) - values
     expected = by.variance - (1 / spread) @ by.pilot_variance
     for channel in range(4):
         assert (error**2)[:, channel::4].mean() == pytest.approx(expected[channel], rel=SIGMAS * (2 / count) ** 0.5)
@@ -106,7 +107,7 @@ def test_one_component_is_the_textbooks_linear_estimate():
     expected = reading + gain @ (y - reading[at])
     by = table.estimator(0)
     found = _with_1(y[None])[0] @ by.linear[:65] / np.repeat(window(PATCH).ravel(), 4)
-    assert found == pytest.approx(expected, rel=2e-4)
+    assert found + np.tile(given.black, PATCH**2) == pytest.approx(expected, rel=2e-4)
     left = np.diag(whole) - np.einsum("ij,ji->i", gain, whole[at])
     assert by.variance == pytest.approx([left[channel::4].mean() for channel in range(4)], rel=1e-4)
 
