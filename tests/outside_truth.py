@@ -22,11 +22,6 @@ def colour_science() -> Any:
 
 MAGNIFICATION = 0.00323  # where none is named
 
-# Of a white scene of 100 cd/m^2.
-PHOTON_RADIANCE = {  # of 400-700 nm [1/(s sr m^2)]; at 550 nm and the mean of the bands [1/(s sr m^2 nm)]
-    "D65": {"total": 1.1142691e18, "at_550_nm": 3.9921618e15, "mean": 3.5944165e15},
-    "E": {"total": 1.1764900e18, "at_550_nm": 3.7951291e15, "mean": 3.7951291e15},
-}
 IRRADIANCE = {  # f-number, magnification: lux per cd/m^2, photons [1/(um^2 s)] under D65
     (2.8, MAGNIFICATION): (0.09647774905903855, 107502.18),
     (2.8, 0.0): (0.09708259127286134, 108176.13),

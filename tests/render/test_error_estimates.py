@@ -17,11 +17,6 @@ NM = np.arange(505.0, 600.0, 10.0)
 WIDTH_NM = band_widths(NM, None)
 
 
-def test_the_relative_error_of_uniform_planes_is_standard_error_over_mean():
-    values, variance = np.full((1, 3, 8, 9), 4.0, np.float32), np.full((1, 3, 8, 9), 0.25, np.float32)
-    assert relative_error(ONE, values, variance) == pytest.approx(0.5 / 4.0, rel=1e-6)
-
-
 def variance_of(light, difference, lamp=0.0, lamp_difference=0.0, rates=1):
     """Stated variance of one group's light (band, h, w), of which a lamp in view gives a part (h, w)."""
     shape = np.broadcast_shapes(*(np.shape(x) for x in (light, difference, lamp, lamp_difference)))

@@ -15,7 +15,6 @@ from scipy.stats import t as student
 from render import meter
 from render.engine import render
 from render.geometry import look_at, to_world
-from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from scenes.catalog import load
@@ -183,16 +182,3 @@ def test_the_error_told_is_the_scatter_over_seeds():
     told = np.mean([(level.relative_error * level.value) ** 2 for level in levels])
     low, high = (chi2.ppf(tail, count - 1) / (count - 1) for tail in (FALSE_ALARM / 2, 1 - FALSE_ALARM / 2))
     assert low < values.var(ddof=1) / told < high
-
-
-def test_light_is_metered_in_this_programs_variant_and_the_users_own_stays():
-    sky = {"light": {"type": "constant"}}
-    expected, transport = metered(sky), render(metered_scene(sky), (1, 1), wavelength_nm=BANDS_NM, spp=1)
-    mi = mitsuba_module()
-    before = mi.variant()
-    try:
-        mi.set_variant("scalar_rgb")
-        np.testing.assert_array_equal(transport.irradiance[0], expected)
-        assert mi.variant() == "scalar_rgb"
-    finally:
-        mi.set_variant(before)

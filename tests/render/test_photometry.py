@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from loop import loop
-from outside_truth import PHOTON_RADIANCE, V_NM, V
+from outside_truth import V_NM, V
 
 from render.illuminants import illuminant
 from render.photometry import (
@@ -20,11 +19,6 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM
 
 ISET_NM, ISET_WIDTH_NM = np.arange(400.0, 701.0, 10.0), np.full(31, 10.0)
 WIDTH_NM = np.full(40, 10.0)
-
-
-def photons(spectral, nm, width_nm):
-    """Photons of all bands: sum of E lambda / (h c) d_lambda, written out."""
-    return float((spectral * nm * 1e-9 * width_nm).sum() / (6.62607015e-34 * 299792458.0))
 
 
 def test_constants_are_the_exact_ones_of_the_si():
@@ -75,12 +69,3 @@ def test_colour_matching_functions_are_nowhere_negative_and_v_peaks_at_555_nm():
 
 def test_v_equals_isetcams_table():
     assert luminous_efficiency(V_NM, np.full(V_NM.size, 1e-3)) == pytest.approx(V, abs=1e-4)  # 4 digits there
-
-
-@loop(("light", "expected"), list(PHOTON_RADIANCE.items()))
-def test_photons_of_a_scene_of_100_candela_match_the_independent_numbers(light, expected):
-    spectral = 100 * illuminant(light).band_average(ISET_NM, ISET_WIDTH_NM)
-    at_550_nm = 100 * illuminant(light).band_average([550.0], [1e-3]) * photons_per_joule([550.0])
-    assert photons(spectral, ISET_NM, ISET_WIDTH_NM) == pytest.approx(expected["total"], rel=2e-3)
-    assert at_550_nm[0] == pytest.approx(expected["at_550_nm"], rel=2e-3)
-    assert (spectral * photons_per_joule(ISET_NM)).mean() == pytest.approx(expected["mean"], rel=2e-3)

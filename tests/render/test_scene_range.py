@@ -16,8 +16,6 @@ from render.geometry import look_at, to_world
 from render.scene import LightGroup, Node, Scene, spectrum_node, uniform_node
 from render.scene_range import check_range, warn_of_coloured_lights, warn_of_dark_ends
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
-from render.user_scene.scene_file import load_scene_file
-from rodcone.errors import InputError
 from scenes.catalog import load
 from scenes.catalog import names as scenes
 
@@ -124,28 +122,6 @@ def test_held_ends_go_on_in_the_picture(reflectance: Node, rows: bool) -> None:
     inside = {id(EVEN): (0.5, 0.6), id(UNEVEN): (0.65, 0.55)}[id(reflectance)]
     found = radiance(replace(scene, extend="hold"))
     assert found * np.pi == pytest.approx([0.2, *inside, 0.4], rel=2e-3)  # wavelengths jittered within 10 nm
-
-
-XML = """<scene version="3.0.0">
-<sensor type="perspective"><film type="hdrfilm"><integer name="width" value="4"/>
-<integer name="height" value="4"/></film>
-<transform name="to_world"><lookat origin="0,0,4" target="0,0,0" up="0,1,0"/></transform>
-<float name="fov" value="20"/></sensor>
-<emitter type="directional" id="sun"><vector name="direction" x="0" y="0" z="-1"/>
-<spectrum name="irradiance" value="1"/></emitter>
-<shape type="rectangle" id="wall"><bsdf type="diffuse">
-<spectrum name="reflectance" value="400:0.2, 550:0.8, 700:0.4"/></bsdf></shape></scene>"""
-
-
-def test_a_scene_file_is_refused_or_held(tmp_path: Path) -> None:
-    path = tmp_path / "scene.xml"
-    path.write_text(XML.replace("400:", "410:"))
-    with pytest.raises(InputError, match=r"wall/_arg_0/reflectance is known over 410-700 nm alone; .*--extend hold"):
-        radiance(load_scene_file(path).scene)
-    path.write_text(XML)
-    found = radiance(load_scene_file(path, extend="hold").scene)
-    assert found * np.pi == pytest.approx([0.2, 0.5, 0.6, 0.4], rel=2e-3)
-    refusal(load_scene_file, path, extend="zero", match="extend: 'zero' is unknown")
 
 
 @loop(

@@ -111,15 +111,10 @@ def test_a_spectrum_over_what_is_no_nanometres_is_refused_and_the_unit_named(nm,
 @loop(("factor", "unit"), [(1e-3, "micrometres"), (1e-9, "metres")])
 def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor, unit):
     nm = np.arange(385.0, 780.0, 10.0) * factor
-    for refuse in (
-        lambda: refusal(band_widths, nm, None),
-        lambda: refusal(band_widths, nm, 10.0 * factor),
-        lambda: refusal(SpectralRadiance, np.ones((2, 2, 40)), nm),
-        lambda: refusal(SpectralIrradiance, np.ones((2, 2, 40)), nm, 2.2),
-    ):
-        text = refuse()
-        assert text.startswith(f"wavelength_nm: {380 * factor:g} to {780 * factor:g} is outside 100 to 20000 nm")
-        assert f"they seem to be {unit}: multiply them" in text
+    words = f"wavelength_nm: {380 * factor:g} to {780 * factor:g} is outside 100 to 20000 nm; they seem to be {unit}"
+    for call, more in ((band_widths, 10.0 * factor), (SpectralRadiance, 0.0), (SpectralIrradiance, 2.2)):
+        given = (nm, more) if call is band_widths else (np.ones((2, 2, 40)), nm, more)
+        assert refusal(call, *given).startswith(words)
 
 
 @loop("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])

@@ -215,13 +215,6 @@ def test_halves_whose_noise_crosses_zero_still_average_to_the_relit_radiance():
     assert even.values - odd.values == pytest.approx(-6 * lit, rel=2e-6)
 
 
-def test_the_error_of_a_relit_scene_adds_the_groups_variances():
-    shape = (2, NM.size, *SIZE)
-    made = transport(radiance=np.ones(shape, np.float32), variance=np.full(shape, 0.01, np.float32))
-    lit = made.relight({"sky": flat(), "lamp": flat()}, powers={"sky": 3.0, "lamp": 1.0})
-    assert lit.relative_mc_error == pytest.approx(0.1 * np.sqrt(3.0**2 + 1.0) / 4.0, rel=1e-5)
-
-
 @loop("correlation", [-1.0, -0.4, 0.7])
 def test_the_variance_of_groups_that_share_paths_holds_their_covariance(correlation):
     made = transport()

@@ -13,11 +13,11 @@ from builders import block_means
 from scipy.ndimage import maximum_filter
 from scipy.stats import chi2, norm
 from scipy.stats import t as student
+from stock_mitsuba import stock
 
 from render.engine import render
 from render.geometry import look_at, to_world, translate
 from render.illuminants import illuminant, lines_nm
-from render.loader import mitsuba_module
 from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum, line_bands
 from rodcone.jit import backend
@@ -71,34 +71,16 @@ def difference(one, other):
     return t, 2 * student.sf(np.abs(t), freedom), caught
 
 
-def stock(scene, spp, size=SIZE, nm=BANDS_NM, width_nm=WIDTH_NM, passes=PASSES):
-    """Band averages of Mitsuba's own `path` and `specfilm`, (pass, band, h, w); the lights at their own spectra."""
-    mi, description = mitsuba_module(), scene.description
-    film = {"type": "specfilm", "width": size[1], "height": size[0], "component_format": "float32"}
-    for index, (centre, width) in enumerate(zip(nm, width_nm, strict=True)):
-        ends = {"wavelength_min": centre - width / 2, "wavelength_max": centre + width / 2}
-        film[f"band{index:03d}"] = {"type": "regular", **ends, "values": "1,1"}
-    film["rfilter"] = {"type": "box"}
-    description["sensor"] = {**description["sensor"], "film": film, "sampler": {"type": "multijitter"}}
-    description["integrator"] = {"type": "path", "max_depth": DEPTH}
-    loaded = mi.load_dict(description)
-    made = [np.asarray(mi.render(loaded, spp=spp, seed=SEED + k), np.float64) for k in range(passes)]
-    return np.moveaxis(np.stack(made), -1, 1) / width_nm[:, None, None]
-
-
 def dense(scene, **options):
     """The engine's transport, and its radiance at the scene's own lights, (band, h, w)."""
     made = render(scene, SIZE, **({"wavelength_nm": BANDS_NM, "max_depth": DEPTH} | options))
     return made, np.moveaxis(made.relight().values, -1, 0).astype(np.float64)
 
 
-def compared(scene, block, made, lit, direct):
+def compared(block, made, lit, direct):
     """Welch's test of block means, lights in view left out: they are as bright in both, their rims drown the rest."""
     away = ~maximum_filter(made.coverage.mean > 0, 3)
-    emitted = [g.spectrum.band_average(made.wavelength_nm, made.width_nm) * g.power for g in scene.groups.values()]
-    variance = np.einsum("gb,gbhw->bhw", np.square(emitted), made.variance.astype(np.float64))
-    if made.shared:
-        variance += made.shared.term(np.array(emitted), made.variance)
+    variance = made.relight_variance(luminance_cd_m2=made.level().value).astype(np.float64)
     ours = Estimate.of_pixels(lit * away, variance * away, 2, block)
     mean, variance = direct.mean(axis=0), direct.var(axis=0, ddof=1) / len(direct)
     return difference(ours, Estimate.of_pixels(mean * away, variance * away, len(direct), block))
@@ -144,12 +126,12 @@ def renders(request):
     """Scene, our transport and radiance, and stock's passes."""
     scene = SCENES[request.param]()
     made, lit = dense(scene, max_spp=1536, seed=11)
-    return scene, made, lit, stock(scene, 1024)
+    return scene, made, lit, stock(scene, SIZE, BANDS_NM, WIDTH_NM, spp=1024, passes=PASSES, seed=SEED)
 
 
 def test_blocks_and_bands_of_diffuse_scenes_are_those_of_stock_mitsuba(renders):
-    scene, *both = renders
-    t, chance, caught = compared(scene, BLOCK, *both)
+    _, *both = renders
+    t, chance, caught = compared(BLOCK, *both)
     assert t.size == 9 * 8
     assert chance.min() > LEVEL
     # Noise as stated: were all bands of a block one, nine independent squares would follow chi-squared's law.
@@ -159,8 +141,8 @@ def test_blocks_and_bands_of_diffuse_scenes_are_those_of_stock_mitsuba(renders):
 
 
 def test_whole_pictures_of_diffuse_scenes_are_those_of_stock_mitsuba(renders):
-    scene, *both = renders
-    _, chance, caught = compared(scene, SIZE[0], *both)
+    _, *both = renders
+    _, chance, caught = compared(SIZE[0], *both)
     assert chance.min() > LEVEL
     print(f"least bias caught in a picture's band: worst {caught.max():.2%}")
     assert caught.max() < 0.01
@@ -184,7 +166,7 @@ def test_a_caustic_has_the_total_energy_that_stock_mitsuba_gives_it():
     # Values of single pixels have a heavy tail: totals over the picture are compared, drawn 32 times over.
     scene, draws = focus(), 32
     ours = np.stack([dense(scene, spp=128, seed=20 + k)[1].mean(axis=(1, 2)) for k in range(draws)])
-    theirs = stock(scene, 512, passes=draws).mean(axis=(2, 3))
+    theirs = stock(scene, SIZE, BANDS_NM, WIDTH_NM, spp=512, passes=draws, seed=SEED).mean(axis=(2, 3))
     _, unlit = dense(scene, spp=16, max_depth=2)
     assert unlit.mean() < 0.01 * ours.mean()  # without the way through the ball it is dark there
     _, chance, caught = difference(Estimate.of_draws(ours), Estimate.of_draws(theirs))
@@ -202,7 +184,8 @@ def test_a_sodium_lamp_relit_on_line_bands_is_what_stock_mitsuba_renders_directl
     made, lit = dense(scene, wavelength_nm=nm, width_nm=width_nm, max_spp=768, seed=60)
     assert nm.size == 3
     assert lit[1].mean() > 10 * lit[[0, 2]].mean()  # the line stays in its band
-    t, chance, caught = compared(scene, BLOCK, made, lit, stock(scene, 2560, nm=nm, width_nm=width_nm))
+    direct = stock(scene, SIZE, nm, width_nm, spp=2560, passes=PASSES, seed=SEED)
+    t, chance, caught = compared(BLOCK, made, lit, direct)
     assert t.size == 3 * 9
     assert chance.min() > LEVEL
     print(f"least bias caught in a block of the line's band: median {np.median(caught[1]):.2%}")

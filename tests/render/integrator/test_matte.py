@@ -94,43 +94,28 @@ def test_reflectance_read_from_the_table_is_that_of_the_texture(reflectance, two
         assert np.asarray(value) == pytest.approx(expected * np.asarray(density), rel=1e-5, abs=2e-6)
 
 
+PRINT = printed("camera", edge(600, 12, 0.05, 0.3), grey(0.8), 3.0, 20.0)
+CHEQUERED = printed("camera", grey(0.05), grey(0.8), 3.0, 20.0)
+CHEQUERED["bsdf"]["a"] = checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]
+
+
 @as_guest()
-def test_a_picture_mixes_two_reflectances_as_mitsuba_s_blend_does(situation):
+@loop(("stock", "rows"), [(PRINT, True), (CHEQUERED, False)])
+def test_a_picture_mixes_two_reflectances_as_mitsuba_s_blend_does(stock, rows, situation):
+    """From the table where both have rows; checks under it are evaluated."""
     mi, (si, wo, numbers) = mitsuba_module(), situation
-    stock = printed("camera", edge(600, 12, 0.05, 0.3), grey(0.8), 3.0, 20.0)
     node, curves = with_rows(with_matte_surfaces({"bsdf": stock}))
-    assert {"row", "other_row", "twosided"} < node["bsdf"].keys()
+    assert (node["bsdf"]["type"], {"row", "other_row", "twosided"} < node["bsdf"].keys()) == ("matte", rows)
     nm, step = np.array([[450.0, 500.0, 600.0, 700.0]] * 16), np.zeros(COUNT, np.uint32)
     si.uv = mi.Point2f(*np.random.default_rng(3).random((2, COUNT)).astype(np.float32))
     si.wavelengths = mi.Spectrum(450.0, 500.0, 600.0, 700.0)
-    reader = TableReader(mi, reflectance_table(curves, nm))
+    reader = TableReader(mi, reflectance_table(curves or (grey(0.5),), nm))
     surface, blend = mi.load_dict(node["bsdf"]), mi.load_dict(stock)
     expected = np.asarray(blend.eval(mi.BSDFContext(), si, wo))
     assert expected.max() > 0.1
     (value,), _, _, _ = surface.scatter_bands(si, wo, numbers, [si.wavelengths], reader, mi.UInt32(step))
     assert np.asarray(value) == pytest.approx(expected, rel=1e-4, abs=2e-6)
     assert np.asarray(surface.eval(mi.BSDFContext(), si, wo)) == pytest.approx(expected, rel=1e-4, abs=2e-6)
-
-
-OCHRE = {"type": "diffuse", "reflectance": {"type": "rgb", "value": [0.6, 0.3, 0.1]}}
-
-
-@loop("surface_key, part", [("a", checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]), ("a", OCHRE), ("b", OCHRE)])
-@as_guest()
-def test_a_picture_mixes_checks_or_an_rgb_colour_with_the_other_reflectance(surface_key, part, situation):
-    mi, (si, wo, numbers) = mitsuba_module(), situation
-    stock = printed("camera", grey(0.05), grey(0.8), 3.0, 20.0)
-    stock["bsdf"][surface_key] = part
-    node, curves = with_rows(with_matte_surfaces({"bsdf": stock}))
-    assert node["bsdf"]["type"] == "matte"
-    nm, step = np.array([[450.0, 500.0, 600.0, 700.0]] * 16), np.zeros(COUNT, np.uint32)
-    si.uv = mi.Point2f(*np.random.default_rng(3).random((2, COUNT)).astype(np.float32))
-    si.wavelengths = mi.Spectrum(450.0, 500.0, 600.0, 700.0)
-    surface, blend = mi.load_dict(node["bsdf"]), mi.load_dict(stock)
-    reader = TableReader(mi, reflectance_table(curves or (grey(0.5),), nm))
-    (value,), _, _, _ = surface.scatter_bands(si, wo, numbers, [si.wavelengths], reader, mi.UInt32(step))
-    expected = np.asarray(blend.eval(mi.BSDFContext(), si, wo))
-    assert np.asarray(value) == pytest.approx(expected, rel=1e-4, abs=2e-6)
 
 
 def test_lambertian_surfaces_become_it_wherever_they_stand():

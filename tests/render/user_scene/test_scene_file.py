@@ -218,10 +218,10 @@ def test_parameters_can_be_given_as_mitsuba_takes_them(tmp_path: Path) -> None:
 
 
 def test_tables_over_400_to_700_nm_are_held_with_a_note_shorter_ones_refused(tmp_path: Path) -> None:
-    def read(first: int, last: int) -> SceneFile:
+    def read(first: int, last: int, extend: str | None = None) -> SceneFile:
         table = f'<spectrum name="reflectance" value="{first}:0.2, {last}:0.6"/>'
         wall = f'<shape type="rectangle" id="wall"><bsdf type="diffuse">{table}</bsdf></shape>'
-        return load_scene_file(write(tmp_path, wall, SUN, CAMERA))
+        return load_scene_file(write(tmp_path, wall, SUN, CAMERA), extend=extend)
 
     held = read(400, 700)
     assert held.notes == ("surfaces known over 400-700 nm go on at their end values beyond",)
@@ -230,8 +230,10 @@ def test_tables_over_400_to_700_nm_are_held_with_a_note_shorter_ones_refused(tmp
     ]
     np.testing.assert_allclose(ends / ends[0], [1.0, 1.0, 3.0], rtol=1e-5)
     assert read(380, 780).notes == ()
-    with pytest.raises(InputError, match="wall/_arg_0/reflectance is known over 420-700 nm alone"):
-        check_range(read(420, 700).scene, 380.0, 780.0)
+    told = r"wall/_arg_0/reflectance is known over 420-700 nm alone; .*--extend hold"
+    refusal(check_range, read(420, 700).scene, 380.0, 780.0, match=told)
+    check_range(read(420, 700, "hold").scene, 380.0, 780.0)
+    refusal(read, 420, 700, "zero", match="extend: 'zero' is unknown")
 
 
 def test_names_of_exporters_with_dots_and_blanks_are_kept_apart(tmp_path: Path) -> None:
