@@ -105,9 +105,7 @@ def test_every_number_of_a_choice_stands_in_page_and_table_with_its_factor_and_u
 
 
 @pytest.mark.thorough
-def test_the_command_writes_page_and_json(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, measured: list[Stage]
-) -> None:
+def test_the_command_writes_page_and_json(tmp_path, monkeypatch, measured):
     asked = []
     monkeypatch.setattr(
         "studies.commands.bench.stages", lambda task, scene, sensor: asked.append(task.samples) or iter(measured)

@@ -88,9 +88,7 @@ def test_a_render_with_more_noise_than_the_sensor_is_told(scene: str, level: str
         (["--cfa", "rgbw_4x4"], "shot.tiff", ["shot.json", "shot.tiff"]),
     ],
 )
-def test_a_stored_radiance_becomes_what_its_name_says(
-    more: list[str], name: str, written: list[str], exr: Path, tmp_path: Path
-) -> None:
+def test_a_stored_radiance_becomes_what_its_name_says(more, name, written, exr, tmp_path):
     out = tmp_path / "o" / name
     code, printed, err = call(["capture", str(exr), "-o", str(out), "--exposure", "20ms", *more])
     assert (code, sorted(path.name for path in out.parent.iterdir())) == (0, written)
@@ -174,9 +172,7 @@ def test_an_isetcam_scene_is_judged_under_the_illuminant_that_it_holds(tmp_path:
     assert white.band_average(*inner) == pytest.approx(lamp.band_average(*inner), rel=0.02)
 
 
-def test_the_file_carries_the_calibration_for_the_light_or_the_white_balance_asked_for(
-    exr: Path, tmp_path: Path
-) -> None:
+def test_the_file_carries_the_calibration_for_the_light_or_the_white_balance_asked_for(exr, tmp_path):
     sensor = preset("low_noise", "bayer")
     for more, light in (([], "D65"), (["--white-balance", "A"], "A"), (["--light", "A"], "A")):
         code, _, err = call(["capture", exr, "--cfa", "bayer", "-o", tmp_path / "shot.dng", *more])
@@ -191,7 +187,6 @@ REFUSED = (
     ("color_cheker", "scene: 'color_cheker' ... did you mean 'color_checker'"),
     ("flat_field --sensor lownoise", "sensor preset ... did you mean 'low_noise'"),
     ("flat_field --cfa RGGB", "cfa: 'RGGB' is unknown ... write 'bayer_rggb'"),
-    ("flat_field --cfa bayr", "cfa: 'bayr' is unknown ... did you mean 'bayer'"),
     ("flat_field --cfa rccc", "can't hold the mosaic ... shot.tif"),
     ("shot.dng", "'shot.dng' is a raw file, for rodcone develop ... .xml, .exr, .mat"),
     ("mine.toml", "'mine.toml' is a study or a sensor ... rodcone sweep or --sensor"),
@@ -202,18 +197,13 @@ REFUSED = (
     ("scene.exr --extend hold", "extend: 'hold' for 'scene.exr', a stored picture ... leave it out"),
     ("flat_field --extend zero", "extend: 'zero' is unknown; allowed: hold"),
     ("flat_field -o o/shot.cr2", "another ending ... .dng, .tif, .tiff"),
-    ("flat_field --level 25nits", "unit ... 'nits' ... cd/m2, lux"),
     ("flat_field --level 5", "level: '5' has no unit ... write 5lux"),
-    ("flat_field --level -5lux", "level: -5.0 is outside ... such as 25lux"),
     ("wall.exr --level 5lux", "needs a reference plane"),
     ("flat_field --exposure auto:V", "exposure: 'auto:V' is not a time ... did you mean 'auto:W'"),
     ("flat_field --exposure auto:W --cfa bayer", "looks at W ... give auto, or a time such as 20ms"),
-    ("flat_field --exposure 20", "exposure: '20' is not a time ... write 20ms or 20s"),
-    ("flat_field --exposure -5ms", "exposure: '-5ms' is not a time ... write 20ms"),
     ("flat_field --exposure 1/0", "exposure: '1/0' is not a time ... or 1/50"),
     ("flat_field --exposure 9e9s", "exposure: 9000000000.0 is outside 0 to 1e+06"),
     ("flat_field --light 5000", "'5000' has no unit ... write 5000K"),
-    ("flat_field --light D66", "illuminant: 'D66' ... D65"),
     ("flat_field --light lamp=A", "light group: 'lamp' ... sky"),
     ("flat_field --light sky=", "light: 'sky=' ... such as sky=A"),
     ("flat_field --light =A", "light: '=A' ... such as sky=A"),
@@ -287,19 +277,6 @@ def test_a_time_with_a_unit_is_the_time_in_seconds(exr: Path, tmp_path: Path) ->
     assert frames[0] == frames[1] == frames[2]
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(
-    ("asked", "shape"),
-    [(["--height", "8"], (8, 8)), (["--width", "6"], (6, 6)), (["--height", "6", "--width", "10"], (6, 10))],
-)
-def test_a_scene_is_photographed_in_the_height_and_width_asked_for(
-    asked: list[str], shape: tuple[int, int], tmp_path: Path
-) -> None:
-    out = tmp_path / "shot.dng"
-    assert call(["capture", "flat_field", "--spp", "1", "--exposure", "1ms", "-o", str(out), *asked])[0] == 0
-    assert read_raw(out).shape == shape
-
-
 @pytest.mark.thorough
 def test_another_lamp_gives_its_own_colours_and_white_balance_another_neutral(tmp_path: Path) -> None:
     out, sensor = tmp_path / "shot.dng", preset("low_noise", "bayer")
@@ -344,9 +321,7 @@ def negative(path: Path, cfa: str = "bayer", share: float = 0.25, light: str = "
 
 @pytest.mark.parametrize(("cfa", "share"), [("bayer", 0.25), ("rgbw", 0.18)])
 @pytest.mark.parametrize("ev", [0.0, 1.0, -3.0])
-def test_a_grey_wall_at_a_share_of_the_well_is_shown_at_that_share(
-    cfa: str, share: float, ev: float, tmp_path: Path
-) -> None:
+def test_a_grey_wall_at_a_share_of_the_well_is_shown_at_that_share(cfa, share, ev, tmp_path):
     negative(tmp_path / "shot.dng", cfa, share)
     code, out, _ = call(["develop", str(tmp_path / "shot.dng"), "--ev", str(ev)])
     assert (code, out) == (0, f"{tmp_path / 'shot.png'}\n")
@@ -398,9 +373,7 @@ def test_as_shot_balance_keeps_the_light_s_colour_that_gray_world_takes_away(cfa
     ("asked", "shape"),
     [(["--width", "32"], (24, 32)), (["--height", "12"], (12, 16)), (["--height", "48", "--width", "1"], (48, 1))],
 )
-def test_a_smaller_picture_holds_the_means_of_linear_light(
-    asked: list[str], shape: tuple[int, int], tmp_path: Path
-) -> None:
+def test_a_smaller_picture_holds_the_means_of_linear_light(asked, shape, tmp_path):
     raw = negative(tmp_path / "shot.dng")
     stripes = np.arange(SHAPE[1]) % 8 < 4  # of half the light: no colour leaves the display's range
     dn = np.where(stripes, np.rint((raw.dn + raw.black_dn) / 2), raw.dn).astype(np.uint16)
@@ -416,25 +389,17 @@ def test_a_smaller_picture_holds_the_means_of_linear_light(
     assert means[0] == pytest.approx(np.full(3, 0.75 * 0.25), rel=0.02)  # and the edges' own width
 
 
-def test_the_bits_and_the_encoding_asked_for_are_the_files(tmp_path: Path) -> None:
+def test_the_bits_the_encoding_and_the_processor_asked_for_are_the_files(tmp_path: Path) -> None:
     negative(tmp_path / "shot.dng")
-    asked = ["develop", tmp_path / "shot.dng", "--bits", "16", "--json", "-o"]
-    assert call([*asked, tmp_path / "shot.png"])[0] == 0
+    asked = ["develop", tmp_path / "shot.dng", "--bits", "16", "--isp", "bayer_malvar", "--json", "-o"]
+    code, printed, _ = call([*asked, tmp_path / "shot.png"])
+    assert (code, json.loads(printed)["isp"]) == (0, "bayer_malvar")
     assert (tmp_path / "shot.png").read_bytes()[24] == 16  # IHDR's depth
     code, printed, _ = call([*asked, tmp_path / "wide.tif", "--encoding", "display-p3"])
     assert (code, json.loads(printed)["encoding"]) == (0, "display-p3")
     assert tifffile.imread(tmp_path / "wide.tif").dtype == np.uint16
     with Image.open(tmp_path / "wide.tif") as picture:
         assert b"D\0i\0s\0p\0l\0a\0y\0 \0P\x003" in picture.info["icc_profile"]
-
-
-def test_any_processor_of_the_mosaic_can_be_asked_for(tmp_path: Path) -> None:
-    negative(tmp_path / "shot.dng")
-    for isp in ("bayer_malvar", "bayer_menon", "bayer_nlm"):
-        code, out, _ = call(["develop", tmp_path / "shot.dng", "--isp", isp, "--ev", "0", "--json"])
-        assert (code, json.loads(out)["isp"]) == (0, isp)
-        with Image.open(tmp_path / "shot.png") as picture:
-            assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.6, isp
 
 
 def test_a_picture_of_another_program_beside_the_raw_file_is_left_alone(tmp_path: Path) -> None:
@@ -506,9 +471,7 @@ NOT_DEVELOPED = (
 )
 
 
-def test_what_cannot_be_developed_is_refused_and_leaves_no_picture(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_cannot_be_developed_is_refused_and_leaves_no_picture(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     raw = negative(Path("shot.dng"))
     Path("cut.dng").write_bytes(Path("shot.dng").read_bytes()[:-1])
@@ -520,22 +483,7 @@ def test_what_cannot_be_developed_is_refused_and_leaves_no_picture(
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("cfa", ["rccb", "rccc", "ryyb", "mono"])
-def test_other_mosaics_are_captured_and_developed(cfa: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    asked = ["color_checker", "--cfa", cfa, "--size", "48", "--spp", "4", "--level", "500lux", "-o", "shot.tif"]
-    assert call(["capture", *asked])[0] == 0
-    assert call(["develop", "shot.tif", "--white-balance", "as-shot"])[0] == 0
-    shown = np.asarray(Image.open("shot.png"), dtype=float)
-    neutral = shown[:4].reshape(-1, 3).mean(axis=0)  # card above the chart
-    assert np.ptp(neutral) < 6
-    assert (np.ptp(shown, axis=-1).max() == 0) == (cfa in ("rccc", "mono"))
-
-
-@pytest.mark.thorough
-def test_a_burst_is_captured_and_its_merged_frames_are_developed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_burst_is_captured_and_its_merged_frames_are_developed(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     asked = ["flat_field", "--size", "32", "--spp", "4", "--level", "2cd/m2", "--cfa", "bayer"]
     assert call(["capture", *asked, "-o", "one.dng"])[0] == 0

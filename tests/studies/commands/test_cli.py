@@ -5,13 +5,10 @@ import sys
 from importlib import metadata
 from pathlib import Path
 
-import pytest
 from command_line import call, check_refusals
 
 
-def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rows = (
         ("demo --longest-exposure -1s", "--longest-exposure ... '-1s' is not a time ... write 20ms"),

@@ -112,9 +112,7 @@ def test_a_package_is_own_foreign_missing_or_shared(tmp_path: Path, monkeypatch:
     assert "stage-tools" in shared.value
 
 
-def test_a_distribution_that_wrote_into_rodcones_folder_is_found(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_distribution_that_wrote_into_rodcones_folder_is_found(tmp_path, monkeypatch):
     info = tmp_path / "stage_tools-1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text("Metadata-Version: 2.1\nName: stage-tools\nVersion: 1.0\n")

@@ -1,7 +1,6 @@
 """What `rodcone list` says: every name that a catalogue knows, and temperatures as the spectra have them."""
 
 import json
-from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -13,7 +12,6 @@ from render.illuminants import illuminant
 from scenes import catalog
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
-from studies.commands.list import texts
 
 
 def printed(*arguments: object) -> str:
@@ -33,16 +31,6 @@ def test_every_name_of_every_catalogue_is_listed() -> None:
     assert all(text.strip() for lines in found.values() for text in lines.values())
     for name in found["lights"]:
         illuminant(name)
-
-
-def test_texts_of_scenes_and_processors_are_those_of_their_modules() -> None:
-    for name, text in texts("scenes").items():
-        sentence = str(import_module(f"scenes.{name}").__doc__).strip().split("\n", 1)[0]
-        assert text == f"{sentence} Lights: {', '.join(catalog.load(name).groups)}."
-    for name, text in texts("processors").items():
-        processor = PROCESSORS[name]
-        extra = f"; pip install rodcone[{processor.extra}]" if processor.extra else ""
-        assert text == f"{processor.mosaic}: {processor.source}{extra}"
 
 
 def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from command_line import call
 
 from render.engine import render
 from render.error_estimates import Halves
@@ -13,7 +14,6 @@ from render.reference import FOLDER, SHIPPED, find_reference, require_agreement,
 from rodcone.progress import duration
 from scenes.catalog import load
 from studies.budget.ledger import as_stated
-from studies.commands.cli import main
 from studies.commands.demo import STUDY
 from studies.study.lit_scene import film_of, open_choice
 from studies.study.render_noise import MARGIN
@@ -21,13 +21,6 @@ from studies.study.study_file import read_study
 
 pytestmark = pytest.mark.thorough
 DEMO = ["demo", "--size", "32", "--sensor", "low_noise", "--level", "100cd/m2", "--processor", "bayer"]
-
-
-def call(*arguments: str) -> int:
-    """Exit code of a command."""
-    with pytest.raises(SystemExit) as stopped:
-        main(list(arguments))
-    return int(stopped.value.code or 0)
 
 
 def stored(size: int = 32):  # type: ignore[no-untyped-def]
@@ -42,13 +35,11 @@ def stored(size: int = 32):  # type: ignore[no-untyped-def]
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """References, one of which was made."""
     made = tmp_path_factory.mktemp("references")
-    assert call("reference", "--size", "32", "--until", "100", "--out", str(made)) == 0
+    assert call(["reference", "--size", "32", "--until", "100", "--out", made])[0] == 0
     return made
 
 
-def test_the_file_has_its_certificate_and_the_same_command_goes_on(
-    folder: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_file_has_its_certificate_and_the_same_command_goes_on(folder, monkeypatch):
     monkeypatch.setenv(FOLDER, str(folder))
     first = stored().certificate
     assert first["samples"] == pytest.approx(512, rel=0.15)
@@ -57,55 +48,41 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(
     assert first["halves"]["chance"] > 1e-3
     assert {"mitsuba", "drjit", "rodcone"} <= set(first["versions"])
     until = str(first["share"] / 1.5)
-    assert call("reference", "--size", "32", "--until", until, "--out", str(folder)) == 0
-    printed = capsys.readouterr()
+    code, _, told = call(["reference", "--size", "32", "--until", until, "--out", folder])
     # its first look is where the first call ended: variance falls with the samples, and these with the time
     left = duration(first["seconds"] * (MARGIN * first["share"] / float(until) - 1))
-    assert f"of the sensor's variance in 95 % of pixels; about {left} more to {float(until):g}" in printed.err
+    assert f"of the sensor's variance in 95 % of pixels; about {left} more to {float(until):g}" in told
+    assert code == 0
     second = stored().certificate
     assert second["share"] <= float(until)
     assert second["samples"] > first["samples"]
     assert second["seconds"] > first["seconds"]
 
 
-def test_the_demo_tests_the_reference_photographs_it_and_says_so(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_the_demo_tests_the_reference_photographs_it_and_says_so(folder, tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(folder))
-    assert call(*DEMO, "-o", str(tmp_path / "with")) == 0
-    assert "agrees with it within its noise" in capsys.readouterr().err
+    code, _, told = call([*DEMO, "-o", tmp_path / "with"])
+    assert (code, "agrees with it within its noise" in told) == (0, True)
     results = json.loads((tmp_path / "with" / "results.json").read_text("utf-8"))
     assert "light: the reference still_life-32x32x20" in json.dumps(results)
     assert "light: the reference still_life-32x32x20" in (tmp_path / "with" / "report.html").read_text("utf-8")
     assert {row["spp"] for row in results["rows"]} == {stored().transport.spp}
-    assert call(*DEMO, "--render", "--spp", "16", "-o", str(tmp_path / "without")) == 0
+    # mean squared half difference in each frame's electrons over the sensor's variance
+    assert all(0 < row["mc_share"] < stored().certificate["share"] for row in results["rows"])
+    assert call([*DEMO, "--render", "--spp", "16", "-o", tmp_path / "without"])[0] == 0
     assert "light: the reference" not in (tmp_path / "without" / "results.json").read_text("utf-8")
 
 
-def test_the_share_of_a_demo_is_the_certificates(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Recounted by two halves: mean squared half difference in each frame's electrons over the sensor's variance."""
-    monkeypatch.setenv(FOLDER, str(folder))
-    assert call(*DEMO, "-o", str(tmp_path)) == 0
-    results = json.loads((tmp_path / "results.json").read_text("utf-8"))
-    shares = [row["mc_share"] for row in results["rows"]]
-    assert min(shares) > 0
-    assert max(shares) < stored().certificate["share"]
-
-
-def test_a_reference_of_other_light_is_refused_in_one_line(
-    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_reference_of_other_light_is_refused_in_one_line(folder, tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(folder))
     made = stored()
     light = Halves(np.float32(1.05) * made.transport.light.mean, made.transport.light.difference)
     other = tmp_path / "others" / made.path.name
     save_reference(other, replace(made.transport, light=light), made.certificate)
     monkeypatch.setenv(FOLDER, str(other.parent))
-    assert call(*DEMO, "-o", str(tmp_path / "out")) == 2
-    words = capsys.readouterr().err.splitlines()[-1]
-    assert "disagrees with still_life-32x32x20" in words
-    assert "rodcone doctor" in words
-    assert "--render" in words
+    code, _, told = call([*DEMO, "-o", tmp_path / "out"])
+    words = ("disagrees with still_life-32x32x20", "rodcone doctor", "--render")
+    assert (code, [word in told.splitlines()[-1] for word in words]) == (2, [True] * 3)
 
 
 def test_the_light_of_the_demo_comes_with_the_project(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

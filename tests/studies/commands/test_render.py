@@ -97,9 +97,7 @@ def test_a_catalogue_scene_is_rendered_by_name(tmp_path: Path) -> None:
     assert read_exr(out).shape == (2, 3)
 
 
-def test_what_an_interrupt_left_is_written_and_told(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_an_interrupt_left_is_written_and_told(scene, tmp_path, monkeypatch):
     whole = render_command.render_transport
 
     def interrupted(*arguments: Any, **options: Any) -> Any:
@@ -124,9 +122,7 @@ def test_surfaces_go_on_at_their_ends_where_it_is_asked_for(scene: Path, tmp_pat
     np.testing.assert_allclose(read_exr(out).values, 0.5 * 2 / np.pi, rtol=1e-5)
 
 
-def test_a_light_that_ends_within_the_bands_is_told_once(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_light_that_ends_within_the_bands_is_told_once(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(warnings, "filters", [("always", None, Warning, None, 0)])  # not as errors, as in these tests
     scene.write_text(scene.read_text().replace('"irradiance" value="2"', '"irradiance" value="450:2, 700:2"'))
     code, _, err = call(["render", str(scene), "-o", str(tmp_path / "o.exr"), *QUICK])
@@ -156,9 +152,7 @@ REFUSED = (
 )
 
 
-def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(
-    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(scene, tmp_path, monkeypatch):
     (scene.parent / "sky.xml").write_text(SCENE.format("sunsky"))
     (scene.parent / "hostile.xml").write_text(SCENE.replace("<sensor", '<path value="."/><sensor', 1))
     (tmp_path / "taken.exr").mkdir()

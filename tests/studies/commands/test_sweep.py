@@ -12,9 +12,6 @@ import sweep_sample as SAMPLE
 from any_cpu.configurations import environment
 from command_line import call, check_refusals
 
-from studies.sweep.export import read_rows
-
-REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "flir_bfs_u3_50s5m.toml"
 TEXT = """
 scenes = [{source = "scene.exr", light = "E"}]
 levels = ["1cd/m2", "25cd/m2"]
@@ -68,25 +65,6 @@ def test_a_sweep_follows_the_plan_and_reference_models_everything(study: Path, t
 
 
 @pytest.mark.thorough
-def test_a_template_untouched_but_for_two_sensors_ranks_them_as_shot(tmp_path: Path) -> None:
-    """By night, where Gray World takes a sodium lamp for a grey wall and turns the answer round."""
-    mine, chip, out = tmp_path / "mine.toml", tmp_path / "chip.toml", tmp_path / "out"
-    assert call(["new", "study", "-o", str(mine)])[0] == 0
-    assert call(["new", "preset", "low_noise", "--noise", str(REPORT), "-o", str(chip)])[0] == 0
-    quick = (
-        *("scenes=['night_street']", "levels=['1cd/m2']", f"sensors=['low_noise', '{chip}']"),
-        *("processors=['interleaved']", "seeds=1", "render.size=64", "render.spp=64"),
-    )
-    ranks = {}
-    for balance in ((), ("white_balances=['as-shot']",), ("white_balances=['gray-world']",)):
-        asked = [part for change in (*quick, *balance) for part in ("--set", change)]
-        assert call(["sweep", str(mine), "-o", str(out), "--workers", "1", "--as-stated", *asked])[0] == 0
-        ranks[balance] = [row.sensor for row in sorted(read_rows(out), key=lambda row: row.psnr_db)]
-    default, as_shot, gray_world = ranks.values()
-    assert default == as_shot == gray_world[::-1] == ["low_noise", "chip.toml"]
-
-
-@pytest.mark.thorough
 def test_what_one_processor_made_another_finds(tmp_path: Path) -> None:
     """A sweep goes on on another machine: neither the render nor a picture is made again."""
     path = tmp_path / "study.toml"
@@ -123,9 +101,7 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     assert larger["bytes"] - fixed == pytest.approx(16 * (facts["bytes"] - fixed), rel=1e-9)
 
 
-def test_dry_run_counts_cells_of_this_code_alone_as_kept(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_dry_run_counts_cells_of_this_code_alone_as_kept(study, tmp_path, monkeypatch):
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--json"]
     made = json.loads(call([*command, "--workers", "1", "--as-stated"])[1])["made"]
     assert json.loads(call([*command, "--dry-run"])[1])["kept"] == made > 0
@@ -135,9 +111,11 @@ def test_dry_run_counts_cells_of_this_code_alone_as_kept(
 
 def test_faults_are_one_line_and_nothing_is_begun(study: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(study.parent)
+    Path("damaged.xml").write_text("<scene", "utf-8")
     rows = (
         ("--set lvels=3", "did you mean 'levels'?"),
         ("--set scenes=absent.exr", "absent.exr"),
+        ("--set scenes=damaged.xml", "damaged.xml"),
         ("--set scenes=stil_life", "did you mean 'still_life'?"),
         ("--set levels=10lux", "needs a reference plane"),
         ("--workers 0", "workers: 0 is outside 1 to 1024"),
@@ -152,9 +130,7 @@ def test_faults_are_one_line_and_nothing_is_begun(study: Path, monkeypatch: pyte
     check_refusals("sweep study.toml", bad_place, study.parent, code=1)
 
 
-def test_a_full_disk_is_one_line_that_says_what_is_kept(
-    study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_full_disk_is_one_line_that_says_what_is_kept(study, tmp_path, monkeypatch):
     def full(*_: object) -> None:
         raise OSError(28, "No space left on device", str(tmp_path / "out" / "pictures"))
 
