@@ -1,11 +1,9 @@
-"""Made-up values and noise pictures for the report's tests; ``python tests/report_sample.py FILE`` writes it."""
+"""Made-up values and noise pictures for the report's tests."""
 
 import json
-import sys
 from collections.abc import Callable
 from dataclasses import replace
 from itertools import product
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -208,10 +206,3 @@ def sample_pictures(report: ReportData) -> ReportPictures:
         if name in pictures and opened(pictures[name]).shape == truth[name].shape
     }
     return ReportPictures(pictures, maps)
-
-
-if __name__ == "__main__":
-    from studies.pages.report import render_report
-
-    sample = sample_report()
-    Path(sys.argv[1]).write_text(render_report(sample, sample_pictures(sample)), encoding="utf-8")

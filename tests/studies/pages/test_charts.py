@@ -13,7 +13,6 @@ from render.spectrum import Spectrum
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.photon_transfer import Transfer
 from sensor.presets import low_noise, preset
-from studies.design.expect import ExpectedError
 from studies.metrics.truth import light_of
 from studies.pages import design_page, plots
 from studies.photograph.snr import channel_e
@@ -75,17 +74,6 @@ def test_photon_transfer_is_drawn_in_its_units(drawn: Drawn) -> None:
     np.testing.assert_allclose(curves(logarithmic)["dark noise"][1], np.sqrt([8.0, 8.0]))
     e, noise_e = curves(logarithmic)["shot noise, slope ½"]
     np.testing.assert_allclose(noise_e, np.sqrt(e))
-
-
-def test_a_camera_that_is_better_than_the_first_gains(drawn: Drawn) -> None:
-    def errors(psnr_db: float, colour: float) -> list[ExpectedError]:
-        return [ExpectedError(light, 0.01, psnr_db + light, 9.0, 9.0, 9.0, colour) for light in (0.1, 10.0)]
-
-    decibels, colours = drawn(design_page.gain_svg, {"first": errors(20.0, 5.0), "better": errors(21.5, 4.0)})
-    for axes, gain in ((decibels, 1.5), (colours, 1.0)):
-        light, gains = axes.lines[0].get_data()
-        assert (list(light), list(gains)) == ([0.1, 10.0], [gain, gain])
-        assert axes.get_title("left").endswith("over first")
 
 
 def test_spectra_end_at_1_in_their_own_nanometres(drawn: Drawn) -> None:

@@ -1,6 +1,5 @@
 """The page's answer in words, on tables made by hand: won, lost, mixed, level, one seed, one level, two sensors."""
 
-import re
 from dataclasses import replace
 
 import numpy as np
@@ -64,20 +63,6 @@ CASES = {
 def test_the_answer_is_in_words_with_sizes() -> None:
     for made, words in CASES.values():
         assert answer(made).replace("\N{NO-BREAK SPACE}", " ") == words, (made, words)
-
-
-def test_the_other_way_round_every_better_is_a_worse() -> None:
-    for name in [name for name in CASES if name != "one seed"]:
-        made = CASES[name][0]
-        other = answer(replace(made, names=made.names[::-1], ours=made.theirs, theirs=made.ours))
-        swaps = {"better": "worse", "worse": "better", "lower": "higher", "higher": "lower", "+": "−", "−": "+"}
-        mirrored = "".join(
-            swaps.get(part, part) for part in re.split(r"(better|worse|lower|higher|[+−])", answer(made))
-        )
-        if "in part" in mirrored:  # gains come first
-            assert mirrored.count("better") == other.count("better"), name
-        elif " to " not in mirrored:
-            assert mirrored == other, name
 
 
 def test_in_light_the_better_one_needs_less() -> None:
@@ -170,34 +155,34 @@ def test_by_the_mosaic_alone_is_said_only_where_the_times_agree() -> None:
     assert comparisons(others)[CAMERA]["answers"]["0 1"][0]["times"] == ""
 
 
+MISS = "Gray World misses this scene's light by ΔE"
+
+
 @pytest.mark.parametrize(
     ("misses", "lead", "words"),
     [
         (
-            {"bayer": 4.1, "ple_bayer": 3.9},
+            (4.1, 3.9),
             0.4,
-            "Gray World misses this scene's light by ΔE 4.1 (Bayer, bilinear, moonlight); the lead is 0.4. It misses "
-            "by more than the lead at 2 of 2 light levels.",
+            f"{MISS} 4.1 (Bayer, bilinear, moonlight); the lead is 0.4. It misses by more than the lead at 2",
         ),
-        (
-            {"bayer": 0.1, "ple_bayer": 3.0},
-            -2.9,
-            "Gray World misses this scene's light by ΔE 3.0 (PLE, Bayer, moonlight)",
-        ),
-        ({"bayer": 4.1, "ple_bayer": 3.9}, 4.2, ""),
-        ({"bayer": 4.1, "ple_bayer": 3.9}, -4.2, ""),
-        ({"bayer": 0.9, "ple_bayer": 0.9}, 0.0, ""),  # nobody sees it
-        ({"bayer": None, "ple_bayer": None}, 0.0, ""),  # a processor that tells no balance
+        ((0.1, 3.0), -2.9, f"{MISS} 3.0 (PLE, Bayer, moonlight)"),
+        ((4.1, 3.9), 4.2, ""),
+        ((4.1, 3.9), -4.2, ""),
+        ((0.9, 0.9), 0.0, ""),  # nobody sees it
+        ((None, None), 0.0, ""),  # a processor that tells no balance
     ],
 )
 def test_a_balance_that_misses_the_light_by_more_than_the_lead_is_told(misses, lead, words) -> None:
+    of = dict(zip(("bayer", "ple_bayer"), misses, strict=True))
+
     def balanced(row: Row) -> Row:
         better = lead * (row.processor == "bayer")
-        return replace(row, delta_e_median=9.0 - better, balance_delta_e=misses[row.processor])
+        return replace(row, delta_e_median=9.0 - better, balance_delta_e=of[row.processor])
 
     def said(balance: str) -> str:
         report = SAMPLE.sample_report(
-            balanced, levels=2, seeds=SEEDS, cameras=tuple(misses), sensors=SAMPLE.SENSORS[:1], balances=(balance,)
+            balanced, levels=2, seeds=SEEDS, cameras=tuple(of), sensors=SAMPLE.SENSORS[:1], balances=(balance,)
         )
         return str(comparisons(report)[CAMERA]["answers"]["0 1"][0]["balance"])
 

@@ -49,9 +49,3 @@ def test_decisions_of_all_seeds_count() -> None:
     assert cell_of(*rows).substitution == 0.75
     assert cell_of(*rows).balance == {"R": "gray world", "G": "gray world", "B": "calibrated"}
     assert cell_of(rows[0], None).substitution is None
-
-
-def test_one_seed_has_no_interval() -> None:
-    cell = cell_of(made(psnr_db=20.0))
-    assert (cell.mean("psnr_db"), isnan(cell.half("psnr_db"))) == (20.0, True)
-    assert text.figure_text(cell, "psnr_db", 1) == "20.0"
