@@ -13,9 +13,9 @@ import pytest
 import scipy
 import sweep_sample as SAMPLE
 from command_line import call
+from refusal import refusal
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from rodcone.errors import InputError
 from sensor.presets import low_noise, preset_file
 from sensor.variations import vary
 from studies.dataset.judge import MEASURED, Score, expected, judge, scores_of_sweep
@@ -154,9 +154,7 @@ def test_the_closed_form_stands_beside_sensors_of_this_package(tmp_path: Path) -
     ],
 )
 def test_a_wrong_encoding_is_recognised(change: Any, words: str, out: Path, tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=words) as told:
-        judge(noisy(out, tmp_path / "mine", change), out, "mine", HERE)
-    assert "\n" not in str(told.value)
+    refusal(judge, noisy(out, tmp_path / "mine", change), out, "mine", HERE, match=words)
 
 
 def test_tiff_of_16_bits_and_arrays_are_read_alike(out: Path, tmp_path: Path) -> None:
@@ -207,28 +205,24 @@ def test_bad_pictures_are_told_in_a_line(case: str, out: Path, tmp_path: Path) -
     spoil, words = BAD[case]
     folder = noisy(out, tmp_path / "mine")
     spoil(folder, min(truths(out)))
-    with pytest.raises(InputError, match=words) as told:
-        judge(folder, out, "mine", HERE)
-    assert "\n" not in str(told.value)
+    refusal(judge, folder, out, "mine", HERE, match=words)
 
 
 def test_a_set_that_cannot_judge_is_told_in_a_line(out: Path, tmp_path: Path) -> None:
     pictures = noisy(out, tmp_path / "mine")
     (tmp_path / "empty").mkdir()
-    with pytest.raises(InputError, match=r"holds none; allowed: \.png"):
-        judge(tmp_path / "empty", out, "mine", HERE)
-    with pytest.raises(InputError, match="no manifest of a set"):
-        judge(pictures, tmp_path, "mine", HERE)
+    refusal(judge, tmp_path / "empty", out, "mine", HERE, match=r"holds none; allowed: \.png")
+    refusal(judge, pictures, tmp_path, "mine", HERE, match="no manifest of a set")
     copy = tmp_path / "copy"
     shutil.copytree(out / "set", copy / "set")
     shard = next((copy / "set").glob("*.tar"))
     shard.write_bytes(shard.read_bytes()[:-5000])
-    with pytest.raises(InputError, match=f"{shard.name} isn't what was written; run rodcone dataset again"):
-        judge(pictures, copy, "mine", HERE)
+    refusal(
+        judge, pictures, copy, "mine", HERE, match=f"{shard.name} isn't what was written; run rodcone dataset again"
+    )
     text = (copy / "set" / "manifest.jsonl").read_text()
     (copy / "set" / "manifest.jsonl").write_text(text.replace('"planes": ["rgb"]', '"planes": []'))
-    with pytest.raises(InputError, match="was made without rgb"):
-        judge(pictures, copy, "mine", HERE)
+    refusal(judge, pictures, copy, "mine", HERE, match="was made without rgb")
 
 
 def test_the_command_writes_table_csv_json_and_page(out: Path, tmp_path: Path) -> None:

@@ -89,9 +89,7 @@ def test_raw_minus_truth_has_the_stated_variance(source: str, level_cd_m2: float
 # 4 conditions; in the brightest G's metered time is shorter than the frame's, and the density costs it light in all.
 @pytest.mark.parametrize("level_cd_m2", [1.0, 150.0])
 @pytest.mark.parametrize("reading", [ChannelReading("G", metered=True), ChannelReading("G", light_share=0.3)], ids=str)
-def test_channels_read_apart_have_the_stated_variance_and_well(
-    reading: ChannelReading, level_cd_m2: float, tmp_path: Path
-) -> None:
+def test_channels_read_apart_have_the_stated_variance_and_well(reading, level_cd_m2, tmp_path):
     sensor = with_channel_readings(with_pixel(**SOURCES["all"]), [reading])
     samples = taken(tmp_path, sensor, level_cd_m2)
     assert abs(z_of(samples)) < 4.5

@@ -6,11 +6,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from explore_sample import GAUSSIAN, random_controls, small_transport
+from refusal import refusal
 
 import rodcone as public
 from isp.processors.catalogue import PROCESSORS, libraries
 from render.photometry import luminance
-from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
 from studies.explore.chain import photograph
@@ -116,8 +116,7 @@ def test_lamps_that_give_no_light_are_refused():
         ({"moon": Lamp()}, "'moon' is unknown"),
         ({"sun": Lamp(table=((900.0, 1.0), (950.0, 1.0)))}, "no light"),
     ):
-        with pytest.raises(InputError, match=words):
-            photograph(transport, Controls(lamps=lamps))
+        refusal(photograph, transport, Controls(lamps=lamps), match=words)
 
 
 def test_another_exposure_is_of_the_same_chip_and_another_seed_is_another_chip():

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 from explore_sample import GAUSSIAN, RENDER, random_controls, small_transport
+from refusal import refusal
 
 import rodcone as public
-from rodcone.errors import InputError
 from studies.explore.answers import python_of
 from studies.explore.chain import photograph
 from studies.explore.controls import Controls, Lamp
@@ -84,8 +84,7 @@ def test_a_wrong_view_or_control_is_refused_in_one_line():
         ("raw", {"lamps": {"sun": {"spectrum": 3}}}, "lamps"),
         ("raw", {"lens": 1j}, "lens"),
     ):
-        with pytest.raises(InputError, match=rf"\A.*{words}.*\Z"):
-            public.explorer_view(small_transport(), view, **controls)
+        refusal(public.explorer_view, small_transport(), view, **controls, match=rf"\A.*{words}.*\Z")
 
 
 def test_a_transports_python_says_that_it_was_given():

@@ -6,7 +6,7 @@ import numpy as np
 
 from rodcone.digests import digest
 from studies.study.study import Condition, SceneChoice
-from studies.sweep.cells import cell_key, device_stream, exposure_stream, labels
+from studies.sweep.cells import cell_key, device_stream, exposure_stream
 from studies.sweep.provenance import Provenance
 
 AT = Condition(SceneChoice("still_life"), "own", "25cd/m2", "10ms", "low_noise")
@@ -20,26 +20,6 @@ def test_a_stream_is_the_same_for_the_same_coordinates_and_writing() -> None:
     assert draws(exposure_stream(AT, "rgbw", 0)) == draws(exposure_stream(AT, "rgbw", 0))
     spelt = replace(AT, level="25.0 cd/m2", exposure="0.01s")
     assert draws(exposure_stream(AT, "rgbw", 0)) == draws(exposure_stream(spelt, "rgbw", 0))
-
-
-def test_each_coordinate_gives_an_exposure_noise_of_its_own() -> None:
-    for change in [
-        {"scene": SceneChoice("flat_field")},
-        {"spectrum": "A"},
-        {"level": "25lux"},
-        {"exposure": "auto"},
-        {"sensor": "table1_output"},
-    ]:
-        other = replace(AT, **change)  # type: ignore[arg-type]
-        assert draws(exposure_stream(AT, "rgbw", 0)) != draws(exposure_stream(other, "rgbw", 0)), change
-
-
-def test_fixed_patterns_belong_to_sensor_mosaic_and_seed_alone() -> None:
-    streams = [("low_noise", "rgbw", 0), ("low_noise", "bayer", 0), ("low_noise", "rgbw", 1), ("x", "rgbw", 0)]
-    drawn = [draws(device_stream(*place)) for place in streams]
-    assert len({tuple(each) for each in drawn}) == 4
-    assert draws(device_stream("low_noise", "rgbw", 0)) == drawn[0]
-    assert drawn[0] != draws(exposure_stream(AT, "rgbw", 0))
 
 
 def test_streams_are_those_of_the_first_release() -> None:
@@ -64,16 +44,3 @@ def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
         keys.append(cell_key(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
     assert len(set(keys)) == 1 + 6 + 4
     assert cell_key(*given) == keys[0]
-
-
-def test_a_row_names_files_without_their_folder() -> None:
-    condition = Condition(SceneChoice("/a/desk.exr"), "own", "1cd/m2", "auto", "/b/mine.toml")
-    assert labels(condition) == {
-        "scene": "desk.exr",
-        "spectrum": "own",
-        "level": "1cd/m2",
-        "exposure": "auto",
-        "sensor": "mine.toml",
-        "white_balance": "as-shot",
-        "frames": 1,
-    }

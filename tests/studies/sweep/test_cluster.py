@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 import sweep_sample as SAMPLE
+from refusal import refusal
 
 from rodcone.errors import InputError
 from studies.sweep import cluster as module
@@ -124,8 +125,7 @@ def test_a_cluster_that_does_not_answer_is_told_in_time() -> None:
 
 def test_what_is_no_address_is_refused() -> None:
     for address in ["127.0.0.1:8786", "http://127.0.0.1:80", "tcp://127.0.0.1", "tcp://x:99999", ""]:
-        with pytest.raises(InputError, match="allowed: tcp://HOST:PORT or tls://HOST:PORT"):
-            check_address(address)
+        refusal(check_address, address, match="allowed: tcp://HOST:PORT or tls://HOST:PORT")
 
 
 def test_settings_for_tls_that_do_not_fit_the_address_are_told(tmp_path: Path) -> None:

@@ -149,9 +149,7 @@ def restored() -> Iterator[None]:
 
 @pytest.mark.thorough
 @pytest.mark.usefixtures("restored")
-def test_cells_of_other_versions_are_made_anew_and_the_old_ones_removed(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_cells_of_other_versions_are_made_anew_and_the_old_ones_removed(tmp_path, monkeypatch):
     """A sweep ended after one cell, gone on with under another NumPy: no mean holds cells of both."""
     study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
     with monkeypatch.context() as patched:

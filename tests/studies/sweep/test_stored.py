@@ -154,9 +154,7 @@ def told_in_one_line(arguments: list[str]) -> int:
 
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("name", DAMAGES)
-def test_a_damaged_ledger_is_one_line_and_no_row_is_another(
-    name: str, whole: tuple[Path, list[Row]], tmp_path: Path
-) -> None:
+def test_a_damaged_ledger_is_one_line_and_no_row_is_another(name, whole, tmp_path):
     folder, right = whole
     out = tmp_path / "out"
     shutil.copytree(folder / "out", out)
