@@ -7,7 +7,6 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import browser as CHROME
 import pytest
@@ -171,9 +170,7 @@ def test_the_finished_pages_ask_no_host_for_anything(site: Path) -> None:
 @pytest.mark.slow
 @pytest.mark.timeout(1800)
 @CHROME.NEEDED
-def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_complaint(
-    site: Path, browser: Any
-) -> None:
+def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_complaint(site, browser):
     for width, dark in VIEWS:
         for name in (
             "index",

@@ -75,9 +75,7 @@ READS = "from pathlib import Path\nTEXT = (Path(__file__).parent / 'sensor' / 'p
     ],
     ids=["a test that fails", "tests that pass", "a module that can't be imported"],
 )
-def test_only_a_test_that_fails_counts_as_caught(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, test: str, caught: bool
-) -> None:
+def test_only_a_test_that_fails_counts_as_caught(tmp_path, monkeypatch, test, caught):
     fault = _project(tmp_path, test)
     (tmp_path / "pytest.ini").write_text("[pytest]\nmarkers = slow\n")
     monkeypatch.setattr(faults, "digest", lambda fault: "")

@@ -36,9 +36,7 @@ def steps(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Steps:
     return made
 
 
-def test_a_part_that_failed_is_tried_again_and_one_that_is_done_is_not(
-    steps: Steps, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_part_that_failed_is_tried_again_and_one_that_is_done_is_not(steps, capsys):
     assert verify.main() == 1
     assert "| second | NO | second ran |" in capsys.readouterr().out
     steps.second_kept = True

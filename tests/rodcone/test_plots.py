@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from builders import raw_image
 from matplotlib import pyplot
+from refusal import refusal
 
 from isp.picture import Picture
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
-from rodcone.errors import InputError
 from rodcone.plots import CHANNEL_COLOURS
 from sensor.curves import rgbw
 from sensor.emva1288.characterise import characterise
@@ -62,8 +62,7 @@ def test_a_line_through_radiance_is_luminance() -> None:
 
 def test_a_line_outside_the_picture_is_refused() -> None:
     for asked, words in (({"row": 6}, "row: 6.* 0 to 5"), ({"row": -1}, "row: -1"), ({"row": 1.5}, "row: 1.5")):
-        with pytest.raises(InputError, match=words):
-            Picture(np.ones((6, 9, 3)), {"R": "given"}).plot_line(**asked)
+        refusal(Picture(np.ones((6, 9, 3)), {"R": "given"}).plot_line, **asked, match=words)
     assert not pyplot.get_fignums()
 
 

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
@@ -12,7 +13,6 @@ from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from render.spectrum import VISIBLE_NM, Floats
 from render.transport import Transport
-from rodcone.errors import InputError
 from scenes.catalog import load
 from scenes.reflectances import color_checker
 from sensor.cfa import mask
@@ -23,9 +23,7 @@ from sensor.response import expected_electrons
 from studies.budget.bands import counts, fine_bands, groups_of
 from studies.budget.ledger import as_stated
 from studies.commands import new as new_command
-from studies.metrics.chart_colours import daylight_delta_e
 from studies.metrics.target_figures import patch_masks
-from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
 from studies.study.lit_scene import level_luminance, open_choice, under
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep.frames import colours_under
@@ -85,32 +83,18 @@ def test_ws_electrons_per_lux_are_the_integral(wall: Transport) -> None:
         assert found == pytest.approx(integral_e(sensor, name, LUX, 0.01), rel=8e-3), name
 
 
-def test_under_low_pressure_sodium_all_colours_collapse_and_under_d65_none_do() -> None:
-    scene, masks = load("color_checker"), patch_masks(load("color_checker"), (64, 64))
-    nm, width = fine_bands([illuminant("sodium_low")])
-    chart = render(scene, (64, 64), wavelength_nm=nm, width_nm=width, spp=16)
-    errors, spread = {}, {}
-    for name in ("D65", "A", "sodium_low"):
-        lit = under(chart, name).relight(luminance_cd_m2=1.0)
-        light = light_in_bands(illuminant(name), nm, width)
-        linear = true_srgb(lit, light, shown_white_cd_m2(under(chart, name), 1.0))
-        errors[name] = daylight_delta_e(linear, masks)[:18].mean()
-        spread[name] = max(float(np.ptp(linear[mask].mean(axis=0))) for mask in masks)
-    assert spread["sodium_low"] < 1e-3  # grey, whatever the surface
-    assert 0.3 < spread["D65"] < 1.5
-    assert errors["D65"] < 0.5  # shading by the board, and the 64 pixels
-    assert errors["D65"] < errors["A"] < 8.0
-    assert 12.0 < errors["sodium_low"] < 45.0
-
-
 def test_a_study_renders_the_range_that_it_asks_for() -> None:
     far = Study((SceneChoice("color_checker"),), ("1lux",), render=RenderLimits(range_nm=(380.0, 1070.0)))
     (model,) = as_stated(far).renders.values()
     edges = np.array(model.wavelength_nm) - np.array(model.width_nm) / 2
     assert edges[0] == 380.0
     assert model.wavelength_nm[-1] + model.width_nm[-1] / 2 == pytest.approx(1070.0)
-    with pytest.raises(InputError, match=r"still_life: bands reach 380-1070 nm, and .* 380-780 nm alone"):
-        open_choice(SceneChoice("still_life"), far)
+    refusal(
+        open_choice,
+        SceneChoice("still_life"),
+        far,
+        match=r"still_life: bands reach 380-1070 nm, and .* 380-780 nm alone",
+    )
     assert open_choice(SceneChoice("still_life", extend="hold"), far).scene is not None
 
 

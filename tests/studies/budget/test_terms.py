@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 from builders import transport_of
+from refusal import refusal
 
 from render.error_estimates import Halves
 from render.illuminants import illuminant
@@ -14,7 +15,6 @@ from render.loader import mitsuba_module
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat
 from render.transport import Transport
-from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import camera_equation, falloff, form_image
@@ -221,8 +221,7 @@ def test_the_view_of_a_camera_is_that_of_mitsuba() -> None:
         ({"focal_length": "wide"}, "focal_length 'wide'"),
         ({"fov": 40.0, "fov_axis": "z"}, "fov_axis: 'z' is unknown"),
     ):
-        with pytest.raises(InputError, match=words):
-            horizontal_view_deg(wrong, (10, 10))
+        refusal(horizontal_view_deg, wrong, (10, 10), match=words)
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="needs LLVM or CUDA for the fast readout")

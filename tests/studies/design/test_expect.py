@@ -7,20 +7,15 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from isp.design.expected_error import Noise, expected_error, sampled
 from isp.design.spectral_prior import PRIORS, load_prior
-from isp.ple.prior import mixture, own_prior
-from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset
-from studies.design.expect import expect, lens_of, metric_rows, middle_pixels, responses_e, sampling_of, view_of
+from studies.design.expect import expect, lens_of, metric_rows, responses_e, view_of
 from studies.metrics.truth import neutral_electrons
-from studies.photograph.camera import calibrate
 
 ROOT = Path(__file__).resolve().parents[3]
 LEVELS = (0.036, 2.0, 25.0)
@@ -110,55 +105,6 @@ def test_component_known_is_ahead_of_a_linear_estimate() -> None:
     assert all(row.psnr_db > row.linear_psnr_db for row in expect(RGBW, LEVELS))
 
 
-@pytest.mark.thorough
-def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
-    """Counted another way: roots of signal of R, G, B and W, dense matrices; both after the colour matrix of R, G, B.
-
-    They agree within 0.25 dB, not closer: in `ple`'s prior W of each photograph is off by a factor of its own (4 %),
-    which no spectrum has, so that W tells less of R, G and B there.
-    """
-    green_e = np.array([2.0, 5.0, 20.0, 100.0, 500.0])  # from white
-    held, seen = load_prior("drawn"), view_of("drawn", "D65")
-    matrix = np.asarray(calibrate(RGBW, illuminant("D65")).to_srgb)[:, :3]
-    responses, noise = responses_e(RGBW, seen), Noise(dark_e=1.8, prnu=0.0, full_e=np.inf)
-    white = np.linalg.lstsq(held.spectra, np.ones(len(held.spectra)), rcond=None)[0]
-    to_srgb = matrix @ (responses / (responses @ white)[:, None])[:3]
-    per_cd_m2 = neutral_electrons(BAYER, seen.light, 1.0)[1]
-
-    def slopes(linear: np.ndarray) -> np.ndarray:
-        return np.asarray(np.clip(linear, 0.0031308, 1.0) ** (1 / 2.4 - 1))
-
-    def ours(tile: Tile, white_e: float) -> float:
-        sensor, total = preset("low_noise", tile), 0.0
-        samples = sampled(held.patches, sampling_of(sensor, responses_e(sensor, seen)), middle_pixels())
-        for m in held.reflectances:
-            rows = slopes(held.patches.means[:, middle_pixels()] @ (m * to_srgb).T)[..., None] * m * to_srgb
-            forms = (rows.swapaxes(-1, -2) @ rows)[None]
-            scale = np.full(64, m * white_e / per_cd_m2)
-            total += float(expected_error(held.patches.weights, samples, scale, noise, forms)[0])
-        return total
-
-    def theirs(tile: Tile, white_e: float) -> float:
-        prior, mix = own_prior(), mixture(own_prior())
-        channel = np.array([["RGBW".index(tile[y % 2][x % 2]) for x in range(8)] for y in range(8)]).ravel()
-        at, total = 4 * np.arange(64) + channel, 0.0
-        for m in held.reflectances:
-            electrons = m * white_e * prior.neutral_e[channel]
-            for weight, mean, covariance in zip(np.exp(mix.log_weights), mix.means, mix.covariances, strict=True):
-                signals = covariance * (2 * mean[:, None]) * (2 * mean)  # of roots, about the mean
-                read = electrons * np.maximum(mean[at], 0.05) ** 2 + noise.dark_e**2
-                cross = signals[:, at] * electrons
-                left = signals - cross @ np.linalg.solve(electrons[:, None] * cross[at] + np.diag(read), cross.T)
-                for pixel in 4 * middle_pixels():
-                    rows = slopes(m * matrix @ mean[pixel : pixel + 3] ** 2)[:, None] * m * matrix
-                    total += weight * np.trace(rows @ left[pixel : pixel + 3, pixel : pixel + 3] @ rows.T)
-        return total
-
-    for white_e in green_e:
-        gains = [10 * np.log10(error(BAYER.cfa, white_e) / error(RGBW.cfa, white_e)) for error in (ours, theirs)]
-        assert abs(gains[0] - gains[1]) < 0.25
-
-
 def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
     tiles = (("V",), ("VLVM", "LVLV", "VMVS", "LVLV"), ("VVLL", "VVLM", "LMVV", "LSVV"))
     cameras = [read_sensor(ROOT / "docs/eye/eye.toml", tile) for tile in tiles]
@@ -173,14 +119,3 @@ def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
 def test_quads_lose_and_white_wins_in_the_dark(prior: str) -> None:
     assert (gain_db(quad(("RG", "GB")), prior) < 0).all()
     assert gain_db(("RG", "BW"), prior)[0] > 0.3
-
-
-def test_what_is_unknown_is_refused_in_one_line() -> None:
-    for choices, words in [
-        ({"prior": "drawns"}, "did you mean 'drawn'"),
-        ({"light": "D66"}, "did you mean 'D65'"),
-        ({"exposure": "auto:V"}, "exposure: 'auto:V'"),
-    ]:
-        with pytest.raises(InputError, match=words) as error:
-            expect(RGBW, [1.0], **choices)
-        assert "\n" not in str(error.value), (choices, words)

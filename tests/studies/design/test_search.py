@@ -37,9 +37,7 @@ def test_turned_mirrored_and_shifted_tiles_are_one() -> None:
 
 
 @pytest.mark.thorough
-def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_known(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_known(monkeypatch):
     # Three letters: 3^4 tiles are 21 but for turns, mirrors and shifts (Burnside's lemma over the 32 moves).
     wanted, known, shares = goal(letters="RGB"), {}, []
     best = best_tile(wanted, 2, 0, 0, known, lambda _, share: shares.append(share))

@@ -4,10 +4,10 @@ from itertools import product
 
 import numpy as np
 import pytest
+from refusal import refusal
 from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from rodcone.errors import InputError
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.pu21 import pu21_psnr_db
 from studies.metrics.quality import measure, psnr_db
@@ -36,12 +36,6 @@ def test_ssim_is_the_papers_equation() -> None:
     assert measure(second, first).ssim == pytest.approx(ssim(second, first), rel=1e-9)
 
 
-def test_ssim_of_even_pictures_is_the_luminance_term_alone() -> None:
-    first, second = np.full((20, 20, 3), 0.4), np.full((20, 20, 3), 0.6)
-    closed = (2 * 0.4 * 0.6 + 1e-4) / (0.4**2 + 0.6**2 + 1e-4)
-    assert measure(first, second).ssim == pytest.approx(closed, rel=1e-9)
-
-
 def test_the_95th_percentile_sees_what_the_median_does_not() -> None:
     truth = np.full((20, 20, 3), 0.5)
     picture = truth.copy()
@@ -65,7 +59,4 @@ def test_a_picture_that_is_not_finite_has_no_quality() -> None:
         sound, broken = np.full((24, 24, 3), 0.5), np.full((24, 24, 3), 0.5)
         broken[3, 4, 0] = value
         for pictures in ((broken, sound), (sound, broken)):
-            with pytest.raises(
-                InputError, match=rf"^(picture|truth|luminance_cd_m2): {value} at \(3, 4.*finite numbers"
-            ):
-                metric(*pictures)
+            refusal(metric, *pictures, match=rf"^(picture|truth|luminance_cd_m2): {value} at \(3, 4.*finite numbers")

@@ -6,6 +6,7 @@ import colour
 import numpy as np
 import pytest
 from builders import require_library
+from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit, fit_matrix
 from isp.colour.white_balance import neutral_response
@@ -15,7 +16,6 @@ from render.photometry import colour_matching_functions, tristimulus
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
 from rodcone.colour_spaces import encode_srgb
-from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.capture import expose
 from sensor.config import SensorConfig
@@ -221,7 +221,10 @@ def test_speed_is_78_over_the_exposure_that_fills_the_well() -> None:
 
 def test_what_cannot_be_calibrated_is_refused() -> None:
     blind = {"R": flat(), "G": flat(0.5), "B": Spectrum(np.array([900.0, 950.0]), np.array([1.0, 1.0]))}
-    with pytest.raises(InputError, match=r"responses: B collects nothing under the light"):
-        calibrate(camera(blind), illuminant("D65"))
-    with pytest.raises(InputError, match=r"responses: R, G, B can't tell colours apart"):
-        calibrate(camera(dict.fromkeys("RGB", flat())), illuminant("D65"))
+    refusal(calibrate, camera(blind), illuminant("D65"), match=r"responses: B collects nothing under the light")
+    refusal(
+        calibrate,
+        camera(dict.fromkeys("RGB", flat())),
+        illuminant("D65"),
+        match=r"responses: R, G, B can't tell colours apart",
+    )

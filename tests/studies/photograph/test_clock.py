@@ -115,9 +115,7 @@ def test_the_reports_stages_add_up_to_the_runs_wall_clock(workers: int, work: Wo
     assert stages[OTHER] == pytest.approx((work.now() - start) * (1 - 1 / workers))
 
 
-def test_a_render_counts_once_however_many_cells_share_it(
-    work: Work, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_render_counts_once_however_many_cells_share_it(work, tmp_path, monkeypatch):
     module = sys.modules["studies.sweep.prepare"]
     make = work.taking("render", 7.0, module.make_transport)
 

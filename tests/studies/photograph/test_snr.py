@@ -26,13 +26,6 @@ def test_shot_noise_alone_takes_the_square_of_the_snr() -> None:
     assert electrons_at_snr(10.0, quiet, EXPOSURE_S) == pytest.approx(50 + np.sqrt(2500 + 100 * step), rel=1e-9)
 
 
-DARK = {
-    "": {},
-    "dark current": {"dark_current_e_per_s": 2e4},
-    "hot pixels": {"hot_pixel_share": 0.02, "hot_pixel_dark_current_e_per_s": 1e4},
-}
-
-
 def test_a_well_that_dark_current_fills_has_no_snr() -> None:
     """Light of 60 % of the well, and dark electrons of 50 % in the exposure."""
     sensor = low_noise("bayer")
@@ -62,23 +55,6 @@ def test_light_and_electrons_belong_together() -> None:
     drawn = snr_at(np.array([found["G"].luminance_cd_m2, 1e7]), sensor, "A", EXPOSURE_S)["G"]
     assert drawn[0] == pytest.approx(10.0, rel=1e-6)
     assert np.isnan(drawn[1])
-
-
-@pytest.mark.parametrize("luminance_cd_m2", [1.0, 30.0])
-@pytest.mark.parametrize("dark", DARK)
-def test_an_even_field_is_simulated_as_the_closed_form_has_it(dark: str, luminance_cd_m2: float) -> None:
-    """262 144 pixels: the standard error of the SNR is under 0.02 dB, and columns are alike in this preset."""
-    sensor = replace(table1_output(), cfa=("W",))
-    pixel = replace(sensor.pixel, **DARK[dark])
-    sensor = replace(sensor, pixel=pixel)
-    (electrons,) = channel_e(sensor, light_of("D65"), luminance_cd_m2, EXPOSURE_S)
-    rng = np.random.default_rng(0)
-    device = draw_device(sensor, (512, 512), rng)
-    raw = expose(np.full((512, 512), electrons), sensor, EXPOSURE_S, device, rng)
-    dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
-    signal_e = raw.electrons.mean() - dark_e_per_s * EXPOSURE_S
-    simulated_db = 20 * np.log10(signal_e / raw.electrons.std())
-    assert simulated_db == pytest.approx(20 * np.log10(float(snr(electrons, sensor, EXPOSURE_S))), abs=0.08)
 
 
 @pytest.mark.sample(1)

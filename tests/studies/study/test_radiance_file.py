@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from rodcone.errors import InputError
 from studies.study.lit_scene import make_transport, open_choice
 from studies.study.scene_source import file_white, open_radiance_file
 from studies.study.study import RenderLimits, SceneChoice, Study
@@ -48,5 +48,4 @@ def test_a_size_that_a_picture_does_not_take_is_told(tmp_path: Path, size: int |
 @pytest.mark.parametrize(("height", "width"), [(15, 20), (20, 4097)])
 def test_picture_of_a_size_that_no_camera_takes_is_refused(tmp_path: Path, height: int, width: int) -> None:
     path = ramp(tmp_path / "a.exr", height, width)
-    with pytest.raises(InputError, match=r"a\.exr: side"):
-        open_radiance_file(path, file_white(path, "E"))
+    refusal(open_radiance_file, path, file_white(path, "E"), match=r"a\.exr: side")

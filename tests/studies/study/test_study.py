@@ -4,6 +4,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from refusal import refusal
 
 from rodcone.errors import InputError
 from sensor.presets import preset_file
@@ -100,12 +101,11 @@ def test_the_near_infrared_asks_for_lights_that_are_known_there() -> None:
     replace(STUDY, render=far, spectra=("own", "sunlight", "moonlight", "2856K", "E", "LED-B5"))
     for light in ("D65", "A", "LED-V1", "sodium_high", "sodium_low"):
         replace(STUDY, spectra=(light,))
-        with pytest.raises(InputError, match=f"spectra: '{light}' is known over .* take one of them") as error:
-            replace(STUDY, render=far, spectra=(light,))
-        assert "\n" not in str(error.value)
+        refusal(
+            replace, STUDY, render=far, spectra=(light,), match=f"spectra: '{light}' is known over .* take one of them"
+        )
 
 
 def test_a_range_without_lights_or_without_a_band_is_refused() -> None:
     for range_nm in [(380.0,), (780.0, 380.0), (200.0, 780.0), (380.0, 1200.0), (380.0, 400.0)]:
-        with pytest.raises(InputError, match="range_nm: "):
-            replace(STUDY, render=replace(STUDY.render, range_nm=range_nm))
+        refusal(replace, STUDY, render=replace(STUDY.render, range_nm=range_nm), match="range_nm: ")
