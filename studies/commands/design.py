@@ -3,6 +3,7 @@
 import json
 import re
 import sys
+import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -86,7 +87,7 @@ class DesignOrder:
         count = len(self.levels)
         if self.weights and (len(self.weights) != count or min(self.weights) < 0 or not sum(self.weights)):
             raise InputError(
-                f"weights: {list(self.weights)} for {count} levels; allowed: a number for each, 0 or more; see over"
+                f"weights: {list(self.weights)} for {count} levels; allowed: 0 or more; give --weights once for each"
             )
 
     @property
@@ -191,7 +192,10 @@ def _write(out: Path, sensor: str, camera: SensorConfig, filters: bool) -> None:
     head, *tables = re.split(r"^(?=\[)", text, flags=re.MULTILINE)
     head = re.sub(r"^cfa\s*=\s*(\[[^\]]*\]|[^\n]*)\n?", "", head, flags=re.MULTILINE)
     parts = [f"cfa = {json.dumps(list(camera.cfa))}\n{head}"]
-    parts += [table for table in tables if not table.startswith("[responses]")]
+    for table in tables:  # but those of channels that the new mosaic lacks
+        keys = tomllib.loads(table)
+        if "responses" not in keys and all(x["channel"] in camera.channels for x in keys.get("channels", ())):
+            parts.append(table)
     if filters or "responses" in content:
         curves = camera.responses.curves
         nm = next(iter(curves.values())).wavelength_nm
@@ -200,4 +204,7 @@ def _write(out: Path, sensor: str, camera: SensorConfig, filters: bool) -> None:
             f'\n[responses]\ncsv = "curves.csv"\nrange_nm = [{nm[0]}, {nm[-1]}]\nquantum_efficiency = "{kind}"\n'
         )
         write_files({out / "curves.csv": responses_csv(curves)})
-    write_files({out / "sensor.toml": "".join(parts), out / "study.toml": _STUDY.read_bytes()})
+    study = _STUDY.read_text("utf-8")
+    if "W" not in camera.responses.curves:
+        study = study.replace(', "ple_rgbw"', "")
+    write_files({out / "sensor.toml": "".join(parts), out / "study.toml": study})

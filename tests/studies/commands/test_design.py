@@ -36,17 +36,20 @@ def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) 
 
 @pytest.mark.thorough
 def test_a_camera_with_curves_of_its_own_takes_them_along(tmp_path: Path) -> None:
-    """Into another folder, with a mosaic over several lines; a damaged file of tiles is refused, not counted."""
+    """Into another folder, with a mosaic over several lines and no W; a damaged file of tiles is refused."""
     (tmp_path / "mine").mkdir()
-    (tmp_path / "mine" / "c.csv").write_text("wavelength_nm,R,G,B,W\n380,0,0,.3,.6\n580,.1,.4,.1,.9\n780,.4,0,0,.5\n")
+    (tmp_path / "mine" / "c.csv").write_text("wavelength_nm,R,G,B\n380,0,0,.3\n580,.1,.4,.1\n780,.4,0,0\n")
     table = '[responses]\ncsv = "c.csv"\nrange_nm = [380, 780]\nquantum_efficiency = "included"\n'
-    text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = [\n  "RG",\n  "BW"]')
+    text = preset_file("white_apart").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = [\n  "RG",\n  "GB"]')
+    text = text.replace('channel = "W"', 'channel = "G"') + '\n[[channels]]\nchannel = "B"\nlight_share = 0.5\n'
     (tmp_path / "mine" / "s.toml").write_text(text.replace("\n[lens]", f"\n{table}\n[lens]"), "utf-8")
-    few = ["design", tmp_path / "mine" / "s.toml", *FEW[2:], "-o", tmp_path / "found"]
+    few = ["design", tmp_path / "mine" / "s.toml", "--tile", "BR/RB", *FEW[4:], "-o", tmp_path / "found"]
     assert call(few)[0] == 0
     given, taken = (preset(path) for path in (tmp_path / "mine" / "s.toml", tmp_path / "found" / "sensor.toml"))
     assert taken.responses.curves["G"].values.tolist() == given.responses.curves["G"].values.tolist() == [0, 0.4, 0]
     assert (taken.lens, taken.pixel) == (given.lens, given.pixel)
+    assert [x.channel for x in taken.chip.channels] == ["B"]  # G is read apart where there is one
+    assert call(["sweep", tmp_path / "found" / "study.toml", "--as-stated", "--dry-run"])[0] == 0
     (tmp_path / "found" / "tried.json").write_text("[1, 2]")
     code, _, err = call(few)
     assert code == 2
