@@ -24,6 +24,9 @@ LAMPS = ("A", "F2", "F11", "LED-B1", "LED-B3", "LED-B5", "LED-RGB1", "LED-V1", "
 HOURS = ("day", "dusk", "night")
 SUN_RADIUS_DEG, SUN_DISTANCE_M = 0.27, 400.0
 SUN_SR = 2 * pi * (1 - cos(radians(SUN_RADIUS_DEG)))
+Rng = np.random.Generator
+Nodes = dict[str, Node]
+Pair = tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -34,9 +37,9 @@ class _Stage:
     opening for daylight of `window_m`, None under the open sky.
     """
 
-    nodes: dict[str, Node]
+    nodes: Nodes
     view: Node
-    cells: list[tuple[float, float]]
+    cells: list[Pair]
     unit_m: float
     lamps: list[tuple[float, float, float]]
     panes: tuple[str, ...] = ()
@@ -64,13 +67,12 @@ def diorama(seed: int = 0) -> Scene:
         if rng.random() < 0.6:
             nodes |= {f"thing{index:02d}_{key}": node for key, node in _thing(rng, x, z, stage.unit_m).items()}
     lights, groups = _lights(rng, HOURS[rng.integers(3)], stage)
+    nodes |= {key: nodes.get(key, {}) | node for key, node in lights.items()}  # a lamp, or the light of a pane
     name = f"diorama-{seed:x}" if seed else "diorama"
-    for key, node in lights.items():  # a lamp, or the light of a pane that is there
-        nodes[key] = nodes.get(key, {}) | node
     return Scene(name, {"type": "scene", "sensor": stage.view, **nodes}, groups, reference_plane="meter_card")
 
 
-def _street(rng: np.random.Generator) -> _Stage:
+def _street(rng: Rng) -> _Stage:
     """Street between house fronts with windows, poles and trees."""
     half_m = float(rng.uniform(3.5, 6.0))
     nodes = {
@@ -106,7 +108,7 @@ def _street(rng: np.random.Generator) -> _Stage:
     return _Stage(nodes, view, cells, 0.9, lamps, tuple(panes))
 
 
-def _room(rng: np.random.Generator) -> _Stage:
+def _room(rng: Rng) -> _Stage:
     """Closed room with pictures on its walls and a window at its left."""
     width, height, depth = rng.uniform(4, 6), rng.uniform(2.4, 3.2), rng.uniform(5, 9)
     nodes = {
@@ -123,19 +125,18 @@ def _room(rng: np.random.Generator) -> _Stage:
     for wall, (pose, length) in walls.items():
         nodes[wall] = panel(pose, length, height, _tile(rng, 2) if rng.random() < 0.7 else matte(_paint(rng, 0.6)))
         if wall != "front":  # behind the camera
-            nodes |= _leaves(rng, wall, pose @ translate(0, 0.1, 0.01), 0.42 * length, 0.35 * height, (0.3, 1.6), 10)
+            nodes |= _leaves(rng, wall, pose @ translate(0, 0.1, 0.01), (0.42 * length, 0.35 * height), (0.3, 1.6), 10)
     window = translate(0.02 - width / 2, 0.6 * height, rng.uniform(-0.2, 0.2) * depth) @ rotate((0, 1, 0), 90)
-    lamps = [
-        (x * width, height - rng.uniform(0.05, 0.8), z * depth) for x, z in ((-0.3, 0.1), (0.3, -0.1), (0.0, -0.35))
-    ]
-    view = camera(
-        rng.uniform(40, 60), (rng.uniform(-0.3, 0.3) * width, rng.uniform(1.2, 1.7), depth / 2 - 0.3), (0.0, 0.9, -1.0)
-    )
+    places = (-0.3, 0.1), (0.3, -0.1), (0.0, -0.35)
+    lamps = [(x * width, height - rng.uniform(0.05, 0.8), z * depth) for x, z in places]
+    fov_deg = rng.uniform(40, 60)
+    origin = rng.uniform(-0.3, 0.3) * width, rng.uniform(1.2, 1.7), depth / 2 - 0.3
+    view = camera(fov_deg, origin, (0.0, 0.9, -1.0))
     cells = [((x + 0.5) * width / 6 - width / 2, 0.4 + (z + 0.5) * 0.7 - depth / 2) for x in range(6) for z in range(5)]
     return _Stage(nodes, view, cells, 0.6, lamps, window=window @ translate(0, 0, 0.01))
 
 
-def _table(rng: np.random.Generator) -> _Stage:
+def _table(rng: Rng) -> _Stage:
     """Table, far or near before a wall with leaves; indoors or outdoors."""
     far_m = float(rng.choice((0.7, 3.0, 8.0)))
     wall = translate(0, 0.5, -far_m)
@@ -146,7 +147,7 @@ def _table(rng: np.random.Generator) -> _Stage:
         "wall": panel(wall, 40.0, rng.uniform(2.5, 6), _tile(rng, 12)),
     }
     sizes_m = 0.1 + 0.05 * far_m, 0.5 + 0.3 * far_m
-    nodes |= _leaves(rng, "wall", wall @ translate(0, 0, 0.01), 0.9 + 0.3 * far_m, 0.5, sizes_m, 40)
+    nodes |= _leaves(rng, "wall", wall @ translate(0, 0, 0.01), (0.9 + 0.3 * far_m, 0.5), sizes_m, 40)
     lamps = [(x, rng.uniform(0.5, 1.2), z) for x, z in ((-0.9, 0.3), (0.9, -0.2), (-0.1, 0.8))]
     view = camera(rng.uniform(18, 28), (rng.uniform(-0.5, 0.5), rng.uniform(0.35, 0.9), 2.1), (0.0, 0.15, 0.0))
     cells = [(0.16 * x - 0.56, 0.2 * z - 0.4) for x in range(8) for z in range(5)]
@@ -154,9 +155,9 @@ def _table(rng: np.random.Generator) -> _Stage:
     return _Stage(nodes, view, cells, 0.09, lamps, window=window if rng.random() < 0.5 else None)
 
 
-def _lights(rng: np.random.Generator, hour: str, stage: _Stage) -> tuple[dict[str, Node], dict[str, LightGroup]]:
+def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightGroup]]:
     """Sun and sky or a window, and lamps of one or two spectra."""
-    nodes: dict[str, Node] = {}
+    nodes: Nodes = {}
     groups: dict[str, LightGroup] = {}
     area: Node = {"emitter": {"type": "area"}}
     if stage.window is not None:
@@ -171,9 +172,8 @@ def _lights(rng: np.random.Generator, hour: str, stage: _Stage) -> tuple[dict[st
         groups["sky"] = LightGroup(("sky",), illuminant(_daylight(rng, hour)), lux / pi)
         if hour == "day" and rng.random() < 0.7:
             height, bearing = radians(rng.uniform(15, 65)), radians(rng.uniform(-130, 130))
-            nodes["sun"] = far_disk(
-                (sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height)), SUN_DISTANCE_M, SUN_RADIUS_DEG
-            )
+            towards = sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height)
+            nodes["sun"] = far_disk(towards, SUN_DISTANCE_M, SUN_RADIUS_DEG)
             groups["sun"] = LightGroup(("sun/emitter",), illuminant("sunlight"), rng.uniform(2e4, 9e4) / SUN_SR)
     if hour == "day":
         return nodes, groups
@@ -188,34 +188,33 @@ def _lights(rng: np.random.Generator, hour: str, stage: _Stage) -> tuple[dict[st
             pose = translate(x, y - 0.01 * side_m, z) @ rotate((1, 0, 0), 90)
             nodes[head] = panel(pose, 0.9 * side_m, 0.9 * side_m, matte(grey(0.04)), **area)
             emitters.append(f"{head}/emitter")
-        height_m = stage.lamps[index][1]
-        luminance = rng.uniform(10, 100) * height_m**2 / (0.9 * side_m) ** 2
+        luminance = rng.uniform(10, 100) * stage.lamps[index][1] ** 2 / (0.9 * side_m) ** 2
         groups[f"lamps{index}"] = LightGroup(tuple(emitters), illuminant(str(name)), luminance)
     if stage.panes:
-        nodes |= {pane: dict(area) for pane in stage.panes}
+        nodes |= dict.fromkeys(stage.panes, area)
         emitters = [f"{pane}/emitter" for pane in stage.panes]
         groups["panes"] = LightGroup(tuple(emitters), illuminant("3000K"), rng.uniform(3, 30))
     return nodes, groups
 
 
-def _daylight(rng: np.random.Generator, hour: str) -> str:
+def _daylight(rng: Rng, hour: str) -> str:
     low, high = {"day": (5500, 9000), "dusk": (8000, 20000), "night": (4100, 6000)}[hour]
     return f"D{rng.integers(low, high)}K"
 
 
-def _paint(rng: np.random.Generator, purest: float = 1.0) -> Spectrum:
+def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
     """A measured patch's reflectance, mixed with grey and darkened."""
     _, patch = color_checker()[rng.integers(24)]
     share, level = purest * rng.uniform(0.6, 1), rng.uniform(0.03, 0.8)
     return Spectrum(patch.wavelength_nm, rng.uniform(0.5, 1) * (share * patch.values + (1 - share) * level))
 
 
-def _tile(rng: np.random.Generator, repeats: float) -> Node:
+def _tile(rng: Rng, repeats: float) -> Node:
     """Brick, grass or gravel, dark gaps between muted stones."""
     return printed(TILES[rng.integers(3)], grey(0.02), _paint(rng, 0.9), repeats * rng.uniform(0.5, 1.5), 90.0)
 
 
-def _surface(rng: np.random.Generator, repeats: float = 1.0) -> Node:
+def _surface(rng: Rng, repeats: float = 1.0) -> Node:
     """Any surface but glass."""
     kind, turn_deg = rng.random(), float(rng.uniform(0, 180))
     if kind < 0.15:
@@ -232,26 +231,17 @@ def _surface(rng: np.random.Generator, repeats: float = 1.0) -> Node:
     return matte(_paint(rng))
 
 
-def _leaves(
-    rng: np.random.Generator,
-    wall: str,
-    pose: Floats,
-    half_m: float,
-    up_m: float,
-    sizes_m: tuple[float, float],
-    count: int,
-) -> dict[str, Node]:
+def _leaves(rng: Rng, wall: str, pose: Floats, half_m: Pair, sizes_m: Pair, count: int) -> Nodes:
     """Pictures and sheets on a wall, sizes by a power law, each before the one drawn earlier."""
-    nodes = {}
-    low, high = sizes_m
+    nodes, (low, high), (half, up) = {}, sizes_m, half_m
     for index in range(count):
         side_m = low * (1 - rng.random() * (1 - (low / high) ** 1.5)) ** (-1 / 1.5)
-        at = pose @ translate(rng.uniform(-half_m, half_m), rng.uniform(-up_m, up_m), 0.0005 * index)
+        at = pose @ translate(rng.uniform(-half, half), rng.uniform(-up, up), 0.0005 * index)
         nodes[f"{wall}_leaf{index:02d}"] = panel(at, side_m, side_m * rng.uniform(0.4, 1.4), _surface(rng))
     return nodes
 
 
-def _tree(rng: np.random.Generator, x: float, z: float) -> dict[str, Node]:
+def _tree(rng: Rng, x: float, z: float) -> Nodes:
     """Trunk and a crown of leafy balls."""
     height_m, radius_m, leaf = rng.uniform(1.5, 3), rng.uniform(0.6, 1.4), _tile(rng, 2)
     nodes = {"trunk": rod((x, 0.0, z), (x, height_m + radius_m, z), 0.1, matte(_paint(rng, 0.5)))}
@@ -263,7 +253,7 @@ def _tree(rng: np.random.Generator, x: float, z: float) -> dict[str, Node]:
     return nodes
 
 
-def _thing(rng: np.random.Generator, x: float, z: float, unit_m: float) -> dict[str, Node]:
+def _thing(rng: Rng, x: float, z: float, unit_m: float) -> Nodes:
     """Ball, block, pillar, pole, stack or a heap of many small things, on the ground."""
     kind, surface, size_m = rng.random(), _surface(rng), float(unit_m * rng.uniform(0.4, 1.0))
     x, z = x + rng.uniform(-0.2, 0.2) * unit_m, z + rng.uniform(-0.2, 0.2) * unit_m
