@@ -30,7 +30,7 @@ from studies.sweep.prepare import SET, Job, known_cells, scene_cells
 from studies.sweep.provenance import versions
 from studies.sweep.run_sweep import at_work
 
-SPLITS = {"train": 0.8, "validation": 0.1, "test": 0.1}  # share of the scenes, in the mean
+SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
 PREPARED = 0.5  # of the progress bar, for the scenes' files
 _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_-]")
 _SHARD = re.compile(rf"({'|'.join(SPLITS)})-\d{{6}}\.tar")
@@ -100,13 +100,12 @@ def make_set(
                 "same set; choose another with --out"
             )
         wanted = {shard.key for shard in shards}
-        standing = [made for made in shards_of(earlier) if made.key in wanted and stands(folder, made)]
-        write_manifest(folder, head, standing)
-        there = {made.key for made in standing}
-        missing = [shard for shard in shards if shard.key not in there]
+        standing = {made.key: made for made in shards_of(earlier) if made.key in wanted and stands(folder, made)}
+        missing = [shard for shard in shards if shard.key not in standing]
+        write_manifest(folder, head, standing.values())
         for count, made in enumerate(runner(missing, make=make_shard), start=1):
-            standing.append(made)
-            write_manifest(folder, head, standing)
+            standing[made.key] = made
+            write_manifest(folder, head, standing.values())
             show(f"shard {count} of {len(missing)}", PREPARED + (1 - PREPARED) * count / len(missing))
         write_files({folder / CARD: card(read_manifest(folder))})
     return SetMade(folder, len(samples), len(shards), len(missing))
@@ -119,8 +118,7 @@ def _show_render(show: Step, index: int, count: int, share: float, error: float)
 def split_of(scene: str) -> str:
     """Split of a scene by its hash alone, so that it never is in two."""
     place = int(scene[:12], 16) / 16**12
-    bounds = np.cumsum(list(SPLITS.values()))
-    return list(SPLITS)[min(int(np.searchsorted(bounds, place, side="right")), len(SPLITS) - 1)]
+    return next(split for split, end in SPLITS.items() if place < end)
 
 
 def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:

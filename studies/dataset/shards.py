@@ -2,7 +2,7 @@
 
 import json
 import tarfile
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
@@ -87,7 +87,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
     tar.addfile(member, BytesIO(content))
 
 
-def write_manifest(folder: Path, head: Lines, shards: Sequence[LinesMade]) -> None:
+def write_manifest(folder: Path, head: Lines, shards: Iterable[LinesMade]) -> None:
     """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
     lines = head + [line for made in sorted(shards, key=lambda made: made.lines[0]["name"]) for line in made.lines]
     write_files({folder / MANIFEST: "".join(f"{json.dumps(line)}\n" for line in lines)})
