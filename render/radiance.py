@@ -55,8 +55,8 @@ class SpectralRadiance:
     def __post_init__(self) -> None:
         require_fields(self)
         values = real_array("radiance", self.values)
-        if not np.issubdtype(values.dtype, np.floating):
-            values = values.astype(np.float64)
+        least = np.float32 if values.dtype.kind == "f" else np.float64  # half floats would overflow
+        values = values.astype(np.result_type(values, least), copy=False)
         centres = np.array(real_array("wavelength_nm", self.wavelength_nm), dtype=np.float64)
         widths = band_widths(centres, self.width_nm)
         if values.ndim != 3 or values.shape[2] != centres.size or 0 in values.shape:
