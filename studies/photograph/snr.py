@@ -6,6 +6,7 @@ from math import pi
 import numpy as np
 
 from render.spectrum import Floats
+from rodcone.errors import require_name
 from sensor.config import SensorConfig
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
@@ -44,6 +45,9 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
 
     Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
     """
+    of_channel(sensor, channel)  # which asks for one
+    if channel is not None:
+        require_name("channel", channel, sensor.channels)
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
     # each is a frame of its own, for which a camera may switch its gain or meter a channel
     chosen = sensor.chip.switched or any(x.metered for x in sensor.chip.channels)

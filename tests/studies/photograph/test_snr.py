@@ -5,6 +5,7 @@ from math import inf, pi
 
 import numpy as np
 import pytest
+from refusal import refusal
 
 from sensor.capture import expose
 from sensor.device import draw_device
@@ -24,6 +25,12 @@ def test_shot_noise_alone_takes_the_square_of_the_snr() -> None:
     step = quiet.gain_e_per_dn**2 / 12
     # e / sqrt(e + step) = 10
     assert electrons_at_snr(10.0, quiet, EXPOSURE_S) == pytest.approx(50 + np.sqrt(2500 + 100 * step), rel=1e-9)
+
+
+def test_a_channel_is_asked_for_where_channels_are_read_apart_and_has_to_be_the_mosaic_s() -> None:
+    electrons = np.array([100.0])
+    refusal(snr, electrons, preset("white_apart"), EXPOSURE_S, match="channel: none given for a camera that reads")
+    refusal(snr, electrons, low_noise(), EXPOSURE_S, "Q", match="channel: 'Q' is unknown; allowed: B, G, R, W")
 
 
 def test_a_well_that_dark_current_fills_has_no_snr() -> None:
