@@ -4,6 +4,7 @@ from collections.abc import Sequence
 from math import floor, isfinite, isinf, isnan, log10
 
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
+from sensor.presets import names
 from studies.metrics.metric import Metric
 from studies.pages.report_data import ReportCell
 from studies.study.levels import parse_exposure, parse_level
@@ -86,8 +87,9 @@ def camera_name(camera: str) -> str:
 
 
 def plain_name(name: str) -> str:
-    """Return a sensor's or scene's name without its file's ending."""
-    return name.removesuffix(".toml")
+    """Return a sensor's name without its file's ending, which parts a preset's copy from the preset."""
+    plain = name.removesuffix(".toml")
+    return name if plain in names() else plain
 
 
 def with_signs(words: str) -> str:

@@ -12,7 +12,7 @@ WRITTEN = {
     text.level_text: {"0.036cd/m2": "0.036 cd/m²", "500lux": "500 lux"},
     text.substitution_text: {None: "not applicable", True: "on", 0.25: "on for 25 % of the seeds", 0.0: "off"},
     text.with_signs: {"10 photons per um^2, 5 cd/m2, cos^4": "10 photons per µm², 5 cd/m², cos⁴"},
-    text.plain_name: {"quiet.toml": "quiet", "low_noise": "low_noise"},
+    text.plain_name: {"quiet.toml": "quiet", "low_noise": "low_noise", "low_noise.toml": "low_noise.toml"},
     text.exposure_name: {text.way_name("auto"): "automatic", text.way_name("2ms", 4): "2 ms, 4 frames"},
 }
 
