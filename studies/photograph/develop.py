@@ -1,7 +1,7 @@
 """A raw file developed into a picture for the screen."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -83,7 +83,8 @@ def develop(
     """
     name = processor or mosaic_processor(raw)
     require_consent("isp", name, trust_code)
-    colour = calibration or raw.colour
+    raw = raw if calibration is None else replace(raw, colour=calibration)
+    colour = raw.colour
     if colour is None:
         raise InputError(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"

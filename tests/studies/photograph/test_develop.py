@@ -52,6 +52,7 @@ def test_what_is_missing_or_unknown_is_said_in_one_line() -> None:
         ({"raw": raw, "processor": "bayer_menon_fair"}, "did you mean 'bayer_menon'"),
         ({"raw": raw, "processor": "bayer_fair"}, "is gone; .*; use bayer_bilinear"),
         ({"raw": raw, "white_balance": "none"}, "white_balance: 'none' is unknown"),
+        ({"raw": raw, "calibration": raw_of("rgbw").colour}, "colour: 4 channels don't fit the mosaic's"),
     ):
         refusal(develop, **arguments, match=told)  # type: ignore[arg-type]
 
