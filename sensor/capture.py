@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
+from rodcone.errors import require_whole
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
@@ -65,6 +66,7 @@ def capture(
         Where the bands don't fill the camera's window: what each channel loses.
     """
     formed = isinstance(radiance, SpectralIrradiance)
+    require_whole("samples_per_pixel", samples_per_pixel, 1, 64, "give samples a side")
     if device is None:
         rows, columns = (size if formed else size // samples_per_pixel for size in radiance.values.shape[:2])
         shape = rows, columns

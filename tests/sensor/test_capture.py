@@ -63,6 +63,11 @@ def test_one_capture_takes_one_key_from_the_generator(exact):
     assert rng.bit_generator.state == twin.bit_generator.state
 
 
+@loop("samples", [0, -1])
+def test_a_number_of_samples_that_is_none_is_refused(samples):
+    refusal(capture, scene(), preset("low_noise"), 0.02, samples_per_pixel=samples, match="samples_per_pixel: ")
+
+
 @loop("exact", [False, True])
 def test_a_chip_of_another_size_is_refused_in_one_line(exact):
     sensor = preset("low_noise")
