@@ -16,7 +16,7 @@ from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.transport import Transport
-from sensor.cfa import BAYER, RGBW, Tile
+from sensor.cfa import BAYER, RGBW, Tile, channel_map
 from sensor.device import Device
 from sensor.raw import RawImage
 
@@ -51,6 +51,12 @@ def any_order(terms: int) -> float:
     Each addition rounds once, by up to half an eps (Higham 2002, section 4.2). A quotient of two such sums counts both.
     """
     return terms * float(np.finfo(float).eps)
+
+
+def mosaic_of(planes: Mapping[str, ArrayLike], cfa: Tile, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """What each site sees of its own channel: a plane (h, w), or one number."""
+    names = channel_map(cfa, shape)
+    return np.select([names == name for name in planes], [np.broadcast_to(x, shape) for x in planes.values()], 0.0)
 
 
 def even_device(shape: tuple[int, int]) -> Device:

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
-from builders import raw_image
+from builders import mosaic_of, raw_image
 from loop import loop
 from numpy.typing import NDArray
 
@@ -54,10 +54,9 @@ def chart(cfa: str, light: str) -> tuple[RawImage, Image]:
     scale = 0.95 * sensor.pixel.full_well_e / (weights @ spectrum).max()
     electrons = (surfaces() * spectrum) @ weights.T * scale
     shape = (ROWS * SIDE, COLUMNS * SIDE)
-    mosaic = np.zeros(shape)
-    for index, channel in enumerate(sensor.channels):
-        plane = np.kron(electrons[:, index].reshape(ROWS, COLUMNS), np.ones((SIDE, SIDE)))
-        mosaic[mask(sensor.cfa, channel, shape)] = plane[mask(sensor.cfa, channel, shape)]
+    patches_e = electrons.T.reshape(-1, ROWS, COLUMNS)
+    planes = {name: np.kron(part, np.ones((SIDE, SIDE))) for name, part in zip(sensor.channels, patches_e, strict=True)}
+    mosaic = mosaic_of(planes, sensor.cfa, shape)
     raw = raw_image(
         np.rint(mosaic / sensor.gain_e_per_dn + sensor.black_dn),
         sensor.cfa,

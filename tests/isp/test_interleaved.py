@@ -11,9 +11,8 @@ from builders import RGBW_4X4, raw_image
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
-from isp.planes import fill, planes
 from isp.reference import reconstruct_reference, reference_with_noise, sum_weights
-from isp.settings import PAPER, PAPER_5X5, SIGMA_D, WINDOW, Settings
+from isp.settings import PAPER, PAPER_5X5, WINDOW, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
@@ -63,11 +62,15 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
             assert result.noise_gain[(*x, i)] == pytest.approx(gain, rel=2 * EXP2_ERROR)
 
 
-def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
-    """Log weights and samples of eq. (1) by pixel and channel, from eqs. (2) to (6); for RGBW in a 2x2 tile alone."""
+def transcription(raw, settings):
+    """Log weights and samples of eq. (1) by pixel and channel, from eqs. (2) to (6); for RGBW in a 2x2 tile alone.
+
+    By the paper's own method distances are in electrons, every sample counts, and alpha is counted over the patch.
+    """
     height, width = raw.shape
-    letters, half, reach = channel_map(raw.cfa, raw.shape), patch // 2, neighbourhood // 2
-    stable = 2 * np.sqrt(np.maximum(raw.electrons + 3 / 8 + raw.dark_noise_e**2, 0))
+    plain, half, reach = settings.distance == "raw", settings.patch // 2, settings.reach
+    letters, sigma_s = channel_map(raw.cfa, raw.shape), settings.sigma_s
+    stable = raw.electrons if plain else 2 * np.sqrt(np.maximum(raw.electrons + 3 / 8 + raw.dark_noise_e**2, 0))
 
     def plane(values, letter, y):
         if letters[y] == letter:
@@ -83,7 +86,7 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     h = {i: {y: plane(stable, i, y) for y in np.ndindex(raw.shape)} for i in "RGBW"}
     white = {y: plane(raw.electrons, "W", y) for y in np.ndindex(raw.shape)}
     steps = list(product(range(-half, half + 1), repeat=2))
-    noise = dict(zip("RGBW", noise_distances(raw.cfa, patch, reach), strict=True))
+    noise = dict(zip("RGBW", noise_distances(raw.cfa, settings.patch, reach), strict=True))
 
     def reflect(k, size):
         while not 0 <= k < size:
@@ -93,13 +96,14 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
     def distance(i, x, y):
         at = lambda p, a: h[i][reflect(p[0] + a[0], height), reflect(p[1] + a[1], width)]  # noqa: E731
         total = sum((at(x, a) - at(y, a)) ** 2 for a in steps)
-        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach] if patch > 1 else 0.0
+        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach] if half and not plain else 0.0
         return math.sqrt(max(total - bias, 0.0))
 
-    window = list(product(range(-(WINDOW // 2), WINDOW // 2 + 1), repeat=2))
+    around = half if plain else WINDOW // 2
+    window = list(product(range(-around, around + 1), repeat=2))
 
     def trust(x):
-        return 1 / (1 + spread(x) / 9)
+        return 1.0 if plain else 1 / (1 + spread(x) / 9)
 
     def spread(x):
         """Half differences of opposite samples, squared, less their noise; the four letters of the tile in turn."""
@@ -114,6 +118,8 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
 
     def counts(x, y):
         """Whether y isn't brighter than the brightest of its letter around x allows."""
+        if plain:
+            return True
         steps = [[a for a in range(-3, 4) if (a - (d - c)) % 2 == 0] for c, d in zip(x, y, strict=True)]
         near = [(x[0] + a, x[1] + b) for a, b in product(*steps)]
         most = max(raw.electrons[s] for s in near if s in white)
@@ -136,52 +142,29 @@ def transcription(raw, neighbourhood, patch, sigma_d, sigma_s):
             for y in np.ndindex(raw.shape):
                 if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach and counts(x, y):
                     beta_s = alpha(y) * distance(i, x, y) + (1 - alpha(y)) * distance("W", x, y)
-                    log_weights.append(
-                        -(math.dist(x, y) ** 2) / (2 * sigma_d**2) - trust(x) * beta_s**2 / (2 * sigma_s**2)
-                    )
+                    spatial = math.dist(x, y) ** 2 / (2 * settings.sigma_d**2)
+                    log_weights.append(-spatial - trust(x) * beta_s**2 / (2 * sigma_s**2))
                     values.append(raw.electrons[y])
             yield (*x, k), np.array(log_weights), np.array(values)
 
 
-@pytest.mark.parametrize(("patch", "sigma_s"), [(1, 3.0), (5, 2.0)])
-def test_the_reference_is_the_paper_pixel_by_pixel(patch, sigma_s):
-    raw = scene((7, 8), 2500.0)  # partly saturated
+CASES = [
+    (Settings(neighbourhood=7, patch=1, sigma_d=2.5, sigma_s=3.0), 0),
+    (Settings(neighbourhood=7, patch=5, sigma_d=2.5, sigma_s=2.0), 0),
+    (replace(PAPER, neighbourhood=7), 2),
+    (replace(PAPER_5X5, neighbourhood=7), 2),
+]
+
+
+@pytest.mark.parametrize(("settings", "seed"), CASES)
+def test_the_reference_is_the_paper_pixel_by_pixel(settings, seed):
+    raw = scene((7, 8), 2500.0, seed=seed)  # partly saturated
     assert 0 < raw.saturated.mean() < 0.5
-    got = reconstruct_reference(raw, Settings(neighbourhood=7, patch=patch, sigma_d=2.5, sigma_s=sigma_s))
-    for place, log_weights, values in transcription(raw, 7, patch, 2.5, sigma_s):
-        weights = np.exp(log_weights - log_weights.max())
-        expected = (weights * values).sum() / weights.sum()
+    got, kernel = reconstruct_reference(raw, settings), reconstruct(raw, settings)
+    for place, log_weights, values in transcription(raw, settings):
+        expected = np.average(values, weights=np.exp(log_weights - log_weights.max()))
         assert got[place] == pytest.approx(expected, rel=1e-10)
-
-
-@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
-@pytest.mark.parametrize("settings", [PAPER, PAPER_5X5])
-def test_the_papers_own_method_is_eqs_1_to_6_to_the_letter(settings, function):
-    """Distances in electrons, every sample counts, and alpha is counted over the patch: no outside term is left."""
-    raw = scene((12, 13), 2500.0, seed=2)
-    assert 0 < raw.saturated.mean() < 0.5
-    settings = replace(settings, neighbourhood=7)
-    half, letters = settings.patch // 2, channel_map(RGBW, raw.shape)
-    full = fill((raw.electrons >= raw.saturation_e).astype(float), RGBW, "W") > 0
-    windows = [
-        np.lib.stride_tricks.sliding_window_view(np.pad(plane, half, mode="reflect"), (settings.patch, settings.patch))
-        for plane in planes(raw, "raw")
-    ]
-    got = function(raw, settings)
-    for x in np.ndindex(raw.shape):
-        for i, letter in enumerate("RGBW"):
-            near = [y for y in np.ndindex(raw.shape) if letters[y] == letter and max(abs(np.subtract(x, y))) <= 3]
-            log_weights = []
-            for y in near:
-                rows, columns = (slice(max(k - half, 0), k + half + 1) for k in y)
-                alpha = full[rows, columns].mean()  # the patch in the frame
-                own, white = (np.linalg.norm(windows[k][x] - windows[k][y]) for k in (i, 3))
-                beta_s = alpha * own + (1 - alpha) * white
-                log_weights.append(
-                    -(math.dist(x, y) ** 2) / (2 * settings.sigma_d**2) - beta_s**2 / (2 * settings.sigma_s**2)
-                )
-            weights = np.exp(np.array(log_weights) - max(log_weights))
-            assert got[(*x, i)] == pytest.approx(np.average([raw.electrons[y] for y in near], weights=weights), abs=0.2)
+        assert kernel[place] == pytest.approx(expected, abs=0.2)
 
 
 KERNEL_CASES = [
@@ -282,7 +265,7 @@ def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_be
     raw = scene((8, 9), 2500.0)
     result = reconstruct(raw, Settings(neighbourhood=11, patch=5, sigma_s=sigma_s))
     largest = 2 * math.sqrt(raw.electrons.max() + raw.dark_noise_e**2 + 3 / 8)
-    for place, log_weights, values in transcription(raw, 11, 5, SIGMA_D, sigma_s):
+    for place, log_weights, values in transcription(raw, Settings(neighbourhood=11, patch=5, sigma_s=sigma_s)):
         distance = -log_weights.max() * 2 * sigma_s**2
         # Rounding of 25 squares and their sum, and of the planes they come from: 2 d (delta x - delta y).
         rounding = (32 * distance + 2 * math.sqrt(25 * distance) * 2 * largest) * 2.0**-24 / (2 * sigma_s**2)

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_PHASES, raw_image
+from builders import BAYER_PHASES, RGBW_PHASES, mosaic_of, raw_image
 
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct
@@ -13,7 +13,7 @@ from isp.settings import DEFAULTS
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from sensor.cfa import BAYER, RGBW, Tile, channels, mask
+from sensor.cfa import BAYER, RGBW, Tile
 from sensor.raw import RawImage
 
 INTERLEAVED, CONVENTIONAL = NAMED["interleaved"].develop, NAMED["bayer"].develop
@@ -22,10 +22,7 @@ IDENTITY = np.eye(3)
 
 def raw(cfa: Tile, levels_e: dict[str, float], shape: tuple[int, int] = (32, 32), noise_e: float = 0.0) -> RawImage:
     """Raw image at one electron a DN with a black level of 100."""
-    electrons = np.zeros(shape)
-    for channel in channels(cfa):
-        electrons[mask(cfa, channel, shape)] = levels_e[channel]
-    electrons += noise_e * np.random.default_rng(0).standard_normal(shape)
+    electrons = mosaic_of(levels_e, cfa, shape) + noise_e * np.random.default_rng(0).standard_normal(shape)
     return raw_image(np.clip(np.rint(electrons + 100), 0, 15_100), cfa, read_noise_e=max(noise_e, 1.0))
 
 

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import RGBW_PHASES, raw_image
+from builders import RGBW_PHASES, mosaic_of, raw_image
 
 from isp.remosaic import bayer_tile, remosaic
 from sensor.calibration import ColourCalibration
@@ -17,11 +17,7 @@ LEVELS_E = {"R": 500.0, "G": 1000.0, "B": 400.0, "W": 5000.0}
 
 def raw(cfa: Tile, scene: dict[str, np.ndarray]) -> RawImage:
     """Noise-free mosaic of a scene's channels at one electron a DN, black 100."""
-    shape = scene["R"].shape
-    electrons = np.zeros(shape)
-    for channel in channels(cfa):
-        electrons[mask(cfa, channel, shape)] = scene[channel][mask(cfa, channel, shape)]
-    return raw_image(np.rint(electrons + 100), cfa)
+    return raw_image(np.rint(mosaic_of(scene, cfa, scene["R"].shape) + 100), cfa)
 
 
 def flat(shape: tuple[int, int] = (33, 40)) -> dict[str, np.ndarray]:

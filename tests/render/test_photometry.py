@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from outside_truth import V_NM, V
 
 from render.illuminants import illuminant
 from render.photometry import (
@@ -11,7 +10,6 @@ from render.photometry import (
     PLANCK_J_S,
     colour_matching_functions,
     luminance,
-    luminous_efficiency,
     photons_per_joule,
     tristimulus,
 )
@@ -65,7 +63,3 @@ def test_colour_matching_functions_are_nowhere_negative_and_v_peaks_at_555_nm():
     assert min(curve.values.min() for curve in colour_matching_functions()) >= 0
     assert v.wavelength_nm[v.values.argmax()] == 555.0
     assert v.values.max() == 1.0
-
-
-def test_v_equals_isetcams_table():
-    assert luminous_efficiency(V_NM, np.full(V_NM.size, 1e-3)) == pytest.approx(V, abs=1e-4)  # 4 digits there

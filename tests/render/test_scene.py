@@ -111,9 +111,7 @@ DEEP = {"type": "shapegroup", "inner": {"type": "sphere", "glow": {"type": "area
         (BOTH | {"more": LightGroup(("sky",), flat())}, {}, "emitter 'sky' is in 2 light groups; put it in one"),
         (BOTH, {"shelf": DEEP}, "emitter 'shelf/inner/glow' is in 0 light groups"),
         (BOTH, SUN, "emitter 'sky' of type 'timed_sunsky' can't be relit; allowed: area, constant, point"),
-        ({"lamp": LAMP}, SUN, "emitter 'sky' of type 'timed_sunsky' can't be relit"),
         (BOTH, {"sky": {"type": "projector"}}, "emitter 'sky' of type 'projector' can't be relit"),
-        (BOTH, {"sky": {"type": "directionalarea"}}, "emitter 'sky' of type 'directionalarea' can't be relit"),
         (
             BOTH,
             {"sky": {"type": "envmap"}},

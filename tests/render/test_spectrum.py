@@ -62,12 +62,8 @@ def test_wavelengths_that_do_not_increase_are_refused_with_their_values(nm):
 
 @loop("values", [[1.0], [1.0, -0.1], [1.0, np.nan], [np.inf, 1.0], [1.0, 1.0, 1.0]])
 def test_values_that_are_not_finite_positive_or_one_a_wavelength_are_refused(values):
-    refusal(
-        Spectrum,
-        np.array([400.0, 500.0]),
-        np.array(values),
-        words=("spectrum values", "2 finite numbers >= 0, one a wavelength; correct them"),
-    )
+    words = "spectrum values", "2 finite numbers >= 0, one a wavelength; correct them"
+    refusal(Spectrum, np.array([400.0, 500.0]), np.array(values), words=words)
 
 
 def test_band_widths_are_the_spacing_of_even_centres():
@@ -119,12 +115,8 @@ def test_bands_and_pictures_in_other_units_are_refused_and_the_unit_named(factor
 
 @loop("width", [20.0, [10.0, 10.3, 10.0], [10.0, 10.0, 10.3]])
 def test_bands_that_overlap_by_over_a_hundredth_are_refused(width):
-    refusal(
-        band_widths,
-        [400.0, 410.0, 420.0],
-        width,
-        words=("overlap, and the light of both would count twice; give widths that don't",),
-    )
+    match = "overlap, and the light of both would count twice; give widths that don't"
+    refusal(band_widths, [400.0, 410.0, 420.0], width, match=match)
     assert "overlap" in refusal(SpectralRadiance, np.ones((2, 2, 3)), [400.0, 410.0, 420.0], 0.0, width)
 
 

@@ -7,7 +7,6 @@ from math import pi
 import numpy as np
 import pytest
 from loop import loop
-from scipy.fft import dctn, idctn
 from scipy.integrate import quad
 from scipy.special import j0, j1
 
@@ -198,21 +197,3 @@ def test_the_tail_of_a_lamp_is_the_airy_pattern_s():
     for r in (6, 9, 14):
         envelope = 2.8 * nm.mean() * 1e-3 / (np.pi**3 * (r * 2.2) ** 3) * 2.2**2
         assert white[64, 64 + r] == pytest.approx(envelope, rel=0.25)
-
-
-def test_around_lamps_one_sample_a_pixel_is_nearer_to_sixteen_than_a_transfer_cut_at_nyquist():
-    """Lamps a thousand times as bright as what surrounds them, anywhere within pixels."""
-    rng = np.random.default_rng(5)
-    fine = np.ones((4 * 64, 4 * 80))
-    for _ in range(12):
-        row, column = rng.integers(0, 250), rng.integers(0, 310)
-        fine[row : row + 4, column : column + 6] = 1000.0
-    pixels = fine.reshape(64, 4, 80, 4).mean(axis=(1, 3))
-    truth = image(fine, 4, diffraction=1.0)
-    rows, columns = (np.arange(size) / (2 * size * 2.2) for size in pixels.shape)
-    cut = idctn(dctn(pixels) * diffraction_otf(np.hypot(rows[:, None], columns), 550.0, IDEAL))
-    dark = truth < 3  # beside a lamp both are as far off: it may lie anywhere within its pixels
-    made, cut_at_nyquist = (
-        np.sqrt(np.mean((x - truth)[dark] ** 2)) for x in (image(pixels, diffraction=1.0), np.maximum(cut, 0))
-    )
-    assert made < cut_at_nyquist / 5

@@ -19,7 +19,7 @@ from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise
-from sensor.response import channel_electrons, expected_electrons, lost_shares
+from sensor.response import expected_electrons, lost_shares
 
 PIXEL = PixelConfig(pitch_um=3.0, fill_factor=0.5, full_well_e=1e5, read_noise_e=2.0, dsnu_e=2.0, prnu=0.1)
 QE = {"R": 0.25, "G": 0.5, "B": 0.125, "W": 1.0}
@@ -104,18 +104,6 @@ def test_single_precision_radiance_agrees_with_double_to_1e_6():
     double = expected(SpectralRadiance(values.astype(np.float64), nm), sensor, 0.01)
     assert single.dtype == double.dtype == np.float64
     np.testing.assert_allclose(single, double, rtol=1e-6)
-
-
-def test_each_pixel_takes_its_own_letter_s_plane():
-    nm = np.arange(385.0, 780.0, 10.0)
-    radiance = SpectralRadiance(np.random.default_rng(3).random((5, 7, nm.size)), nm)
-    sensor = SensorConfig(PIXEL, LensConfig(2.0))
-    image = form_image(radiance, sensor)
-    planes, mosaic = channel_electrons(image, sensor, 0.01), expected_electrons(image, sensor, 0.01)
-    assert planes.shape == (5, 7, 4)
-    for index, channel in enumerate("RGBW"):
-        here = mask(RGBW, channel, (5, 7))
-        np.testing.assert_array_equal(mosaic[here], planes[here, index])
 
 
 def test_an_image_smaller_than_the_tile_is_refused():

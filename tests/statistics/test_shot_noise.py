@@ -7,8 +7,8 @@ keys. The keys are fixed.
 
 import numpy as np
 import pytest
+from exact_law import assert_moments, exact_probabilities
 from loop import loop
-from scipy import stats
 
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
@@ -24,34 +24,6 @@ def camera(gain_e_per_dn, read_noise_e, bits=14, black_level_dn=60):
     well_e = gain_e_per_dn * (2**bits - 1 - black_level_dn)
     pixel = PixelConfig(2.2, 0.9, well_e, read_noise_e, dsnu_e=0.0, prnu=0.0)
     return SensorConfig(pixel, LensConfig(2.8), bits=bits, black_level_dn=black_level_dn)
-
-
-def exact_probabilities(mean_e, sensor):
-    """Probability of each DN: counts up to the well, noise, rounding at half DNs, clipping at both ends."""
-    well_e, sigma, gain = sensor.pixel.full_well_e, sensor.pixel.read_noise_e, sensor.gain_e_per_dn
-    counts = np.arange(stats.poisson.ppf(1e-13, mean_e), stats.poisson.isf(1e-13, mean_e) + 1)
-    weights = stats.poisson.pmf(counts, mean_e)
-    collected = np.minimum(counts, well_e)
-    top = sensor.white_dn
-    if sigma == 0:
-        dn = np.clip(np.rint(collected / gain + sensor.black_dn), 0, top).astype(int)
-        return np.bincount(dn, weights, minlength=top + 1) / weights.sum()
-    edges_e = (np.arange(top) + 0.5 - sensor.black_dn) * gain  # under the first edge DN 0, above the last the top
-    low, high = collected[0] - 9 * sigma, collected[-1] + 9 * sigma
-    near = np.flatnonzero((edges_e > low) & (edges_e < high))
-    below = np.zeros(top)  # probability to lie under each edge
-    below[edges_e >= high] = 1.0
-    below[near] = weights @ stats.norm.cdf((edges_e[near] - collected[:, None]) / sigma) / weights.sum()
-    return np.diff(below, prepend=0.0, append=1.0)
-
-
-def assert_moments(dn, probabilities):
-    levels = np.arange(probabilities.size)
-    mean = probabilities @ levels
-    variance, fourth = (probabilities @ (levels - mean) ** power for power in (2, 4))
-    n = dn.size
-    assert abs(dn.mean() - mean) <= 4 * np.sqrt(variance / n)
-    assert abs(dn.astype(float).var() - variance) <= 4 * np.sqrt((fourth - variance**2) / n)
 
 
 def frame(mean_e, sensor, seed):

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import mosaic_of, raw_image
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours
 from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise, mean_snr, measured
@@ -13,7 +13,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.toml_file import read_toml
 from scenes.reflectances import color_checker
-from sensor.cfa import BAYER, mask
+from sensor.cfa import BAYER
 from sensor.curves import rgbw
 from sensor.raw import RawImage
 
@@ -33,10 +33,8 @@ def fit() -> ColourFit:
 
 def grey(green_e: float) -> RawImage:
     """Noise-free Bayer exposure of a grey whose green collects `green_e`; white lies at 15 000 e-."""
-    dn = np.full((16, 16), 100.0)
-    for channel, share in zip("RGB", NEUTRAL, strict=True):
-        dn[mask(BAYER, channel, (16, 16))] += np.rint(green_e * share)
-    return raw_image(dn, BAYER)
+    levels = dict(zip("RGB", np.rint(green_e * NEUTRAL), strict=True))
+    return raw_image(mosaic_of(levels, BAYER, (16, 16)) + 100, BAYER)
 
 
 def test_gains_are_linear_in_decibels_and_hold_at_the_ends() -> None:

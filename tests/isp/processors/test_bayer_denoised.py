@@ -4,13 +4,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, raw_image
+from builders import BAYER_PHASES, mosaic_of, raw_image
 
 from isp.interleaved import reconstruct
 from isp.processors import sub_images
 from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING
 from isp.processors.catalogue import PROCESSORS
-from sensor.cfa import BAYER, Tile, mask
+from sensor.cfa import BAYER, Tile
 from sensor.raw import RawImage
 
 SHARES = {"R": 0.5, "G": 1.0, "B": 0.4}
@@ -18,7 +18,7 @@ SHARES = {"R": 0.5, "G": 1.0, "B": 0.4}
 
 def expected_e(cfa: Tile, shape: tuple[int, int], level_e: float) -> np.ndarray:
     """Electrons of a neutral field: G at the level, R at a half, B at 0.4 of it."""
-    return sum(share * level_e * mask(cfa, channel, shape) for channel, share in SHARES.items())
+    return level_e * mosaic_of(SHARES, cfa, shape)
 
 
 def exposure(electrons: np.ndarray, cfa: Tile) -> RawImage:

@@ -59,6 +59,13 @@ def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     return raw_image(np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100), tile, white_dn=FULL_E + 100)
 
 
+def balanced(name: str, level_e: np.ndarray) -> np.ndarray:
+    """Picture of a grey scene, balanced by its neutral."""
+    tile = tile_of(name)
+    balance = [neutral_of(name)[channel] for channel in channels(tile)]
+    return PROCESSORS[name].develop(grey(name, tile, level_e), IDENTITY, balance=balance).rgb
+
+
 @pytest.mark.sample(4)
 @pytest.mark.parametrize("shape", [(30, 33), (17, 16)])
 @pytest.mark.parametrize("name", QUICK)
@@ -76,9 +83,7 @@ def test_a_grey_ramp_into_saturation_takes_no_colour() -> None:
         # doesn't hold highlights shows G 15 000 e- beside R and B of up to 37 500. Interpolating across the kink where
         # the ramp ends, or at the frame's border, may miss by one step of the ramp: 500 e-.
         ramp = 5000.0 + 500.0 * np.indices((24, 80))[1]
-        tile = tile_of(name)
-        balance = [neutral_of(name)[channel] for channel in channels(tile)]
-        rgb = PROCESSORS[name].develop(grey(name, tile, ramp), IDENTITY, balance=balance).rgb
+        rgb = balanced(name, ramp)
         assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6), name
         bright = rgb[:, -20:]
         assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5), name
@@ -86,9 +91,7 @@ def test_a_grey_ramp_into_saturation_takes_no_colour() -> None:
 
 def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s() -> None:
     for name in AVAILABLE:
-        tile = tile_of(name)
-        balance = [neutral_of(name)[channel] for channel in channels(tile)]
-        rgb = PROCESSORS[name].develop(grey(name, tile, np.full((24, 24), 1e5)), IDENTITY, balance=balance).rgb
+        rgb = balanced(name, np.full((24, 24), 1e5))
         ends_with_w = name in ("rgbw_sato", "cmyw_yamagami")
         assert rgb == pytest.approx(np.full((24, 24, 3), FULL_E / 5 if ends_with_w else FULL_E), rel=1e-5), name
 
@@ -98,9 +101,7 @@ def test_nothing_beside_a_highlight_is_brighter_than_it() -> None:
         # filters with negative weights overshoot at the edge of a square of saturated grey
         rows, columns = np.indices((32, 34))
         square = np.where((abs(rows - 16) < 7) & (abs(columns - 16) < 7), 1e5, 2000.0)
-        tile = tile_of(name)
-        balance = [neutral_of(name)[channel] for channel in channels(tile)]
-        rgb = PROCESSORS[name].develop(grey(name, tile, square), IDENTITY, balance=balance).rgb
+        rgb = balanced(name, square)
         if name in ENDS_IN_W:  # differences of colours from a luminance of their own
             assert luminance_of_srgb(rgb).max() <= FULL_E * (1 + 1e-6), name
         else:

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import mosaic_of, raw_image
 
 from isp.colour.white_balance import neutral_response
 from isp.planes import fill
@@ -20,8 +20,7 @@ BALANCE = [0.5, 1.0, 0.4, 5.0]
 def exposure(planes_e: dict[str, np.ndarray], cfa: Tile = RGBW, dark_e: float = 1.0) -> RawImage:
     """Noise-free raw image in which each channel's sites read that channel's plane."""
     shape = next(iter(planes_e.values())).shape
-    electrons = np.select([channel_map(cfa, shape) == channel for channel in planes_e], list(planes_e.values()))
-    dn = np.clip(np.rint(4 * electrons) + 100, 0, 60_100)
+    dn = np.clip(np.rint(4 * mosaic_of(planes_e, cfa, shape)) + 100, 0, 60_100)
     return raw_image(dn, cfa, white_dn=60_100.0, gain_e_per_dn=0.25, read_noise_e=dark_e, dsnu_e=0.0)
 
 

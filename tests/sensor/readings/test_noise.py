@@ -77,17 +77,6 @@ def test_two_charges_without_dark_noise_add_their_photons():
         assert merged_variance(light, fine, 0.01)[1] == pytest.approx(1e5 / whole, rel=1e-3)
 
 
-def test_prnu_of_two_photodiodes_averages_and_of_one_doesn_t():
-    noise = {"read_noise_e": 0.0, "dsnu_e": 0.0, "full_well_e": 1e9}
-    halves = sensor_of(
-        Reading(**noise, light_share=0.5, photodiode="a"), Reading(**noise, light_share=0.5, photodiode="b"), prnu=0.02
-    )
-    twice = sensor_of(Reading(**noise), Reading(**noise, time_share=0.5), prnu=0.02)
-    light = 1e8
-    assert noise_sources(light, halves, 0.01)["PRNU"] == pytest.approx(0.02 * light / np.sqrt(2), rel=1e-3)
-    assert noise_sources(light, twice, 0.01)["PRNU"] == pytest.approx(0.02 * light, rel=1e-12)
-
-
 @loop("name", HDR)
 def test_sources_sum_to_the_variance_and_frames_are_interpolated_within_a_thousandth(name):
     sensor = preset(name)

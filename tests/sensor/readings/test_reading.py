@@ -53,8 +53,6 @@ def test_switching_and_merging_are_a_word_of_the_file(tmp_path):
         (PIXEL + ONE.replace("dsnu_e = 1\n", "") + OTHER + LENS, ("readings: dsnu_e is missing",)),
         (PIXEL + ONE + OTHER + "gain = 4\n" + LENS, ("readings key: 'gain' is unknown",)),
         (PIXEL + ONE + OTHER + "read_nose_e = 4\n" + LENS, ("did you mean 'read_noise_e'?",)),
-        (PIXEL + ONE.replace("= 2\n", "= nan\n") + OTHER + LENS, ("read_noise_e: nan",)),
-        (PIXEL + ONE.replace("= 2000", '= "2000"') + OTHER + LENS, ("full_well_e: '2000'",)),
         (PIXEL + ONE + OTHER + "photodiode = 3\n" + LENS, ("photodiode: 3 is not a text in quotes",)),
         (PIXEL + (ONE + "time_share = 0.5\n") * 2 + LENS, ("time_share: [0.5, 0.5]", "divide by 0.5")),
         (PIXEL + ONE + OTHER + "light_share = 0.5\n" + LENS, ("light_share: [1.0, 0.5]", "name photodiodes apart")),
