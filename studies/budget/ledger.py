@@ -210,9 +210,9 @@ def _mean(values: NDArray[np.float64]) -> float:
 
 def ledger_html(ledgers: Sequence[Ledger]) -> str:
     """Table for a notebook: a row a condition and mosaic, a column a term."""
-    names = ["condition", "noise, e-", "off, e-", "together", *(term.name for term in ledgers[0].terms)]
-    head = "".join(f"<th>{escape(name)}</th>" for name in names)
-    cells = ([" ".join(condition_words(row)), *figures(row)] for row in ledgers)
+    names = term_names(ledgers)
+    head = "".join(f"<th>{escape(name)}</th>" for name in ("condition", "noise, e-", "off, e-", "together", *names))
+    cells = ([" ".join(condition_words(row)), *figures(row, names)] for row in ledgers)
     rows = ("".join(f"<td>{escape(text)}</td>" for text in line) for line in cells)
     return f"<table>{''.join(f'<tr>{row}</tr>' for row in (head, *rows))}</table>"
 
@@ -223,10 +223,16 @@ def condition_words(row: Ledger) -> tuple[str, ...]:
     return of.scene.label, label(of.spectrum), of.level, of.exposure, of.sensor, row.mosaic
 
 
-def figures(row: Ledger) -> list[str]:
+def term_names(ledgers: Sequence[Ledger]) -> list[str]:
+    """Names of all terms: a picture file has no falloff."""
+    longest_first = sorted(ledgers, key=lambda row: -len(row.terms))
+    return list(dict.fromkeys(term.name for row in longest_first for term in row.terms))
+
+
+def figures(row: Ledger, names: Sequence[str]) -> list[str]:
     """Noise and error [e-], the error's share, and the share of each term, in brackets where it is modelled."""
-    terms = [f"({percent(term.share)})" if term.modelled else percent(term.share) for term in row.terms]
-    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", percent(row.share), *terms]
+    shares = {x.name: f"({percent(x.share)})" if x.modelled else percent(x.share) for x in row.terms}
+    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", percent(row.share), *(shares.get(name, "") for name in names)]
 
 
 def percent(share: float) -> str:

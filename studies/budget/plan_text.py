@@ -7,7 +7,17 @@ from typing import Any
 from rich.table import Table
 
 from studies.budget.choice import image_ns, render_ns
-from studies.budget.ledger import KERNEL, LEAST_SHOWN, MONTE_CARLO, Plan, Term, condition_words, figures, percent
+from studies.budget.ledger import (
+    KERNEL,
+    LEAST_SHOWN,
+    MONTE_CARLO,
+    Plan,
+    Term,
+    condition_words,
+    figures,
+    percent,
+    term_names,
+)
 from studies.budget.terms import LENS_TERMS
 from studies.study.study import SceneChoice, Study, most_spp
 
@@ -45,24 +55,22 @@ def plan_table(plan: Plan) -> Table:
     worse = [max((x for x in plan.ledgers if x.condition == of), key=lambda row: row.share) for of in plan.images]
     words = [condition_words(row) for row in worse]
     varies = [len({line[i] for line in words}) > 1 for i in range(len(words[0]))]
-    small = [all(row.terms[i].share < LEAST_SHOWN for row in worse) for i in range(len(worse[0].terms))]
-    names = [term.name for term in worse[0].terms]
+    names = term_names(worse)
+    large = {term.name for row in worse for term in row.terms if term.share >= LEAST_SHOWN}
     title = " ".join(words[0][i] for i in range(len(words[0])) if not varies[i] and i != LEVEL)
-    left_out = ", ".join(name for name, is_small in zip(names, small, strict=True) if is_small)
+    columns, left_out = [x for x in names if x in large], ", ".join(x for x in names if x not in large)
     table = Table(
         box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold", title=title, title_justify="left"
     )
     table.caption = f"under {100 * LEAST_SHOWN:g}% everywhere: {left_out}" if left_out else None
     table.caption_justify = "left"
-    columns = [name for name, is_small in zip(names, small, strict=True) if not is_small]
     table.add_column("light", overflow="fold", min_width=17)
     for name in ("noise, e-", "off, e-", "sum", *columns):
         table.add_column(name.replace(" ", "\n"), justify="right", no_wrap=True)
     lines: dict[tuple[str, ...], list[str]] = {}
     for row, line in zip(worse, words, strict=True):
-        cells = [cell for cell, is_small in zip(figures(row), (*[False] * 3, *small), strict=True) if not is_small]
         rest = " ".join(word for i, word in enumerate(line) if varies[i] and i != LEVEL)
-        lines.setdefault((rest, *cells), []).append(row.condition.level)
+        lines.setdefault((rest, *figures(row, columns)), []).append(row.condition.level)
     above = ""
     for (rest, *cells), levels in lines.items():
         if rest != above:

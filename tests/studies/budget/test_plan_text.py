@@ -1,5 +1,6 @@
 """A plan's table: nothing cut off in 100 columns, conditions of the same figures in one line, all terms named."""
 
+import re
 from dataclasses import replace
 from io import StringIO
 
@@ -7,7 +8,7 @@ import pytest
 from rich.console import Console
 
 from sensor.presets import low_noise
-from studies.budget.ledger import Ledger, Plan, Term
+from studies.budget.ledger import Ledger, Plan, Term, ledger_html
 from studies.budget.plan_text import cost_over_reference, plan_json, plan_table, reasons
 from studies.study.model import ImageModel, RenderModel
 from studies.study.study import BudgetShares, Condition, RenderLimits, SceneChoice, Study
@@ -41,6 +42,24 @@ def test_terms_under_a_tenth_of_a_per_cent_everywhere_are_named_below() -> None:
     lines = printed({"1cd/m2": {"bands": 0.01, "level": 0.0009}})
     left_out = ", ".join(name for name in TERMS if name != "bands")
     assert " ".join(lines).endswith(f"under 0.1% everywhere: {left_out}")
+
+
+def test_a_picture_file_s_ledger_lacks_a_term_beside_a_scene_s() -> None:
+    ledgers = []
+    for scene, names in (("cube.exr", TERMS[:-2] + TERMS[-1:]), ("siemens_star", TERMS)):
+        condition = Condition(SceneChoice(scene), "own", "1cd/m2", "auto", "low_noise")
+        terms = tuple(Term(name, 1.0, 0.01 * (1 + TERMS.index(name)), modelled=False) for name in names)
+        ledgers.append(Ledger(condition, "rgbw", 0.066, 1234.5, terms, 12.34, 1.23))
+    images = {row.condition: ImageModel(low_noise().lens) for row in ledgers}
+    plan = Plan(renders={}, images=images, ledgers=tuple(ledgers))
+    text = StringIO()
+    Console(file=text, width=120).print(plan_table(plan))
+    lines = [line.split() for line in text.getvalue().splitlines() if line.startswith("1cd/m2")]
+    assert [line[-2:] for line in lines] == [["6%", "8%"], ["7%", "8%"]]
+    cells = re.findall(r"<t[hd]>([^<]*)", ledger_html(plan.ledgers))
+    rows = [cells[start : start + 12] for start in range(0, 36, 12)]
+    assert rows[0][-2:] == ["cos^4", "kernel"]
+    assert [row[-2:] for row in rows[1:]] == [["", "8%"], ["7%", "8%"]]
 
 
 SCENE = SceneChoice("still_life")
