@@ -38,13 +38,21 @@ class Gaussians:
     factors : (component, pixel, coefficient, direction) float64
         F, as (pixel * coefficient, direction).
     rest : (component,) float64
-        r: a component's covariance is C = F F' + r I.
+        r: a component's covariance is C = F F' + r I + b^2 mu mu'.
+    brightness : float
+        b: relative standard deviation of a patch's brightness.
     """
 
     weights: Doubles
     means: Doubles
     factors: Doubles
     rest: Doubles
+    brightness: float
+
+    @property
+    def directions(self) -> Doubles:
+        """F and b mu, as `factors`."""
+        return np.concatenate([self.factors, self.brightness * self.means[..., None]], axis=-1)
 
 
 @dataclass(frozen=True)
@@ -74,14 +82,14 @@ def pooled(prior: Gaussians) -> Gaussians:
     components, pixels, coefficients = prior.means.shape
     mean = np.tensordot(prior.weights, prior.means, 1)
     root = np.sqrt(prior.weights)[:, None, None]
-    spread = (prior.means - mean).reshape(components, -1) * root[:, :, 0]
+    spread = (prior.means - mean).reshape(components, -1) * root[:, :, 0] * np.hypot(1.0, prior.brightness)
     inside = (prior.factors.reshape(components, pixels * coefficients, -1) * root).swapaxes(0, 1)
     factors = np.concatenate([inside.reshape(pixels * coefficients, -1), spread.T], axis=1)
     values, vectors = np.linalg.eigh(factors @ factors.T)
     kept = values > values[-1] * 1e-12
     factor = vectors[:, kept] * np.sqrt(values[kept])
     rest = prior.weights @ prior.rest
-    return Gaussians(np.ones(1), mean[None], factor.reshape(1, pixels, coefficients, -1), rest[None])
+    return Gaussians(np.ones(1), mean[None], factor.reshape(1, pixels, coefficients, -1), rest[None], prior.brightness)
 
 
 def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
@@ -130,6 +138,8 @@ class Samples:
         H C_k (2 - L)' there: `cross` without a lens.
     within : (component, pixel, coefficient, coefficient) float64
         C_k of each middle pixel's coefficients, and the square of what the lens does to its mean.
+    brightness : float
+        b of the prior.
     """
 
     means: Doubles
@@ -137,6 +147,7 @@ class Samples:
     cross: Doubles
     beside: Doubles
     within: Doubles
+    brightness: float
 
 
 def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens: Doubles | None = None) -> Samples:
@@ -152,15 +163,16 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
     lens : (pixel, pixel) float64, optional
         L: share of one pixel's light (second axis) that falls on another (first axis); `sampling` has it too.
     """
-    loadings = np.einsum("spc,kpcd->ksd", sampling, prior.factors, optimize=True)
-    factors, rest = prior.factors[:, middle], prior.rest
+    directions, rest = prior.directions, prior.rest
+    loadings = np.einsum("spc,kpcd->ksd", sampling, directions, optimize=True)
+    inside = directions[:, middle]
     plain = sampling.reshape(len(sampling), -1)
 
     def cross(lens: Doubles) -> Doubles:
-        factors = np.einsum("pq,kqcd->kpcd", lens, prior.factors, optimize=True)
+        spread = np.einsum("pq,kqcd->kpcd", lens, directions, optimize=True)
         plain = np.einsum("sqc,pq->spc", sampling, lens, optimize=True)
         return np.asarray(
-            np.einsum("ksd,kpcd->kspc", loadings, factors, optimize=True) + rest[:, None, None, None] * plain
+            np.einsum("ksd,kpcd->kspc", loadings, spread, optimize=True) + rest[:, None, None, None] * plain
         )
 
     sharp = np.eye(sampling.shape[1])[middle]
@@ -171,9 +183,10 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
         signal=loadings @ loadings.swapaxes(1, 2) + rest[:, None, None] * (plain @ plain.T),
         cross=cross(blurred),
         beside=cross(2 * sharp - blurred),
-        within=np.einsum("kpcd,kped->kpce", factors, factors, optimize=True)
+        within=np.einsum("kpcd,kped->kpce", inside, inside, optimize=True)
         + rest[:, None, None, None] * np.eye(sampling.shape[2])
         + off[..., :, None] * off[..., None, :],
+        brightness=prior.brightness,
     )
 
 
@@ -192,8 +205,10 @@ def expected_error(weights: Doubles, samples: Samples, scale: Doubles, noise: No
         W: the squared error of a pixel is e' W e, e that of its coefficients.
     """
     signal = samples.signal * scale[:, None] * scale
-    spread = np.diagonal(signal, axis1=1, axis2=2)
-    total = signal + np.eye(len(scale)) * sample_variance(samples.means * scale, spread, noise)[:, None]
+    mean_e = samples.means * scale
+    # Other samples know the brightness: only what else they don't know makes a sample full or not.
+    spread = np.diagonal(signal, axis1=1, axis2=2) - (samples.brightness * mean_e) ** 2
+    total = signal + np.eye(len(scale)) * sample_variance(mean_e, spread, noise)[:, None]
     cross, beside = samples.cross * scale[:, None, None], samples.beside * scale[:, None, None]
     gain = np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1)).reshape(cross.shape)
     left = samples.within - np.einsum("kspc,kspe->kpce", beside, gain, optimize=True)  # W leaves its even part

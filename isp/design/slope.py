@@ -1,9 +1,11 @@
 """Slope of the expected error by the electrons of each sample from each coefficient: what a better filter would pass.
 
 With G = S^-1 H C, S = H C H' + N, the error of the middle pixels is tr W (C - C H' G); N depends on H through a
-sample's mean H mu and its spread H C H'. With D = G W G', the adjoint of the posterior covariance is
+sample's mean H mu and its spread H C H' - (b H mu)^2. With D = G W G', the adjoint of the posterior covariance is
 
-    dE/dH = 2 (D H C - G W C) + diag(D) (N_mean mu' + 2 N_spread H C)        C at the middle pixels where it follows W
+    dE/dH = 2 (D H C - G W C) + diag(D) ((N_mean - 2 b^2 N_spread H mu) mu' + 2 N_spread H C),
+
+C at the middle pixels where it follows W.
 """
 
 from collections.abc import Sequence
@@ -56,7 +58,7 @@ def error_slopes(
     # Signals in unit light: H C, H C H', C of the middle pixels with all, and among each one's coefficients.
     components, pixels, coefficients = patches.means.shape
     h, means = sampling.reshape(len(sampling), -1), patches.means.reshape(components, -1)
-    f, rest = patches.factors.reshape(components, pixels * coefficients, -1), patches.rest[:, None, None]
+    f, rest = patches.directions.reshape(components, pixels * coefficients, -1), patches.rest[:, None, None]
     chosen = (middle[:, None] * coefficients + np.arange(coefficients)).ravel()
     hc = (h @ f) @ f.swapaxes(1, 2) + rest * h
     at_middle = f[:, chosen] @ f.swapaxes(1, 2) + rest * np.eye(h.shape[1])[chosen]
@@ -69,11 +71,13 @@ def error_slopes(
     by_hc, by_middle, by_mean = (np.zeros((*errors.shape, *x.shape)) for x in (hch, cross, hm))
     for index, (scales, noise) in enumerate(lights):
         for t, scene in zip(scales, rows, strict=True):
-            mean, spread = t * hm, t**2 * np.diagonal(hch, axis1=1, axis2=2)
+            mean = t * hm
+            spread = t**2 * np.diagonal(hch, axis1=1, axis2=2) - (patches.brightness * mean) ** 2
             total = t**2 * hch + sample_variance(mean, spread, noise)[..., None] * eye
             g = np.linalg.solve(total, t * cross.reshape(*hm.shape, -1)).reshape(cross.shape)
             left = within - np.einsum("kspc,kspe->kpce", t * cross, g, optimize=True)
             by_noise_mean, by_noise_spread = variance_slopes(mean, spread, noise)
+            by_noise_mean = by_noise_mean - 2 * patches.brightness**2 * mean * by_noise_spread
             for metric, r in enumerate(scene):
                 gr = weights * np.einsum("kspc,kpdc->kspd", g, r, optimize=True)
                 errors[index, metric] += np.einsum("k,kpdc,kpce,kpde->", weights[:, 0, 0, 0], r, left, r, optimize=True)

@@ -55,6 +55,7 @@ def load_prior(name: str) -> SpectralPrior:
             means=(arrays["mean"] + arrays["centres"] @ arrays["basis"].T).reshape(shape),
             factors=(arrays["basis"] @ factors).reshape(*shape, directions),
             rest=arrays["rest"],
+            brightness=float(arrays["reflectances"].std() / arrays["reflectances"].mean()),
         ),
         reflectances=arrays["reflectances"],
         source=source,

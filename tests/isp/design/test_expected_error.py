@@ -19,6 +19,7 @@ def mixture(components: int, seed: int = 1) -> Gaussians:
         means=rng.uniform(1.0, 2.0, (components, PIXELS, COEFFICIENTS)),
         factors=0.2 * rng.standard_normal((components, PIXELS, COEFFICIENTS, DIRECTIONS)),
         rest=rng.uniform(0.001, 0.01, components),
+        brightness=0.3,
     )
 
 
@@ -32,8 +33,8 @@ def unit_forms(components: int) -> np.ndarray:
 
 
 def covariance(prior: Gaussians, k: int) -> np.ndarray:
-    factor = prior.factors[k].reshape(PIXELS * COEFFICIENTS, -1)
-    return factor @ factor.T + prior.rest[k] * np.eye(len(factor))
+    factor, mean = prior.factors[k].reshape(PIXELS * COEFFICIENTS, -1), prior.brightness * prior.means[k].ravel()
+    return factor @ factor.T + prior.rest[k] * np.eye(len(factor)) + np.outer(mean, mean)
 
 
 def error(prior: Gaussians, scale: float, noise: Noise) -> float:
@@ -119,8 +120,7 @@ def test_error_falls_with_light_and_a_larger_well_and_rises_with_noise() -> None
 def test_without_samples_the_error_is_that_of_the_prior() -> None:
     prior = mixture(2)
     blind = Noise(dark_e=1e9, prnu=0.0, full_e=np.inf)
-    alone = np.einsum("k,kpcd->p", prior.weights, prior.factors**2)[MIDDLE].mean()
-    alone += COEFFICIENTS * prior.weights @ prior.rest
+    alone = prior.weights @ [np.diag(covariance(prior, k)).reshape(PIXELS, -1)[MIDDLE].sum() for k in range(2)] / 2
     assert_allclose(error(prior, 1.0, blind), alone, rtol=1e-9)
 
 
