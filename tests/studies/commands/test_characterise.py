@@ -12,7 +12,7 @@ from command_line import call, check_refusals
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.emva1288.characterise import characterise, configured
-from sensor.presets import low_noise, preset_file
+from sensor.presets import low_noise
 from sensor.raw_files.raw_file import write_raw
 
 SMALL = ["--height", "32", "--width", "48"]
@@ -58,16 +58,6 @@ def test_the_plot_is_one_svg_with_nothing_from_outside(tmp_path):
     assert set(re.findall(r"(?:href=\"|url\()(.)|src=|@import", text)) == {"#"}
     assert "nan" not in text.lower()
     assert list(tmp_path.rglob("*")) == [tmp_path / "new", path]
-
-
-def test_a_file_of_the_user_s_own_is_measured_too(tmp_path):
-    path = tmp_path / "mine.toml"
-    path.write_text(preset_file("low_noise").read_text("utf-8").replace("dsnu_e = 1.0", "dsnu_e = 9.0"), "utf-8")
-    code, out, _ = call(["characterise", str(path), "--json", *SMALL])
-    figures = {figure["name"]: figure for figure in json.loads(out)["figures"]}
-    assert code == 0
-    assert figures["DSNU"]["configured"] == 9.0
-    assert figures["DSNU"]["measured"] == pytest.approx(9.0, rel=0.1)
 
 
 def test_bad_input_is_refused(tmp_path, monkeypatch):

@@ -137,14 +137,6 @@ def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_mea
     assert sensor.responses.band_average(("G",), [536.0], [0.1])[0, 0] == pytest.approx(0.9125, rel=2e-3)
 
 
-def test_a_report_with_a_preset_that_lends_is_ready_for_any_scene(tmp_path):
-    path = tmp_path / "mine.toml"
-    assert call(["new", "preset", "low_noise", "--noise", REPORT, "-o", path]) == (0, f"{path}\n", "")
-    sensor = read_sensor(path)
-    assert set(sensor.responses.curves) == set("RGBW")
-    assert sensor.pixel.read_noise_e == 5.56
-
-
 def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_path):
     raw = raw_image(
         np.full((16, 16), 500), BAYER, gain_e_per_dn=0.8, read_noise_e=3.0, dsnu_e=0.0, iso=400.0, colour=COLOUR

@@ -99,14 +99,6 @@ def test_channels_read_apart_have_the_stated_variance_and_well(reading, level_cd
     assert wells_e["G"] / wells_e["R"] == pytest.approx(deeper, rel=0.05)  # steps of a sixteenth of an octave
 
 
-def test_a_set_whose_prnu_is_twice_what_it_states_is_found(tmp_path: Path) -> None:
-    stated = taken(tmp_path, with_pixel(prnu=0.01), 100.0)
-    doubled = taken(tmp_path, with_pixel(prnu=0.02), 100.0)
-    mixed = [(arrays, facts) for (arrays, _), (_, facts) in zip(doubled, stated, strict=True)]
-    assert abs(z_of(doubled)) < 4.5
-    assert z_of(mixed) > 20
-
-
 def test_coefficients_are_those_of_the_data_sheet() -> None:
     sensor, time_s = with_pixel(read_noise_e=3.0, dsnu_e=2.0, prnu=0.02, dark_current_e_per_s=50.0), 0.1
     gain = sensor.gain_e_per_dn

@@ -26,12 +26,6 @@ def test_whole_factors_are_means_of_blocks_and_a_finer_grid_repeats() -> None:
     assert area_average(picture, (6, 8)) == pytest.approx(picture, rel=1e-12)
 
 
-def test_independent_noise_falls_as_the_root_of_the_pixels_averaged() -> None:
-    noise = RNG.standard_normal((400, 400))
-    # 40 000 means of four: the standard error of their deviation is 0.35 %
-    assert area_average(noise, (200, 200)).std() == pytest.approx(0.5, rel=0.02)
-
-
 def test_pixels_follow_from_the_pitch_in_the_pictures_proportions() -> None:
     area = EqualArea(side_um=883.2, coarsest_um=6.9)
     assert area.shape((300, 400), 6.9) == (96, 128)
