@@ -443,17 +443,3 @@ def test_a_material_that_chooses_by_wavelength_is_refused(freed, monkeypatch):
     text = refusal(render, ball_under_the_sky(hair), (6, 6), wavelength_nm=BANDS_NM, spp=16)
     assert text.startswith("scene: a material chooses where light goes by wavelength")
     assert "allowed: materials whose sampling doesn't depend on wavelength; replace it" in text
-
-
-@loop(
-    "bsdf",
-    [
-        {"type": "roughplastic", "diffuse_reflectance": RAMP, "alpha": 0.2},
-        {"type": "plastic", "diffuse_reflectance": RAMP, "nonlinear": True},
-        {"type": "principled", "base_color": RAMP, "metallic": 0.5},
-    ],
-)
-def test_coloured_materials_of_one_sampling_are_rendered(bsdf):
-    made = render(ball_under_the_sky(bsdf), (6, 6), wavelength_nm=BANDS_NM, spp=16)
-    middle = made.radiance[0, :, 2:4, 2:4].mean(axis=(1, 2))
-    assert (np.diff(middle) > 0).all()  # redder is brighter, as the reflectance says

@@ -144,6 +144,8 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
     ("text", "words"),
     [
         ("wavelength_nm,a,b\n400,1,1\n700,1,1\n", "has 2 columns beside wavelength_nm; allowed: 1"),
+        ("watts,a\n400,1\n700,1\n", "has header"),
+        ("wavelength_nm,a\n400,1\n700,-1\n", "finite numbers >= 0"),
         ("wavelength_nm,a\n900,1\n1000,1\n", "it gives no visible light"),
     ],
 )

@@ -72,17 +72,6 @@ def test_each_pixel_has_the_samples_that_its_count_tells(monkeypatch):
     assert (made.counts % 2 == 0).all(), "both halves alike"
 
 
-def test_a_render_gone_on_from_counts_both_parts(paths, tmp_path):
-    scene = load("flat_field")
-    part = render(scene, SIZE, spp=136, cache=tmp_path, **BANDS)
-    first = drawn(paths, 1)
-    whole = render(scene, SIZE, max_spp=512, cache=tmp_path, **BANDS)
-    assert (part.spp, whole.spp) == (first - PILOT, first - PILOT + drawn(paths, 1))
-    assert whole.spp == 512
-    again = render(scene, SIZE, spp=512, cache=tmp_path, **BANDS)
-    assert (again.spp, drawn(paths, 1)) == (whole.spp, 0)
-
-
 def test_parts_count_by_their_samples(paths):
     """A mean over all samples: that of the parts, weighed by the samples that were counted."""
     scene = load("cornell_box")

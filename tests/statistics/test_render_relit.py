@@ -8,6 +8,7 @@ seeds are fixed.
 
 import numpy as np
 import pytest
+from builders import block_means
 from scipy.stats import t as student
 
 from render.engine import render
@@ -48,9 +49,7 @@ def with_lamp(scene, name):
 
 def blocks(radiance):
     """Means over blocks of pixels, (band, block)."""
-    planes = np.moveaxis(radiance.values.astype(np.float64), -1, 0)
-    h, w = SIZE[0] // BLOCK, SIZE[1] // BLOCK
-    return planes.reshape(-1, h, BLOCK, w, BLOCK).mean(axis=(2, 4)).reshape(len(planes), -1)
+    return block_means(np.moveaxis(radiance.values, -1, 0), BLOCK).reshape(radiance.wavelength_nm.size, -1)
 
 
 def rms(values):

@@ -155,24 +155,17 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
 
 
 def test_matrix_takes_bands_of_uneven_widths() -> None:
-    # the first two bands as one of 20 nm, then every band as two, the first of them 2 and 8 nm wide
+    # every band as two, the first of them 2 and 8 nm wide
     spd = illuminant("D65").band_average(NM, WIDTH)
     curves = rgbw().band_average(("R", "G", "B"), NM, WIDTH)
-    even = fit_matrix(curves, NM, spd, SURFACES)
-    nm = np.concatenate([[NM[:2].mean()], NM[2:]])
-    width = np.concatenate([[20.0], WIDTH[2:]])
-    merged = [
-        np.concatenate([values[..., :2].mean(-1, keepdims=True), values[..., 2:]], -1) for values in (curves, SURFACES)
-    ]
-    uneven = fit_matrix(merged[0], nm, np.concatenate([[spd[:2].mean()], spd[2:]]), merged[1], width)
-    assert uneven == pytest.approx(even, abs=2e-3)  # 380-400 nm: a hundredth of B's light, in which curves bend
     split = [np.repeat(values, 2, axis=-1) for values in (curves, SURFACES, spd)]
     halves = np.ravel(np.stack([NM - 2.5, NM + 2.5], axis=1))
     widths = np.full(halves.shape, 5.0)
-    widths[:2], halves[:2] = (2.0, 8.0), (NM[0] - 4.0, NM[0] + 1.0)  # the first band in two of 2 and 8 nm
-    assert fit_matrix(split[0], halves, split[2], split[1], widths) == pytest.approx(even, abs=2e-3)
+    widths[:2], halves[:2] = (2.0, 8.0), (NM[0] - 4.0, NM[0] + 1.0)
+    uneven = fit_matrix(split[0], halves, split[2], split[1], widths)
+    assert uneven == pytest.approx(fit_matrix(curves, NM, spd, SURFACES), abs=2e-3)
     with pytest.raises(InputError, match="width_nm"):
-        fit_matrix(merged[0], nm, np.ones(nm.size), merged[1])
+        fit_matrix(split[0], halves, split[2], split[1])
 
 
 def test_fit_takes_transposed_tables_alike() -> None:

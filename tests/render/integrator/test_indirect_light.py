@@ -80,12 +80,3 @@ def test_light_is_direct_in_a_mirror_and_indirect_from_one() -> None:
     assert np.allclose(
         (whole.light.mean - whole.indirect.mean)[ground], direct.light.mean[ground], rtol=1e-5, atol=1e-6
     )
-
-
-def test_raw_light_keeps_its_bits() -> None:
-    scene = two_lights()
-    divided, plain = drawn(scene, 8), drawn(scene, 8, split=False)
-    assert plain.indirect is None
-    for one, other in ((divided.light, plain.light), (divided.coverage, plain.coverage)):
-        assert np.array_equal(one.mean, other.mean)
-        assert np.array_equal(one.difference, other.difference)

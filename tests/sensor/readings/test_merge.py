@@ -113,16 +113,6 @@ def test_what_fills_the_last_reading_reads_the_top_and_counts_as_saturated():
     assert not under.saturated.any()
 
 
-def test_the_first_reading_alone_is_what_a_chip_with_one_reading_gives():
-    sensor = preset("dual_gain")
-    device = draw_device(sensor, SHAPE, np.random.default_rng(1))
-    alone = draw_device(of_reading(sensor, 0), SHAPE, np.random.default_rng(1))
-    np.testing.assert_array_equal(device.readings[0].photo_response, alone.photo_response)
-    np.testing.assert_array_equal(device.readings[0].dark_offset_e, alone.dark_offset_e)
-    np.testing.assert_array_equal(device.readings[1].photo_response, alone.photo_response)
-    assert np.corrcoef(device.readings[1].dark_offset_e.ravel(), alone.dark_offset_e.ravel())[0, 1] < 4 / 256
-
-
 def test_a_camera_that_switches_gives_one_gain_s_frame():
     sensor = preset("dual_gain")
     sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
