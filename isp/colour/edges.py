@@ -9,7 +9,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from isp.kernel.edges import CORRELATION, MISSED, REACH, SHADING, SIDE, TINY_E, UNKNOWN, channel_noise, sharpen_frame
+from isp.kernel.edges import CORRELATION, MISSED, NEAR, REACH, SPREAD, TINY_E, UNKNOWN, channel_noise, sharpen_frame
 from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.cfa import mask
@@ -26,15 +26,17 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
 
         e = sum_c C_cc / N_c / (1 + sum_c m_c^2 / N_c).
 
-    Of the light's variation 0.7 is shading of the mean colour: C' = 0.3 C + 0.7 e m m^T. Samples S_y of channels o_y,
-    at distances of r pixels, are correlated by exp(-r^2 / 2). Their best linear estimate of the channels is
+    Light varies 2.5 times as much as the planes, which are means, and 0.7 of that is shading of the mean colour:
+    C' = 0.75 C + 1.75 e m m^T. Samples S_y of channels o_y, at distances of r pixels, are correlated by exp(-r^2 / 2).
+    Their best linear estimate of the channels is
 
         E_c = m_c + sum_yz C'(c, o_y) exp(-r_y^2 / 2) [C'(o_y, o_z) exp(-r_yz^2 / 2) + N_y delta_yz]^-1 (S_z - m_o_z),
 
-    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. It counts less where
-    contrast is a lamp's and the samples lie on their planes, by chi^2, their mean squared distance over N_y:
+    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. With chi^2 the mean of
+    their squared distances to planes over N_y, and chi_0^2 that weighted by exp(-2 r_y^2), it counts less where
+    contrast is a lamp's and the samples lie on their planes:
 
-        F = P + max(0, 1 - e^4 / (1 + chi^2)) (E - P).
+        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P).
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
     the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
@@ -67,7 +69,7 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
 
 def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, sites: NDArray[np.intp]) -> Floats:
     """In double precision; the arrays reach `REACH` pixels further. `isp.kernel.edges` is the same in single."""
-    window, (shot, dark, full_e) = sliding_window_view(planes, (SIDE, SIDE), axis=(0, 1)), channel_noise(raw)
+    window, (shot, dark, full_e) = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1)), channel_noise(raw)
     (height, width), inner = window.shape[:2], slice(REACH - 1, 1 - REACH)
     sample = sliding_window_view(electrons[inner, inner], (3, 3)).reshape(height, width, 9)
     site = sliding_window_view(sites[inner, inner], (3, 3)).reshape(height, width, 9)
@@ -76,13 +78,13 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     # What the window holds.
     mean = window.mean(axis=(3, 4))
     away = window - mean[..., None, None]
-    covariance = np.einsum("...cij,...dij->...cd", away, away) / SIDE**2
+    covariance = np.einsum("...cij,...dij->...cd", away, away) / away[0, 0, 0].size
     light = np.maximum(mean, 0.0)
     noise = np.maximum(shot * light + dark, TINY_E)
     variance = np.einsum("...cc->...c", covariance)
     contrast = (variance / noise).sum(axis=2, keepdims=True) / (1.0 + (light**2 / noise).sum(axis=2, keepdims=True))
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]
-    covariance = (1.0 - SHADING) * covariance + SHADING * shading
+    covariance = SPREAD[0] * covariance + SPREAD[1] * shading
 
     # The best linear estimate.
     value = np.take_along_axis(near, site[..., None, :], axis=2)[:, :, 0]
@@ -96,12 +98,13 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
     # As far as an edge was missed.
-    chi_squared = ((sample - value) ** 2 / sample_noise).mean(axis=2, keepdims=True)
-    sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + chi_squared), 0.0) * (estimate - plane)
+    squares = (sample - value) ** 2 / sample_noise
+    sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
-    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * np.minimum(chi_squared / MISSED, 1.0)
+    missed = np.minimum(squares.mean(axis=2, keepdims=True) / MISSED, 1.0)
+    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
     black = np.minimum(contrast, 1.0)
     hue = np.where(full[..., :3].any(axis=2, keepdims=True), black, np.where(full[..., 3:], black**4, lamp))
     unknown = np.where(full, 1.0, hue)

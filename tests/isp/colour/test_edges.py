@@ -47,7 +47,7 @@ def by_hand(raw, planes, gains, row, column):
     mean, dark = window.mean(axis=0), raw.dark_noise_e**2
     covariance, noise = np.cov(window.T, bias=True), mean + dark
     contrast = np.sum(np.diag(covariance) / noise) / (1.0 + np.sum(mean**2 / noise))
-    covariance = 0.3 * covariance + 0.7 * contrast * np.outer(mean, mean)
+    covariance = 0.75 * covariance + 1.75 * contrast * np.outer(mean, mean)
     places = list(product((row - 1, row, row + 1), (column - 1, column, column + 1)))
     own = [names.index(raw.cfa[i % cells][j % cells]) for i, j in places]
     apart = [[np.exp(-((i - k) ** 2 + (j - m) ** 2) / 2.0) for k, m in places] for i, j in places]
@@ -58,11 +58,12 @@ def by_hand(raw, planes, gains, row, column):
     matrix = np.array([[covariance[own[a], own[b]] * apart[a][b] + read[a] * (a == b) for b in kept] for a in kept])
     to_pixel = np.array([[covariance[c, own[a]] * apart[4][a] for a in kept] for c in range(4)])
     estimate = mean + to_pixel @ np.linalg.inv(matrix) @ (samples - mean[own])[kept]
-    chi_squared = np.mean((samples - on_planes) ** 2 / read)
-    counts = max(0.0, 1.0 - contrast**4 / (1.0 + chi_squared))
+    squares = (samples - on_planes) ** 2 / read
+    near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
+    counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
-    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, chi_squared / 30.0)
+    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, squares.mean() / 30.0)
     unknown = np.where(full, 1.0, min(1.0, contrast) ** (1 if any(full[:3]) else 4) if any(full) else lamp)
     return sharp + unknown * ((gains * sharp).max() / gains - sharp)
 
