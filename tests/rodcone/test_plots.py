@@ -21,6 +21,7 @@ from sensor.readout import noise_sources, noise_variance
 
 @pytest.fixture(autouse=True)
 def closed() -> Iterator[None]:
+    pyplot.close("all")  # another file's tests may have left some
     yield
     pyplot.close("all")
 
