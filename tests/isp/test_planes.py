@@ -8,7 +8,7 @@ from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
 from isp.anscombe import LEAST_PRNU, stabilise
 from isp.planes import bilinear, fill, tent_radius, tent_weights
-from sensor.cfa import BAYER, RGBW, channels, mask
+from sensor.cfa import BAYER, MOSAICS, RGBW, channels, mask
 from sensor.raw import RawImage
 
 SPARSE = ("RGGG", "GGGG", "GGGG", "GGGG")
@@ -101,3 +101,18 @@ def test_green_impulse_reaches_its_four_neighbours() -> None:
     dn[4, 3] = 800  # a green site of RG/GB
     green = bilinear(raw(dn, BAYER))[3:6, 2:5, 1]
     assert green == pytest.approx(800 * np.array([[0.0, 0.25, 0.0], [0.25, 1.0, 0.25], [0.0, 0.25, 0.0]]))
+
+
+def test_samples_at_unequal_distance_weigh_by_a_tent() -> None:
+    """On a tile of two by two all samples within reach lie equally far; on four by four the nearest weigh most."""
+    cfa, generator = MOSAICS["rgbw_4x4"], np.random.default_rng(3)
+    image = raw(generator.integers(1, 60_000, (12, 12)), cfa)
+    red = bilinear(image)[..., 0]
+    for row, column in product(range(4, 8), range(4, 8)):
+        total = weight = 0.0
+        for down, across in product(range(-2, 3), range(-2, 3)):
+            if cfa[(row + down) % 4][(column + across) % 4] == "R":
+                here = (3 - abs(down)) * (3 - abs(across))
+                total, weight = total + here * image.electrons[row + down, column + across], weight + here
+        own = cfa[row % 4][column % 4] == "R"
+        assert red[row, column] == pytest.approx(image.electrons[row, column] if own else total / weight, rel=1e-12)
