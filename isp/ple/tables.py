@@ -56,7 +56,7 @@ class Sampling:
     dark_e: tuple[float, ...]
     prnu: float
 
-    @property
+    @cached_property
     def black(self) -> Singles:
         """Mean reading of a sample without light, by channel [units of noise]."""
         return np.array([readings(dark_e).mean(np.zeros(1))[0] for dark_e in self.dark_e], np.float32)

@@ -156,7 +156,7 @@ def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposu
 
 
 def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
-    """Compare the fast readout with the exact first."""
+    """Compare the fast readout with the exact one."""
     calls = {name: _capture(bench, sensor, radiance, exposure_s, exact=name == "exact") for name in ("fast", "exact")}
     frames = timed(calls, bench.repeats + 1)
     # The two draw different frames of the same statistics: only the mean over the frame can be compared.
