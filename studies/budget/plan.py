@@ -169,6 +169,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
             for mosaic in mosaics(study):
                 sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)
+                sensor = replace(sensor, lens=lens)
                 of_any_time = effects(lit, sensor, lens, pilot.groups, rng)
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):

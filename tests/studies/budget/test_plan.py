@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from command_line import call, check_refusals
 from numpy.typing import NDArray
+from refusal import refusal
 
 from render.transport import Transport
 from sensor.kernel.kernel import expected_electrons_single
@@ -114,6 +115,11 @@ def test_what_a_study_states_of_the_lens_goes_before_the_sensors_own_and_that_be
         (as_stated(SMALL), (1.0, 0.0)),  # a pixel of today has a lens
     ):
         assert {(image.lens.diffraction, image.lens.veiling_glare) for image in made.images.values()} == {expected}
+
+
+def test_a_metered_channel_in_a_shaking_hand_is_refused_as_a_sweep_refuses_it(cache: Path) -> None:
+    shaky = replace(SMALL, sensors=("white_apart",), levels=("500cd/m2",), lens=LensTerms(shake="hand"))
+    refusal(plan, shaky, cache=cache, match="shake_um: .*after a part of the time")
 
 
 def test_a_picture_file_is_planned_in_its_own_bands(tmp_path: Path) -> None:
