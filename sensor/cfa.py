@@ -33,15 +33,15 @@ def mosaics() -> tuple[str, ...]:
 
 
 def tile_of(mosaic: str | Sequence[str]) -> Tile:
-    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels.
+    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels, also as ``RG/BW``.
 
     Raises
     ------
     InputError
         For an unknown name, or rows that don't make a rectangle of letters.
     """
-    if not isinstance(mosaic, str):
-        return check_tile(mosaic)
+    if not isinstance(mosaic, str) or "/" in mosaic:
+        return check_tile(mosaic.split("/") if isinstance(mosaic, str) else mosaic)
     if mosaic not in MOSAICS:
         bayer = f"bayer_{mosaic.lower()}"
         if bayer in MOSAICS:

@@ -52,7 +52,7 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         tile, change = VARIATIONS[mosaic]
         responses = change(sensor.responses)
     else:
-        tile = tile_of(mosaic.split("/") if "/" in mosaic else mosaic)
+        tile = tile_of(mosaic)
         if sensor.chip.sites > 1 and plain(tile) != tile:
             raise InputError(
                 f"cfa: {mosaic!r} for a sensor that bins, whose raw images hold no quad; allowed: what they hold, such "

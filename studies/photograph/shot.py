@@ -47,6 +47,7 @@ from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
+_SPP = 64
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
@@ -65,7 +66,7 @@ class Order:
     sensor : str or Path
         Sensor preset by name, or a preset file.
     cfa : str, optional
-        Mosaic, such as rgbw or bayer; the preset's own by default.
+        Mosaic by name, or rows such as RG/BW; the preset's own by default.
     exposure : str
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
         brightest W, auto:information for the one of the two whose samples hold more.
@@ -86,8 +87,8 @@ class Order:
         Pixels; with one of height and width the other keeps the proportions.
     width : int, optional
         Pixels; as height.
-    spp : int
-        Samples a pixel of the render.
+    spp : int, optional
+        Samples a pixel of the render; 64 by default.
     frames : int
         Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
     shake : str, optional
@@ -116,7 +117,7 @@ class Order:
     size: Annotated[int | None, (1, 8192, "give the picture's longer side in pixels")] = None
     height: int | None = None
     width: int | None = None
-    spp: Annotated[int, (1, 1 << 16, "give samples per pixel")] = 64
+    spp: Annotated[int | None, (1, 1 << 16, "give samples per pixel")] = None
     frames: Annotated[int, (1, MOST_FRAMES, "give exposures of a burst")] = 1
     shake: str | None = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
@@ -185,7 +186,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         transport = render(
             opened.scene,
             _size(order, opened),
-            spp=order.spp,
+            spp=order.spp or _SPP,
             seed=order.seed,
             progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
         )
@@ -275,7 +276,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             f"give {AUTO}, or a time such as 20ms"
         )
     if is_radiance_file(order.source):
-        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width")
+        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width", "spp")
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
         require_absent(place, **{name: getattr(order, name) for name in scene_options})
         if len(order.light) > 1 or "=" in "".join(order.light):

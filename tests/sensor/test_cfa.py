@@ -62,6 +62,6 @@ def test_the_4x4_mosaic_is_a_white_checkerboard_with_a_bayer_mosaic_of_2x2_cells
 
 def test_a_mosaic_is_taken_by_name_or_by_its_rows():
     assert tile_of("bayer") == BAYER
-    assert tile_of(["CY", "YM"]) == ("CY", "YM")
+    assert tile_of(["CY", "YM"]) == tile_of("CY/YM") == ("CY", "YM")
     refusal(tile_of, "rgwb", match=r"cfa: 'rgwb' is unknown; allowed: bayer.*did you mean 'rgbw'")
     refusal(tile_of, 3, match=r"cfa: 3 is not a tile")

@@ -216,6 +216,7 @@ REFUSED = (
     ("flat_field --size 8 --width 4", "width: 4 beside --size ... leave it out"),
     ("scene.exr --size 8", "size: 8 for 'scene.exr', a stored picture ... leave it out"),
     ("scene.exr --width 8", "width: 8 for 'scene.exr', a stored picture ... leave it out"),
+    ("scene.exr --spp 64", "spp: 64 for 'scene.exr', a stored picture ... leave it out"),
     ("flat_field --size 0", "size: 0"),
     ("flat_field --spp 0", "spp: 0"),
     ("flat_field --seed -1", "seed: -1"),
