@@ -34,7 +34,10 @@ def of_channel(sensor: SensorConfig, channel: str | None) -> tuple[SensorConfig,
     """
     if channel is None and sensor.chip.channels:
         names = [x.channel for x in sensor.chip.channels]
-        raise InputError(f"channel: none given for a camera that reads {names} apart; allowed: one of the mosaic's")
+        raise InputError(
+            f"channel: none given for a camera that reads {', '.join(names)} apart; allowed: "
+            f"{', '.join(sensor.channels)}; give one"
+        )
     for reading in sensor.chip.channels:
         if reading.channel == channel:
             return replace(sensor, pixel=reading.pixel_of(sensor.pixel), chip=Chip()), reading.share

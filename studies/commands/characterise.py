@@ -70,9 +70,9 @@ class Frames:
             require_whole("reading", self.reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
             sensor = of_reading(sensor, self.reading - 1)
         if sensor.chip.channels:
-            channel = str(self.channel)
-            require_name(f"channel of {preset!r}, which reads channels apart", channel, sensor.channels)
-            return of_channel(sensor, channel)[0]
+            if self.channel is not None:
+                require_name(f"channel of {preset!r}, which reads channels apart", self.channel, sensor.channels)
+            return of_channel(sensor, self.channel)[0]
         if self.channel is not None:
             raise InputError(f"channel: {self.channel!r} of {preset!r}, whose channels are read alike; leave it out")
         return sensor

@@ -69,6 +69,8 @@ def test_bad_input_is_refused(tmp_path, monkeypatch):
         ("absent.toml", "can't be read"),
         ("", "PRESET"),
         ("dual_gain", "sensor: 2 readings of a pixel; allowed: one"),
+        ("white_apart", "channel: none given for a camera that reads W apart; allowed: R, G, B, W; give one"),
+        ("white_apart --channel V", "channel of 'white_apart', which reads channels apart: 'V' is unknown"),
         ("dual_gain --reading 3", "reading: 3 is outside 1 to 2"),
         ("low_noise --reading 1", "reading: 1 of 'low_noise', whose pixels are read once"),
         ("--from a.dng b.dng --reading 1", "reading: 1 beside raw files"),
