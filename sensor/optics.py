@@ -169,8 +169,8 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     return np.moveaxis(planes, 0, -1)
 
 
-def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:
-    """One line for each effect of a lens that `form_image` leaves out or approximates, with its cost.
+def left_out(sensor: SensorConfig) -> tuple[str, ...]:
+    """One line for each effect of a lens that `form_image` leaves out, or approximates at one sample a pixel: its cost.
 
     MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
     """
@@ -179,20 +179,11 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
     if not lens.diffraction:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
         lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
-    if samples_per_pixel == 1 and (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
+    if (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
         lines.append(
             f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist; "
             "4 samples a pixel don't"
         )
-    if samples_per_pixel > 1 and lens.diffraction:
-        # What the nearest copy adds at the pixels' Nyquist frequency (`sensor.diffraction.sampled_otf`).
-        copy_per_um = np.array((samples_per_pixel - 0.5) / sensor.site_pitch_um)
-        excess = float(diffraction_otf(copy_per_um, WAVELENGTH_NM, lens))
-        if excess > 0:
-            lines.append(
-                f"detail finer than a sample: it lifts the MTF at Nyquist by {APERTURE_AT_NYQUIST * excess:.3f}; "
-                "more samples a pixel don't"
-            )
     if not lens.horizontal_view_deg:
         corner = (1 + (tan(radians(VIEW_DEG / 2)) * DIAGONAL) ** 2) ** -2
         lines.append(
