@@ -4,11 +4,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from rodcone.errors import require_whole
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import auto_exposure_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
@@ -20,7 +18,7 @@ from sensor.shake import shaken
 def capture(
     radiance: SpectralRadiance | SpectralIrradiance,
     sensor: SensorConfig,
-    exposure_s: float | None = None,
+    exposure_s: float,
     device: Device | None = None,
     rng: np.random.Generator | None = None,
     *,
@@ -29,8 +27,8 @@ def capture(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    What is left out is as `rodcone capture` has it by default; the same frame at every call then. A camera that shakes
-    (`LensConfig.shake_um`) takes a path of its own in each exposure.
+    Chip and noise that are left out are as `rodcone capture` has them; the same frame at every call then. A camera that
+    shakes (`LensConfig.shake_um`) takes a path of its own in each exposure.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
@@ -43,8 +41,8 @@ def capture(
         Quickest as float32 with band-planar memory, as renders are. An image on the sensor, of `form_image`, saves
         forming it again.
     sensor : SensorConfig
-    exposure_s : float, optional
-        0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
+    exposure_s : float
+        0 or more [s].
     device : Device, optional
         The chip, of the frame's size; left out, the one that ``default_rng([0, 0])`` draws.
     rng : numpy.random.Generator, optional
@@ -65,21 +63,15 @@ def capture(
     UserWarning
         Where the bands don't fill the camera's window: what each channel loses.
     """
-    formed = isinstance(radiance, SpectralIrradiance)
-    require_whole("samples_per_pixel", samples_per_pixel, 1, 64, "give samples a side")
-    if device is None:
-        rows, columns = (size if formed else size // samples_per_pixel for size in radiance.values.shape[:2])
-        shape = rows, columns
-        device = draw_device(sensor, shape, np.random.default_rng([0, 0]))
-    rng = np.random.default_rng([0, 1]) if rng is None else rng
     numpy_runs = exact or backend() == "numpy"
+    formed = isinstance(radiance, SpectralIrradiance)
     scaled = samples_per_pixel == 1 and not spreads(sensor.lens) and not formed
     light = radiance
     if isinstance(light, SpectralRadiance) and (numpy_runs or not scaled or sensor.lens.shake_um):
         light = form_image(light, sensor, samples_per_pixel)
-    if exposure_s is None:
-        image = light if isinstance(light, SpectralIrradiance) else form_image(light, sensor)
-        exposure_s = auto_exposure_s(image, sensor)
+    height, width = light.values.shape[:2]
+    device = device or draw_device(sensor, (height, width), np.random.default_rng([0, 0]))
+    rng = rng or np.random.default_rng([0, 1])
     expected_e: NDArray[np.floating]
     if isinstance(light, SpectralIrradiance) and sensor.lens.shake_um:
         moved = shaken(channel_electrons(light, sensor, exposure_s), sensor, exposure_s, rng)

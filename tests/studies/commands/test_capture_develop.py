@@ -18,14 +18,13 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from sensor.capture import capture
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
-from studies.photograph.camera import calibrate, iso_speed
+from studies.photograph.camera import calibrate, capture, iso_speed
 from studies.photograph.shot import Order, take
 from studies.study.lit_scene import open_choice, white_spectrum
 from studies.study.study import OWN, SceneChoice, Study
@@ -510,6 +509,6 @@ def test_a_burst_is_captured_and_its_merged_frames_are_developed(tmp_path, monke
 
 def test_capture_in_python_gives_the_commands_frame(exr: Path, tmp_path: Path) -> None:
     take(Order(exr, tmp_path / "shot.dng"))
-    ours, theirs = capture(read_exr(exr), preset("low_noise")), read_raw(tmp_path / "shot.dng")
+    ours, theirs = capture(read_exr(exr)), read_raw(tmp_path / "shot.dng")
     assert ours.exposure_s == pytest.approx(theirs.exposure_s, rel=1e-6)
     assert np.array_equal(ours.dn, theirs.dn)
