@@ -1,7 +1,5 @@
 """The numbers that Parmar & Wandell (2009) give, and what is exact about them."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
@@ -10,9 +8,7 @@ from render.radiance import SpectralRadiance
 from sensor.cfa import RGBW, mask
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.device import Device
 from sensor.optics import form_image
-from sensor.readout import read_out
 from sensor.response import channel_electrons, expected_electrons
 
 MOONLIGHT_CD_M2 = 0.036
@@ -40,17 +36,6 @@ def test_moonlight_through_f_5_6_is_10_photons_a_square_micrometre_and_second():
     assert photons == pytest.approx(10.0, rel=5e-3)  # exact: 9.97; 0.0361 cd/m^2 would be 10.00
 
 
-def test_1000_electrons_read_out_have_30_db():
-    sensor, shape = replace(camera(2.0, 4.0), bits=16), (512, 512)
-    flat = Device(np.ones(shape), np.zeros(shape))
-    rng = np.random.default_rng(1)
-    sensor = replace(sensor, pixel=replace(sensor.pixel, full_well_e=2000.0))  # 33 DN an electron: no rounding to see
-    first, second = (read_out(np.full(shape, 1000.0), sensor, flat, 0.01, rng).electrons for _ in range(2))
-    snr = (first.mean() + second.mean()) / 2 / (np.std(first - second) / np.sqrt(2))
-    # the spread of n differences has the relative error 1/sqrt(2 n); 4 of them: false-alarm rate 6.3e-5
-    assert snr == pytest.approx(np.sqrt(1000), rel=4 / np.sqrt(2 * first.size) + 1e-5)
-
-
 def test_6_um_against_2_um_is_9_54_db_of_two_sensors_at_100_cd_m2_and_f_4():
     for channel in "RGBW":
         # Figure 1b. Shot noise alone: the SNR is the root of the electrons.
@@ -60,20 +45,6 @@ def test_6_um_against_2_um_is_9_54_db_of_two_sensors_at_100_cd_m2_and_f_4():
             for sensor in (camera(6.0, 4.0), camera(2.0, 4.0))
         )
         assert decibels(np.sqrt(large) / np.sqrt(small)) == pytest.approx(9.542425, abs=1e-6), channel
-
-
-def test_6_um_against_2_um_is_9_54_db_as_read_out():
-    shape, rng, snr = (512, 512), np.random.default_rng(2), []
-    for pitch_um in (6.0, 2.0):
-        sensor = camera(pitch_um, 4.0)
-        one_tile = expected_electrons(form_image(scene("D65", 100.0), sensor), sensor, 0.01)
-        green_e = float(one_tile[mask(RGBW, "G", (2, 2))][0])
-        sensor = replace(sensor, bits=16, pixel=replace(sensor.pixel, full_well_e=2 * green_e))
-        flat = Device(np.ones(shape), np.zeros(shape))
-        first, second = (read_out(np.full(shape, green_e), sensor, flat, 0.01, rng).electrons for _ in range(2))
-        snr.append((first.mean() + second.mean()) / np.sqrt(2) / np.std(first - second))
-    # two spreads, each with the relative error 1/sqrt(2 n): 4 of their quadrature in dB, false-alarm rate 6.3e-5
-    assert decibels(snr[0] / snr[1]) == pytest.approx(9.542425, abs=decibels(1 + 4 / np.sqrt(shape[0] * shape[1])))
 
 
 def ratios(light, nm):

@@ -184,16 +184,3 @@ def test_a_lamp_of_one_pixel_has_no_dots_around_it(f_number, pitch_um):
     # Dots: a pixel brighter than its neighbours in the row. From the fourth on the tail is 1/r^3 and what is
     # left of the rings, 1.2 at most where a pixel is narrower than one; cut at Nyquist the transfer made it 5 and more.
     assert (tail[3:-1] / np.sqrt(tail[2:-2] * tail[4:])).max() < 1.25
-
-
-def test_the_tail_of_a_lamp_is_the_airy_pattern_s():
-    """Beyond the first rings a pixel gets the share of the pattern's envelope N lambda / (pi^2 r^3), summed over it."""
-    lamp = np.zeros((129, 129))
-    lamp[64, 64] = 1.0
-    nm = np.arange(400.0, 701.0, 5.0)
-    radiance = SpectralRadiance(np.repeat(lamp[..., None], nm.size, axis=2), nm)
-    sensor = camera(diffraction=1.0)
-    white = form_image(radiance, sensor).values.mean(axis=2) / camera_equation(sensor.lens)
-    for r in (6, 9, 14):
-        envelope = 2.8 * nm.mean() * 1e-3 / (np.pi**3 * (r * 2.2) ** 3) * 2.2**2
-        assert white[64, 64 + r] == pytest.approx(envelope, rel=0.25)

@@ -98,26 +98,6 @@ def test_a_sum_holds_the_light_of_its_own_four_pixels(binning):
 
 
 @BOTH
-@pytest.mark.parametrize("exact", [True, False])
-def test_prnu_of_four_pixels_is_averaged_and_dsnu_added(binning, exact):
-    """What stays of the mean over exposures is the chip's own pattern, to the last digit of its noise."""
-    if not exact and backend() == "numpy":
-        pytest.skip("Dr.Jit has no backend here")
-    pixel = {"prnu": 0.05, "dsnu_e": 20.0, "full_well_e": 8000.0}
-    sensor = camera(binning, **pixel)
-    chip, apart = (draw_device(s, (64, 64), np.random.default_rng(5)) for s in (sensor, sensor.photosites))
-    np.testing.assert_array_equal(chip.photo_response, apart.photo_response)  # one chip, read in two ways
-    offsets_e = block_sums(apart.dark_offset_e)
-    np.testing.assert_allclose(sensor.pixel_sums(apart.dark_offset_e), offsets_e)
-    expected = 1000.0 * block_sums(apart.photo_response) + offsets_e
-    rng, n = np.random.default_rng(6), 64
-    frames = [expose(np.full((64, 64), 1000.0), sensor, 0.1, chip, rng, exact=exact).electrons for _ in range(n)]
-    deviation = (np.mean(frames, axis=0) - expected) / np.sqrt(4000.0 / n)
-    # chi-square of 1024 pixels within 4.5 standard errors, and the gain's rounding: false-alarm rate 7e-6
-    assert abs((deviation**2).mean() - 1.0) < 4.5 * np.sqrt(2 / deviation.size) + 0.01
-
-
-@BOTH
 def test_a_block_with_a_hot_pixel_is_listed_as_defective(binning):
     sensor = camera(binning, hot_pixel_share=0.02)
     device = draw_device(sensor, (64, 64), np.random.default_rng(1))

@@ -153,16 +153,6 @@ def test_read_noise_is_that_of_the_pixel_s_own_counter():
         assert abs(dn[row, column] - (1000 + noise_e / sensor.gain_e_per_dn)) < 0.51
 
 
-def test_shot_and_read_noise_of_a_pixel_are_independent():
-    for mean_e in (10.0, 1000.0):
-        shot = read(mean_e, shape=(512, 512)).astype(np.float64)
-        noisy = replace(COUNTS, pixel=replace(COUNTS.pixel, read_noise_e=40.0), black_level_dn=400.0)
-        dark = read(0.0, noisy, (512, 512)).astype(np.float64)
-        for power in (1, 2):
-            first, second = ((x - x.mean()).ravel() ** power for x in (shot, dark))
-            assert abs(np.corrcoef(first, second)[0, 1]) < 4.5 / 512
-
-
 # Draws by coordinates
 
 
