@@ -16,7 +16,6 @@ Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the sh
 LINE_EVERY_S = 5.0
 SHOW_EVERY_S = 0.2  # in a notebook
 START = "start"  # what a task says before its first step
-PACE_OVER_S = 300.0  # of the latest work, by which the time left is told: its parts differ
 
 
 @contextmanager

@@ -22,11 +22,10 @@ EXACT_NS = 40.0  # a pixel
 
 @dataclass(frozen=True)
 class Choice:
-    """What a scene's render and its conditions' images hold: bands, samples, samples wanted, terms left out."""
+    """What a scene's render and its conditions' images hold: bands, samples, terms left out."""
 
     count: int
     spp: int
-    wanted_spp: int
     left_out: dict[Condition, frozenset[str]]
 
 
@@ -67,7 +66,7 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
         )
         spp = min(max(wanted, FIRST_SPP), most_spp)
         cost = sum(lens_ns for lens_ns, _ in lens_choices.values()) + render_ns(bands, spp)
-        choices.append((cost, Choice(count=count, spp=spp, wanted_spp=wanted, left_out=left_out)))
+        choices.append((cost, Choice(count=count, spp=spp, left_out=left_out)))
     return min(choices, key=itemgetter(0))[1]
 
 
