@@ -24,12 +24,14 @@ from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s, most_informative_s
 from sensor.optics import SpectralIrradiance, form_image
+from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
+from sensor.variations import vary
 from studies.explore.controls import TIME, Controls, Lamp, options_of
-from studies.explore.equipment import alone, camera_of, lit_transport, own_camera
+from studies.explore.equipment import alone, camera_of, lit_transport
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
 from studies.photograph.camera import colour_fit, develop_to_scale
@@ -180,14 +182,14 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
     scale = controls.level_cd_m2 * scale_1
-    base = memo.of("own camera", (controls.sensor, controls.mosaic), own_camera, controls.sensor, controls.mosaic)
+    base = memo.of("own camera", optics[:2], lambda: vary(preset(controls.sensor), controls.mosaic))
     sensor = memo.of("camera", camera, camera_of, controls, base)
 
     # Lens and filters
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
-            radiance = memo.of("radiance", spectrum, _radiance, lit, name)
+            radiance = memo.of("radiance", spectrum, alone(lit, name).relight)
             frames[name] = memo.of("frame", (spectrum, optics), _group_frame, radiance, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
@@ -208,7 +210,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
-    device = memo.of("device", chip, _chip, sensor, shape, controls.seed)
+    device = memo.of("device", chip, draw_device, sensor, shape, _rng(controls.seed, _CHIP))
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
     take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
     exposures = []
@@ -249,10 +251,6 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 # Stages
 
 
-def _radiance(lit: Transport, name: str) -> SpectralRadiance:
-    return alone(lit, name).relight()
-
-
 def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame:
     irradiance = form_image(radiance, sensor)
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
@@ -263,7 +261,7 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
         spectrum = (name, lamp.spectrum, lamp.table)
-        radiance = memo.of("radiance", spectrum, _radiance, exposed.transport, name)
+        radiance = memo.of("radiance", spectrum, alone(exposed.transport, name).relight)
         planes.append(memo.of("true", (spectrum, light.spectrum.tobytes()), true_srgb, radiance, light, 1.0))
     true = _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
     return true, to_bytes(true)
@@ -271,16 +269,8 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
     shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
-    planes = [memo.of("scattered", lamp, _scattered_luminance, lit, lamp[0]) for lamp in shining]
+    planes = [memo.of("scattered", lamp, alone(lit, lamp[0]).scattered_luminance) for lamp in shining]
     return white_of(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
-
-
-def _scattered_luminance(lit: Transport, name: str) -> Image:
-    return alone(lit, name).scattered_luminance()
-
-
-def _chip(sensor: SensorConfig, shape: tuple[int, int], seed: int) -> Device:
-    return draw_device(sensor, shape, _rng(seed, _CHIP))
 
 
 def _weighted(weights: Any, planes: list[Image]) -> Image:

@@ -10,8 +10,6 @@ from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError
 from sensor.config import SensorConfig
-from sensor.presets import preset
-from sensor.variations import vary
 from studies.explore.controls import Controls, Lamp
 from studies.metrics.truth import Light, light_in_bands
 from studies.study.scene_source import first_light, replaceable_luminance
@@ -55,13 +53,8 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
     return replace(group, spectrum=spectrum * (group_luminance / luminance), power=power)
 
 
-def own_camera(sensor: str, mosaic: str) -> SensorConfig:
-    """Sensor of a preset's name or a file, with a mosaic."""
-    return vary(preset(sensor), mosaic)
-
-
 def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
-    """Sensor with its lens as the controls have it; `base` is that of `own_camera`.
+    """Sensor with its lens as the controls have it; `base` is the sensor with the controls' mosaic.
 
     Raises
     ------
