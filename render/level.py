@@ -97,7 +97,7 @@ class Irradiance:
     __repr__ = brief
 
     def level(self, weights: Floats) -> Level:
-        """Illuminance; `weights` as of `PassMeans.luminance_level`."""
+        """Illuminance; `weights` as of `SceneMeans.luminance_level`."""
         value, flat = float((weights * self.mean).sum()), weights.ravel()
         if value <= 0:
             return Level(value, None)

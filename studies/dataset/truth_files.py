@@ -8,7 +8,6 @@ import numpy as np
 
 from render.cache import file_digests
 from render.combine import emission
-from render.denoised.relight import relight_denoised
 from render.photometry import luminance, tristimulus
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import files_of
@@ -19,7 +18,7 @@ from rodcone.types import Floats
 from sensor.optics import form_image
 from sensor.response import channel_electrons
 from studies.dataset.sample import TruthFiles
-from studies.study.lit_scene import OpenedScene, under
+from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.sweep.cells import Cell
 from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
 from studies.sweep.provenance import versions
@@ -88,9 +87,7 @@ def _made(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: 
         files["surfaces"], objects, materials = keep_array(folder, planes), seen.objects, seen.materials
     for spectrum in job.study.spectra:
         lit = under(transport, spectrum)
-        view = (
-            lit.relight(luminance_cd_m2=1.0) if lit.denoised is None else relight_denoised(lit, luminance_cd_m2=1.0)[0]
-        )
+        view = photographed(lit, 1.0)
         xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm)
         planes = np.concatenate([xyz, group_shares(lit)], axis=-1).astype(np.float32)
         files[f"light of {spectrum}"] = keep_array(folder, planes)
