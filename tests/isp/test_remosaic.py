@@ -31,14 +31,6 @@ def test_the_tile_is_bayer_with_red_where_it_was() -> None:
         assert "".join(tile).index("R") == "".join(cfa).index("R"), cfa
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("cfa", PHASES)
-def test_a_flat_field_stays_flat_to_the_border(cfa: Tile) -> None:
-    made = remosaic(raw(cfa, flat()))
-    for channel in "RGB":
-        assert set(made.dn[mask(made.cfa, channel, made.shape)].tolist()) == {LEVELS_E[channel] + 100}
-
-
 @pytest.mark.sample(2)
 @pytest.mark.parametrize("cfa", PHASES)
 def test_sites_on_which_both_mosaics_agree_keep_their_sample(cfa: Tile) -> None:

@@ -46,20 +46,6 @@ def test_the_luminance_is_ws_in_full_bandwidth() -> None:
         assert luminance_of_srgb(picture.rgb) == pytest.approx(plane, rel=1e-12), (name, white)
 
 
-def test_yamagamis_colour_differences_have_less_noise_than_satos() -> None:
-    # Bilinear leaves a colour's own samples as they are: standard deviation 1 there. The tent averages 7.1 samples.
-    rng = np.random.default_rng(3)
-    noisy = exposure({channel: 500 + 20 * rng.standard_normal((96, 96)) for channel in "RGBW"})
-    sato, yamagami = (
-        PROCESSORS[name].develop(noisy, np.eye(3), balance=[1, 1, 1, 1]).rgb for name in ("rgbw_sato", "rgbw_yamagami")
-    )
-    blue_sites = channel_map(noisy.cfa, noisy.shape) == "B"
-    spread = [np.std((rgb[..., 2] - rgb[..., 0])[blue_sites]) for rgb in (sato, yamagami)]
-    # at a B site Sato's B is a sample (1) and R the mean of two (1/2): sqrt(1.5) * 20; Yamagami's: sqrt(2 / 7.1) * 20
-    assert spread[0] == pytest.approx(20 * np.sqrt(1.5), rel=0.1)
-    assert spread[1] == pytest.approx(20 * np.sqrt(2 / (64 / 24) ** 2), rel=0.15)
-
-
 def test_combining_weighs_samples_by_a_tent() -> None:
     mosaic = np.zeros((24, 24))
     mosaic[12, 12] = 1.0  # a red site

@@ -6,13 +6,13 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image, require_library
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image
 from refusal import refusal
 
 from isp.processors import sub_images
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.sub_images import Mix, bm3d_mosaic, hadamard, principal_components
-from sensor.cfa import Tile, channels, mask
+from sensor.cfa import Tile
 from sensor.raw import RawImage
 
 SHARES = {"R": 0.5, "G": 1.0, "B": 0.4, "W": 5.0}
@@ -63,29 +63,6 @@ def test_what_all_sub_images_share_stands_in_one_component_which_alone_gives_the
     matrix = principal_components(sites)
     assert np.abs(matrix[0]) == pytest.approx(np.full(4, 0.5))
     assert (sites @ matrix[:1].T) @ matrix[:1] == pytest.approx(sites)
-
-
-# Processors that denoise with BM3D's own library: light kept, noise gone, the same bits from any thread.
-
-NAMES = [name for name, processor in PROCESSORS.items() if processor.extra == "bm3d"]
-TILES: dict[str, Tile] = {"bayer": ("GB", "RG"), "rgbw": ("GR", "WB")}
-
-
-@pytest.mark.sample(1)
-@pytest.mark.parametrize("name", NAMES)
-@pytest.mark.parametrize("level_e", [20.0, 400.0])
-def test_most_of_the_noise_of_a_flat_field_goes_and_no_light(name: str, level_e: float) -> None:
-    require_library(name)
-    image = raw(TILES[PROCESSORS[name].mosaic], (64, 64), level_e)
-    balance = [SHARES[channel] for channel in channels(image.cfa)]
-    picture = PROCESSORS[name].develop(image, np.eye(3), balance=balance)
-    # 4096 samples: the mean of each colour is known to sigma / sqrt(n), and 5 of these allow 1 false alarm in 3e5 for
-    # each of 30 means
-    for index, channel in enumerate("RGB"):
-        count = mask(image.cfa, channel, image.shape).sum()
-        sigma = np.sqrt(SHARES[channel] * level_e + image.dark_noise_e**2) / SHARES[channel]
-        assert abs(picture.rgb[..., index].mean() - level_e) <= 5 * sigma / np.sqrt(count)
-        assert picture.rgb[..., index].std() < 0.25 * sigma  # 16 samples averaged at the least
 
 
 def test_a_tile_of_more_sites_is_refused_in_one_line_before_anything_is_denoised(

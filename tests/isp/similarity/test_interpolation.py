@@ -1,6 +1,5 @@
-"""How far distances are trusted between samples that differ: closed forms, noise, any tile, edges without fringes."""
+"""How far distances are trusted between samples that differ: closed forms, any tile, edges without fringes."""
 
-import math
 from itertools import product
 
 import numpy as np
@@ -47,20 +46,6 @@ def test_a_step_in_closed_form():
             step,
             column,
         )
-
-
-def test_noise_alone_makes_none_on_average():
-    """The mean before the cut at 0 is 0: shown where a wide sum leaves little of the scatter."""
-    for tile in TILES:
-        noise = np.random.default_rng(5).normal(size=(200, 200))
-        patch = 41
-        # Far from the border no pair is cut. A sum scatters by less than patch * sqrt(10), as few neighbours correlate;
-        # cut at 0 its mean is 0.4 of that, so once that is far beyond chance.
-        variance = interpolation_variance(noise, tile, patch)[60:-60, 60:-60]
-        assert variance.mean() < patch * math.sqrt(10), tile
-        loud = interpolation_variance(1.1 * noise, tile, patch)[60:-60, 60:-60].mean()
-        share = float(np.mean(sum(opposite_pairs(tile).values())))
-        assert loud == pytest.approx(patch**2 * share * (1.1**2 - 1) / 2, abs=3 * patch * math.sqrt(10)), tile
 
 
 def test_pairs_tell_what_all_samples_of_the_planes_would():
