@@ -10,7 +10,7 @@ from outside_truth import colour_science
 from refusal import refusal
 
 from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
-from render.photometry import colour_matching_functions, luminance, tristimulus
+from render.photometry import colour_matching_functions, luminance
 from render.published_spectra import PATH, published_spectra
 from render.spectrum import Spectrum, black_body, line_bands
 
@@ -24,23 +24,6 @@ def test_every_light_has_a_luminance_of_one(name):
     sampled = np.interp(fine, light.wavelength_nm, light.values, left=0.0, right=0.0)
     luminance_cd_m2 = 683.0 * 0.05 * (sampled * np.interp(fine, v.wavelength_nm, v.values)).sum()
     assert luminance_cd_m2 == pytest.approx(1.0, rel=2e-4)
-
-
-@loop(
-    ("name", "x", "y"),
-    [  # CIE 15, 1931 observer
-        ("A", 0.44758, 0.40745),
-        ("D65", 0.31272, 0.32903),
-        ("E", 1 / 3, 1 / 3),
-        ("F2", 0.3721, 0.3751),
-        ("F11", 0.3805, 0.3769),
-        ("sodium_high", 0.5330, 0.4150),
-        ("LED-B1", 0.4560, 0.4078),
-    ],
-)
-def test_every_light_has_its_published_chromaticity(name, x, y):
-    xyz = tristimulus(illuminant(name).band_average(NM, WIDTH_NM), NM, WIDTH_NM)
-    assert xyz[:2] / xyz.sum() == pytest.approx([x, y], abs=5e-4)
 
 
 # Kieffer and Stone 2005, table 4, visible bands: nm, a0 to a3, d1 to d3.

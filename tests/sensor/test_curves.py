@@ -7,6 +7,7 @@ import pytest
 from loop import loop
 from refusal import refusal
 
+from render.illuminants import illuminant
 from render.spectrum import Spectrum
 from rodcone.csv_file import MOST_BYTES
 from rodcone.errors import InputError
@@ -15,12 +16,34 @@ from sensor.curves import read_csv, read_curve, rgbw
 PEAKS = {"R": (0.560, 592.0), "G": (0.678, 540.0), "B": (0.415, 476.0), "W": (1.0, 620.0)}
 
 
+def electrons(channel, light, first_nm, last_nm):
+    """Relative electrons under a light given as energy: rectangle sum at 1 nm of energy x wavelength x response."""
+    nm = np.arange(first_nm, last_nm + 1.0)
+    spectrum, curve = illuminant(light), rgbw().curves[channel]
+    energy = np.interp(nm, spectrum.wavelength_nm, spectrum.values)
+    return np.sum(energy * nm * np.interp(nm, curve.wavelength_nm, curve.values))
+
+
 @loop("channel", PEAKS)
 def test_each_curve_peaks_where_the_published_one_does(channel):
     peak, nm = PEAKS[channel]
     curve = rgbw().curves[channel]
     assert curve.values.max() == pytest.approx(peak, abs=5e-4)
     assert curve.wavelength_nm[curve.values.argmax()] == nm
+
+
+@loop(
+    ("light", "first_nm", "last_nm", "ratios"),
+    [
+        ("E", 380, 780, (10.16, 5.85, 13.81)),
+        ("D65", 380, 780, (9.80, 4.88, 10.84)),
+        ("D65", 400, 700, (7.90, 3.93, 8.76)),
+    ],
+)
+def test_w_collects_the_published_multiple_of_r_g_and_b(light, first_nm, last_nm, ratios):
+    white = electrons("W", light, first_nm, last_nm)
+    for channel, ratio in zip("RGB", ratios, strict=True):
+        assert white / electrons(channel, light, first_nm, last_nm) == pytest.approx(ratio, rel=0.03)
 
 
 def test_a_letter_without_a_curve_is_refused_by_name():

@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import EVERY_TERM
 from loop import loop
 from refusal import refusal
 
@@ -20,7 +19,6 @@ from sensor.device import draw_device
 from sensor.photodiodes import binned, binned_tile
 from sensor.readout import noise_sources, noise_variance
 from sensor.variations import vary
-from studies.photograph.snr import electrons_at_snr
 
 QUIET = PixelConfig(1.0, 0.9, full_well_e=8000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 BOTH = loop("binning", ["charge", "digital"])
@@ -163,13 +161,6 @@ def test_the_raw_image_states_its_own_dark_noise(binning, bits):
     raw = even_frame(camera(binning, read_noise_e=3.0, dsnu_e=4.0, bits=bits), 0.0, (512, 512))
     # of a variance of normal values, within 4.5 standard errors: false-alarm rate 7e-6
     assert raw.electrons.var() == pytest.approx(raw.dark_noise_e**2, rel=4.5 * np.sqrt(2 / raw.dn.size))
-
-
-@BOTH
-def test_light_for_an_snr_is_of_the_sum(binning):
-    sensor = camera(binning, **{name: EVERY_TERM[name] for name in ("read_noise_e", "dsnu_e", "prnu")})
-    electrons = electrons_at_snr(10.0, sensor, 0.1)
-    assert electrons / np.sqrt(noise_variance(np.full((1, 1), electrons), sensor, 0.1)[0, 0]) == pytest.approx(10.0)
 
 
 @BOTH

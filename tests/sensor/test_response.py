@@ -65,15 +65,6 @@ def test_bands_add_up_each_with_its_own_wavelength_and_width():
     np.testing.assert_allclose(electrons, photons * np.array([[QE["R"], QE["G"]], [QE["B"], QE["W"]]]), rtol=1e-12)
 
 
-@loop("factor", [0.5, 2.0, 3.0])
-def test_electrons_are_quadratic_in_pitch_and_linear_in_fill_factor(factor):
-    scene, plain = uniform(1e-3, [500.0, 510.0]), camera()
-    wider = camera(pixel=replace(PIXEL, pitch_um=3.0 * factor))
-    np.testing.assert_allclose(expected(scene, wider, 0.1), factor**2 * expected(scene, plain, 0.1), rtol=1e-13)
-    fuller = camera(pixel=replace(PIXEL, fill_factor=0.25 * factor))
-    np.testing.assert_allclose(expected(scene, fuller, 0.1), factor / 2 * expected(scene, plain, 0.1), rtol=1e-13)
-
-
 @loop(
     ("centre_nm", "width_nm", "inside"),
     [

@@ -41,7 +41,7 @@ def test_dynamic_range_read_out_is_that_of_the_closed_form(mosaic: str) -> None:
 @pytest.mark.thorough
 def test_matching_w_to_g_costs_just_what_w_gathers_more() -> None:
     rgbw, matched = (range_db(sensor_of("table1_pixel", mosaic))[0] for mosaic in ("rgbw", "rgbw_nd"))
-    assert rgbw - matched == pytest.approx(20 * np.log10(4.88), abs=0.02)  # W over G under D65, tests/paper
+    assert rgbw - matched == pytest.approx(20 * np.log10(4.88), abs=0.02)  # W over G under D65
 
 
 @pytest.mark.parametrize("processor", ["cmyw_yamagami_published", "rgbw_sato_published"])

@@ -96,13 +96,3 @@ def test_a_camera_that_switches_its_gain_takes_each_light_as_a_frame_of_its_own(
     for number, (index, together) in enumerate(zip((0, 1), snr(light_e, sensor, EXPOSURE_S)[0], strict=True)):
         alone = of_reading(sensor, index)
         assert together == pytest.approx(float(snr(light_e[:, [number]], alone, EXPOSURE_S)[0, 0]), rel=1e-12)
-
-
-@pytest.mark.parametrize("readout", ["merged", "switched"])
-def test_two_readings_have_the_snr_in_the_light_that_it_takes(readout: str) -> None:
-    sensor = preset("dual_gain")
-    sensor = replace(sensor, chip=replace(sensor.chip, readout=readout))
-    for ratio in (0.3, 3.0, 30.0, 70.0):
-        light_e = np.array([[electrons_at_snr(ratio, sensor, EXPOSURE_S)]])
-        assert snr(light_e, sensor, EXPOSURE_S)[0, 0] == pytest.approx(ratio, rel=1e-5)
-    assert electrons_at_snr(1e4, sensor, EXPOSURE_S) == inf
