@@ -157,8 +157,8 @@ def warn_if_full(raw: RawImage) -> None:
     """Warn of a frame most of whose pixels are saturated, as one of 10 s is that was meant as 10 ms."""
     if (full := float(raw.saturated.mean())) > MOST_FULL:
         warnings.warn(
-            f"exposure_s: {full:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give less, such as 0.01 or "
-            "'10ms' for ten milliseconds, or leave it out",
+            f"exposure_s: {full:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give less (a number "
+            "is seconds: 10 ms is 0.01 or '10ms'), or leave it out",
             stacklevel=4,
         )
 

@@ -91,6 +91,9 @@ def develop(
     """
     if not raw.name:
         raise InputError(f"raw: {str(raw)!r} is a folder; give the path of a raw file")
+    for path in more:
+        if path.suffix.lower() == ".png":
+            raise InputError(f"raw: {str(path)!r} is a picture; allowed: raw files; to write it give --out {path}")
     choices = vars(order).copy()
     out, bits = choices.pop("out"), choices.pop("bits")
     picture = default_path(raw) if out is None else out

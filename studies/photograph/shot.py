@@ -220,7 +220,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if saturated > MOST_SATURATED:
         notes += [
             f"{saturated:.0%} of the pixels are saturated at {exposure_s:g} s; give a shorter --exposure, "
-            "such as 20ms, or leave it out"
+            "or leave it out"
         ]
 
     # The files.

@@ -11,7 +11,7 @@ from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
 from rodcone.brief import brief
-from rodcone.errors import InputError, require_fields, require_keys, require_range, require_whole, unknown
+from rodcone.errors import InputError, in_place, require_fields, require_keys, require_range, require_whole, unknown
 from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset
@@ -280,7 +280,8 @@ def _check_cameras(study: Study) -> None:
                 "allowed: all bin, or none; give each a study of its own"
             )
         for mosaic in mosaics(study):
-            vary(sensor, mosaic)
+            with in_place(f"sensor {label(name)} with the mosaic {mosaic}, which a processor takes"):
+                vary(sensor, mosaic)
 
 
 def _check_shares_and_sizes(study: Study) -> None:

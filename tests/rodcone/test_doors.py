@@ -285,7 +285,7 @@ def test_a_linear_picture_encodes_itself(tmp_path: Path) -> None:
 def test_a_frame_that_is_all_full_or_all_dark_is_told() -> None:
     """Of 256 pixels in the dark one may lie above its noise by chance."""
     for side, luminance_cd_m2, exposure, words in (
-        (64, 25.0, 10, "saturated at 10 s"),
+        (64, 25.0, 10, "saturated at 10 s; give less (a number is seconds"),
         (64, 1e-4, "1us", "no more than dark noise"),
         (16, 1e-4, "1us", "no more than dark noise"),
         (64, 25.0, "10ms", ""),

@@ -48,6 +48,16 @@ def test_auto_exposure_goes_without_green(tmp_path: Path) -> None:
     assert replace(STUDY, sensors=sensors).exposures == ("auto:information",)
 
 
+def test_a_sensor_without_a_channel_of_a_processor_s_mosaic_is_named_with_it(tmp_path: Path) -> None:
+    nm, mine = (380, 780), tmp_path / "mine.toml"
+    (tmp_path / "rgb.csv").write_text("nm,R,G,B\n" + "".join(f"{x},0.1,0.3,0.1\n" for x in nm), "utf-8")
+    text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = "bayer"')
+    responses = '[responses]\ncsv = "rgb.csv"\nrange_nm = [380, 780]\nquantum_efficiency = "included"\n'
+    mine.write_text(text + responses, "utf-8")
+    words = "sensor mine.toml with the mosaic rgbw, which a processor takes: responses: channel: 'W' is unknown"
+    refusal(replace, STUDY, sensors=(str(mine),), match=words)
+
+
 def test_white_balances_left_out_are_the_processors() -> None:
     for processors, stated, balances in [
         (("interleaved", "bayer"), (), ("as-shot",)),
