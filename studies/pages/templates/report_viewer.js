@@ -235,7 +235,7 @@ function fit() {
   const ratio = window.devicePixelRatio || 1;
   const [height, width] = size();
   const room = byId("pair").clientWidth || byId("viewer").clientWidth;
-  const beside = getComputedStyle(byId("pair")).gridTemplateColumns.split(" ").length > 1 ? room - 330 : room;
+  const beside = getComputedStyle(byId("pair")).gridTemplateColumns.split(" ").length > 1 ? room - 400 : room;
   const tall = Math.max(0.86 * window.innerHeight, 512 * (height / width));
   const factor = Math.floor(Math.min(beside / width, tall / height) * ratio);
   // On a phone the picture is as wide as the screen, even where that is no whole multiple.

@@ -171,7 +171,11 @@ def test_error_maps_are_ciede2000_and_flip_of_each_pixel(browser: Any, report: P
 
 
 @pytest.mark.thorough
-def test_fits_the_window(browser: Any, report: Path) -> None:
+def test_fits_the_window(browser: Any, report: Path, axes: Path) -> None:
+    page = CHROME.open_page(browser, axes)  # the figures beside its pictures are wide
+    for width in (900, 960, 1040):
+        CHROME.show(page, width=width)
+        assert page.evaluate("document.documentElement.scrollWidth") <= width
     page = CHROME.open_page(browser, report)
     for dark in (False, True):
         for width, height, wide in ((390, 844, 358), (1280, 800, 512), (1920, 1080, 768), (2560, 1440, 1024)):
