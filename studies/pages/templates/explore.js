@@ -184,7 +184,8 @@ function render({ model, el }) {
     const name = view === "truth" ? `${TITLES[view]}, ${header.spp ? `${format(header.spp)} samples, render noise ${(100 * header.render_error).toPrecision(2)} %` : "from the file"}` : `${side.toUpperCase()}: ${TITLES[view]}`;
     if (view !== "picture") return `${name}: ${SCALES[view]}`;
     const snr = facts.snr_db === null ? "" : `, green's SNR ${facts.snr_db.toFixed(1)} dB`;
-    return `${name}: ${told.processor}, ${seconds(facts.exposure_s)}, ${(100 * facts.saturated).toPrecision(2)} % full${snr}`;
+    const time = (told.frames > 1 ? `${told.frames} × ` : "") + seconds(facts.exposure_s), full = Number((100 * facts.saturated).toPrecision(2));
+    return `${name}: ${told.processor}, ${time}, ${full} % full${snr}`;
   }
 
   // Figures follow the picture: asked once it is painted, dim until theirs is there

@@ -286,8 +286,9 @@ def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, 
           const figures = {json.dumps(FIGURES)}, wait = kind => new Promise(done => (function look() {{
             const one = asked.find(each => each.kind === kind); one ? done(one.number) : setTimeout(look, 10); }})());
           const colour = new DataView(new Uint8Array([10, 20, 30, 10, 20, 30]).buffer);
-          const facts = [{{ exposure_s: 0.0125, saturated: 0.0123, snr_db: 17.36 }}];
-          tell({{ ...answer, number: 2, size: [2, 1], facts }}, [colour, colour]);
+          const facts = [{{ exposure_s: 0.0125, saturated: 0.9999, snr_db: 17.36 }}];
+          const cameras = answer.cameras.map(one => ({{ ...one, controls: {{ ...one.controls, frames: 4 }} }}));
+          tell({{ ...answer, number: 2, size: [2, 1], facts, cameras }}, [colour, colour]);
           el.querySelector("canvas").dispatchEvent(new KeyboardEvent("keydown", {{ key: "ArrowUp" }}));
           for (const kind of ["histogram", "pixel"])
             tell({{ kind, number: await wait(kind), python: "", noise_note: "", [kind]: figures[kind] }}, []);
@@ -303,7 +304,7 @@ def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, 
             figures: all(el, ".figures svg").map(svg) }};
         """,
     )
-    assert said["captions"][0].endswith(": interleaved, 12.5 ms, 1.2 % full, green's SNR 17.4 dB")
+    assert said["captions"][0].endswith(": interleaved, 4 × 12.5 ms, 100 % full, green's SNR 17.4 dB")
     assert said["captions"][1] == "Reference, 4 samples, render noise 10 %: without the sensor's noise"
     assert said["pixel"] == [10, 20, 30, 255]
     assert said["rows"] == [
