@@ -173,7 +173,6 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("width_m", "height_m"), _METRES),
         "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
         "ratio": _range(1e-6, 1e6, "give signal over noise"),
-        "dark_current_e_per_s": _range(0.0, 1e12, "give electrons a second, 0 for none"),
         **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
         **dict.fromkeys(("electrons", "expected_e"), _array(least=0.0)),
         "levels_cd_m2": lambda name, value: _array(least=1e-9)(name, value).ravel(),

@@ -21,11 +21,9 @@ _Dark = TypeVar("_Dark", PixelConfig, Reading)
 _Sites: TypeAlias = float | NDArray[np.float64]
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
-# Fields that all frames must share: what turns DN into electrons, and the noise that weighs them.
-_CALIBRATION = (
-    *("cfa", "shape", "black_dn", "white_dn", "gain_e_per_dn"),
-    *("read_noise_e", "dsnu_e", "prnu", "column_gain_spread", "noise_steps", "channel_noise"),
-)
+# Fields that all frames must share; and those of one exposure time, with which dark current goes.
+_CAMERA = ("cfa", "shape", "white_dn", "gain_e_per_dn", "prnu", "column_gain_spread")
+_EXPOSURE = ("black_dn", "read_noise_e", "dsnu_e", "noise_steps", "channel_noise")
 
 
 @dataclass(frozen=True)
@@ -53,14 +51,18 @@ class Merged:
 
 @dataclass(frozen=True)
 class _Group:
-    """All frames of one exposure time: their number, and their mean rate."""
+    """All frames of one exposure time: their number, their mean rate, and a sample's noise and clear level."""
 
     exposure_s: float
     count: int
     rate: NDArray[np.float64]
+    temporal_e2: _Sites
+    dsnu_e: _Sites
+    shot: _Sites
+    clear_e: _Sites
 
 
-def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merged:
+def merge(frames: Sequence[RawImage]) -> Merged:
     """Weigh each pixel's exposures by the inverse of their temporal noise, and leave the saturated ones out.
 
     Weights and saturation both follow the merged rate itself, never one frame's own noisy value: among linear
@@ -75,40 +77,28 @@ def merge(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> Merg
     ----------
     frames : sequence of RawImage
         Of one camera and one scene; exposure times above 0, in any order.
-    dark_current_e_per_s : float
-        Calibrated dark current, to be subtracted.
 
     Raises
     ------
     InputError
         For no frames, frames of different cameras, or an exposure of 0 s.
     """
-    require_range("dark_current_e_per_s", dark_current_e_per_s, 0.0, 1e12, "give electrons per second, 0 for none")
     groups = _grouped(frames)
-    first = frames[0]
-    temporal_e2, dsnu_e, shot, full_e = _at_sites(first)
-    spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + (first.column_gain_spread * full_e) ** 2) ** 0.5
-    # Half, lest a well of a few electrons never count.
-    clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-
-    rate, variance, per_s = _weighted(groups, temporal_e2, shot)
-    full = rate * groups[0].exposure_s >= clear_e
+    rate, variance, offset = _weighted(groups)
+    full = rate * groups[0].exposure_s >= groups[0].clear_e
     for start in range(1, len(groups)):
         if not full.any():
             break
-        shorter = _weighted(groups[start:], temporal_e2, shot)
-        rate, variance, per_s = (
-            np.where(full, new, old) for new, old in zip(shorter, (rate, variance, per_s), strict=True)
+        shorter = _weighted(groups[start:])
+        rate, variance, offset = (
+            np.where(full, new, old) for new, old in zip(shorter, (rate, variance, offset), strict=True)
         )
-        full &= rate * groups[start].exposure_s >= clear_e
-    photo_rate = rate - dark_current_e_per_s
-    # `prnu` holds the columns' gains too, which act on dark current as well.
-    of_columns = first.column_gain_spread**2 * (rate**2 - photo_rate**2)
-    fixed = (dsnu_e * per_s) ** 2 + (first.prnu * photo_rate) ** 2 + of_columns
-    return Merged(rate_e_per_s=photo_rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
+        full &= rate * groups[start].exposure_s >= groups[start].clear_e
+    fixed = offset**2 + (frames[0].prnu * rate) ** 2
+    return Merged(rate_e_per_s=rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
-def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) -> RawImage:
+def merged_raw(frames: Sequence[RawImage]) -> RawImage:
     """Merge frames into one raw image, which is developed as any other: the exposure that they are together.
 
     Its electrons are the merged rate times the sum of the exposure times, so that shot noise stays what an exposure of
@@ -120,17 +110,15 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
     ----------
     frames : sequence of RawImage
         As `merge`; one alone is given back as it is.
-    dark_current_e_per_s : float
-        Calibrated dark current, to be subtracted.
 
     Raises
     ------
     InputError
         As `merge`; for frames of several readings each and different times.
     """
-    if len(frames) == 1 and not dark_current_e_per_s:
+    if len(frames) == 1:
         return frames[0]
-    merged, first = merge(frames, dark_current_e_per_s), frames[0]
+    merged, first = merge(frames), frames[0]
     times = np.array([frame.exposure_s for frame in frames])
     if first.noise_steps and np.ptp(times) > 0:
         raise InputError(
@@ -138,13 +126,17 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
             "merge those of equal times"
         )
     whole_s = float(times.sum())
-    deeper = whole_s / float(times.min())
-    gain_e = first.full_well_e * deeper / BURST_WHITE_DN
-    # In the dark a frame's weight goes with the square of its time.
-    squares = float((times**2).sum())
-    temporal_e2 = (first.read_noise_e**2 + first.rounding_e2) * whole_s**2 / squares
-    offsets = whole_s * float(times.sum()) / squares  # that come with each frame, by the frame's
-    full_e = _at_sites(first)[-1] * deeper
+    shortest = min(frames, key=lambda frame: frame.exposure_s)
+    deeper = whole_s / shortest.exposure_s
+    gain_e = shortest.full_well_e * deeper / BURST_WHITE_DN
+    full_e = _at_sites(shortest)[-1] * deeper
+    read_noise_e, dsnu_e = _dark_noise(times, [(x.read_noise_e**2 + x.rounding_e2, x.dsnu_e) for x in frames])
+    channel_noise = []
+    for noise in shortest.channel_noise:
+        alone = [frame.noise_of(noise.channel) for frame in frames]
+        read_e, offset_e = _dark_noise(times, [(x.read_noise_e**2, x.dsnu_e) for x in alone])
+        well_e = noise.full_well_e * deeper
+        channel_noise.append(replace(noise, full_well_e=well_e, read_noise_e=read_e, dsnu_e=offset_e))
     full = np.all([frame.saturated for frame in frames if frame.exposure_s == times.min()], axis=0)
     electrons = np.where(full, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
     return replace(
@@ -153,8 +145,8 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
         black_dn=0.0,
         white_dn=BURST_WHITE_DN,
         gain_e_per_dn=gain_e,
-        read_noise_e=sqrt(temporal_e2),
-        dsnu_e=first.dsnu_e * offsets,
+        read_noise_e=read_noise_e,
+        dsnu_e=dsnu_e,
         exposure_s=whole_s,
         noise_steps=tuple(
             replace(
@@ -165,15 +157,7 @@ def merged_raw(frames: Sequence[RawImage], dark_current_e_per_s: float = 0.0) ->
             )
             for step in first.noise_steps
         ),
-        channel_noise=tuple(
-            replace(
-                noise,
-                full_well_e=noise.full_well_e * deeper,
-                read_noise_e=noise.read_noise_e * whole_s / sqrt(squares),
-                dsnu_e=noise.dsnu_e * offsets,
-            )
-            for noise in first.channel_noise
-        ),
+        channel_noise=tuple(channel_noise),
     )
 
 
@@ -207,19 +191,42 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
     """Frames by exposure time, longest first; `InputError` unless they are of one camera."""
     if len(frames) == 0:
         raise InputError("frames: none were given; allowed: one or more raw images; take some")
+    first_of_time = {frame.exposure_s: frame for frame in reversed(frames)}
     for index, frame in enumerate(frames):
-        for name in _CALIBRATION:
-            if getattr(frame, name) != getattr(frames[0], name):
+        same_time = first_of_time[frame.exposure_s]
+        pairs = [(name, getattr(frame, name), getattr(frames[0], name)) for name in _CAMERA]
+        pairs += [(name, getattr(frame, name), getattr(same_time, name)) for name in _EXPOSURE]
+        apart = [[(noise.channel, noise.shot) for noise in x.channel_noise] for x in (frame, frames[0])]
+        for name, value, other in (*pairs, ("channel_noise", *apart)):
+            if value != other:
                 raise InputError(
-                    f"frames: {name} of frame {index} is {getattr(frame, name)!r}, of the first "
-                    f"{getattr(frames[0], name)!r}; allowed: frames of one camera; merge them apart"
+                    f"frames: {name} of frame {index} is {value!r}, of one before it {other!r}; "
+                    "allowed: frames of one camera; merge them apart"
                 )
         require_range(f"exposure_s of frame {index}", frame.exposure_s, 1e-12, 1e7, "leave frames of 0 s out")
     groups = []
     for exposure_s in sorted({frame.exposure_s for frame in frames}, reverse=True):
-        same = [frame.electrons for frame in frames if frame.exposure_s == exposure_s]
-        groups.append(_Group(exposure_s, len(same), np.asarray(sum(same)) / (len(same) * exposure_s)))
+        same = [frame for frame in frames if frame.exposure_s == exposure_s]
+        rate = np.asarray(sum(frame.electrons for frame in same)) / (len(same) * exposure_s)
+        temporal_e2, dsnu_e, shot, full_e = _at_sites(same[0])
+        gains_e = same[0].column_gain_spread * full_e
+        spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + gains_e**2) ** 0.5
+        # Half, lest a well of a few electrons never count.
+        clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
+        groups.append(_Group(exposure_s, len(same), rate, temporal_e2, dsnu_e, shot, clear_e))
     return groups
+
+
+def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, float]]) -> tuple[float, float]:
+    """Read noise and DSNU of a dark pixel merged from frames of such temporal variances and DSNU [e- of all the time].
+
+    In the dark a frame's weight is the square of its time over its variance.
+    """
+    temporal_e2, dsnu_e = np.array(frames).T
+    temporal_e2 = np.maximum(temporal_e2, 1e-30)  # without noise the times alone weigh
+    weights, whole_s = times_s**2 / temporal_e2, times_s.sum()
+    offset = float((weights * dsnu_e / times_s).sum() / weights.sum())
+    return float(whole_s / np.sqrt(weights.sum())), float(whole_s * offset)
 
 
 def _at_sites(raw: RawImage) -> tuple[_Sites, _Sites, _Sites, _Sites]:
@@ -234,10 +241,8 @@ def _at_sites(raw: RawImage) -> tuple[_Sites, _Sites, _Sites, _Sites]:
     return sites[0], sites[1], sites[2], sites[3]
 
 
-def _weighted(
-    groups: Sequence[_Group], temporal_e2: _Sites, shot: _Sites
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Best rate, its variance, and the mean of 1/exposure under its weights, each (h, w).
+def _weighted(groups: Sequence[_Group]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Best rate, its variance, and the standard deviation of its fixed offset, each (h, w).
 
     A group's rate has the variance (shot x rate x time + temporal noise) / (frames x time^2). The rate in it is the
     merged one: a start from shot noise alone, where the weights are the times, and a few rounds.
@@ -245,9 +250,9 @@ def _weighted(
     whole_s = sum(group.count * group.exposure_s for group in groups)
     rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))
     for _ in range(_ROUNDS):
-        noise_e2 = [shot * np.maximum(rate, 0.0) * group.exposure_s + temporal_e2 for group in groups]
+        noise_e2 = [group.shot * np.maximum(rate, 0.0) * group.exposure_s + group.temporal_e2 for group in groups]
         weights = [group.count * group.exposure_s**2 / noise for group, noise in zip(groups, noise_e2, strict=True)]
         total = np.asarray(sum(weights))
         rate = sum(w * group.rate for w, group in zip(weights, groups, strict=True)) / total
-    per_s = np.asarray(sum(w / group.exposure_s for w, group in zip(weights, groups, strict=True))) / total
-    return rate, 1 / total, per_s
+    offsets = sum(w * (group.dsnu_e / group.exposure_s) for w, group in zip(weights, groups, strict=True))
+    return rate, 1 / total, np.asarray(offsets / total)

@@ -32,11 +32,11 @@ class RawImage:
     cfa : tuple of str
         Tile of channels, row 0 first.
     black_dn, white_dn : float
-        Reading of no light, and of a full well.
+        Reading of no light, with the mean of its dark current; and of a full well.
     gain_e_per_dn : float
         Electrons per digital number.
     read_noise_e, dsnu_e : float
-        Standard deviations of the temporal and the fixed dark noise [e-].
+        Standard deviations of the temporal and the fixed dark noise [e-], with dark current's.
     prnu : float
         Standard deviation of the pixels' relative response.
     exposure_s : float

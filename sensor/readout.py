@@ -1,6 +1,7 @@
 """From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
 
 from collections.abc import Callable
+from math import hypot, sqrt
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -147,7 +148,7 @@ def read_out(
     for number, (reading, patterns) in enumerate(zip(readings, device.readings, strict=True)):
         alone = of_reading(sensor, number)
         dn = draw(expected * reading.share, alone, patterns, exposure_s, keys[reading.charge], number)
-        raws.append(as_raw(dn, alone, exposure_s * reading.time_share, engine, patterns.hot))
+        raws.append(as_raw(dn, alone, exposure_s, engine, patterns.hot))
     return merge_readings(raws, sensor, exposure_s)
 
 
@@ -269,20 +270,30 @@ def as_read(sensor: SensorConfig, expected_e: NDArray[Any], channel: str | None 
 def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
-    """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels."""
+    """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
+
+    Black is what covered pixels read. Dark current raises it by its mean and adds to both kinds of dark noise: its own
+    shot noise, and what the columns' gains make of it.
+    """
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel
+    dark_e = min(pixel.dark_current_e_per_s * exposure_s, pixel.full_well_e)
     return RawImage(
         dn=dn,
         cfa=sensor.cfa,
-        black_dn=sensor.black_dn,
+        black_dn=min(sensor.black_dn + dark_level_dn(sensor, exposure_s), sensor.white_dn - 1),
         white_dn=sensor.white_dn,
         gain_e_per_dn=sensor.gain_e_per_dn,
-        read_noise_e=pixel.read_noise_e,
-        dsnu_e=pixel.fixed_dark_e,
+        read_noise_e=hypot(pixel.read_noise_e, sqrt(dark_e)),
+        dsnu_e=hypot(pixel.fixed_dark_e, pixel.column_gain_spread * dark_e),
         prnu=pixel.fixed_gain,
         column_gain_spread=pixel.column_gain_spread,
         exposure_s=float(exposure_s),
         engine=engine,
         defects=None if hot is None else np.argwhere(hot),
     )
+
+
+def dark_level_dn(sensor: SensorConfig, exposure_s: float) -> int:
+    """Mean of dark current in whole DN, as raw converters take black; up to half a DN of it stays in the samples."""
+    return round(sensor.pixel.dark_current_e_per_s * exposure_s / sensor.gain_e_per_dn)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sensor.calibration import NoiseStep
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import RawImage
-from sensor.readings.noise import Floats, best_weights, covariances, dark_electrons, seams, shares, whole_share
+from sensor.readings.noise import Floats, best_weights, covariances, of_reading, seams, shares, whole_share
 
 MERGED_WHITE_DN = 2**24 - 1  # linear words of 24 bits, as chips that merge give them; single precision holds them all
 _ROUNDS = 6  # of the weights, as of `sensor.burst`
@@ -33,11 +33,16 @@ def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: f
         Of the longest [s].
     """
     whole, last = whole_share(sensor), seams(sensor, exposure_s).order[-1]
-    estimates_e = np.stack([raw.electrons / share for raw, share in zip(raws, shares(sensor), strict=True)])
-    electrons = merged_electrons(estimates_e, sensor, exposure_s) * whole
+    dark_current_e = sensor.pixel.dark_current_e_per_s * exposure_s
+    estimates_e = []
+    for number, (raw, share) in enumerate(zip(raws, shares(sensor), strict=True)):
+        # Dark current goes with its fraction of a DN, which the reading's own black leaves in.
+        collected_e = (raw.dn.astype(np.float64) - of_reading(sensor, number).black_dn) * raw.gain_e_per_dn
+        estimates_e.append(collected_e / share - dark_current_e)
+    electrons = merged_electrons(np.stack(estimates_e), sensor, exposure_s) * whole
     base, *steps = noise_of_merged(sensor, exposure_s)
 
-    full_e = sensor.pixel.full_well_e * whole
+    full_e = max(sensor.pixel.full_well_e - dark_current_e, 1.0) * whole
     dark_e = BLACK_SIGMAS * hypot(base.read_noise_e, base.dsnu_e)
     black_dn = ceil(MERGED_WHITE_DN * dark_e / (full_e + dark_e))
     gain_e = full_e / (MERGED_WHITE_DN - black_dn)
@@ -67,20 +72,20 @@ def merged_electrons(estimates_e: Floats, sensor: SensorConfig, exposure_s: floa
     Parameters
     ----------
     estimates_e : (reading, h, w) float64
-        Each reading's electrons over its share.
+        Each reading's electrons over its share, without the dark current's mean.
 
     Returns
     -------
     (h, w) float64
     """
-    at, dark_e = seams(sensor, exposure_s), dark_electrons(sensor, exposure_s)
+    at = seams(sensor, exposure_s)
     levels = np.concatenate([[0.0], np.geomspace(1e-2, sensor.pixel.full_well_e, _LEVELS - 1)])
     total = np.asarray(sum(covariances(levels, sensor, exposure_s).values()))
     flat = estimates_e.reshape(len(estimates_e), -1)
     light, where = np.empty(flat.shape[1]), np.arange(flat.shape[1])
     for number, above_e in enumerate(at.above_e):
         weights = best_weights(total, at.order[number:])
-        light[where] = _weighted(flat[:, where], weights, levels + dark_e)
+        light[where] = _weighted(flat[:, where], weights, levels)
         where = where[light[where] >= above_e]
         if where.size == 0:
             break
@@ -106,9 +111,10 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
 def noise_of_merged(sensor: SensorConfig, exposure_s: float) -> list[NoiseStep]:
     """Noise of merged electrons from the dark on, and from each seam on.
 
-    Read noise and offsets are told where a step begins, shot noise and PRNU where it ends: there each counts.
+    Dark noise is told where a step begins, the light's shot noise and PRNU where it ends: there each counts.
     """
     at, whole = seams(sensor, exposure_s), whole_share(sensor)
+    of_columns_e2 = (sensor.pixel.column_gain_spread * sensor.pixel.dark_current_e_per_s * exposure_s) ** 2
     starts_e = np.concatenate([[0.0], at.above_e[:-1]])
     steps = []
     for number, (start_e, end_e) in enumerate(zip(starts_e, at.above_e, strict=True)):
@@ -117,8 +123,8 @@ def noise_of_merged(sensor: SensorConfig, exposure_s: float) -> list[NoiseStep]:
             NoiseStep(
                 from_e=whole * float(start_e),
                 shot=whole * bright["shot noise"] / float(end_e),
-                read_noise_e=whole * sqrt(dark["read noise"] + dark["quantisation"]),
-                dsnu_e=whole * sqrt(dark["DSNU"] + dark["column offsets"]),
+                read_noise_e=whole * sqrt(dark["read noise"] + dark["quantisation"] + dark["dark current"]),
+                dsnu_e=whole * sqrt(dark["DSNU"] + dark["column offsets"] + of_columns_e2),
                 prnu=hypot(sqrt(bright["PRNU"]) / float(end_e), sensor.pixel.column_gain_spread),
             )
         )

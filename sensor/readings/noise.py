@@ -33,7 +33,7 @@ class Seams:
     ----------
     order : (reading,) intp
     above_e : (reading,) float64
-        Electrons of the whole pixel, light and dark current; of the last the level from which it may clip.
+        Photo-electrons of the whole pixel; of the last the level from which it may clip.
     """
 
     order: NDArray[np.intp]
@@ -134,7 +134,8 @@ def seams(sensor: SensorConfig, exposure_s: float) -> Seams:
     full_e = np.array([x.full_well_e for x in sensor.chip.readings]) / shares(sensor)
     total = sum(covariances(full_e, sensor, exposure_s).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
-    above_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
+    clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
+    above_e = np.maximum(clear_e - dark_electrons(sensor, exposure_s), 1.0)  # no light clears a well of dark current
     order = np.argsort(above_e, kind="stable")
     return Seams(order, above_e[order])
 
@@ -151,12 +152,11 @@ def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float
     at = seams(sensor, exposure_s)
     merged_e2 = dict.fromkeys(by_source, np.zeros_like(light))
     pixel_share = np.ones_like(light)  # of pixels whose merged light is over the seams so far
-    dark_e = dark_electrons(sensor, exposure_s)
     for number, above_e in enumerate(at.above_e):
         weights = best_weights(total, at.order[number:])
         noise_e = np.sqrt(np.einsum("ni,nij,nj->n", weights, total, weights))
         last = number == len(at.order) - 1
-        beyond = np.zeros_like(light) if last else scipy.special.ndtr((light + dark_e - above_e) / noise_e)
+        beyond = np.zeros_like(light) if last else scipy.special.ndtr((light - above_e) / noise_e)
         for name, covariance in by_source.items():
             variance_e2 = np.einsum("ni,nij,nj->n", weights, covariance, weights)
             merged_e2[name] = merged_e2[name] + pixel_share * (1 - beyond) * variance_e2

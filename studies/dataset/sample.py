@@ -17,7 +17,7 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readings.by_channel import of_channel, well_e
-from sensor.readout import as_read, noise_sources, noise_variance
+from sensor.readout import as_read, dark_level_dn, noise_sources, noise_variance
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
@@ -141,7 +141,10 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
     shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
     alone = {name: of_channel(sensor, name) for name in mean_e}
-    dark_e = {name: x.pixel.dark_current_e_per_s / share * cell.exposure_s for name, (x, share) in alone.items()}
+    dark_e = {
+        name: (x.pixel.dark_current_e_per_s * cell.exposure_s - dark_level_dn(x, cell.exposure_s) * x.gain_e_per_dn) / s
+        for name, (x, s) in alone.items()
+    }
     return {
         **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
         **frame_labels(cell),
@@ -155,7 +158,7 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
         "noise": noise_coefficients(sensor, cell.exposure_s),
         "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
         "mean_e": mean_e,
-        "dark_current_e": dark_e,
+        "dark_above_black_e": dark_e,
         "full_well_e": {name: well_e(sensor, name) for name in mean_e},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),

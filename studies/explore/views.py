@@ -52,8 +52,7 @@ def noise_picture(shot: Shot) -> Bytes:
     """Raw image less the expected electrons: grey is none, black and white are four standard deviations."""
     exposed = shot.exposed
     light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or all that a pixel was read for
-    dark_e = exposed.sensor.pixel.dark_current_e_per_s * exposed.exposure_s / _light_share(exposed)
-    noise_e = exposed.raw.electrons / light - (_collected_e(exposed) + dark_e)
+    noise_e = exposed.raw.electrons / light - _collected_e(exposed)
     return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
 

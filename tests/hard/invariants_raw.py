@@ -14,7 +14,7 @@ from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channel_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage
-from sensor.readout import noise_variance, spread_charge
+from sensor.readout import dark_level_dn, noise_variance, spread_charge
 
 ROUNDING = 1e-5  # a weighted mean in single precision leaves the range of its samples by less
 RAW_FRAMES, PICTURES = 32, 12  # each with a chip and noise of its own; a picture takes five times as long
@@ -58,7 +58,7 @@ def raw_unbiased(situation: Situation) -> Margin | None:
     margins = []
     for name in CAMERAS:
         sensor = behind(situation, name).sensor
-        mean_e = _collected(behind(situation, name))
+        mean_e = _above_black(behind(situation, name))
         room = _leaves_room(mean_e, sensor, situation.exposure_s)
         names = channel_map(sensor.cfa, mean_e.shape)
         frames = [shoot(situation, name, 100 + seed) for seed in range(RAW_FRAMES)] if room.any() else []
@@ -77,7 +77,7 @@ def pictures_unbiased(situation: Situation) -> Margin | None:
     margins = []
     for name in CAMERAS:
         sensor = behind(level, name).sensor
-        mean_e = _collected(behind(level, name))
+        mean_e = _above_black(behind(level, name))
         if not _leaves_room(mean_e, sensor, level.exposure_s).all():
             continue
         names = channel_map(sensor.cfa, mean_e.shape)
@@ -100,11 +100,16 @@ def flat_field(situation: Situation) -> Situation:
     return replace(situation, radiance=even, sensor=replace(situation.sensor, lens=lens), samples_per_pixel=1)
 
 
-def _collected(situation: Situation) -> Image:
-    """Mean of what each sound pixel collects [e-]."""
-    pixel = situation.sensor.pixel
+def _above_black(situation: Situation) -> Image:
+    """Mean of each sound pixel's electrons: light, and what black leaves of dark current."""
+    pixel, time_s = situation.sensor.pixel, situation.exposure_s
     electrons = spread_charge(expected(situation), pixel.crosstalk)
-    return np.asarray(electrons + pixel.dark_current_e_per_s * situation.exposure_s)
+    return np.asarray(electrons + pixel.dark_current_e_per_s * time_s - _dark_black_e(situation.sensor, time_s))
+
+
+def _dark_black_e(sensor: SensorConfig, exposure_s: float) -> float:
+    """Electrons by which dark current raises black."""
+    return dark_level_dn(sensor, exposure_s) * sensor.gain_e_per_dn
 
 
 def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDArray[np.bool_]:
@@ -114,7 +119,9 @@ def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDAr
     sigma_e = np.sqrt(noise_variance(mean_e, sensor, exposure_s))
     # Highlights are held from where a pixel counts as saturated, some sigmas of the dark under the well.
     top_e = pixel.full_well_e * (1 - SATURATION_SIGMAS * pixel.column_gain_spread)
-    top_e -= SATURATION_SIGMAS * float(np.hypot(dark_e, sensor.gain_e_per_dn))
+    dark_current_e = pixel.dark_current_e_per_s * exposure_s
+    top_e -= SATURATION_SIGMAS * float(np.hypot(np.hypot(dark_e, dark_current_e**0.5), sensor.gain_e_per_dn))
+    top_e -= _dark_black_e(sensor, exposure_s)
     fits = sensor.black_dn * sensor.gain_e_per_dn >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
     return np.asarray(fits & (mean_e + ROOM_SIGMAS * sigma_e < top_e))
 

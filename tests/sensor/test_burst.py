@@ -110,9 +110,9 @@ def test_fixed_patterns_have_the_stated_variance_over_a_chip():
         assert merged.fixed_variance.mean() > 0.2 * stated
 
 
-def test_the_dark_current_that_calibration_knows_is_taken_off():
+def test_dark_current_is_taken_off_frames_of_any_times():
     sensor = camera(dark_current_e_per_s=5e4, read_noise_e=2.0)
-    merged = merge(shoot(sensor, 2e4, [0.01, 0.04]), dark_current_e_per_s=5e4)
+    merged = merge(shoot(sensor, 2e4, [0.01, 0.04]))
     noise = np.sqrt(merged.temporal_variance.mean())
     assert abs(merged.rate_e_per_s.mean() - 2e4) < noise * (4 / np.sqrt(PIXELS) + 0.02)
 
@@ -146,7 +146,6 @@ def test_frames_that_do_not_belong_together_are_refused():
     assert "cfa of frame 1" in refusal(merge, [one, replace(other, cfa=("RG", "GB"))])
     assert "shape of frame 1 is (8, 10)" in refusal(merge, [one, shoot(camera(), 1e4, [0.01], shape=(8, 10))[0]])
     assert "exposure_s of frame 1" in refusal(merge, [one, replace(other, exposure_s=0.0)])
-    assert "dark_current_e_per_s" in refusal(merge, [one], dark_current_e_per_s=-1.0)
 
 
 def test_a_merged_burst_is_one_exposure_of_all_its_time():

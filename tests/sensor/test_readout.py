@@ -80,10 +80,30 @@ def test_photo_response_scales_the_mean_before_the_poisson_draw():
 def test_dark_current_is_not_scaled_by_photo_response():
     response = np.broadcast_to(np.repeat([0.0, 1.0, 3.0], 100), (300, 300))
     sensor = camera(bits=16, dark_current_e_per_s=400.0)
-    electrons = expose(sensor, 25.0, (300, 300), Device(response, np.zeros((300, 300))), exposure_s=0.1).electrons
+    raw = expose(sensor, 25.0, (300, 300), Device(response, np.zeros((300, 300))), exposure_s=0.1)
+    collected_e = (raw.dn - float(sensor.black_dn)) * sensor.gain_e_per_dn
     for value in (0.0, 1.0, 3.0):
-        here, mean = electrons[response == value], 40.0 + 25.0 * value
+        here, mean = collected_e[response == value], 40.0 + 25.0 * value
         assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)  # three times 6.3e-5
+
+
+@loop("exposure_s", [0.0, 0.1, 1.0])
+def test_a_frame_without_light_has_no_mean_and_the_noise_that_its_raw_image_states(exposure_s):
+    """Electrons of the dark: their mean within half a DN and 4 standard errors, their variance by chi-square, 1e-4."""
+    terms = {"read_noise_e": 3.0, "dsnu_e": 2.0, "column_gain_spread": 0.02, "prnu": 0.02}
+    sensor = camera(bits=12, dark_current_e_per_s=300.0, **terms)
+    raw = expose(sensor, 0.0, (256, 1024), draw_device(sensor, (256, 1024), rng(9)), exposure_s)
+    by_columns_e = raw.column_gain_spread * 300.0 * exposure_s
+    error_e = np.sqrt(raw.dark_noise_e**2 / raw.dn.size + by_columns_e**2 / 1024)
+    assert abs(raw.electrons.mean()) < raw.gain_e_per_dn / 2 + 4 * error_e
+    spread_e2 = 4 * (raw.dark_noise_e**2 * np.sqrt(2 / raw.dn.size) + by_columns_e**2 * np.sqrt(2 / 1024))
+    assert abs(raw.electrons.var() - raw.dark_noise_e**2) < spread_e2
+    assert raw.black_dn == round(raw.black_dn)
+
+
+def test_a_well_that_dark_current_fills_reads_full_and_has_a_black_under_white():
+    sensor = camera(dark_current_e_per_s=1e9)
+    assert expose(sensor, 0.0, (8, 8), exposure_s=1.0).saturated.all()
 
 
 def test_the_well_clips_before_dark_offsets_are_added():
@@ -183,9 +203,10 @@ def test_a_hot_pixel_collects_its_own_dark_current_on_top_of_the_others_and_no_l
     hot[:, ::3] = True
     device = Device(np.full((300, 300), 2.0), np.zeros((300, 300)), hot=hot)
     sensor = camera(bits=16, dark_current_e_per_s=50.0, hot_pixel_dark_current_e_per_s=400.0)
-    electrons = expose(sensor, 25.0, (300, 300), device, exposure_s=0.2).electrons
+    raw = expose(sensor, 25.0, (300, 300), device, exposure_s=0.2)
+    collected_e = (raw.dn - float(sensor.black_dn)) * sensor.gain_e_per_dn
     for where, mean in ((~hot, 60.0), (hot, 140.0)):
-        here = electrons[where]
+        here = collected_e[where]
         # Poisson: mean and variance within 4 standard errors, four comparisons: 2.5e-4
         assert abs(here.mean() - mean) < 4 * np.sqrt(mean / here.size)
         assert abs(here.var() - mean) < 4 * np.sqrt((2 * mean**2 + mean) / here.size)

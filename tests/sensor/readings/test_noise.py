@@ -124,10 +124,9 @@ def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
 def test_noise_steps_are_within_a_third_of_a_decibel_of_the_closed_form(name):
     sensor = preset(name)
     whole, at = whole_share(sensor), seams(sensor, 0.02).above_e
-    dark_e = sensor.pixel.dark_current_e_per_s * 0.02  # its shot noise is in the samples' own electrons
     for number, step in enumerate(noise_of_merged(sensor, 0.02)):
         light = np.linspace(1.05 * at[number - 1] if number else 0.0, 0.97 * at[number], 200)
-        found = whole**2 * (merged_variance(light, sensor, 0.02) - dark_e)
+        found = whole**2 * merged_variance(light, sensor, 0.02)
         electrons = whole * light
         told = step.shot * electrons + step.read_noise_e**2 + step.dsnu_e**2 + (step.prnu * electrons) ** 2
         assert np.abs(10 * np.log10(told / found)).max() < 1 / 3

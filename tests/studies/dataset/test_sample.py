@@ -62,7 +62,7 @@ def squares(samples: list[Made]) -> np.ndarray:
         for row, column in np.ndindex(2, 2):
             name, gain = facts["tile"][row][column], facts["gain_e_per_dn"]
             x = arrays["mosaic_e"][row::2, column::2] / gain
-            dark_dn = facts["black_dn"] + facts["dark_current_e"][name] / gain
+            dark_dn = facts["black_dn"] + facts["dark_above_black_e"][name] / gain
             off_dn = arrays["raw"][row::2, column::2].astype(float) - dark_dn - x
             noise = facts["noise"][name]
             found.append(off_dn**2 / (noise["a"] * x + noise["b"] + noise["c"] * x**2))
