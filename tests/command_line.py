@@ -44,12 +44,19 @@ def _content(folder: Path) -> dict[Path, tuple[int, int]]:
     return {path: (stat.st_size, stat.st_mtime_ns) for path, stat in stats.items()}
 
 
-def in_new_python(code: str, *arguments: object, folder: Path | None = None, **variables: str) -> str:
-    """What `code` prints in a Python of its own, with the variable that names LLVM unset."""
+def new_python(
+    code: str, *arguments: object, folder: Path | None = None, **variables: str
+) -> subprocess.CompletedProcess[str]:
+    """A Python of its own that has run `code`, with the variable that names LLVM unset."""
     kept = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
     command, environment = [sys.executable, "-c", code, *map(str, arguments)], kept | variables
-    done = subprocess.run(
+    return subprocess.run(
         command, cwd=folder, env=environment, capture_output=True, text=True, timeout=240, check=False
     )
+
+
+def in_new_python(code: str, *arguments: object, folder: Path | None = None, **variables: str) -> str:
+    """What `code` prints in a Python of its own."""
+    done = new_python(code, *arguments, folder=folder, **variables)
     assert done.returncode == 0, done.stderr
     return done.stdout.strip()

@@ -65,6 +65,12 @@ CAMERA_BLACK, CAMERA_WHITE = (512.0, 514.0, 510.0, 520.0), 16_000
 CAMERA_MATRIX = np.array([[0.9, -0.3, -0.1], [-0.4, 1.2, 0.2], [-0.05, 0.15, 0.6]])
 
 
+def over_black(electrons: np.ndarray) -> np.ndarray:
+    """DN of that camera's mosaic at one electron a DN, each site over its own black level."""
+    black = np.tile(np.array(CAMERA_BLACK).reshape(2, 2), (electrons.shape[0] // 2, electrons.shape[1] // 2))
+    return np.rint(np.minimum(electrons + black, CAMERA_WHITE)).astype(np.uint16)
+
+
 def other_camera(
     path: Path,
     dn: np.ndarray,

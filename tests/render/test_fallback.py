@@ -1,11 +1,9 @@
 """Without LLVM and CUDA nothing is rendered, the rest runs; and what an import of Mitsuba before rodcone does."""
 
 import json
-import os
-import subprocess
-import sys
 
 import pytest
+from command_line import in_new_python, new_python
 
 FALLBACK = """
 import json
@@ -47,26 +45,12 @@ print(json.dumps({
 """
 
 
-def in_new_python(code, folder=None, **variables):
-    kept = {name: value for name, value in os.environ.items() if name != "DRJIT_LIBLLVM_PATH"}
-    return subprocess.run(
-        [sys.executable, "-c", code],
-        env=kept | {"PYTHONPATH": os.getcwd()} | variables,
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=False,
-    )
-
-
 @pytest.fixture(scope="module")
 def fallback(tmp_path_factory):
     folder = tmp_path_factory.mktemp("scene")
     (folder / "scene.xml").write_text('<scene version="3.0.0"/>')
-    done = in_new_python(FALLBACK, DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so", folder=folder)
-    assert done.returncode == 0, done.stderr
-    said = json.loads(done.stdout.splitlines()[-1])
+    printed = in_new_python(FALLBACK, DRJIT_LIBLLVM_PATH="/nonexistent/libLLVM.so", folder=folder)
+    said = json.loads(printed.splitlines()[-1])
     if said["backend"] == "cuda":
         pytest.skip("a CUDA device answers here, whatever the LLVM library")
     return said
@@ -101,7 +85,7 @@ def test_importing_mitsuba_first_works_or_is_refused_behind_one_warning(before):
         "made = render(load('flat_field'), (2, 2), wavelength_nm=np.arange(405.0, 780.0, 50.0), spp=8)\n"
         "print(backend(), made.variant, made.radiance.shape)"
     )
-    done = in_new_python(code)
+    done = new_python(code)
     warnings = [line for line in done.stderr.splitlines() if "Warning" in line]
     if warnings:  # Dr.Jit has looked for an LLVM by itself
         assert len(warnings) == 1

@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
-from file_samples import CAMERA_BLACK as BLACK
 from file_samples import CAMERA_MATRIX as MATRIX
 from file_samples import CAMERA_WHITE as WHITE
-from file_samples import other_camera
+from file_samples import other_camera, over_black
 from loop import loop
 from refusal import refusal
 
@@ -23,15 +22,9 @@ rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is no
 SHAPE = (40, 60)
 
 
-def levels(electrons: np.ndarray) -> np.ndarray:
-    """DN of a mosaic at one electron a DN, each site over its own black level."""
-    black = np.tile(np.array(BLACK).reshape(2, 2), (electrons.shape[0] // 2, electrons.shape[1] // 2))
-    return np.rint(np.minimum(electrons + black, WHITE)).astype(np.uint16)
-
-
 def test_each_channels_black_is_taken_off(tmp_path: Path) -> None:
     above = np.random.default_rng(0).integers(0, 15_000, SHAPE).astype(np.float64)
-    raw = read_raw(other_camera(tmp_path / "shot.dng", levels(above)))
+    raw = read_raw(other_camera(tmp_path / "shot.dng", over_black(above)))
     assert (raw.cfa, raw.shape, raw.black_dn, raw.white_dn) == (("RG", "GB"), SHAPE, 520.0, 16_000.0)
     np.testing.assert_array_equal(raw.dn - raw.black_dn, above)
     assert (raw.exposure_s, raw.f_number, raw.iso) == (pytest.approx(0.01), pytest.approx(4.0), None)
@@ -47,7 +40,7 @@ def test_a_full_sample_is_full_whatever_its_black_was(tmp_path: Path) -> None:
 def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation: int, tmp_path: Path) -> None:
     above = np.full(SHAPE, 2000.0)
     above[:20, :20] = 12_000.0  # a bright corner: its place and the frame's proportions tell all eight apart
-    path = other_camera(tmp_path / "shot.dng", levels(above), orientation=orientation)
+    path = other_camera(tmp_path / "shot.dng", over_black(above), orientation=orientation)
     raw = read_raw(path)
     with rawpy.imread(str(path)) as theirs:
         picture = theirs.postprocess(output_bps=16, no_auto_bright=True, gamma=(1, 1), half_size=False)
@@ -55,7 +48,7 @@ def test_frames_are_turned_upright_as_libraw_turns_its_own_pictures(orientation:
     assert brightest_corner(picture[..., 1]) == brightest_corner(raw.dn)
     # the channels are turned with the samples: each is found by its own level
     shares = np.select([np.indices(SHAPE).sum(0) % 2 == 1, np.indices(SHAPE)[0] % 2 == 0], [1.0, 0.5], 0.25)
-    mosaic = read_raw(other_camera(tmp_path / "sites.dng", levels(8000.0 * shares), orientation=orientation))
+    mosaic = read_raw(other_camera(tmp_path / "sites.dng", over_black(8000.0 * shares), orientation=orientation))
     by_value = np.where(mosaic.electrons == 8000 * mosaic.gain_e_per_dn, "G", "R")
     by_value[np.isclose(mosaic.electrons, 2000 * mosaic.gain_e_per_dn)] = "B"
     assert mosaic.cfa == tuple("".join(row) for row in by_value[:2, :2])
@@ -67,7 +60,7 @@ def brightest_corner(frame: np.ndarray) -> int:
 
 
 def test_white_balance_and_matrix_are_the_files(tmp_path: Path) -> None:
-    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0))))
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0))))
     assert raw.colour is not None
     assert raw.colour.neutral == pytest.approx([0.5, 1.0, 0.7], rel=1e-5)
     assert raw.colour.to_srgb.sum(axis=1) == pytest.approx(np.ones(3), abs=1e-14)  # LibRaw's have 24 bits
@@ -84,7 +77,7 @@ def test_white_balance_and_matrix_are_the_files(tmp_path: Path) -> None:
 
 
 def test_a_file_without_colours_says_so(tmp_path: Path) -> None:
-    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), colours=False))
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), colours=False))
     assert raw.colour is not None
     assert facts["colour_matrix"] == "none"
     np.testing.assert_array_equal(raw.colour.to_srgb, np.eye(3))
@@ -94,7 +87,7 @@ def test_noise_comes_from_the_files_profile(tmp_path: Path) -> None:
     # S = 1 / full scale in electrons, O = (dark / full scale)^2; three channels whose mean counts
     full, dark = 31_000.0, 6.0
     pair = (1 / full, (dark / full) ** 2)
-    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair * 3)
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), noise=pair * 3)
     raw, facts = open_raw(path)
     assert facts["noise"] == "profile of the file"
     assert raw.gain_e_per_dn == pytest.approx(full / (WHITE - 520))
@@ -103,7 +96,7 @@ def test_noise_comes_from_the_files_profile(tmp_path: Path) -> None:
 
 @loop("pair", [(0.0, 0.0), (float("nan"), 1.0), (-1e-4, 1e-9), (2.0, 1e-9), (1e-4, 2.0), (1e-4,)])
 def test_a_profile_that_says_nothing_is_not_believed(pair: tuple[float, ...], tmp_path: Path) -> None:
-    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)), noise=pair)
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), noise=pair)
     assert read_noise_profile(path, 15_000.0) is None
 
 
@@ -111,17 +104,17 @@ def test_noise_is_estimated_from_a_frame_large_enough_and_assumed_otherwise(tmp_
     rng = np.random.default_rng(1)
     ramp = np.tile(np.geomspace(20.0, 4000.0, 512), (400, 1))
     electrons = rng.poisson(ramp) + 3.0 * rng.standard_normal(ramp.shape)  # at 0.5 e- a DN
-    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", levels(electrons / 0.5)))
+    raw, facts = open_raw(other_camera(tmp_path / "shot.dng", over_black(electrons / 0.5)))
     assert facts["noise"] == "estimated from the frame"
     assert facts["gain_e_per_dn"] == raw.gain_e_per_dn == pytest.approx(0.5, rel=0.2)
-    raw, facts = open_raw(other_camera(tmp_path / "small.dng", levels(np.full(SHAPE, 3000.0))))
+    raw, facts = open_raw(other_camera(tmp_path / "small.dng", over_black(np.full(SHAPE, 3000.0))))
     assert facts["noise"] == "assumed"
     assert (raw.white_dn - raw.black_dn) * raw.gain_e_per_dn == pytest.approx(ASSUMED_FULL_WELL_E)
     assert raw.read_noise_e == ASSUMED_DARK_NOISE_E
 
 
 def test_mosaics_that_are_not_bayers_are_refused(tmp_path: Path) -> None:
-    dn = levels(np.full((36, 60), 3000.0))
+    dn = over_black(np.full((36, 60), 3000.0))
     x_trans = tuple(int(colour) for colour in "121101010212121101101121212010101121")
     other_camera(tmp_path / "x.dng", dn, pattern=x_trans, repeat=(6, 6))
     other_camera(tmp_path / "row.dng", dn, pattern=(0, 1, 0, 2))
@@ -130,7 +123,7 @@ def test_mosaics_that_are_not_bayers_are_refused(tmp_path: Path) -> None:
 
 
 def test_without_rawpy_the_extra_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    path = other_camera(tmp_path / "shot.dng", levels(np.full(SHAPE, 3000.0)))
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)))
     monkeypatch.setitem(sys.modules, "rawpy", None)
     refusal(read_raw, path, match=r"^rawpy: not installed .*pip install 'rodcone\[photographs\]'")
 
@@ -147,7 +140,7 @@ def test_what_libraw_cannot_read_is_one_line(name: str, content: bytes, tmp_path
 @loop("side", [20_000, 60_000])
 def test_pixels_that_a_file_can_not_hold_are_refused_before_memory_is_taken(side: int, tmp_path: Path) -> None:
     """LibRaw itself takes 0.8 GB for 20 000 pixels a side, whatever the file holds."""
-    content = other_camera(tmp_path / "shot.dng", levels(np.zeros(SHAPE))).read_bytes()
+    content = other_camera(tmp_path / "shot.dng", over_black(np.zeros(SHAPE))).read_bytes()
     for code, held in ((256, SHAPE[1]), (257, SHAPE[0])):
         entry = struct.pack("<HHII", code, 4, 1, held)
         assert content.count(entry) == 1

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import tifffile
-from builders import any_order, raw_image
+from builders import any_order, mosaic_of, raw_image
 from command_line import call, check_refusals
+from file_samples import CAMERA_BLACK, CAMERA_WHITE, other_camera, over_black
 from PIL import Image
 from scipy.io import savemat
 
@@ -417,15 +418,8 @@ def test_a_picture_of_another_program_beside_the_raw_file_is_left_alone(tmp_path
 
 def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(tmp_path: Path) -> None:
     pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")
-    raw = negative(tmp_path / "shot.dng")
-    with tifffile.TiffFile(tmp_path / "shot.dng") as file:
-        page = file.pages[0]
-        kept = (33421, 33422, 50706, 50707, 50710, 50711, 50714, 50717, 50722, 50728, 50779)  # the rest is ours
-        tags = [(tag.code, tag.dtype, tag.count, tag.value, True) for tag in page.tags.values() if tag.code in kept]
-        dn = page.asarray()
-    tifffile.imwrite(
-        tmp_path / "other.dng", dn, photometric=32803, metadata=None, extratags=[*tags, (271, "s", 0, "Other", True)]
-    )
+    neutral = mosaic_of({"R": 0.5, "G": 1.0, "B": 0.7}, BAYER, SHAPE)  # as it was shot
+    other_camera(tmp_path / "other.dng", over_black(0.25 * neutral * (CAMERA_WHITE - max(CAMERA_BLACK))))
     code, out, _ = call(["develop", str(tmp_path / "other.dng"), "--ev", "0", "--json"])
     facts = json.loads(out)
     assert (code, facts["isp"], facts["noise"], facts["as_shot"]) == (0, "bayer", "assumed", "file")
@@ -433,7 +427,7 @@ def test_a_photograph_of_another_camera_is_developed_and_says_what_was_assumed(t
     with Image.open(tmp_path / "other.png") as picture:
         # the levels' rounding as above
         assert np.abs(np.asarray(picture) - 255 * encode_srgb(np.array(0.25))).max() <= 0.7
-        assert picture.size == raw.shape[::-1]
+        assert picture.size == SHAPE[::-1]
 
 
 def test_black_frames_are_black_and_no_division_by_zero(tmp_path: Path) -> None:
