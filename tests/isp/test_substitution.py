@@ -5,11 +5,11 @@ import pytest
 from builders import raw_image
 from hypothesis import given
 from hypothesis import strategies as st
+from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit
 from isp.substitution import green_snr, matrix_with_white, substitution_weight
 from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError
 from sensor.raw import RawImage
 
 
@@ -60,8 +60,7 @@ def test_the_papers_switch_decides_as_the_blend_does(snr: float, threshold: floa
 
 def test_a_negative_threshold_or_width_is_refused() -> None:
     for threshold, octaves in [(-1.0, 1.0), (float("nan"), 1.0), (1.0, -0.1), (1.0, float("nan"))]:
-        with pytest.raises(InputError, match=r"is not allowed; give 0 or more"):
-            substitution_weight(1.0, threshold, octaves)
+        refusal(substitution_weight, 1.0, threshold, octaves, match=r"is not allowed; give 0 or more")
 
 
 @given(st.floats(0.0, 1.0))

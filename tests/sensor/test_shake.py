@@ -10,7 +10,6 @@ from refusal import refusal
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from rodcone.errors import InputError
 from sensor.capture import capture
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
@@ -111,8 +110,7 @@ def test_energy_of_every_channel_is_kept_and_nothing_is_negative(time_s):
 
 
 def test_unknown_way_to_hold_a_camera_is_refused():
-    with pytest.raises(InputError, match="shake: 'tripod' is unknown; allowed: hand"):
-        held_lens(LensConfig(2.8), "tripod")
+    refusal(held_lens, LensConfig(2.8), "tripod", match="shake: 'tripod' is unknown; allowed: hand")
 
 
 @loop("name, time_s", [("staggered", 0.001), ("white_apart", 0.01)])

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from builders import raw_image
+from refusal import refusal
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours, fit_matrix, relative_noise, training
 from render.illuminants import illuminant
@@ -95,8 +96,7 @@ def test_a_frame_of_noise_alone_stays_finite_and_leaves_colour_to_w(fit: ColourF
 
 
 def test_channels_that_do_not_fit_are_refused(fit: ColourFit) -> None:
-    with pytest.raises(InputError, match=r"^channels: \('C',\) are not allowed; fitted were"):
-        fit.matrix(("C",))
+    refusal(fit.matrix, ("C",), match=r"^channels: \('C',\) are not allowed; fitted were")
     with pytest.raises(InputError, match=r"^responses: 4 channels don't fit the names \('R', 'G', 'B'\)"):
         fit_colours("RGB", RESPONSES, NM, LIGHT, SURFACES)
 
@@ -121,8 +121,7 @@ def test_a_plain_matrix_stands_at_any_noise_and_takes_w_as_it_is_for_luminance()
 
 def test_what_is_no_matrix_is_refused() -> None:
     for matrix in [np.ones((2, 3)), np.full((3, 3), np.nan), np.ones(9)]:
-        with pytest.raises(InputError, match=r"^matrix: shape .* is not allowed; give 3x3 finite numbers"):
-            ColourFit.of(matrix)
+        refusal(ColourFit.of, matrix, match=r"^matrix: shape .* is not allowed; give 3x3 finite numbers")
 
 
 def test_matrix_is_exact_for_a_camera_that_sees_as_the_observer_does() -> None:
@@ -142,8 +141,7 @@ def test_shapes_that_do_not_fit_are_refused() -> None:
         (np.ones((3, 7)), SURFACES, "responses"),
         (np.ones((3, 40)), np.ones((2, 40)), "reflectances"),
     ]:
-        with pytest.raises(InputError, match=f"^{name}: .*; give"):
-            fit_matrix(responses, NM, np.ones(40), surfaces)
+        refusal(fit_matrix, responses, NM, np.ones(40), surfaces, match=f"^{name}: .*; give")
 
 
 def test_matrix_takes_bands_of_uneven_widths() -> None:
@@ -156,8 +154,7 @@ def test_matrix_takes_bands_of_uneven_widths() -> None:
     widths[:2], halves[:2] = (2.0, 8.0), (NM[0] - 4.0, NM[0] + 1.0)
     uneven = fit_matrix(split[0], halves, split[2], split[1], widths)
     assert uneven == pytest.approx(fit_matrix(curves, NM, spd, SURFACES), abs=2e-3)
-    with pytest.raises(InputError, match="width_nm"):
-        fit_matrix(split[0], halves, split[2], split[1])
+    refusal(fit_matrix, split[0], halves, split[2], split[1], match="width_nm")
 
 
 def test_fit_takes_transposed_tables_alike() -> None:

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from builders import raw_image
+from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import PROCESSORS
@@ -25,10 +26,7 @@ def written(folder: Path, text: str) -> str:
 
 
 def told(name: str) -> str:
-    with pytest.raises(InputError) as error:
-        processor_of(name).develop(RAW, COLOURS)
-    assert "\n" not in str(error.value)
-    return str(error.value)
+    return refusal(lambda: processor_of(name).develop(RAW, COLOURS))
 
 
 def test_a_function_and_a_processor_of_ones_own_are_what_they_call(tmp_path: Path) -> None:
@@ -61,8 +59,7 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
         require_consent("isp", "mine.py", trust_code=True)
     assert own_version(name) == {"mine.py": digest_file(tmp_path / "mine.py")}
     for expected in ({}, {"mine.py": "0" * 32}, {"other.py": digest_file(tmp_path / "mine.py")}):
-        with pytest.raises(InputError, match="isn't the file that the sweep began with"):
-            processor_of(name, expected)
+        refusal(processor_of, name, expected, match="isn't the file that the sweep began with")
     assert not (tmp_path / trace).exists()
     processor_of(name, own_version(name))
     assert (tmp_path / trace).exists()

@@ -3,10 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
-import pytest
 from refusal import refusal
 
-from rodcone.errors import InputError
 from studies.budget.ledger import as_stated
 from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study
@@ -28,10 +26,7 @@ def written(folder: Path, text: str = TEXT) -> Path:
 
 
 def told(folder: Path, text: str = TEXT, *changes: str) -> str:
-    with pytest.raises(InputError) as error:
-        read_study(written(folder, text), changes)
-    assert "\n" not in str(error.value)
-    return str(error.value)
+    return refusal(read_study, written(folder, text), changes)
 
 
 def test_a_file_becomes_a_study_with_files_beside_it(tmp_path: Path) -> None:
