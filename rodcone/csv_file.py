@@ -31,9 +31,9 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
     Raises
     ------
     InputError
-        For a file that can't be read, a cell that is no number, another header, or wavelengths that aren't nm.
+        For a file that can't be read, a cell that is no number, another header, or wavelengths that aren't rising nm.
     """
-    fix = "give a CSV of numbers with a header"
+    fix = "give a CSV of numbers, with commas between them, and a header"
     with read_errors(f"{what}: {str(path)!r} can't be read", fix, (OSError, ValueError, csv.Error)):
         content = read_bounded(Path(path), MOST_BYTES)
         header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
@@ -49,6 +49,10 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
         raise InputError(
             f"{what}: {str(path)!r} has wavelengths up to {table[:, 0].max():g}; allowed: nm; convert them"
         )
+    falls = np.flatnonzero(np.diff(table[:, 0]) <= 0)
+    if falls.size:
+        pair = " then ".join(f"{nm:g}" for nm in table[falls[0] : falls[0] + 2, 0])
+        raise InputError(f"{what}: {str(path)!r} has wavelengths {pair}; allowed: strictly increasing; sort its rows")
     return dict(zip(names, table.T, strict=True))
 
 
