@@ -57,6 +57,16 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     return read_sensor(name if is_path else preset_file(str(name)), cfa)
 
 
+def table1_pixel(cfa: str = "rgbw") -> SensorConfig:
+    """Table 1, its noise voltages taken at the photodiode, as ISET computes: read 152.7 e-, DSNU 200 e-."""
+    return preset("table1_pixel", cfa)
+
+
+def table1_output(cfa: str = "rgbw") -> SensorConfig:
+    """Table 1, its noise voltages taken behind the analog gain of 7.98: read 19.1 e-, DSNU 25.1 e-."""
+    return preset("table1_output", cfa)
+
+
 def low_noise(cfa: str = "rgbw") -> SensorConfig:
     """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS)."""
     return preset("low_noise", cfa)

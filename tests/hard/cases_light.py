@@ -27,7 +27,7 @@ from isp.interleaved import reconstruct
 from render.radiance import SpectralRadiance
 from sensor.cfa import channel_map
 from sensor.config import LensConfig, SensorConfig
-from sensor.presets import preset
+from sensor.presets import table1_pixel
 
 MIDDLE = SIDE // 2
 
@@ -134,12 +134,10 @@ LIGHT_CASES = (
     Case(
         "starlight_table1",
         "1e-4 cd/m² for 66 ms, read noise 153 e⁻ and DSNU 200 e⁻",
-        lambda: Situation(at_level(STARLIGHT_CD_M2), preset("table1_pixel"), 0.066),
+        lambda: Situation(at_level(STARLIGHT_CD_M2), table1_pixel(), 0.066),
     ),
     Case("starlight_1h", "1e-4 cd/m² for an hour", lambda: Situation(at_level(STARLIGHT_CD_M2), exposure_s=3600.0)),
-    Case(
-        "moonlight_table1", "0.036 cd/m² for 66 ms", lambda: Situation(at_level(0.036), preset("table1_pixel"), 0.066)
-    ),
+    Case("moonlight_table1", "0.036 cd/m² for 66 ms", lambda: Situation(at_level(0.036), table1_pixel(), 0.066)),
     Case("one_photon", "0.01 e⁻ a pixel, a pixel without noise", lambda: _exactly(0.01)),
     Case("even_2_e", "an even field, 2 e⁻ a pixel and 6 in W", lambda: _even_light(2.0), _white_of_a_flat_field),
     Case("under_30_e", "29.9 e⁻: the last mean drawn from a table", lambda: _exactly(29.9)),
@@ -207,7 +205,7 @@ LIGHT_CASES = (
         _light_kept,
     ),
     Case("all_black", "no light at all", lambda: Situation(even(0.0))),
-    Case("all_black_table1", "no light, 153 e⁻ of read noise", lambda: Situation(even(0.0), preset("table1_pixel"))),
+    Case("all_black_table1", "no light, 153 e⁻ of read noise", lambda: Situation(even(0.0), table1_pixel())),
     Case("all_black_quiet", "no light on a sensor without dark noise", lambda: Situation(even(0.0), _quiet()), _dark),
     Case("all_saturated", "1e9 cd/m² everywhere", lambda: Situation(even(GLINT_CD_M2)), _all_saturated),
     Case(

@@ -8,7 +8,7 @@ from hard.case import Case, Situation, low_noise
 from hard.light import GLINT_CD_M2, SIDE, at_level, even, times
 
 from render.radiance import SpectralRadiance
-from sensor.presets import preset
+from sensor.presets import table1_pixel
 
 
 def _settings(luminance_cd_m2: float = 30.0, **develop: Any) -> Situation:
@@ -51,7 +51,7 @@ PICTURE_CASES = (
     Case(
         "substitution",
         "W gives the luminance of pure noise",
-        lambda: Situation(at_level(0.01), preset("table1_pixel"), develop={"substitution_snr": inf}),
+        lambda: Situation(at_level(0.01), table1_pixel(), develop={"substitution_snr": inf}),
     ),
     Case(
         "no_substitution",

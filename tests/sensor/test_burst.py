@@ -14,7 +14,7 @@ from sensor.capture import capture
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
-from sensor.presets import low_noise, preset
+from sensor.presets import low_noise, preset, table1_pixel
 from sensor.readout import read_out
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=10_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
@@ -91,7 +91,7 @@ def test_beyond_the_shortest_frame_s_well_pixels_are_told_to_be_saturated():
 
 
 def test_frames_of_a_noisy_camera_that_are_full_are_left_out_although_many_read_under_the_top():
-    sensor = preset("table1_pixel")
+    sensor = table1_pixel()
     device = draw_device(sensor, SHAPE, np.random.default_rng(1))
     merged = merge(shoot(sensor, 5e6, (0.001, 0.1), device))
     spread = np.sqrt((merged.temporal_variance + merged.fixed_variance).mean())

@@ -11,7 +11,7 @@ from render.spectrum import flat
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
-from sensor.presets import preset
+from sensor.presets import table1_pixel
 from sensor.response import check_window
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=3.0, dsnu_e=4.0, prnu=0.01)
@@ -58,7 +58,7 @@ def test_a_camera_without_dark_noise_has_black_at_0():
 
 
 def test_table_1_contradicts_itself_and_the_well_rules():
-    sensor = preset("table1_pixel")
+    sensor = table1_pixel()
     assert sensor.pixel.swing_e == pytest.approx(36_000.0, rel=1e-12)  # 1.08 V at 30 uV an electron
     full_e = (sensor.white_dn - sensor.black_dn) * sensor.gain_e_per_dn
     assert full_e == pytest.approx(15_000.0, rel=1e-12)

@@ -14,7 +14,7 @@ from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import read_csv, rgbw
-from sensor.presets import low_noise, names, preset, preset_file
+from sensor.presets import low_noise, names, preset, preset_file, table1_output, table1_pixel
 
 LEAST = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nfull_well_e = 15000\nread_noise_e = 3\ndsnu_e = 4\nprnu = 0.01\n"
 LENS = "[lens]\nf_number = 2.8\n"
@@ -41,22 +41,22 @@ def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(
 @loop(
     ("camera", "read_noise_e", "dsnu_e", "prnu", "diffraction"),
     [
-        ("table1_pixel", 4580.0 / 30.0, 6000.0 / 30.0, 0.017, 0.0),  # the paper has no blur
-        ("table1_output", 4580.0 / (30.0 * 7.98), 6000.0 / (30.0 * 7.98), 0.017, 0.0),
-        ("low_noise", 1.5, 1.0, 0.01, 1.0),
+        (table1_pixel, 4580.0 / 30.0, 6000.0 / 30.0, 0.017, 0.0),  # the paper has no blur
+        (table1_output, 4580.0 / (30.0 * 7.98), 6000.0 / (30.0 * 7.98), 0.017, 0.0),
+        (low_noise, 1.5, 1.0, 0.01, 1.0),
     ],
 )
 @loop("cfa", ["rgbw", "bayer"])
 def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, diffraction, cfa):
     pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu, analog_gain=7.98)
     expected = SensorConfig(pixel, LensConfig(2.8, diffraction=diffraction), cfa=MOSAICS[cfa])
-    assert preset(camera, cfa) == expected
-    assert preset(camera, cfa).gain_e_per_dn == expected.gain_e_per_dn
+    assert camera(cfa) == expected
+    assert camera(cfa).gain_e_per_dn == expected.gain_e_per_dn
 
 
 @loop(("pitch_um", "f_number"), [(6.0, 4.0), (3.0, 2.8), (2.0, 4.0)])
 def test_variants_for_figures_1_and_5_change_pitch_well_and_f_number_alone(pitch_um, f_number):
-    sensor, base = preset(f"table1_output_{pitch_um:g}um"), preset("table1_output")
+    sensor, base = preset(f"table1_output_{pitch_um:g}um"), table1_output()
     well_e = 15_000.0 * (pitch_um / 2.2) ** 2
     assert sensor.pixel.full_well_e == pytest.approx(well_e, rel=1e-12)
     assert sensor.pixel == replace(base.pixel, pitch_um=pitch_um, full_well_e=sensor.pixel.full_well_e)

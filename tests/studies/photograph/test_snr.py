@@ -10,7 +10,7 @@ from refusal import refusal
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.photodiodes import binned
-from sensor.presets import low_noise, preset
+from sensor.presets import low_noise, preset, table1_output
 from sensor.readings.noise import of_reading
 from studies.metrics.truth import light_of
 from studies.paper.setup import shot_noise_alone
@@ -52,7 +52,7 @@ def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
 
 
 def test_light_and_electrons_belong_together() -> None:
-    sensor = preset("table1_output")
+    sensor = table1_output()
     found = {each.channel: each for each in light_for_snr(10.0, sensor, "A", EXPOSURE_S)}
     assert list(found) == ["R", "G", "B", "W"]
     electrons = channel_e(sensor, light_of("A"), found["G"].luminance_cd_m2, EXPOSURE_S)

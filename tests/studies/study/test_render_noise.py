@@ -10,7 +10,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.scene import LightGroup
 from scenes.catalog import load
-from sensor.presets import low_noise, preset
+from sensor.presets import low_noise, table1_output
 from sensor.readout import noise_variance
 from studies.study import render_noise
 from studies.study.render_noise import MOST_SHARE, OF_PIXELS, noise_note, render_quietly, render_share, speckle_sizes
@@ -34,7 +34,7 @@ def grey(relative_error, size=(8, 10), spp=128, **changes):
 
 
 def test_an_even_picture_has_the_share_of_its_fullest_pixels():
-    for sensor in [low_noise(), low_noise("bayer"), preset("table1_output")]:
+    for sensor in [low_noise(), low_noise("bayer"), table1_output()]:
         # Auto exposure brings an even grey to 80 % of the well in its brightest channel that doesn't saturate; a
         # channel of n electrons has Monte Carlo variance (error n)^2, and the share grows with n.
         share = render_share(grey(0.01), sensor, 1e5, LONGEST_S)
@@ -96,7 +96,7 @@ def test_the_caps_stop_it(calls):
 
 def test_a_real_render_reaches_the_share_it_is_asked_for():
     scene = load("cornell_box")
-    share = lambda made: render_share(made, preset("table1_output"), 0.1, LONGEST_S)  # noqa: E731
+    share = lambda made: render_share(made, table1_output(), 0.1, LONGEST_S)  # noqa: E731
     bands = {"wavelength_nm": np.arange(405.0, 780.0, 50.0), "seed": 3}
     limits = {"most_share": MOST_SHARE, "max_spp": 1024, "max_seconds": 60.0}
     made = render_quietly(scene, (8, 8), share, **limits, **bands)
