@@ -156,7 +156,7 @@ def best_rows(places: Places, balance: str, scenes: Sequence[str], levels: Seque
 
 def written(metric: Metric, lead: float) -> str:
     """Write a lead, in bold where a person sees that RGBW is behind."""
-    return f"**{lead_text(metric, lead)}**" if lead <= -metric.seen else lead_text(metric, lead)
+    return f"**{lead_text(metric, lead)}**" if lead <= -metric.threshold else lead_text(metric, lead)
 
 
 def mean_cell(places: Places, balance: str, scenes: Sequence[str], level: str, best: bool = False) -> str:

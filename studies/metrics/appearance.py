@@ -10,7 +10,7 @@ from skimage.color import deltaE_cie76, rgb2lab
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from studies.metrics.pu21 import pu21_psnr_db
 from studies.metrics.quality import require_finite
-from studies.metrics.s_cielab import PIXELS_PER_DEGREE, seen_lab
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, eye_lab
 
 
 def flip(
@@ -48,14 +48,14 @@ class TruePicture:
         sRGB, not clipped; white is 1.
     encoded, lab : (h, w, 3) float64
         As a display shows it, and its CIELAB.
-    seen : (h, w, 3) float64
+    eye_lab : (h, w, 3) float64
         CIELAB after the eye's blur.
     """
 
     linear: Image
     encoded: Image
     lab: Image
-    seen: Image
+    eye_lab: Image
 
 
 @dataclass(frozen=True)
@@ -82,7 +82,7 @@ def true_picture(linear: Image) -> TruePicture:
     """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
     require_finite(truth=linear)
     encoded = encode_srgb(linear)
-    return TruePicture(linear, encoded, rgb2lab(encoded), seen_lab(encoded))
+    return TruePicture(linear, encoded, rgb2lab(encoded), eye_lab(encoded))
 
 
 def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
@@ -105,7 +105,7 @@ def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: f
         For a value that is NaN or infinite.
     """
     require_finite(picture=linear)
-    difference = deltaE_cie76(seen_lab(encoded), truth.seen)
+    difference = deltaE_cie76(eye_lab(encoded), truth.eye_lab)
     luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
     return Appearance(
         float(np.median(difference)),

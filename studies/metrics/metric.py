@@ -19,7 +19,7 @@ class Metric:
     unit : str
     higher : bool
         Whether higher is better.
-    seen : float
+    threshold : float
         Smallest difference of two pictures that is called visible, in the metric's unit; see `SEEN_BY`.
     """
 
@@ -28,22 +28,22 @@ class Metric:
     digits: int
     unit: str
     higher: bool
-    seen: float
+    threshold: float
 
 
-PSNR = Metric("psnr_db", "PSNR", 1, "dB", higher=True, seen=0.5)
-SSIM = Metric("ssim", "SSIM", 3, "", higher=True, seen=0.02)
-DELTA_E = Metric("delta_e_median", "ΔE2000, median", 1, "", higher=False, seen=1.0)
-DELTA_E_95 = Metric("delta_e_p95", "ΔE2000, 95 %", 1, "", higher=False, seen=1.0)
-S_CIELAB = Metric("s_cielab_median", "S-CIELAB, median", 1, "", higher=False, seen=1.0)
-S_CIELAB_95 = Metric("s_cielab_p95", "S-CIELAB, 95 %", 1, "", higher=False, seen=1.0)
-FLIP = Metric("flip_mean", "FLIP", 3, "", higher=False, seen=0.02)
-PU21 = Metric("pu21_psnr_db", "PU21-PSNR", 1, "dB", higher=True, seen=0.5)
-MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True, seen=0.02)
-CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False, seen=1.0)
-PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True, seen=0.5)
+PSNR = Metric("psnr_db", "PSNR", 1, "dB", higher=True, threshold=0.5)
+SSIM = Metric("ssim", "SSIM", 3, "", higher=True, threshold=0.02)
+DELTA_E = Metric("delta_e_median", "ΔE2000, median", 1, "", higher=False, threshold=1.0)
+DELTA_E_95 = Metric("delta_e_p95", "ΔE2000, 95 %", 1, "", higher=False, threshold=1.0)
+S_CIELAB = Metric("s_cielab_median", "S-CIELAB, median", 1, "", higher=False, threshold=1.0)
+S_CIELAB_95 = Metric("s_cielab_p95", "S-CIELAB, 95 %", 1, "", higher=False, threshold=1.0)
+FLIP = Metric("flip_mean", "FLIP", 3, "", higher=False, threshold=0.02)
+PU21 = Metric("pu21_psnr_db", "PU21-PSNR", 1, "dB", higher=True, threshold=0.5)
+MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True, threshold=0.02)
+CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False, threshold=1.0)
+PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True, threshold=0.5)
 _TEXTS = tomllib.loads(Path(__file__).with_name("meanings.toml").read_text("utf-8"))
-# Where the sizes in `Metric.seen` come from; what each metric says, and where it misleads, by its key.
+# Where the sizes in `Metric.threshold` come from; what each metric says, and where it misleads, by its key.
 SEEN_BY: str = _TEXTS["seen_by"]
 MEANINGS: dict[str, str] = _TEXTS["meanings"]
 ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for

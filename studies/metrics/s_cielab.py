@@ -35,7 +35,7 @@ def transfer(plane: int, cycles_per_degree: Floats) -> Floats:
     return np.asarray(gaussians @ (weights / weights.sum()))
 
 
-def seen_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
+def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """XYZ (h, w, 3) after the eye's blur, the picture mirrored at its borders.
 
     In cosine space, where a mirrored blur is a product: exact for any spread, the 4.3 degrees' too, in O(n log n).
@@ -49,9 +49,9 @@ def seen_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEG
     return np.asarray(idctn(spectrum, axes=(0, 1)) @ np.linalg.inv(XYZ_TO_OPPONENT).T)
 
 
-def seen_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
+def eye_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
-    return np.asarray(xyz2lab(seen_xyz(rgb2xyz(encoded), pixels_per_degree)))
+    return np.asarray(xyz2lab(eye_xyz(rgb2xyz(encoded), pixels_per_degree)))
 
 
 def s_cielab(
@@ -66,4 +66,4 @@ def s_cielab(
     pixels_per_degree : float
         Of the eye's view. With fewer the picture is nearer, and finer detail is seen.
     """
-    return np.asarray(deltaE_cie76(seen_lab(picture, pixels_per_degree), seen_lab(truth, pixels_per_degree)))
+    return np.asarray(deltaE_cie76(eye_lab(picture, pixels_per_degree), eye_lab(truth, pixels_per_degree)))

@@ -77,7 +77,7 @@ def _word(outcomes: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...],
         undecided = any(outcomes[metric.key][0] == UNKNOWN for metric in DECIDING)
         return "undecided" if undecided else "level", (), ()
     cases = [(metric, *outcomes[metric.key]) for metric in METRICS]
-    largest = max(abs(lead) / metric.seen for metric, outcome, lead in cases if outcome in (AHEAD, BEHIND))
+    largest = max(abs(lead) / metric.threshold for metric, outcome, lead in cases if outcome in (AHEAD, BEHIND))
     return f"{'clearly' if largest >= CLEARLY else 'a little'} {'better' if gained else 'worse'}", (), ()
 
 
@@ -86,7 +86,9 @@ def _seen(run: dict[str, Leads], outcome: str) -> str:
     named = []
     for family in FAMILIES:
         sizes = {
-            metric: float("inf") if metric == PSNR else float(np.abs(run[metric.key].mean[here]).max()) / metric.seen
+            metric: float("inf")
+            if metric == PSNR
+            else float(np.abs(run[metric.key].mean[here]).max()) / metric.threshold
             for metric in family
             if (here := run[metric.key].outcome == outcome).any()
         }
@@ -242,7 +244,7 @@ def balance_words(group: Group) -> str:
     for level, cells in enumerate(zip(group.ours, group.theirs, strict=True)):
         misses = [cell.mean("balance_delta_e") if _balances(cell) == {GRAY_WORLD} else 0.0 for cell in cells]
         miss, cell = np.nanmax([0.0, *misses]), cells[int(np.argmax(np.nan_to_num(misses)))]
-        if miss >= DELTA_E.seen and miss > abs(lead[level]):
+        if miss >= DELTA_E.threshold and miss > abs(lead[level]):
             cases.append((miss, camera_name(cell.camera), group.pair.levels[level], float(lead[level])))
     if not cases:
         return ""
@@ -260,7 +262,7 @@ def over_groups(groups: Sequence[Group]) -> str:
     parts = []
     for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
         cases = [
-            (abs(size) / metric.seen, metric, float(size), group.title, level)
+            (abs(size) / metric.threshold, metric, float(size), group.title, level)
             for group in groups
             for metric in METRICS
             for lead in [group.pair.leads[metric.key]]

@@ -120,10 +120,10 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
 
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
     """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
-    is_generated = [scene.name.startswith(DRAWN) for scene in report.scenes]
-    rest, means = len(groups) // len(is_generated), []
+    drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
+    rest, means = len(groups) // len(report.scenes), []
     for words, kind in (("named", False), ("drawn", True)):
-        members = [scene for scene, is_drawn in enumerate(is_generated) if is_drawn == kind]
+        members = [scene for scene, is_drawn in enumerate(drawn) if is_drawn == kind]
         for place in range(rest) if len(members) > 1 else ():
             pairs = [groups[scene * rest + place].pair for scene in members]
             ours, theirs = (

@@ -40,7 +40,7 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
     difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
     mean, half = difference.mean(axis=-1), half_width(difference)
     size = np.abs(mean)
-    clear, visible, invisible = size > half, size >= metric.seen, size + half < metric.seen
+    clear, visible, invisible = size > half, size >= metric.threshold, size + half < metric.threshold
     cases = [np.isnan(half), clear & visible & (mean > 0), clear & visible, clear | invisible]
     return Leads(mean, half, np.select(cases, [UNKNOWN, AHEAD, BEHIND, LEVEL], UNKNOWN))
 
@@ -51,7 +51,7 @@ def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
     Of the metrics `DECIDING`, each level is compared with the first of its run.
     """
     runs: list[list[int]] = []
-    sides = [side[metric.key].mean(axis=-1) / metric.seen for metric in DECIDING for side in (ours, theirs)]
+    sides = [side[metric.key].mean(axis=-1) / metric.threshold for metric in DECIDING for side in (ours, theirs)]
     figures = np.nan_to_num(np.array(sides), nan=np.inf, posinf=np.inf).T
     for level, now in enumerate(figures):
         before = figures[runs[-1][0]] if runs else None
@@ -95,7 +95,7 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
     counts. The interval is Student's, of the logarithms.
     """
     x = np.log(np.asarray(light_cd_m2, dtype=np.float64))
-    rises = np.diff(worse.mean(axis=1)) >= PSNR.seen
+    rises = np.diff(worse.mean(axis=1)) >= PSNR.threshold
     logs = np.array(
         [
             [_offset(x, curve, wanted, level, rises) for curve, wanted in zip(worse.T, better[level], strict=True)]

@@ -77,15 +77,15 @@ function drawLead(of, place, metric) {
   const found = range(lengths[of.along]).map((step) => verdict(metric, of, moved(place, of.along, step)));
   const ends = found.filter((one) => one.lead !== null).flatMap(({ lead, half }) => [lead - (half ?? 0), lead + (half ?? 0)]);
   if (!ends.length) return "";
-  const bounds = [Math.min(...ends, -1.5 * metric.seen), Math.max(...ends, 1.5 * metric.seen)];
+  const bounds = [Math.min(...ends, -1.5 * metric.threshold), Math.max(...ends, 1.5 * metric.threshold)];
   const { chart, xs, up } = frameOf(`Lead in ${metric.name}`, of, place, bounds);
-  const band = { class: "unseen", x: LEFT, width: RIGHT - LEFT, y: up(metric.seen), height: up(-metric.seen) - up(metric.seen) };
+  const band = { class: "unseen", x: LEFT, width: RIGHT - LEFT, y: up(metric.threshold), height: up(-metric.threshold) - up(metric.threshold) };
   const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step].lead)}`;
   chart.prepend(make("rect", band));
   chart.append(make("line", { class: "axis", x1: LEFT, x2: RIGHT, y1: up(0), y2: up(0) }),
-    make("text", { class: "tick", x: RIGHT, y: up(metric.seen) - 4, "text-anchor": "end" }, "A better"),
-    make("text", { class: "tick", x: RIGHT, y: up(-metric.seen) + 12, "text-anchor": "end" }, "B better"),
-    make("text", { class: "tick", x: LEFT + 4, y: up(-metric.seen) - 4 }, "grey: not seen"),
+    make("text", { class: "tick", x: RIGHT, y: up(metric.threshold) - 4, "text-anchor": "end" }, "A better"),
+    make("text", { class: "tick", x: RIGHT, y: up(-metric.threshold) + 12, "text-anchor": "end" }, "B better"),
+    make("text", { class: "tick", x: LEFT + 4, y: up(-metric.threshold) - 4 }, "grey: not seen"),
     drawLine(0, xs, found.map((one) => (one.lead === null ? null : [one.lead, one.half])), words, up));
   return chart;
 }

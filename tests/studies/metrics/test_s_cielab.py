@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from outside_truth import colour_science
 
-from studies.metrics.s_cielab import SPREADS, XYZ_TO_OPPONENT, s_cielab, seen_xyz
+from studies.metrics.s_cielab import SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
 
 
 def even(colour: tuple[float, float, float], shape: tuple[int, int] = (24, 40)) -> np.ndarray:
@@ -19,7 +19,7 @@ def test_a_grating_is_dimmed_by_the_sum_of_gaussians() -> None:
             grating = np.cos(np.pi * halves * (np.arange(size) + 0.5) / size)[None, :, None]
             opponent = np.zeros((3, size, 3))
             opponent[..., plane] = grating[..., 0]
-            seen = seen_xyz(opponent @ np.linalg.inv(XYZ_TO_OPPONENT).T, ppd) @ XYZ_TO_OPPONENT.T
+            seen = eye_xyz(opponent @ np.linalg.inv(XYZ_TO_OPPONENT).T, ppd) @ XYZ_TO_OPPONENT.T
             frequency = halves / 2 / size * ppd  # cycles per degree
             weights = np.array([weight for weight, _ in SPREADS[plane]])
             gains = [np.exp(-((np.pi * spread * frequency) ** 2)) for _, spread in SPREADS[plane]]
@@ -51,6 +51,6 @@ def test_all_of_it_agrees_with_colour_sciences_colours() -> None:
     colour, rng, ppd = colour_science(), np.random.default_rng(2), 60.0
     first, second = rng.uniform(0.2, 0.8, (2, 24, 24, 3))
     white = np.array([0.3127, 0.3290])
-    labs = [colour.XYZ_to_Lab(seen_xyz(colour.sRGB_to_XYZ(picture), ppd), white) for picture in (first, second)]
+    labs = [colour.XYZ_to_Lab(eye_xyz(colour.sRGB_to_XYZ(picture), ppd), white) for picture in (first, second)]
     # Its sRGB matrix and white have other last digits: 2e-3, as for CIEDE2000.
     assert s_cielab(first, second, ppd) == pytest.approx(colour.delta_E(*labs, method="CIE 1976"), rel=2e-3)

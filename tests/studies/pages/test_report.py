@@ -303,7 +303,7 @@ def test_numbers_in_sentences_are_recounted_from_the_rows() -> None:
     )
     assert "The plan of this sweep expects at most 2.1 % of all approximations together." in page
     for metric in (figures.PSNR, figures.FLIP):
-        assert f"Seen from {metric.seen}{' dB' if metric.unit else ''} on." in page
+        assert f"Seen from {metric.threshold}{' dB' if metric.unit else ''} on." in page
     alone = SAMPLE.sample_report(levels=3, cameras=("bayer",), sensors=SAMPLE.SENSORS[:1])
     dark, bright = (alone.cells[place].rows[0].psnr_db for place in (0, 2))  # type: ignore[union-attr]
     names = [level.name for level in alone.levels]

@@ -196,7 +196,9 @@ def compared() -> ReportData:
     def moved(made: Any) -> Any:
         at = [ord(letter) for letter in f"{made.sensor}{made.level}{made.processor}"]
         draw = np.random.default_rng([*at, made.seed]).standard_normal
-        known = {metric.key: 20 + metric.seen * (0.4 * (sum(at) % 5) + 0.1 * draw()) for metric in figures.METRICS[:8]}
+        known = {
+            metric.key: 20 + metric.threshold * (0.4 * (sum(at) % 5) + 0.1 * draw()) for metric in figures.METRICS[:8]
+        }
         return replace(made, **known)
 
     cameras = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")

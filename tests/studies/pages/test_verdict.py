@@ -62,7 +62,7 @@ def recount(ours: list[float], theirs: list[float], key: str) -> str:
 
 @pytest.mark.parametrize("metric", figures.METRICS, ids=lambda metric: metric.key)
 def test_direction_and_size_are_those_said_by_hand(metric: figures.Metric) -> None:
-    assert metric.seen == SEEN[metric.key]
+    assert metric.threshold == SEEN[metric.key]
     better, worse = (
         np.full(3, 10.0 + 1.1 * sign * SEEN[metric.key] * (-1 if metric.key in LOWER else 1)) for sign in (1, 0)
     )
