@@ -94,10 +94,6 @@ def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
     return check
 
 
-def _samples(name: str, value: Any) -> Any:
-    return at("rodcone.types:real_array")(name, value)
-
-
 def _size(name: str, value: Any) -> Any:
     sides = list(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping) else []
     if len(sides) != 2 or not all(_passes(_WHOLE, x) and x > 0 for x in sides):
@@ -202,9 +198,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "emission": _plain(Mapping, "a dict by light group"),
         "define": _plain(Mapping, "a dict of texts by name"),
         "index": _each(_WHOLE),
-        "SensorConfig.check_frame.shape": lambda name, value: tuple(_each(_WHOLE)(name, value)),
         "values": _value("numpy:ndarray", "give an array (..., h, w)"),
-        **dict.fromkeys(("dn", "RawImage.noise_at_sites.electrons"), _samples),
     }
 )
 # Functions that look at the result, and warn.

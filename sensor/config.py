@@ -181,22 +181,8 @@ class SensorConfig:
         InputError
             For an odd height or width of a camera that bins: a picture from a file may have any size.
         """
-        self._check_even(values.shape[-2:])
+        _check_even(self, values.shape[-2:])
         return values if self.chip.sites == 1 else block_sums(values)
-
-    @method
-    def check_frame(self, shape: tuple[int, ...]) -> None:
-        """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
-        check_covers(self.cfa, shape)
-        self._check_even(shape)
-
-    def _check_even(self, shape: tuple[int, ...]) -> None:
-        if self.chip.binning and any(side % 2 for side in shape):
-            even = " x ".join(str(side + side % 2) for side in shape)
-            raise InputError(
-                f"size: {' x '.join(map(str, shape))} pixels with binning {self.chip.binning.way!r}; allowed: even "
-                f"height and width; give {even}"
-            )
 
     @property
     def white_dn(self) -> int:
@@ -217,6 +203,21 @@ class SensorConfig:
     def gain_e_per_dn(self) -> float:
         """Electrons per DN: the full well reads the converter's top."""
         return self.pixel.full_well_e / (self.white_dn - self.black_dn)
+
+
+def check_frame(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
+    """Raise `InputError` for a frame of photodiodes that holds no tile of the mosaic, or no whole pixels."""
+    check_covers(sensor.cfa, shape)
+    _check_even(sensor, shape)
+
+
+def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
+    if sensor.chip.binning and any(side % 2 for side in shape):
+        even = " x ".join(str(side + side % 2) for side in shape)
+        raise InputError(
+            f"size: {' x '.join(map(str, shape))} pixels with binning {sensor.chip.binning.way!r}; allowed: even "
+            f"height and width; give {even}"
+        )
 
 
 def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: str = MERGED) -> SensorConfig:

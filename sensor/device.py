@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from rodcone.brief import brief
 from sensor.cfa import block_sums
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, check_frame
 from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
 from sensor.readings.by_channel import at_sites
@@ -59,7 +59,7 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     InputError
         Where the shape doesn't hold a tile of the mosaic, is odd for a sensor that bins, or `rng` isn't a Generator.
     """
-    sensor.check_frame(tuple(shape))
+    check_frame(sensor, shape)
     check_chip(sensor)
     in_charge = sensor.chip.in_charge
     key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])

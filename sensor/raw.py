@@ -168,30 +168,6 @@ class RawImage:
     def _plain(self, channel: str) -> ChannelNoise:
         return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
 
-    @method
-    def noise_at_sites(self, electrons: NDArray[Any]) -> NDArray[Any]:
-        """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
-
-        Parameters
-        ----------
-        electrons : (h, w) float32 or float64
-            Of the mosaic, or of a part of it that begins with a whole tile.
-        """
-        light = np.maximum(electrons, 0.0)
-        variance = light * self.prnu
-        variance *= variance
-        variance += light
-        variance += self.dark_noise_e**2
-        parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise]]
-        parts = [(light >= step.from_e, step) for step in self.noise_steps]
-        parts += [(mask(self.cfa, noise.channel, light.shape), noise) for noise in self.channel_noise]
-        for where, noise in parts:
-            bright_e = light[where]
-            variance[where] = (
-                noise.shot * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
-            )
-        return np.asarray(variance)
-
     @property
     def saturation_e(self) -> float:
         """Level from which a sample of channels that aren't read apart counts as saturated [e-]."""
@@ -208,16 +184,38 @@ class RawImage:
     @property
     def saturated(self) -> NDArray[np.bool_]:
         """Where the pixel counts as saturated, shape (h, w)."""
-        return self.full_at_sites(self.dn)
+        return full_at_sites(self, self.dn)
 
-    @method
-    def full_at_sites(self, dn: NDArray[Any]) -> NDArray[np.bool_]:
-        """Where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
-        full = np.asarray(dn >= self.saturation_e / self.gain_e_per_dn + self.black_dn)
-        for noise in self.channel_noise:
-            at = mask(self.cfa, noise.channel, full.shape)
-            full[at] = dn[at] >= self._saturation_e(noise) / self.gain_e_per_dn + self.black_dn
-        return full
+
+def full_at_sites(raw: RawImage, dn: NDArray[Any]) -> NDArray[np.bool_]:
+    """Where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
+    full = np.asarray(dn >= raw.saturation_e / raw.gain_e_per_dn + raw.black_dn)
+    for noise in raw.channel_noise:
+        at = mask(raw.cfa, noise.channel, full.shape)
+        full[at] = dn[at] >= raw._saturation_e(noise) / raw.gain_e_per_dn + raw.black_dn
+    return full
+
+
+def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
+    """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
+
+    Parameters
+    ----------
+    electrons : (h, w) float32 or float64
+        Of the mosaic, or of a part of it that begins with a whole tile.
+    """
+    light = np.maximum(electrons, 0.0)
+    variance = light * raw.prnu
+    variance *= variance
+    variance += light
+    variance += raw.dark_noise_e**2
+    parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise]]
+    parts = [(light >= step.from_e, step) for step in raw.noise_steps]
+    parts += [(mask(raw.cfa, noise.channel, light.shape), noise) for noise in raw.channel_noise]
+    for where, noise in parts:
+        bright_e = light[where]
+        variance[where] = noise.shot * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
+    return np.asarray(variance)
 
 
 def channel_variance(raw: RawImage, mean_e: ArrayLike) -> NDArray[np.float64]:

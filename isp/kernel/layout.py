@@ -42,7 +42,7 @@ from isp.similarity.guide import fraction_of_full
 from isp.similarity.interpolation import certainty
 from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
-from sensor.raw import RawImage
+from sensor.raw import RawImage, full_at_sites
 
 STRIP_BYTES = 300_000_000  # of all that a strip takes, 0.75 megapixels of RGBW; larger arrays are new memory each time
 
@@ -155,7 +155,7 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
-    full = raw.full_at_sites(dn)
+    full = full_at_sites(raw, dn)
     alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain

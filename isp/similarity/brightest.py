@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from isp.planes import BLOCK_ROWS
 from isp.settings import SIGMA_S, Settings
-from sensor.raw import RawImage
+from sensor.raw import RawImage, noise_at_sites
 
 # Of a flat field's samples 3 in 10 000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
 SIGMAS = 2.5  # over the brightest of 9 or more
@@ -29,7 +29,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
     z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
-    does who takes the paper's distance. The noise is `RawImage.noise_at_sites`.
+    does who takes the paper's distance. The noise is `sensor.raw.noise_at_sites`.
 
     Parameters
     ----------
@@ -50,7 +50,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
     block = max(BLOCK_ROWS // tile[0], 1) * tile[0]
     for first in range(0, shape[0], block):
         part = electrons[first : first + block]
-        bound = raw.noise_at_sites(part)
+        bound = noise_at_sites(raw, part)
         np.sqrt(bound, out=bound)
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2

@@ -21,7 +21,7 @@ from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.capture import capture
 from sensor.cfa import is_bayer
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
 from sensor.optics import form_image, left_out, spreads
@@ -290,7 +290,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
     height, width = _size(order, opened)
-    sensor.check_frame((height, width))
+    check_frame(sensor, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s
 

@@ -24,6 +24,7 @@ from render.transport import Transport
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys
 from rodcone.jit import backend
+from sensor.config import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.levels import parse_level
@@ -116,7 +117,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     check_range(scene, *study.render.range_nm)
     size = film_size(opened.size, study.render.size)
     for name in study.sensors:
-        preset(name).check_frame(size)
+        check_frame(preset(name), size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
     identity = digest_inputs([digest_scene(scene), size])

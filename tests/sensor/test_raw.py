@@ -10,7 +10,7 @@ from scipy import stats
 
 from sensor.calibration import ChannelNoise
 from sensor.cfa import RGBW
-from sensor.raw import SATURATION_SIGMAS, RawImage
+from sensor.raw import SATURATION_SIGMAS, RawImage, noise_at_sites
 
 RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)
 STATED = 3.2e-5  # of a normal under -4 sigma
@@ -36,7 +36,7 @@ def test_a_channel_read_apart_has_its_own_noise_and_saturation():
     """Four times the shot noise, read noise 6, DSNU 8 and a well of 6000: 3000 DN over black."""
     white = ChannelNoise("W", full_well_e=6000.0, shot=4.0, read_noise_e=6.0, dsnu_e=8.0, prnu=0.01)
     raw = replace(RAW, dn=np.full((4, 4), 1100, np.float32), channel_noise=(white,))
-    got = raw.noise_at_sites(np.full((4, 4), 500.0))
+    got = noise_at_sites(raw, np.full((4, 4), 500.0))
     assert got[0, 0] == got[0, 1] == pytest.approx(500 + 3**2 + 4**2 + 5**2, rel=1e-12)
     assert got[1, 1] == got[3, 3] == pytest.approx(4 * 500 + 6**2 + 8**2 + 5**2, rel=1e-12)
     np.testing.assert_array_equal(raw.saturated[:2, :2], [[True, True], [True, False]])

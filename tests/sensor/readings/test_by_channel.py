@@ -18,7 +18,7 @@ from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, preset_file
-from sensor.raw import RawImage
+from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.readings.by_channel import as_metered, of_channel
 from sensor.readout import noise_sources, noise_variance, read_out
@@ -195,7 +195,7 @@ def test_a_burst_keeps_each_channel_s_noise_and_well():
     merged = merged_raw(frames)
     white = mask(RGBW, "W", SHAPE)
     expected = noise_variance(4 * scene(), merged_sensor(sensor, 4), 4 * TIME_S)
-    told = merged.noise_at_sites(4 * scene())
+    told = noise_at_sites(merged, 4 * scene())
     for at in (white, mask(RGBW, "G", SHAPE)):
         assert told[at].mean() == pytest.approx(expected[at].mean(), rel=1e-3)
         assert merged.electrons[at].var() == pytest.approx(expected[at].mean(), rel=5 * np.sqrt(2 / at.sum()))
