@@ -65,6 +65,12 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     return content
 
 
+def require_ending(path: Path, *endings: str, what: str = "out") -> None:
+    """Raise `InputError` where a file's name has another ending, in capitals or not."""
+    if path.suffix.lower() not in endings:
+        raise InputError(f"{what}: {str(path)!r} has another ending; allowed: {', '.join(endings)}; rename it")
+
+
 def check_place(path: Path) -> None:
     """Make the folder of a file to be written later, and raise `OSError` where it can't be written there."""
     path.parent.mkdir(parents=True, exist_ok=True)

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.errors import InputError
+from rodcone.files import require_ending
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 from sensor.raw_files.dng import is_in_dng, is_own, read_dng, write_dng
@@ -16,8 +17,7 @@ ENDINGS = (".dng", ".tif", ".tiff")
 
 def check_ending(path: Path, tile: Tile) -> None:
     """Raise `InputError` where a mosaic can't be written under this name."""
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError(f"raw file: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
+    require_ending(path, *ENDINGS, what="raw file")
     if path.suffix.lower() == ".dng" and not is_in_dng(tile):
         raise InputError(
             f"raw file: {str(path)!r} can't hold the mosaic {tile}; allowed as DNG: Bayer, 2x2 RGBW, quads of both; "

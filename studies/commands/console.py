@@ -12,7 +12,7 @@ from rich.table import Table
 from rich.text import Text
 
 from rodcone.errors import InputError
-from rodcone.files import check_place, finite
+from rodcone.files import check_place, finite, require_ending
 from rodcone.time_text import parse_time
 
 
@@ -70,15 +70,6 @@ def require_new(out: Path, ending: str) -> None:
     require_ending(out, ending)
     if out.exists():
         raise InputError(f"out: {str(out)!r} exists; allowed: a new file; choose another name or remove it")
-
-
-def require_ending(out: Path, *endings: str) -> None:
-    """Raise `InputError` where a file to write has another ending."""
-    if out.suffix.lower() not in endings:
-        raise InputError(
-            f"out: {str(out)!r} doesn't end in {' or '.join(endings)}; allowed: {', '.join(endings)}; "
-            f"write {out.stem}{endings[0]}"
-        )
 
 
 def require_place(out: Path | None, *endings: str) -> None:

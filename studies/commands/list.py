@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from rodcone.errors import InputError
-from rodcone.files import check_place, write_files
-from studies.commands.console import print_json, print_table, require_ending
+from rodcone.files import check_place, require_ending, write_files
+from studies.commands.console import print_json, print_table
 
 # Scenes, lights and processors as their catalogues have them, which import Dr.Jit and take a second.
 NAMES = Path(__file__).parent.parent / "data" / "names.toml"

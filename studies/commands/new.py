@@ -8,7 +8,7 @@ from types import MappingProxyType
 from cyclopts import App
 
 from rodcone.errors import InputError, require_absent, require_keys, require_range
-from rodcone.files import check_place, write_files
+from rodcone.files import check_place, require_ending, write_files
 from rodcone.toml_file import read_toml
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import measured_camera
@@ -162,12 +162,8 @@ def _named(study_file: Path) -> list[str]:
 def _numbers(noise: Path | None) -> PixelNumbers:
     if noise is None:
         return PixelNumbers("no source of noise is given")
-    ending = noise.suffix.lower()
-    if ending == ".toml":
-        return numbers_of(read_report(noise))
-    if ending == ".dng":
-        return dng_numbers(noise)
-    raise InputError(f"noise: {str(noise)!r} has another ending; allowed: .toml, .dng; rename it")
+    require_ending(noise, ".toml", ".dng", what="noise")
+    return numbers_of(read_report(noise)) if noise.suffix.lower() == ".toml" else dng_numbers(noise)
 
 
 def _anchor(text: str) -> tuple[float, float]:

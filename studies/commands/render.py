@@ -16,10 +16,10 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, even_band
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
-from rodcone.files import check_place
+from rodcone.files import check_place, require_ending
 from rodcone.memory import memory, require_memory
 from rodcone.progress import progress, render_words
-from studies.commands.console import INTERRUPTED, Seconds, print_result, require_ending, say
+from studies.commands.console import INTERRUPTED, Seconds, print_result, say
 from studies.study.lit_scene import asked_spectra
 from studies.study.render_facts import render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene

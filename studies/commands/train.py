@@ -5,9 +5,9 @@ from pathlib import Path
 
 from isp.ple.prior import save_prior
 from rodcone.errors import InputError, require_name
-from rodcone.files import check_place
+from rodcone.files import check_place, require_ending
 from sensor.presets import preset
-from studies.commands.console import print_result, require_ending
+from studies.commands.console import print_result
 from studies.training.spectral import KINDS_OF, train_spectral_prior
 from studies.training.train import train_prior
 

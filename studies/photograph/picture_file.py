@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from isp.colour.encoding import ENCODINGS, quantise
 from isp.picture import Picture
 from rodcone.errors import InputError, require_name
-from rodcone.files import write_files
+from rodcone.files import require_ending, write_files
 
 DATA = Path(__file__).parents[1] / "data"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -66,8 +66,7 @@ BITS = (8, 16)
 
 def check_picture_file(path: Path, bits: int, encoding: str) -> None:
     """Raise `InputError` where a picture can't be written under this name, with these bits or in this encoding."""
-    if path.suffix.lower() not in ENDINGS:
-        raise InputError(f"out: {str(path)!r} has another ending; allowed: {', '.join(ENDINGS)}; rename it")
+    require_ending(path, *ENDINGS)
     if bits not in BITS:
         raise InputError(f"bits: {bits!r} is not allowed; give 8 or 16")
     require_name("encoding", encoding, ENCODINGS)

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from rodcone.csv_file import csv_text
-from rodcone.errors import unknown
-from rodcone.files import finite, write_files
+from rodcone.files import finite, require_ending, write_files
 from studies.sweep.database import COLUMNS, last_run, read_results, rows
 from studies.sweep.row import Row
 
@@ -43,8 +42,7 @@ def write_csv(table: Sequence[Row], path: Path) -> None:
     OSError
         Where the file can't be written.
     """
-    if path.suffix != ".csv":
-        raise unknown(f"out: {str(path)!r}: ending", path.suffix, (".csv",))
+    require_ending(path, ".csv")
     write_files({path: to_csv(table)})
 
 

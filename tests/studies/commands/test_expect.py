@@ -49,7 +49,7 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
         ("--light D66", "did you mean 'D65'"),
         ("--prior draw", "did you mean 'drawn'"),
         ("--exposure autoo", "did you mean 'auto'"),
-        ("-o gain.pdf", "doesn't end in .csv or .svg"),
+        ("-o gain.pdf", "has another ending; allowed: .csv, .svg"),
         ("-o gain.svg", "plots gains over the first camera, and there is one"),
     )
     check_refusals("expect low_noise", rows, tmp_path)

@@ -62,7 +62,7 @@ def test_bad_input_is_refused_and_writes_nothing(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     rows = (
         ("low_nois -o a.toml", "did you mean 'low_noise'?"),
-        ("low_noise -o a.txt", "write a.toml"),
+        ("low_noise -o a.txt", "allowed: .toml; rename it"),
         ("low_noise", "--out"),
     )
     check_refusals("new preset", rows, tmp_path)

@@ -20,5 +20,5 @@ def test_it_writes_a_prior_and_prints_its_path(tmp_path, monkeypatch):
 
 
 def test_another_ending_is_refused(tmp_path):
-    rows = [(f"--sensor low_noise -o {name}", "doesn't end in .npz") for name in ("prior.txt", "prior")]
+    rows = [(f"--sensor low_noise -o {name}", "has another ending; allowed: .npz") for name in ("prior.txt", "prior")]
     check_refusals("train", rows, tmp_path)
