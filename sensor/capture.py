@@ -7,6 +7,7 @@ from render.radiance import SpectralRadiance
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
@@ -18,7 +19,7 @@ from sensor.shake import shaken
 def capture(
     radiance: SpectralRadiance | SpectralIrradiance,
     sensor: SensorConfig,
-    exposure_s: float,
+    exposure_s: float | None = None,
     device: Device | None = None,
     rng: np.random.Generator | None = None,
     *,
@@ -27,8 +28,8 @@ def capture(
 ) -> RawImage:
     """Take one exposure: optics, expected electrons, readout.
 
-    Chip and noise that are left out are as `rodcone capture` has them; the same frame at every call then. A camera that
-    shakes (`LensConfig.shake_um`) takes a path of its own in each exposure.
+    What is left out is as `rodcone capture` has it by default; the same frame at every call then. A camera that shakes
+    (`LensConfig.shake_um`) takes a path of its own in each exposure.
 
     With Dr.Jit on LLVM or CUDA all of it runs there: signal in single precision, shot noise as
     `sensor.kernel.poisson` says (exact under 30 e-, distribution function within 5e-6 above). Otherwise, and with
@@ -41,8 +42,8 @@ def capture(
         Quickest as float32 with band-planar memory, as renders are. An image on the sensor, of `form_image`, saves
         forming it again.
     sensor : SensorConfig
-    exposure_s : float
-        0 or more [s].
+    exposure_s : float, optional
+        0 or more [s]; left out, by `sensor.exposure.auto_exposure_s`.
     device : Device, optional
         The chip, of the frame's size; left out, the one that ``default_rng([0, 0])`` draws.
     rng : numpy.random.Generator, optional
@@ -72,6 +73,9 @@ def capture(
     height, width = light.values.shape[:2]
     device = device or draw_device(sensor, (height, width), np.random.default_rng([0, 0]))
     rng = rng or np.random.default_rng([0, 1])
+    if exposure_s is None:
+        image = light if isinstance(light, SpectralIrradiance) else form_image(light, sensor)
+        exposure_s = auto_exposure_s(image, sensor)
     expected_e: NDArray[np.floating]
     if isinstance(light, SpectralIrradiance) and sensor.lens.shake_um:
         moved = shaken(channel_electrons(light, sensor, exposure_s), sensor, exposure_s, rng)
