@@ -130,9 +130,9 @@ def _electrons(variance_dn2: float, error_dn2: float, gain_dn_per_e: Estimate) -
 
 
 def _root(variance: float, error: float) -> Estimate:
-    """Root of an estimated variance; one that isn't above its error gives the root of the error as the error."""
+    """Root of an estimated variance; one that isn't above three errors, as of none, the root of the error."""
     value = sqrt(max(variance, 0.0))
-    return value, error / (2 * value) if variance > error else sqrt(error)
+    return value, error / (2 * value) if variance > 3 * error else sqrt(error)
 
 
 def _squares(image: NDArray[np.float64]) -> Floats:
