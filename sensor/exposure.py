@@ -11,7 +11,7 @@ from rodcone.errors import require_name, require_range
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
-from sensor.readings.by_channel import as_metered, wells_e
+from sensor.readings.by_channel import under_well
 from sensor.readout import noise_variance
 from sensor.response import behind_filters, channel_electrons
 
@@ -147,10 +147,9 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     expected_e : (h, w) float64
         Photo-electrons, as `sensor.response.expected_electrons`.
     """
-    sensor = as_metered(sensor, expected_e)
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
-    return float(np.where(expected_e < wells_e(sensor, expected_e.shape), bits, 0.0).mean())
+    return float(np.where(under_well(expected_e, sensor), bits, 0.0).mean())
 
 
 def warn_if_full(raw: RawImage) -> None:

@@ -49,10 +49,13 @@ def wells_e(sensor: SensorConfig, shape: tuple[int, ...]) -> float | NDArray[np.
     return at_sites(sensor, shape, sensor.pixel.full_well_e, lambda x: x.pixel_of(sensor.pixel).full_well_e / x.share)
 
 
-def well_e(sensor: SensorConfig, channel: str) -> float:
-    """Electrons at which a channel's sites are full."""
+def under_well(expected_e: Floats, sensor: SensorConfig, channel: str | None = None) -> NDArray[np.bool_]:
+    """Which pixels of a frame the light does not fill; parameters as of `as_metered`."""
+    sensor = as_metered(sensor, expected_e, channel)
+    if channel is None:
+        return np.asarray(expected_e < wells_e(sensor, expected_e.shape))
     alone, share = of_channel(sensor, channel)
-    return alone.pixel.full_well_e / share
+    return np.asarray(expected_e < alone.pixel.full_well_e / share)
 
 
 def at_sites(

@@ -11,7 +11,7 @@ from render.spectrum import even_bands
 from rodcone.brief import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from sensor.readings.by_channel import as_metered, wells_e
+from sensor.readings.by_channel import under_well
 from sensor.readout import noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel
@@ -140,8 +140,7 @@ def weigh(
     scale = level_cd_m2 * exposure_s
     # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
     expected_e = scale * np.maximum(sensor_effects.full.mean(axis=0), 0.0)
-    sensor = as_metered(sensor, expected_e)
-    below = expected_e < wells_e(sensor, expected_e.shape)
+    below = under_well(expected_e, sensor)
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
     noise_e2 = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
     blurred, sharp = sensor_effects.blurred**2 * pilot.spp, sensor_effects.sharp**2 * pilot.spp

@@ -16,7 +16,7 @@ from sensor.cfa import channels, mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.raw import RawImage
-from sensor.readings.by_channel import of_channel, well_e
+from sensor.readings.by_channel import of_channel
 from sensor.readout import as_read, dark_level_dn, noise_sources, noise_variance
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
@@ -159,7 +159,7 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
         "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
         "mean_e": mean_e,
         "dark_above_black_e": dark_e,
-        "full_well_e": {name: well_e(sensor, name) for name in mean_e},
+        "full_well_e": {name: x.pixel.full_well_e / s for name, (x, s) in alone.items()},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
         "render_noise": {

@@ -14,7 +14,7 @@ from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
-from sensor.readings.by_channel import as_metered, well_e, wells_e
+from sensor.readings.by_channel import under_well
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
@@ -70,9 +70,7 @@ def _noise_and_room(
     expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
-    sensor = as_metered(sensor, expected_e, channel)
-    full_e = wells_e(sensor, expected_e.shape) if channel is None else well_e(sensor, channel)
-    return noise_variance(expected_e, sensor, exposure_s, channel), np.asarray(expected_e < full_e)
+    return noise_variance(expected_e, sensor, exposure_s, channel), under_well(expected_e, sensor, channel)
 
 
 def charged_share(
