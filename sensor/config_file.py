@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from render.spectrum import Spectrum
 from rodcone.errors import InputError, in_place, read_errors
 from rodcone.toml_file import read_toml, strict_converter, structured
@@ -16,6 +18,7 @@ from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_cs
 from sensor.photodiodes import binned
 
 _SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm")
+MOST_OUTSIDE = 0.01  # share of a response outside the window
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
 
 
@@ -43,6 +46,8 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     -----
     RelativeResponsesWarning
         Where the responses are relative.
+    UserWarning
+        Where a window that the file doesn't state takes over 1 % from one.
     """
     tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
     with read_errors(f"sensor file: {str(path)!r} can't be read", "copy a preset: rodcone new preset NAME -o FILE"):
@@ -56,7 +61,23 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
             RelativeResponsesWarning,
             stacklevel=2,
         )
+    if "responses" in content and "window_nm" not in content:
+        _warn_of_window(sensor, content["responses"]["range_nm"], path)
     return sensor
+
+
+def _warn_of_window(sensor: SensorConfig, range_nm: Sequence[float], path: str | Path) -> None:
+    """Warn where the window that a file doesn't state takes over 1 % from a response."""
+    nm = np.arange(*range_nm)
+    seen = sensor.responses.band_average(sensor.channels, nm + 0.5, np.ones_like(nm))
+    inside = (nm >= sensor.window_nm[0]) & (nm < sensor.window_nm[1])
+    if (seen[:, ~inside].sum(axis=1) > MOST_OUTSIDE * seen.sum(axis=1)).any():
+        (low, high), (first, last) = sensor.window_nm, range_nm
+        warnings.warn(
+            f"sensor file {str(path)!r}: of its responses' {first:g} to {last:g} nm it lets in {low:g} to {high:g}; "
+            f"give window_nm = [{first:g}, {last:g}] too, or range_nm = [{low:g}, {high:g}]",
+            stacklevel=3,
+        )
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from render.spectrum import Spectrum
+from render.spectrum import VISIBLE_NM, Spectrum
 from rodcone.errors import InputError, require_keys
 from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
@@ -179,6 +179,8 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
     else:
         lines.append('cfa = ["W"]  # one channel without a filter, named W: numbers of a monochrome chip')
     lines += [_line(key, number) for key, number in numbers.settings.items()]
+    if shape is not None:
+        lines.append(f"window_nm = {list(VISIBLE_NM)}  # a choice: a filter that lets visible light in")
     lines += ["", *_responses(numbers, shape, curves), "", "[pixel]"]
     names = [field.name for field in fields(PixelConfig)]
     lines += [_line(key, numbers.pixel[key]) for key in names if key in numbers.pixel]

@@ -150,6 +150,16 @@ def test_responses_that_leave_something_to_guess_are_refused(tmp_path, text, par
     refusal(read_sensor, write(tmp_path, whole), words=("camera.toml", *parts))
 
 
+def test_a_window_that_is_not_stated_is_told_where_it_takes_some_of_a_response(tmp_path):
+    write(tmp_path, "wavelength_nm,W\n350,0\n400,0.5\n700,0.5\n1000,0.2\n", "nir.csv")
+    mono = 'cfa = "mono"\n' + LEAST + LENS
+    stated = '[responses]\ncsv = "nir.csv"\nrange_nm = [350, 1000]\nquantum_efficiency = "included"\n'
+    with pytest.warns(UserWarning, match=r"350 to 1000 nm it lets in 380 to 780; give window_nm = \[350, 1000\] too"):
+        read_sensor(write(tmp_path, mono + stated))
+    for whole in ("window_nm = [380, 780]\n" + mono + stated, mono + stated + "ir_cut = 700\n"):
+        read_sensor(write(tmp_path, whole.replace("350,", "375,")))
+
+
 def test_without_responses_the_project_s_own_are_used_and_c_is_w_s_curve():
     assert low_noise().responses is rgbw()
     clear = preset("low_noise", "rccc").responses
