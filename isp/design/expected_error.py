@@ -16,6 +16,7 @@ whose blur nobody undoes, beside x: with V_k = C_k - P_k, what the samples tell,
 """
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -77,19 +78,15 @@ class Noise:
     shot: float | Doubles = 1.0
 
 
+@cache
 def pooled(prior: Gaussians) -> Gaussians:
     """One Gaussian with the mean and covariance of the whole mixture."""
-    components, pixels, coefficients = prior.means.shape
-    mean = np.tensordot(prior.weights, prior.means, 1)
-    root = np.sqrt(prior.weights)[:, None, None]
-    spread = (prior.means - mean).reshape(components, -1) * root[:, :, 0] * np.hypot(1.0, prior.brightness)
-    inside = (prior.factors.reshape(components, pixels * coefficients, -1) * root).swapaxes(0, 1)
-    factors = np.concatenate([inside.reshape(pixels * coefficients, -1), spread.T], axis=1)
-    values, vectors = np.linalg.eigh(factors @ factors.T)
-    kept = values > values[-1] * 1e-12
-    factor = vectors[:, kept] * np.sqrt(values[kept])
-    rest = prior.weights @ prior.rest
-    return Gaussians(np.ones(1), mean[None], factor.reshape(1, pixels, coefficients, -1), rest[None], prior.brightness)
+    mean, root = np.tensordot(prior.weights, prior.means, 1), np.sqrt(prior.weights)[:, None, None]
+    spread = np.hypot(1.0, prior.brightness) * root * (prior.means - mean)
+    wide = np.concatenate([*(root[..., None] * prior.factors), np.moveaxis(spread, 0, -1)], axis=-1)
+    left, sizes, _ = np.linalg.svd(wide.reshape(mean.size, -1), full_matrices=False)
+    factors = (left * sizes).reshape(1, *mean.shape, -1)
+    return Gaussians(np.ones(1), mean[None], factors, prior.weights @ prior.rest[:, None], prior.brightness)
 
 
 def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
@@ -128,29 +125,32 @@ class Samples:
 
     Attributes
     ----------
+    weights : (component,) float64
+        Of the mixture.
     means : (component, sample) float64
         H mu_k.
     signal : (component, sample, sample) float64
         H C_k H'.
+    spread : (component, sample) float64
+        Variance of a sample at a brightness that its neighbours know.
     cross : (component, sample, pixel, coefficient) float64
         H C_k L' at the middle pixels.
     beside : (component, sample, pixel, coefficient) float64
         H C_k (2 - L)' there: `cross` without a lens.
     within : (component, pixel, coefficient, coefficient) float64
         C_k of each middle pixel's coefficients, and the square of what the lens does to its mean.
-    brightness : float
-        b of the prior.
     """
 
+    weights: Doubles
     means: Doubles
     signal: Doubles
+    spread: Doubles
     cross: Doubles
     beside: Doubles
     within: Doubles
-    brightness: float
 
 
-def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens: Doubles | None = None) -> Samples:
+def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens: Doubles) -> Samples:
     """Sample a prior's patches.
 
     Parameters
@@ -160,56 +160,42 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
         H: electrons of each sample from each pixel's coefficients.
     middle : (pixel,) intp
         Pixels whose error counts: the others lack neighbours.
-    lens : (pixel, pixel) float64, optional
+    lens : (pixel, pixel) float64
         L: share of one pixel's light (second axis) that falls on another (first axis); `sampling` has it too.
     """
-    directions, rest = prior.directions, prior.rest
-    loadings = np.einsum("spc,kpcd->ksd", sampling, directions, optimize=True)
-    inside = directions[:, middle]
-    plain = sampling.reshape(len(sampling), -1)
-
-    def cross(lens: Doubles) -> Doubles:
-        spread = np.einsum("pq,kqcd->kpcd", lens, directions, optimize=True)
-        plain = np.einsum("sqc,pq->spc", sampling, lens, optimize=True)
-        return np.asarray(
-            np.einsum("ksd,kpcd->kspc", loadings, spread, optimize=True) + rest[:, None, None, None] * plain
-        )
-
-    sharp = np.eye(sampling.shape[1])[middle]
-    blurred = sharp if lens is None else lens[middle]
-    off = np.einsum("pq,kqc->kpc", blurred - sharp, prior.means)
+    components, pixels, coefficients = prior.means.shape
+    h, f = sampling.reshape(len(sampling), -1), prior.directions.reshape(components, pixels * coefficients, -1)
+    hc, means = (h @ f) @ f.swapaxes(1, 2) + prior.rest[:, None, None] * h, prior.means.reshape(components, -1) @ h.T
+    by_pixel, signal = hc.reshape(components, len(h), pixels, coefficients), hc @ h.T
+    cross = np.einsum("pq,ksqc->kspc", lens[middle], by_pixel, optimize=True)
+    off = np.einsum("pq,kqc->kpc", lens[middle], prior.means) - prior.means[:, middle]
+    inside = np.concatenate([prior.directions[:, middle], off[..., None]], axis=-1)
     return Samples(
-        means=np.einsum("spc,kpc->ks", sampling, prior.means, optimize=True),
-        signal=loadings @ loadings.swapaxes(1, 2) + rest[:, None, None] * (plain @ plain.T),
-        cross=cross(blurred),
-        beside=cross(2 * sharp - blurred),
-        within=np.einsum("kpcd,kped->kpce", inside, inside, optimize=True)
-        + rest[:, None, None, None] * np.eye(sampling.shape[2])
-        + off[..., :, None] * off[..., None, :],
-        brightness=prior.brightness,
+        weights=prior.weights,
+        means=means,
+        signal=signal,
+        spread=np.diagonal(signal, axis1=1, axis2=2) - (prior.brightness * means) ** 2,
+        cross=cross,
+        beside=2 * by_pixel[:, :, middle] - cross,
+        within=inside @ inside.swapaxes(-1, -2) + prior.rest[:, None, None, None] * np.eye(coefficients),
     )
 
 
-def expected_error(weights: Doubles, samples: Samples, scale: Doubles, noise: Noise, forms: Doubles) -> Doubles:
+def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles) -> Doubles:
     """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
 
     Parameters
     ----------
-    weights : (component,) float64
-        Of the mixture.
     samples : Samples
-    scale : (sample,) float64
-        Light times exposure of each sample, over the unit of `samples`.
+    scale : float
+        Light times exposure, over the unit of `samples`.
     noise : Noise
     forms : (metric, component, pixel, coefficient, coefficient) float64
         W: the squared error of a pixel is e' W e, e that of its coefficients.
     """
-    signal = samples.signal * scale[:, None] * scale
-    mean_e = samples.means * scale
-    # Other samples know the brightness: only what else they don't know makes a sample full or not.
-    spread = np.diagonal(signal, axis1=1, axis2=2) - (samples.brightness * mean_e) ** 2
-    total = signal + np.eye(len(scale)) * sample_variance(mean_e, spread, noise)[:, None]
-    cross, beside = samples.cross * scale[:, None, None], samples.beside * scale[:, None, None]
+    variance = sample_variance(scale * samples.means, scale**2 * samples.spread, noise)
+    total = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1])
+    cross, beside = scale * samples.cross, scale * samples.beside
     gain = np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1)).reshape(cross.shape)
     left = samples.within - np.einsum("kspc,kspe->kpce", beside, gain, optimize=True)  # W leaves its even part
-    return np.asarray(np.einsum("k,mkpce,kpce->m", weights, forms, left, optimize=True) / left.shape[1])
+    return np.asarray(np.einsum("k,mkpce,kpce->m", samples.weights, forms, left, optimize=True) / left.shape[1])

@@ -1,7 +1,7 @@
 """Expected error of a sensor under a prior over patches, at a level of light: closed form, no render, no pictures."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import cache
 from math import hypot, log10, sqrt
 
@@ -9,15 +9,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.design.expected_error import Gaussians, Noise, Samples, expected_error, pooled, sampled
+from isp.design.expected_error import Noise, expected_error, pooled, sampled
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.photometry import tristimulus
-from render.spectrum import Floats, Spectrum
-from rodcone.colour_spaces import D65_XY, adapt_to_d65, luminance_of_srgb, xyz_from_xy, xyz_to_srgb
-from rodcone.errors import unknown
-from sensor.cfa import Tile, channels, mask
+from render.spectrum import Floats
+from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
+from rodcone.errors import InputError, require_name
+from sensor.cfa import Tile, channel_map, channels
 from sensor.config import SensorConfig
-from sensor.curves import Responses
 from sensor.diffraction import sampled_otf
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import WAVELENGTH_NM, camera_equation
@@ -26,10 +25,12 @@ from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, light_of
 
-MIDDLE = PATCH // 4  # pixels at a patch's sides whose error doesn't count: they lack neighbours
+# Numbers of the pixels whose error counts, row by row: a patch's others lack neighbours.
+MIDDLE = np.arange(PATCH**2).reshape(PATCH, PATCH)[2:-2, 2:-2].ravel()
 METERED = 64  # side of the frame, drawn from the prior, that the exposure looks at
 _LAB_LINEAR = 216 / 24389  # CIE 15: where the cube root of Lab becomes a line
-_LEAST_SRGB = 0.0031308  # IEC 61966-2-1: where the curve of sRGB becomes a line
+_LAB = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])  # L*, a*, b* of roots of X, Y, Z
+_NODES, _SHARES = np.polynomial.hermite_e.hermegauss(40)  # quadrature over a Gaussian
 
 
 @dataclass(frozen=True)
@@ -88,56 +89,42 @@ def view_of(prior_name: str, light_name: str) -> LitPrior:
 
 def responses_e(sensor: SensorConfig, view: LitPrior) -> Floats:
     """Electrons of each channel's pixel in a second from a coefficient of 1, reflectance 1 having 1 cd/m^2."""
-    light = view.light
-    weights = electrons_per_irradiance(sensor.undivided, light.wavelength_nm, light.width_nm, 1.0)
-    return np.asarray(weights * light.spectrum @ view.basis * camera_equation(sensor.lens))
-
-
-def unit_response_e(sensor: SensorConfig, view: LitPrior) -> Floats:
-    """Electrons of a pixel of response 1 in each band, as `responses_e` has them; shape (band, coefficient)."""
-    light, ones = view.light, Spectrum(np.array([300.0, 1100.0]), np.ones(2))
-    even = replace(sensor, cfa=("W",), responses=Responses({"W": ones})).undivided
-    weights = electrons_per_irradiance(even, light.wavelength_nm, light.width_nm, 1.0)[0]
-    return np.asarray((weights * light.spectrum)[:, None] * view.basis * camera_equation(sensor.lens))
+    weights = electrons_per_irradiance(sensor.undivided, view.light.wavelength_nm, view.light.width_nm, 1.0)
+    return np.asarray(weights * view.light.spectrum @ view.basis * camera_equation(sensor.lens))
 
 
 def metric_rows(prior: SpectralPrior, view: LitPrior, reflectance: float) -> tuple[Floats, ...]:
     """R of encoded sRGB, encoded luminance, L* and (a*, b*) for errors of a patch of mean luminous reflectance 1.
 
     Each has the shape (component, pixel, direction, coefficient), at the middle pixels; |R e|^2 is the squared error.
-    Reflectance 1 is shown as white.
+    Reflectance 1 is shown as white. A curve's slope is that of the straight line nearest to it over the values of a
+    component, which may lie beyond the curve's ends (statistical linearisation, Booton 1954).
     """
-    means, to_xyz = prior.patches.means[:, middle_pixels()], view.xyz * reflectance
-    to_srgb = xyz_to_srgb(to_xyz.T).T
-    # Slopes about the component's mean: of the curve of sRGB, and of the cube root of Lab.
-    linear, xyz = means @ to_srgb.T, means @ to_xyz.T
-    srgb = _curve_slope(linear)[..., None] * to_srgb
-    luminance = _curve_slope(xyz[..., 1:2])[..., None] * luminance_of_srgb(to_srgb.T)
-    white = xyz_from_xy(D65_XY)
-    relative = np.maximum(xyz / white, _LAB_LINEAR)
-    root = (relative ** (-2 / 3) / 3)[..., None] * (to_xyz / white[:, None])
-    lab = np.stack([116 * root[..., 1, :], 500 * (root[..., 0, :] - root[..., 1, :]),
-                    200 * (root[..., 1, :] - root[..., 2, :])], axis=-2)  # fmt: skip
-    return srgb / sqrt(3), luminance, lab[..., :1, :], lab[..., 1:, :]
+    means, factors = prior.patches.means[:, MIDDLE], prior.patches.factors[:, MIDDLE]
+    rest = prior.patches.rest[:, None, None]
+
+    def through(curve: Callable[[Floats], Floats], rows: Floats) -> Floats:
+        deviation = np.sqrt(((rows @ factors) ** 2).sum(axis=-1) + rest * (rows**2).sum(axis=1))
+        values = curve((means @ rows.T)[..., None] + deviation[..., None] * _NODES)
+        slope = values @ (_SHARES * _NODES) / _SHARES.sum() / deviation
+        return np.asarray(slope[..., None] * rows)
+
+    xyz = view.xyz * reflectance
+    lab = _LAB @ through(_lab_root, xyz / xyz_from_xy(D65_XY)[:, None])
+    srgb = through(encode_srgb, xyz_to_srgb(xyz.T).T) / sqrt(3)
+    return srgb, through(encode_srgb, xyz[1:2]), lab[..., :1, :], lab[..., 1:, :]
 
 
-def _curve_slope(linear: Floats) -> Floats:
-    return np.asarray(1.055 / 2.4 * np.clip(linear, _LEAST_SRGB, 1.0) ** (1 / 2.4 - 1))
+def _lab_root(relative: Floats) -> Floats:
+    shown = np.maximum(relative, 0.0)
+    return np.where(shown > _LAB_LINEAR, np.cbrt(shown), (shown * 24389 / 27 + 16) / 116)
 
 
-def middle_pixels() -> np.ndarray[tuple[int], np.dtype[np.intp]]:
-    """Numbers of a patch's middle pixels, row by row."""
-    inside = np.zeros((PATCH, PATCH), dtype=bool)
-    inside[MIDDLE:-MIDDLE, MIDDLE:-MIDDLE] = True
-    return np.flatnonzero(inside)
-
-
-def sampling_of(sensor: SensorConfig, responses: Floats, blur: bool = False) -> Floats:
+def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats:
     """H of a patch: electrons of each sample from each pixel's coefficients, through lens, filters and crosstalk."""
-    site = sites_of(sensor.cfa, channels(sensor.cfa))
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
-    lens, spread = lens_of(sensor, blur), spread_of(sensor.pixel.crosstalk)
-    return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, responses[site], optimize=True))
+    filters, spread = responses[sites_of(sensor.cfa)], spread_of(sensor.pixel.crosstalk)
+    return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, filters, optimize=True))
 
 
 def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
@@ -149,9 +136,9 @@ def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
     return points.reshape(PATCH**2, -1).T
 
 
-def sites_of(tile: Tile, names: Sequence[str]) -> NDArray[np.intp]:
-    """Number among some channels of that of each pixel of a patch, shape (pixel,)."""
-    return np.asarray(np.argmax([mask(tile, name, (PATCH, PATCH)).ravel() for name in names], axis=0))
+def sites_of(tile: Tile) -> NDArray[np.intp]:
+    """Number among a tile's channels of that of each pixel of a patch, shape (pixel,)."""
+    return np.array([channels(tile).index(name) for name in channel_map(tile, (PATCH, PATCH)).flat])
 
 
 def spread_of(crosstalk: float) -> Floats:
@@ -187,77 +174,58 @@ def expect(
     Raises
     ------
     InputError
-        For an unknown light, prior or rule of exposure.
+        For an unknown light, prior or rule of exposure, or a pixel of several readings.
     """
-    if prior not in PRIORS:
-        raise unknown("prior", prior, PRIORS)
-    spectral, seen, forms = load_prior(prior), view_of(prior, light), _forms(prior, light)
+    require_name("prior", prior, PRIORS)
+    if count := len(sensor.chip.readings):
+        raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
+    spectral, forms = load_prior(prior), _forms(prior, light)
+    responses, lens = responses_e(sensor, view_of(prior, light)), lens_of(sensor, blur)
+    sampling, frame_e = sampling_of(sensor, responses, lens), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
+    # Component known, and one Gaussian in the mixture's place.
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
-    responses = responses_e(sensor, seen)
-    sampling, frame_e = sampling_of(sensor, responses, blur), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
-    known, linear = (
-        sampled(patches, sampling, middle_pixels(), lens_of(sensor, blur))
-        for patches in (spectral.patches, pooled_patches(prior))
-    )
-    by_light: dict[str, tuple[list[float], float]] = {}
-    result = []
-    for level_cd_m2 in levels_cd_m2:
-        white_cd_m2 = float(level_cd_m2) / spectral.reflectances.mean()
+    mixtures = ((spectral.patches, forms), (pooled(spectral.patches), pooled_forms))
+    by_mixture = [(sampled(patches, sampling, MIDDLE, lens), metrics) for patches, metrics in mixtures]
+
+    def at(level_cd_m2: float) -> ExpectedError:
+        white_cd_m2 = level_cd_m2 / spectral.reflectances.mean()
         time_s, noise = exposed(sensor, frame_e * white_cd_m2, exposure)
         scales = spectral.reflectances * white_cd_m2 * time_s
-        key = f"{white_cd_m2 * time_s:.9g} {noise}"  # at full exposure more light changes nothing
-        if key not in by_light:
-            errors = _mean_error(spectral.patches.weights, known, scales, noise, forms)
-            by_light[key] = errors, _mean_error(np.ones(1), linear, scales, noise, pooled_forms)[0]
-        errors, linear_error = by_light[key]
-        result.append(
-            ExpectedError(
-                luminance_cd_m2=float(level_cd_m2),
-                exposure_s=time_s,
-                psnr_db=-10 * log10(errors[0]),
-                linear_psnr_db=-10 * log10(linear_error),
-                luminance_db=-10 * log10(errors[1]),
-                lightness=sqrt(errors[2]),
-                colour=sqrt(errors[3]),
-            )
+        known, linear = (
+            np.mean([expected_error(samples, s, noise, w) for s, w in zip(scales, metrics, strict=True)], axis=0)
+            for samples, metrics in by_mixture
         )
-    return result
+        return ExpectedError(
+            luminance_cd_m2=level_cd_m2,
+            exposure_s=time_s,
+            psnr_db=-10 * log10(known[0]),
+            linear_psnr_db=-10 * log10(linear[0]),
+            luminance_db=-10 * log10(known[1]),
+            lightness=sqrt(known[2]),
+            colour=sqrt(known[3]),
+        )
+
+    return [at(float(level_cd_m2)) for level_cd_m2 in levels_cd_m2]
 
 
 @cache
 def _forms(prior: str, light: str) -> Floats:
     """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
     spectral, seen = load_prior(prior), view_of(prior, light)
-    by_reflectance = [metric_rows(spectral, seen, reflectance) for reflectance in spectral.reflectances]
-    return np.stack([np.stack([row.swapaxes(-1, -2) @ row for row in rows]) for rows in by_reflectance])
-
-
-@cache
-def pooled_patches(prior: str) -> Gaussians:
-    """One Gaussian with mean and covariance of the prior's patches."""
-    return pooled(load_prior(prior).patches)
+    by_reflectance = (metric_rows(spectral, seen, reflectance) for reflectance in spectral.reflectances)
+    return np.array([[row.swapaxes(-1, -2) @ row for row in rows] for rows in by_reflectance])
 
 
 @cache
 def drawn_pixels(prior: str) -> Floats:
     """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
-    spectral, rng, count = load_prior(prior), np.random.default_rng(0), METERED**2
-    component, pixel = rng.choice(len(spectral.patches.weights), count, p=spectral.patches.weights), middle_pixels()[0]
+    spectral, rng, shape = load_prior(prior), np.random.default_rng(0), (METERED, METERED)
+    component, pixel = rng.choice(len(spectral.patches.weights), shape, p=spectral.patches.weights), MIDDLE[0]
     factors = spectral.patches.factors[component, pixel]
-    coefficients = spectral.patches.means[component, pixel] + np.einsum(
-        "ncd,nd->nc", factors, rng.standard_normal((count, factors.shape[-1]))
-    )
-    coefficients *= spectral.reflectances[rng.integers(len(spectral.reflectances), size=count), None]
+    off = (factors @ rng.standard_normal((*shape, factors.shape[-1], 1)))[..., 0]
+    coefficients = (spectral.patches.means[component, pixel] + off) * rng.choice(spectral.reflectances, (*shape, 1))
     # No surface reflects more light of any wavelength than falls on it: a deep colour is no bright one.
-    coefficients /= np.maximum(1.0, (coefficients @ spectral.spectra.T).max(axis=1, keepdims=True))
-    return np.asarray(coefficients.reshape(METERED, METERED, -1))
-
-
-def _mean_error(weights: Floats, samples: Samples, scales: Floats, noise: Noise, forms: Floats) -> list[float]:
-    """Mean over equally likely reflectances of a patch, shape (metric,)."""
-    ones = np.ones(samples.means.shape[1])
-    errors = [expected_error(weights, samples, s * ones, noise, form) for s, form in zip(scales, forms, strict=True)]
-    return [float(error) for error in np.mean(errors, axis=0)]
+    return np.asarray(coefficients / np.maximum(1.0, (coefficients @ spectral.spectra.T).max(axis=-1, keepdims=True)))
 
 
 def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -> tuple[float, Noise]:
@@ -266,26 +234,18 @@ def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -
     `per_second_e` are electrons behind every filter, shape (h, w, channel).
     """
     time_s = exposure_of_electrons_s(exposure, per_second_e, sensor) if isinstance(exposure, str) else exposure
-    metered = as_metered(sensor, behind_filters(per_second_e * time_s, sensor)) if sensor.chip.channels else sensor
-    return time_s, noise_of(metered, time_s)
+    return time_s, noise_of(as_metered(sensor, behind_filters(per_second_e * time_s, sensor)), time_s)
 
 
 def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
-    """Noise of a sample, every source of the sensor in it; of a patch's samples where channels are read apart."""
-    plain = _noise_of_channel(sensor, exposure_s, "")
-    noise = [_noise_of_channel(sensor, exposure_s, name) for name in channels(sensor.cfa)]
-    if all(x == plain for x in noise):
-        return plain
-    by_channel = np.array([(x.dark_e, x.full_e, x.shot) for x in noise])
-    dark_e, full_e, shot = by_channel[sites_of(sensor.cfa, channels(sensor.cfa))].T
-    return Noise(dark_e=dark_e, prnu=plain.prnu, full_e=full_e, shot=shot)
+    """Noise of a patch's samples, every source of the sensor in it; channels may be read apart."""
 
+    def of(channel: str) -> tuple[float, ...]:
+        alone, share = of_channel(sensor, channel)
+        pixel, rounding_e = alone.pixel, alone.gain_e_per_dn / sqrt(12)
+        dark_current_e = pixel.dark_current_e_per_s * exposure_s
+        dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
+        return dark_e / share, pixel.fixed_gain, (pixel.full_well_e - dark_current_e) / share, 1 / share
 
-def _noise_of_channel(sensor: SensorConfig, exposure_s: float, channel: str) -> Noise:
-    alone, share = of_channel(sensor, channel)
-    pixel = alone.pixel
-    dark_current_e = pixel.dark_current_e_per_s * exposure_s
-    rounding_e = alone.gain_e_per_dn / sqrt(12)
-    dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
-    full_e = pixel.full_well_e - dark_current_e
-    return Noise(dark_e=dark_e / share, prnu=pixel.fixed_gain, full_e=full_e / share, shot=1 / share)
+    dark_e, prnu, full_e, shot = np.array([of(name) for name in channels(sensor.cfa)])[sites_of(sensor.cfa)].T
+    return Noise(dark_e=dark_e, prnu=prnu, full_e=full_e, shot=shot)

@@ -1,5 +1,7 @@
 """Filters of the least expected error for a tile, by the slope of the closed form."""
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.optimize import minimize
 
@@ -11,19 +13,20 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
-from studies.design.expect import (
-    drawn_pixels,
-    exposed,
-    metric_rows,
-    middle_pixels,
-    sites_of,
-    spread_of,
-    unit_response_e,
-    view_of,
-)
+from sensor.optics import camera_equation
+from sensor.response import electrons_per_irradiance
+from studies.design.expect import MIDDLE, LitPrior, drawn_pixels, exposed, metric_rows, sites_of, spread_of, view_of
 from studies.design.search import BEHIND, Goal, Progress, tile_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
+
+
+def unit_response_e(sensor: SensorConfig, view: LitPrior) -> Floats:
+    """Electrons of a pixel of response 1 in each band, as `responses_e` has them; shape (band, coefficient)."""
+    light, ones = view.light, Spectrum(np.array([300.0, 1100.0]), np.ones(2))
+    even = replace(sensor, cfa=("W",), responses=Responses({"W": ones})).undivided
+    weights = electrons_per_irradiance(even, light.wavelength_nm, light.width_nm, 1.0)[0]
+    return np.asarray((weights * light.spectrum)[:, None] * view.basis * camera_equation(sensor.lens))
 
 
 def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> SensorConfig:
@@ -50,8 +53,8 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
     # What all rounds share.
     prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
     reference_db = tile_db(goal, goal.reference)
-    places = sites_of(tile, names)
-    spread, middle = spread_of(goal.sensor.pixel.crosstalk), middle_pixels()
+    places = sites_of(tile)
+    spread = spread_of(goal.sensor.pixel.crosstalk)
     rows = [[every[metric] for metric in (0, 1, 3)] for every in
             (metric_rows(prior, seen, mean) for mean in prior.reflectances)]  # fmt: skip
     whites_cd_m2 = goal.levels_cd_m2 / prior.reflectances.mean()
@@ -81,7 +84,7 @@ def best_filters(goal: Goal, tile: Tile, rounds: int, progress: Progress) -> Sen
         # At full exposure more light changes nothing.
         first = [[light for light, _ in at].index(light) for light, _ in at]
         lights = [(prior.reflectances * at[index][0], at[index][1]) for index in sorted(set(first))]
-        errors, slopes = error_slopes(prior.patches, sampling, middle, lights, rows)
+        errors, slopes = error_slopes(prior.patches, sampling, MIDDLE, lights, rows)
         level = np.searchsorted(sorted(set(first)), first)
         gains_db = -10 * np.log10(errors[level].T) - reference_db
         by_sample = -10 / np.log(10) * (slopes / errors[..., None, None, None])[level].swapaxes(0, 1)

@@ -38,9 +38,8 @@ def covariance(prior: Gaussians, k: int) -> np.ndarray:
 
 
 def error(prior: Gaussians, scale: float, noise: Noise) -> float:
-    samples = sampled(prior, mosaic(), MIDDLE)
-    forms = unit_forms(len(prior.weights))
-    return float(expected_error(prior.weights, samples, np.full(PIXELS, scale), noise, forms)[0])
+    samples = sampled(prior, mosaic(), MIDDLE, np.eye(PIXELS))
+    return float(expected_error(samples, scale, noise, unit_forms(len(prior.weights)))[0])
 
 
 @pytest.mark.parametrize("spread", [0.0, 0.3])
@@ -57,7 +56,7 @@ def test_one_component_gives_textbook_lmmse_and_the_blur_that_a_picture_keeps(sp
     signal, off = gain @ h - np.eye(len(c)), (blur - np.eye(len(c))) @ mean
     left = np.diag(signal @ c @ signal.T + gain @ n @ gain.T) + off**2
     samples = sampled(prior, sampling, MIDDLE, lens)
-    expected = expected_error(prior.weights, samples, np.full(PIXELS, scale), noise, unit_forms(1))
+    expected = expected_error(samples, scale, noise, unit_forms(1))
     assert_allclose(expected, left.reshape(PIXELS, -1).sum(axis=1)[MIDDLE].mean(), rtol=1e-9)
 
 
@@ -87,9 +86,7 @@ def test_draws_have_the_error_of_a_known_component_and_no_estimator_a_smaller_on
     parts /= parts.sum(axis=0)
     squares = ((np.einsum("jn,jni->ni", parts, estimates) - x) ** 2).reshape(draws, PIXELS, -1).sum(axis=2)[:, MIDDLE]
     one_sided = 4.0 * squares.mean(axis=1).std() / np.sqrt(draws)  # a false alarm in 30 000 runs
-    together = pooled(prior)
-    samples = sampled(together, mosaic(), MIDDLE)
-    linear = float(expected_error(np.ones(1), samples, np.full(PIXELS, scale), noise, unit_forms(1))[0])
+    linear = error(pooled(prior), scale, noise)
     assert squares.mean() > known - one_sided
     assert squares.mean() < linear + one_sided
 
@@ -181,10 +178,9 @@ def test_the_slope_is_that_of_differences() -> None:
     rows = [[rng.standard_normal((3, len(MIDDLE), d, COEFFICIENTS)) for d in (2, 1)] for _ in scales]
 
     def errors_of(h: np.ndarray) -> np.ndarray:
-        samples = sampled(prior, h, MIDDLE)
+        samples = sampled(prior, h, MIDDLE, np.eye(PIXELS))
         by_scene = [
-            expected_error(prior.weights, samples, np.full(PIXELS, scale), noise,
-                           np.stack([row.swapaxes(-1, -2) @ row for row in metrics]))
+            expected_error(samples, scale, noise, np.stack([row.swapaxes(-1, -2) @ row for row in metrics]))
             for scale, metrics in zip(scales, rows, strict=True)
         ]  # fmt: skip
         return np.mean(by_scene, axis=0)
