@@ -24,7 +24,7 @@ from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.budget.bands import fine_bands, groups_of
+from studies.budget.bands import fine_bands, groups_of, wide_bands
 from studies.budget.terms import horizontal_view_deg
 from studies.speed.points import Measured, Stage, Times, electrons, mean_error, timed, yardstick
 from studies.study.levels import parse_level
@@ -104,10 +104,8 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
     nm, width_nm = fine_bands(group.spectrum for group in scene.groups.values())
     calls = {}
     for count in sorted({*bench.bands, MOST_BANDS}):
-        groups = groups_of(width_nm, count)
-        first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
-        widths = np.array([width_nm[group].sum() for group in groups])
-        calls[f"{count} bands"] = _render(bench, scene, first + widths / 2, widths, bench.samples[0], bench.seed)
+        bands = wide_bands(nm, width_nm, groups_of(width_nm, count))
+        calls[f"{count} bands"] = _render(bench, scene, *bands, bench.samples[0], bench.seed)
     results = timed(calls, bench.repeats)
     finest, _ = results[f"{MOST_BANDS} bands"]
     error_e, noise_e = _render_errors(bench, sensor, finest)
