@@ -63,7 +63,6 @@ def test_every_figure_is_written_as_svg_and_png(paper: Paper, folder: Path) -> N
             assert np.asarray(picture.convert("L")).std() > 5  # not blank
 
 
-@pytest.mark.thorough
 def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Paper, folder: Path) -> None:
     page = (folder / "paper.html").read_text("utf-8")
     assert "default-src 'none'; img-src data:; style-src 'unsafe-inline'" in page

@@ -65,22 +65,6 @@ def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp
     assert np.array_equal(np.load(path), right)
 
 
-@pytest.mark.sample(1)
-@pytest.mark.parametrize(("column", "cells"), [("picture", 1), ("truth", 4)])
-@pytest.mark.parametrize("cut", [0, 1, -1])
-def test_a_picture_that_is_cut_is_made_again(column: str, cells: int, cut: int, tmp_path: Path) -> None:
-    study, out = SAMPLE.small_study(tmp_path), tmp_path / "out"
-    SAMPLE.swept(study, out)
-    before = SAMPLE.content(out)
-    path = out / "pictures" / getattr(read_rows(out)[0], column)
-    content = path.read_bytes()
-    path.write_bytes(content[:cut])
-    refusal(sweep_report, out, match="isn't what was written")
-    assert SAMPLE.swept(study, out).made == cells
-    assert SAMPLE.content(out) == before
-    assert path.read_bytes() == content
-
-
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, list[Row]]:
     """A sweep's folder, with its study beside it, and its rows."""
