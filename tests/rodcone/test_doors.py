@@ -289,12 +289,15 @@ def test_a_frame_that_is_all_full_or_all_dark_is_told() -> None:
         (64, 1e-4, "1us", "no more than dark noise"),
         (16, 1e-4, "1us", "no more than dark noise"),
         (64, 25.0, "10ms", ""),
+        (1, 25.0, "10ms", ""),
         (64, 0.0, 0, ""),
     ):
         values = np.full((side, side, 40), 1e-3 * luminance_cd_m2 / RADIANCE.luminance().mean())
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            public.capture(public.SpectralRadiance(values, NM), "low_noise", exposure)
+            public.capture(
+                public.SpectralRadiance(values, NM), public.low_noise("rgbw" if side > 1 else "mono"), exposure
+            )
         assert [words in str(one.message) for one in caught] == [True] * bool(words)
 
 
