@@ -1,7 +1,7 @@
 """Hard cases of rendering and relighting, each with a clear outcome: glass, nothing, fireflies, 10^8 in one picture.
 
 A line in a coarse grid, caustics, one pixel, 1 x N pixels, a missing mesh, no light and a hostile file have their tests
-in test_render_relit, test_render_unbiased, test_render_engine and test_render_scene_file.
+in tests/statistics, test_engine and user_scene.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Estimators of EMVA 1288 on statistics whose answer is known; drawn chips are in `test_sensor_characterise.py`."""
+"""Estimators of EMVA 1288 on statistics whose answer is known; drawn chips are in `test_characterise.py`."""
 
 import numpy as np
 import pytest
