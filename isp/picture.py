@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
-from isp.colour.highlights import clip_highlights
+from isp.colour.highlights import clip_highlights, highlight_level
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
 from rodcone.brief import brief
@@ -137,7 +137,9 @@ def finish(
     noise = np.zeros(3)
     if noise_gain is not None:
         noise = relative_noise(raw, planes, noise_gain, gains, colours)
-    rgb = clip_highlights(raw, planes * gains) @ colours.matrix(noise=noise * COLOUR_ERROR).T
+    rgb = (
+        clip_highlights(raw, planes * gains, highlight_level(raw, gains)) @ colours.matrix(noise=noise * COLOUR_ERROR).T
+    )
     return Picture(rgb, sources, engine)
 
 

@@ -2,7 +2,7 @@
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.edges import sharpen
-from isp.colour.highlights import clip_highlights
+from isp.colour.highlights import clip_highlights, highlight_level
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
@@ -64,7 +64,7 @@ def picture_interleaved(
     weight = substitution_weight(snr, substitution_snr, octaves)
     alpha = saturated_fraction(raw, settings.window)
     planes = sharpen(raw, result.estimate, gains) if ours else result.estimate
-    balanced = clip_highlights(raw, planes * gains)
+    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
     if ours:
         draw_unseen(everything, unseen, gains, balanced)
 

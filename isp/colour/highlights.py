@@ -1,4 +1,4 @@
-"""Highlights: where samples are saturated, and colours held at green's full well, so that a highlight stays neutral."""
+"""Highlights: where samples are saturated, and colours held where the first is full, so that they stay neutral."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +20,16 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
     return box_sums(np.pad(hit, reach).astype(np.uint16), (2 * reach + 1, 2 * reach + 1)) > 0
 
 
-def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | None = None) -> NDArray[np.float64]:
-    """Hold every balanced colour at green's full well near a saturated colour sample: highlights stay neutral.
+def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
+    """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
+    return float(raw.full_well_e * min(gains[raw.channels.index(name)] for name in colour_channels(raw.cfa)))
 
-    Without green it is the full well of `sensor.cfa.unit_channel`.
+
+def clip_highlights(
+    raw: RawImage, balanced: NDArray[np.float64], level: float, reach: int | None = None
+) -> NDArray[np.float64]:
+    """Hold every balanced colour at `highlight_level` near a saturated colour sample: highlights stay neutral.
+
     `reach` as in `saturated_nearby`: that of the filter which made the planes. Where nothing is held the array itself
     is returned.
     """
@@ -31,5 +37,5 @@ def clip_highlights(raw: RawImage, balanced: NDArray[np.float64], reach: int | N
     if not clipped.any():
         return balanced
     limited = balanced.copy()
-    limited[clipped] = np.minimum(rows_at(balanced, clipped), raw.full_well_e)
+    limited[clipped] = np.minimum(rows_at(balanced, clipped), level)
     return limited

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.highlights import clip_highlights
+from isp.colour.highlights import clip_highlights, highlight_level
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, require_letters
@@ -52,7 +52,7 @@ def picture_any_mosaic(
     result = _guided(raw, settings)
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
-    balanced = clip_highlights(raw, planes * gains)
+    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
     noise = np.zeros(len(gains))
     if colours.plain is None:
         noise = relative_noise(raw, planes, result.noise_gain, gains, colours) * COLOUR_ERROR

@@ -58,7 +58,7 @@ def picture_demosaicked_first(
     """
     require_bayer(raw.cfa)
     gains, _ = balance.gains(raw, bilinear(raw))
-    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     names, sites = raw.channels, channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
     stable = stabilise(mosaic / gain, raw.dark_noise_e, 0.0) * np.sqrt(gain)
@@ -67,4 +67,4 @@ def picture_demosaicked_first(
         sigma = NOISE_AFTER_DEMOSAICKING * np.sqrt(OPPONENT**2 @ gains)
         planes = denoise(planes @ OPPONENT.T, sigma.tolist()) @ OPPONENT
     electrons = unstabilise(planes / np.sqrt(gains), raw.dark_noise_e)
-    return Picture(to_rgb(raw, electrons * gains, colours, MALVAR_REACH), sources)
+    return Picture(to_rgb(raw, electrons * gains, level, colours, MALVAR_REACH), sources)

@@ -44,8 +44,8 @@ _STANDS_FOR = {"C": "R", "Y": "G", "M": "B", "W": "W"}
 def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image with W as the luminance of bilinear colours."""
     require_letters(raw, CHANNELS)
-    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
-    rgb = to_rgb(raw, fill_channels(mosaic, raw.cfa, "RGB"), colours, 1)
+    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
+    rgb = to_rgb(raw, fill_channels(mosaic, raw.cfa, "RGB"), level, colours, 1)
     return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
@@ -58,9 +58,9 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
     if balance.neutral is None:
         behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
         balance = replace(balance, neutral=neutral_response(CHANNELS) * behind_density)
-    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     planes = np.stack([combine(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
-    rgb = to_rgb(raw, planes, colours, MATCHED_RADIUS)
+    rgb = to_rgb(raw, planes, level, colours, MATCHED_RADIUS)
     return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
@@ -84,11 +84,11 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
 def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image by early fusion: combined differences of each colour from W, added to W."""
     require_letters(raw, CHANNELS)
-    mosaic, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     white = fill(mosaic, raw.cfa, "W")
     differences = mosaic - white
     planes = np.stack([white + combine(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
-    return Picture(to_rgb(raw, planes, colours, MATCHED_RADIUS), sources)
+    return Picture(to_rgb(raw, planes, level, colours, MATCHED_RADIUS), sources)
 
 
 def combine(values: Plane, cfa: Tile, channel: str) -> Plane:

@@ -40,10 +40,10 @@ def picture_gindele(
 ) -> Picture:
     """Develop a 2x2 RGBW raw image: its mosaic, or a denoised one [e-]."""
     require_letters(raw, CHANNELS)
-    mosaic, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
+    mosaic, level, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     clipped = saturated_nearby(raw, "W", REACH)[..., None]
     planes = np.where(clipped, fill_channels(mosaic, raw.cfa, "RGB"), adams_planes(mosaic, raw.cfa))
-    return Picture(to_rgb(raw, planes, colours, REACH), sources)
+    return Picture(to_rgb(raw, planes, level, colours, REACH), sources)
 
 
 def adams_planes(mosaic: Plane, cfa: Tile) -> Image:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import clip_highlights, saturated_nearby
+from isp.colour.highlights import clip_highlights, highlight_level, saturated_nearby
 from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.picture import Image
 from isp.planes import Plane, bilinear
@@ -13,7 +13,9 @@ from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
-def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tuple[Plane, Mapping[str, BalanceSource]]:
+def balance_mosaic(
+    raw: RawImage, electrons: Plane, balance: WhiteBalance
+) -> tuple[Plane, float, Mapping[str, BalanceSource]]:
     """Balance a mosaic before it is demosaicked, as raw converters do.
 
     Demosaicking that carries detail from one colour to another supposes that their differences are smooth, which only
@@ -31,8 +33,10 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
     -------
     (h, w) float64
         Mosaic in which a neutral reads the same electrons in every channel: green's [e-]. Beside a saturated colour
-        sample no colour reads more than green's full well, so that a neutral highlight is neutral in the mosaic
+        sample no colour reads more than the level that follows, so that a neutral highlight is neutral in the mosaic
         already.
+    float
+        `isp.colour.highlights.highlight_level` [e-].
     mapping of str to str
         Where each channel's gain comes from, as `Picture.balance` has it.
     """
@@ -43,9 +47,10 @@ def balance_mosaic(raw: RawImage, electrons: Plane, balance: WhiteBalance) -> tu
         factors[sites == name] = factor
     values = electrons * factors
     clipped = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    return np.where(clipped, np.minimum(values, raw.full_well_e), values), sources
+    level = highlight_level(raw, gains)
+    return np.where(clipped, np.minimum(values, level), values), level, sources
 
 
-def to_rgb(raw: RawImage, planes: Image, colours: ColourFit, reach: int) -> Image:
+def to_rgb(raw: RawImage, planes: Image, level: float, colours: ColourFit, reach: int) -> Image:
     """Linear sRGB of balanced planes of three colours that a filter of this reach made: highlights, matrix."""
-    return np.asarray(clip_highlights(raw, planes, reach) @ colours.matrix().T)
+    return np.asarray(clip_highlights(raw, planes, level, reach) @ colours.matrix().T)

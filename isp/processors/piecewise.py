@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.highlights import clip_highlights
+from isp.colour.highlights import clip_highlights, highlight_level
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
@@ -105,10 +105,11 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
     gains, sources = balance.gains(raw, planes)
     # The posterior variance is all of the error: no factor on it, as weighted means of samples need.
     noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)
+    level = highlight_level(raw, gains)
     if {"R", "G", "B"} <= set(names):
-        rgb = clip_highlights(raw, planes[..., :3] * gains[:3]) @ colours.matrix(noise=noise[:3]).T
+        rgb = clip_highlights(raw, planes[..., :3] * gains[:3], level) @ colours.matrix(noise=noise[:3]).T
     else:
-        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains), colours, noise)
+        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, level), colours, noise)
     return Picture(rgb, sources)
 
 

@@ -89,6 +89,14 @@ def test_a_grey_ramp_into_saturation_takes_no_colour() -> None:
         assert bright == pytest.approx(np.full(bright.shape, bright[0, 0, 0]), rel=1e-5), name
 
 
+def test_a_ramp_takes_no_colour_where_red_is_full_before_green(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As under a lamp: R is full at two thirds of green's well, 10 000 e-, in column 10 of 80."""
+    monkeypatch.setitem(NEUTRAL, "R", 1.5)
+    for name in AVAILABLE:
+        rgb = balanced(name, 5000.0 + 500.0 * np.indices((24, 80))[1])[:, 4:]
+        assert np.abs(rgb - rgb[..., 1:2]).max() <= 500.0 * (1 + 1e-6), name
+
+
 def test_bright_ends_at_greens_full_well_or_where_w_alone_is_the_luminance_at_w_s() -> None:
     for name in AVAILABLE:
         rgb = balanced(name, np.full((24, 24), 1e5))

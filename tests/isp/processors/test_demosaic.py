@@ -49,7 +49,7 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     dn[4, 5] = 15_100  # a green; beside it a red that reads 1.5 full wells when balanced
     dn[4, 4] = 100 + 11_250
     raw = raw_image(dn, BAYER)
-    mosaic, sources = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    mosaic, _, sources = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert sources == dict.fromkeys("RGB", "given")
     expected = np.full((8, 8), 1000.0)
     expected[4, 4:6] = 15_000.0
@@ -57,5 +57,5 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     far = raw.dn.copy()
     far[4, 4], far[0, 0] = 600, 11_350  # as bright a red, with no full sample beside it, is a red lamp and stays one
     lamp = raw_image(far, BAYER)
-    mosaic, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    mosaic, _, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert mosaic[0, 0] == pytest.approx(22_500.0)
