@@ -22,7 +22,8 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
 def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
     """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
-    return float(raw.full_well_e * min(gains[raw.channels.index(name)] for name in colour_channels(raw.cfa)))
+    wells_e = {name: raw.noise_of(name).full_well_e for name in colour_channels(raw.cfa)}
+    return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
 
 
 def clip_highlights(

@@ -11,6 +11,7 @@ from isp.colour.white_balance import WhiteBalance
 from isp.processors.demosaic import malvar, menon
 from isp.processors.mosaic import balance_mosaic
 from rodcone.optional import optional_library
+from sensor.calibration import ChannelNoise
 from sensor.cfa import BAYER
 
 pytestmark = pytest.mark.skipif(find_spec("colour_demosaicing") is None, reason="rodcone[opponents] is not installed")
@@ -59,3 +60,12 @@ def test_a_mosaic_is_balanced_to_greens_unit_and_held_beside_a_full_colour() -> 
     lamp = raw_image(far, BAYER)
     mosaic, _, _ = balance_mosaic(lamp, lamp.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
     assert mosaic[0, 0] == pytest.approx(22_500.0)
+
+
+def test_colours_are_held_where_the_first_channel_is_full_though_green_is_read_apart() -> None:
+    """Green behind a density is full at 45 000 e-, red at 15 000, balanced 30 000."""
+    noise = ChannelNoise("G", full_well_e=45_000.0, shot=3.0, read_noise_e=1.0, dsnu_e=0.0, prnu=0.0)
+    raw = raw_image(np.full((8, 8), 40_100), BAYER, channel_noise=(noise,))
+    mosaic, level, _ = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    assert level == pytest.approx(30_000.0)
+    assert mosaic == pytest.approx(np.full((8, 8), 30_000.0))
