@@ -63,16 +63,13 @@ class WhiteBalance:
         """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
         return neutral_response(raw.channels) if self.neutral is None else self.neutral
 
-    def gains(
-        self, raw: RawImage, planes: NDArray[np.floating] | None = None
-    ) -> tuple[Floats, Mapping[str, BalanceSource]]:
+    def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.
 
         Parameters
         ----------
-        planes : (h, w, channel) float, optional
-            The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`; the samples
-            themselves where left out.
+        planes : (h, w, channel) float
+            The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
 
         Returns
         -------
@@ -100,15 +97,10 @@ class WhiteBalance:
         sources: dict[str, BalanceSource] = dict.fromkeys(names, "calibrated")
         for group, pixels in groups.items():
             index = [names.index(channel) for channel in group]
-            sites = [pixels & mask(raw.cfa, channel, raw.shape) for channel in names]
-            counts = np.maximum([np.count_nonzero(site) for site in sites], 1)
-            if planes is None:
-                electrons = raw.electrons
-                means = np.array([electrons[site].sum() for site in sites]) / counts
-            else:
-                rows = np.asarray(rows_at(planes, pixels), dtype=np.float64)
-                means = np.einsum("nc->c", rows) / max(len(rows), 1)
-            errors = np.sqrt(channel_variance(raw, np.maximum(means, 0.0))[index] / counts[index])
+            samples = np.maximum([np.sum(pixels & mask(raw.cfa, channel, raw.shape)) for channel in group], 1)
+            rows = np.asarray(rows_at(planes, pixels), dtype=np.float64)
+            means = np.einsum("nc->c", rows) / max(len(rows), 1)
+            errors = np.sqrt(channel_variance(raw, np.maximum(means, 0.0))[index] / samples)
             factors[index], certain = gray_world(means[index], errors, neutral[index], green=group.index(unit))
             for channel, sure in zip(group, certain, strict=True):
                 sources[channel] = "gray world" if sure else "calibrated"

@@ -27,8 +27,6 @@ from rodcone.errors import InputError
 from sensor.cfa import RGBW, is_rgbw
 from sensor.raw import RawImage
 
-SURFACES = 0.3  # in the logarithm: how far surfaces alone take a frame's mean from the neutral; the rest is by lamps
-CAST_STEP = 0.1  # of that rest, so that frames share tables
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
 
 
@@ -87,19 +85,15 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
     names, unit = raw.channels, raw.unit_channel
     index = [LETTERS.index(name) for name in names]
     white_e = prior.neutral_e.copy()
-    neutral = white_e[index] if balance.neutral is None else balance.neutral
-    if curves_differ(prior, neutral, index):
-        warnings.warn(
-            f"curves: a neutral reads {np.round(neutral, 3).tolist()} in {''.join(names)}, as "
-            "under no light that this prior knows; its pictures may be poor; train one by `rodcone train`",
-            UserWarning,
-            stacklevel=2,
-        )
-    # The prior knows surfaces over white's light: where the frame's lamps are of another colour, over theirs.
-    neutral, means = neutral / neutral[names.index(unit)], 1.0 / WhiteBalance(neutral).gains(raw)[0]
-    cast = np.log(means / neutral)
-    cast *= 1.0 - SURFACES / max(np.abs(cast).max(), SURFACES)
-    white_e[index] = neutral * np.exp(np.round(cast / CAST_STEP) * CAST_STEP) * prior.neutral_e[LETTERS.index(unit)]
+    if balance.neutral is not None:
+        if curves_differ(prior, balance.neutral, index):
+            warnings.warn(
+                f"curves: a neutral reads {np.round(balance.neutral, 3).tolist()} in {''.join(names)}, as "
+                "under no light that this prior knows; its pictures may be poor; train one by `rodcone train`",
+                UserWarning,
+                stacklevel=2,
+            )
+        white_e[index] = balance.neutral / balance.neutral[names.index(unit)] * prior.neutral_e[LETTERS.index(unit)]
     estimate, variance = reconstruct(raw, prior, white_e)
     planes = estimate.astype(np.float64)
     gains, sources = balance.gains(raw, planes)

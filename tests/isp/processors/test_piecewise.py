@@ -36,20 +36,6 @@ def test_a_flat_grey_field_stays_flat_and_grey_in_every_phase():
         assert rgb == pytest.approx(np.full(rgb.shape, 1000.0), rel=1e-3), (name, tile)
 
 
-def test_lines_under_another_lamp_than_the_cameras_have_less_than_twice_the_error():
-    """Orange by 0.8 in the logarithms of R and of B: 2.8 times the squared error where white is the camera's."""
-    y, x = np.indices((64, 64))
-    light = np.where((x + 0.37 * y) % 11.3 < 3, 0.8, 0.05)
-    sites, errors = np.vectorize("RGBW".index)(channel_map(RGBW_PHASES[0], light.shape)), []
-    for lamp in ([0.0, 0.0, 0.0, 0.0], [0.8, 0.0, -0.8, 0.0]):
-        white = own_prior().neutral_e * np.exp(lamp)
-        electrons = np.random.default_rng(0).poisson(200.0 * light * np.choose(sites, white))
-        raw = raw_image(electrons + 100, RGBW_PHASES[0])
-        rgb = PROCESSORS["ple_rgbw"].develop(raw, np.eye(3), neutral=own_prior().neutral_e, balance=white).rgb
-        errors.append(((rgb / 200.0 - light[..., None]) ** 2).mean())
-    assert errors[1] < 2.0 * errors[0]
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("name", INDEX)
 def test_highlights_stay_grey_and_end_at_greens_full_well(name):
