@@ -71,7 +71,9 @@ def merge(frames: Sequence[RawImage]) -> Merged:
 
     In the dark the stated temporal variance is too large by the factor 1 + 0.4 / (temporal dark noise [e-]): a noisy
     pixel's light isn't known better. Fixed offsets are common to all frames, and no weight averages them away; where
-    they exceed the temporal noise several times they disturb the weights, and are better subtracted first.
+    they exceed the temporal noise several times they disturb the weights, and are better subtracted first. Frames don't
+    hold their dark current, so that what columns' gains make of it counts as such an offset: the fixed variance lacks
+    2 x spread^2 x light x dark current.
 
     Parameters
     ----------

@@ -115,9 +115,11 @@ def noise_of_merged(sensor: SensorConfig, exposure_s: float) -> list[NoiseStep]:
     """
     at, whole = seams(sensor, exposure_s), whole_share(sensor)
     of_columns_e2 = (sensor.pixel.column_gain_spread * sensor.pixel.dark_current_e_per_s * exposure_s) ** 2
-    starts_e = np.concatenate([[0.0], at.above_e[:-1]])
+    starts_e = np.maximum([0.0, *at.above_e[:-1]], 0.0)
+    ends_e = np.maximum(at.above_e, 1.0)
+    first = min(int(np.sum(at.above_e <= 0.0)), len(ends_e) - 1)  # those before it are full of dark current
     steps = []
-    for number, (start_e, end_e) in enumerate(zip(starts_e, at.above_e, strict=True)):
+    for number, (start_e, end_e) in list(enumerate(zip(starts_e, ends_e, strict=True)))[first:]:
         dark, bright = (_variances_at(level_e, sensor, exposure_s, at.order[number:]) for level_e in (start_e, end_e))
         steps.append(
             NoiseStep(
@@ -128,7 +130,7 @@ def noise_of_merged(sensor: SensorConfig, exposure_s: float) -> list[NoiseStep]:
                 prnu=hypot(sqrt(bright["PRNU"]) / float(end_e), sensor.pixel.column_gain_spread),
             )
         )
-    return steps
+    return [*steps[:1], *steps] if first else steps  # what a raw image says of the dark supposes all charges
 
 
 def _variances_at(

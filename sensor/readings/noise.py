@@ -33,7 +33,8 @@ class Seams:
     ----------
     order : (reading,) intp
     above_e : (reading,) float64
-        Photo-electrons of the whole pixel; of the last the level from which it may clip.
+        Photo-electrons of the whole pixel, under 0 where dark current fills the reading; of the last the level from
+        which it may clip.
     """
 
     order: NDArray[np.intp]
@@ -135,7 +136,7 @@ def seams(sensor: SensorConfig, exposure_s: float) -> Seams:
     total = sum(covariances(full_e, sensor, exposure_s).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
     clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-    above_e = np.maximum(clear_e - dark_electrons(sensor, exposure_s), 1.0)  # no light clears a well of dark current
+    above_e = clear_e - dark_electrons(sensor, exposure_s)  # under 0 where dark current alone fills the reading
     order = np.argsort(above_e, kind="stable")
     return Seams(order, above_e[order])
 

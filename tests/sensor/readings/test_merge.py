@@ -14,6 +14,7 @@ from sensor.device import draw_device
 from sensor.kernel.kernel import read_frame
 from sensor.presets import preset
 from sensor.random import poisson
+from sensor.raw import noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.readings.noise import covariances, of_reading, seams, shares, whole_share
 from sensor.readout import draw_frame, noise_variance
@@ -62,6 +63,21 @@ def test_a_merged_frame_without_light_has_no_mean_and_the_noise_that_it_states(n
     raw = expose(np.zeros(shape), sensor, 0.1, device, np.random.default_rng(4))
     assert abs(raw.electrons.mean()) < 4 * raw.dark_noise_e / np.sqrt(raw.dn.size)
     assert raw.electrons.var() == pytest.approx(raw.dark_noise_e**2, rel=4 * np.sqrt(2 / raw.dn.size))
+
+
+@loop("share", [0.9, 1.05, 1.3])
+@loop("name", HDR)
+def test_a_reading_that_dark_current_fills_is_left_out(name, share):
+    """At three lights: mean, and variance by the raw image, within 4 standard errors and a tenth, 1e-4 a figure."""
+    sensor, shape = preset(name), (128, 128)
+    well_e = min(reading.full_well_e / reading.share for reading in sensor.chip.readings)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=share * well_e / 0.1, prnu=0.0))
+    device, whole = draw_device(sensor, shape, np.random.default_rng(3)), whole_share(sensor)
+    for light in (0.0, 0.01 * sensor.pixel.full_well_e, 0.2 * sensor.pixel.full_well_e):
+        raw = expose(np.full(shape, light), sensor, 0.1, device, np.random.default_rng(4))
+        stated = noise_at_sites(raw, np.full(shape, whole * light)).mean()
+        assert abs(raw.electrons.mean() - whole * light) < 4 * np.sqrt(stated / raw.dn.size), light
+        assert raw.electrons.var() == pytest.approx(stated, rel=0.1 + 4 * np.sqrt(2 / raw.dn.size)), light
 
 
 @loop("light", [3.0, 900.0])  # read noise that were shared would show in the dark
