@@ -64,7 +64,7 @@ class Noise:
     ----------
     dark_e : float or (sample,) float64
         Standard deviation of what doesn't depend on light [e-]: read noise, fixed offsets, dark current, rounding.
-    prnu : float
+    prnu : float or (sample,) float64
         Relative standard deviation of the pixels' gain.
     full_e : float or (sample,) float64
         Electrons at which a sample is full; inf for none.
@@ -73,7 +73,7 @@ class Noise:
     """
 
     dark_e: float | Doubles
-    prnu: float
+    prnu: float | Doubles
     full_e: float | Doubles
     shot: float | Doubles = 1.0
 
