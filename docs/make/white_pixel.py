@@ -59,7 +59,7 @@ def write_study(folder: Path) -> None:
         photograph = Image.open(io.BytesIO(content)).convert("RGB")
         photograph.thumbnail((SIDE, SIDE), Image.Resampling.BOX)
         photograph.save(folder / f"{name.partition('.')[0]}.png")
-    cameras = [*WHITE_PIXEL, f"{net.name}:bayer_net"]
+    cameras = [*WHITE_PIXEL, f"{net.name}:bayer_net", f"{net.name}:bayer_net_bm3d", "bayer_residual_bm3d"]
     names = [f"{name.partition('.')[0]}.png" for name in PHOTOGRAPHS]
     text = STUDY.read_text("utf-8").replace("scenes = [", f"scenes = [\n  {json.dumps(names)[1:-1]},", 1)
     (folder / "study.toml").write_text(re.sub(r"processors = .*", f"processors = {json.dumps(cameras)}", text), "utf-8")
