@@ -67,11 +67,14 @@ def test_the_study_has_small_photographs_and_the_network(tmp_path: Path) -> None
     write_study(tmp_path)
     with Image.open(tmp_path / "china.png") as china:
         assert china.size == (SIDE, SIDE * 3 // 4)
-    text = (tmp_path / "study.toml").read_text("utf-8").replace('"demosaicnet-1-py3-none-any.whl:bayer_net"', '"bayer"')
+    text = (tmp_path / "study.toml").read_text("utf-8")
+    # Others stand for what needs a real wheel or an extra.
+    text = text.replace("demosaicnet-1-py3-none-any.whl:bayer_net_bm3d", "bayer_bilinear")
+    text = text.replace("demosaicnet-1-py3-none-any.whl:bayer_net", "bayer").replace("residual_bm3d", "residual")
     (tmp_path / "study.toml").write_text(text, "utf-8")
     study = read_study(tmp_path / "study.toml")
     assert len(study.scenes) == 15
-    assert study.processors == ("ple_rgbw", "ple_bayer", "bayer")
+    assert study.processors == ("ple_rgbw", "ple_bayer", "bayer", "bayer_bilinear", "bayer_residual")
 
 
 def test_another_study_is_refused() -> None:
