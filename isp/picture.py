@@ -137,10 +137,8 @@ def finish(
     noise = np.zeros(3)
     if noise_gain is not None:
         noise = relative_noise(raw, planes, noise_gain, gains, colours)
-    rgb = (
-        clip_highlights(raw, planes * gains, highlight_level(raw, gains)) @ colours.matrix(noise=noise * COLOUR_ERROR).T
-    )
-    return Picture(rgb, sources, engine)
+    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
+    return Picture(balanced @ colours.matrix(noise=noise * COLOUR_ERROR).T, sources, engine)
 
 
 def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:

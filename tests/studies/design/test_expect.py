@@ -112,9 +112,8 @@ def test_slopes_of_srgb_and_lab_are_those_of_the_nearest_line_over_a_component()
     blue = np.einsum("c,kc->k", colour.XYZ_to_sRGB(seen.xyz.T, apply_cctf_encoding=False)[:, 2], patches.means[:, 18])
     for k in (int(np.argmax(patches.weights)), int(np.argmin(blue))):
         covariance = patches.factors[k, 18] @ patches.factors[k, 18].T + patches.rest[k] * np.eye(len(direction))
-        draws = rng.multivariate_normal(
-            patches.means[k, 18], covariance, 200_000
-        )  # row 2, column 2: the first that counts
+        # row 2, column 2: the first that counts
+        draws = rng.multivariate_normal(patches.means[k, 18], covariance, 200_000)
         xyz = reflectance * draws @ seen.xyz.T
         linear = colour.XYZ_to_sRGB(xyz, apply_cctf_encoding=False)
         y, a, b = (colour.XYZ_to_Lab(np.maximum(xyz, 0.0), colour.XYZ_to_xy(white)) / (116, 500, 200)).T
