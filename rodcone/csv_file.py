@@ -49,7 +49,7 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
         raise InputError(
             f"{what}: {str(path)!r} has wavelengths up to {table[:, 0].max():g}; allowed: nm; convert them"
         )
-    falls = np.flatnonzero(np.diff(table[:, 0]) <= 0)
+    falls = np.flatnonzero(~(table[1:, 0] > table[:-1, 0]))
     if falls.size:
         pair = " then ".join(f"{nm:g}" for nm in table[falls[0] : falls[0] + 2, 0])
         raise InputError(f"{what}: {str(path)!r} has wavelengths {pair}; allowed: strictly increasing; sort its rows")

@@ -54,7 +54,7 @@ def radiance_channels(names: Iterable[str]) -> dict[str, float]:
         shown = ", ".join(sorted(names)[:8]) + (", ..." if len(names) > 8 else "")
         raise InputError(f"it has the channels {shown}; allowed: spectral ones such as S0.550,0nm; save it as spectral")
     ordered = dict(sorted(nm.items(), key=lambda item: item[1]))
-    if np.any(np.diff(list(ordered.values())) <= 0):
+    if len(set(ordered.values())) < len(ordered):
         raise InputError(f"two of the channels {', '.join(ordered)} have one wavelength; allowed: one each; remove one")
     return ordered
 

@@ -63,9 +63,9 @@ def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
         For fewer than two wavelengths, or where they don't increase.
     """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
-    steps = np.diff(nm)
-    if nm.size < 2 or not np.all((steps > 0) & np.isfinite(steps)) or nm[0] <= 0:
+    if nm.size < 2 or not np.all(np.isfinite(nm)) or not np.all(nm[1:] > nm[:-1]) or nm[0] <= 0:
         return nm, band_widths(nm)  # which refuses it
+    steps = np.diff(nm)
     if np.allclose(steps, steps[0], rtol=1e-6):
         return nm, band_widths(nm)
     warnings.warn(

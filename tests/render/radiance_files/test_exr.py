@@ -329,7 +329,7 @@ def test_declared_size_is_bounded_before_memory_is_taken(
 
 
 def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:
-    for nm in ([500.0], [510.0, 500.0], [500.0, np.nan]):
+    for nm in ([500.0], [510.0, 500.0], [500.0, np.nan], [np.inf, np.inf]):
         refusal(bands_between, np.array(nm), match="wavelength_nm")
 
 
