@@ -266,7 +266,8 @@ def _solve_one_light(
             over = np.matmul(rows, linear, out=values[: group.size])
             if sure is not None and at.mix.size == PATCH:
                 under = np.flatnonzero(over.min(axis=1) < 0.0)
-                over[under] = weight[under, None] * _on_the_curve(at, k, evidence[group[under]], sure[under])
+                if under.size:
+                    over[under] = weight[under, None] * _on_the_curve(at, k, evidence[group[under]], sure[under])
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[place] = variance * (by.noise / by.variance)
