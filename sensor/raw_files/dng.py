@@ -76,6 +76,8 @@ def read_dng(path: Path) -> RawImage:
             f"{path}: its DNGPrivateData holds no calibration in electrons; allowed: files that `rodcone capture` wrote"
         )
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
+    if not is_in_dng(raw.cfa):
+        raise InputError(f"{path}: its calibration has the mosaic {raw.cfa}; allowed: an unchanged file; write it anew")
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
         of_file, of_calibration = (directory[code][1] if code in directory else None for directory in (tags, expected))
