@@ -1,7 +1,7 @@
 """From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
 
 import re
-from collections.abc import Callable, Generator, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import metadata
@@ -19,14 +19,14 @@ from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import as_stated
 from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
-from studies.dataset.sample import SURFACES, Sample, frame_labels
+from studies.dataset.sample import Sample, frame_labels
 from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
-from studies.dataset.truth_files import Facts, code_digests, scene_facts, scene_hash, truth_of
+from studies.dataset.truth_files import Facts, code_digests, plane_files, scene_facts, scene_hash
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.study import Study, label
 from studies.sweep.cells import Cell
 from studies.sweep.database import open_results
-from studies.sweep.prepare import SET, Job, known_cells, scene_cells
+from studies.sweep.prepare import SET, Job, scene_cells
 from studies.sweep.provenance import versions
 from studies.sweep.run_sweep import at_work
 
@@ -87,7 +87,7 @@ def make_set(
         samples, scene_lines = list[Sample](), list[dict[str, Any]]()
         for index, opened in enumerate(scenes.values()):
             rendering = partial(_show_render, show, index, len(scenes))
-            cells = known_cells(job, opened) or scene_cells(job, opened, rendering)
+            cells = scene_cells(job, opened, rendering)
             facts = scene_facts(job, opened, cells, rendering)
             samples += _samples_of(job, opened, cells, facts, order)
             scene_lines.append(_scene_line(opened, facts))
@@ -129,7 +129,7 @@ def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Sha
         number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
         parts = [chosen[len(chosen) * i // number : len(chosen) * (i + 1) // number] for i in range(number)]
         for index, part in enumerate(parts):
-            made_from = [(x.key, x.cell.key, _file_names(x), x.planes, x.window, x.part) for x in part]
+            made_from = [(x.key, x.cell.key, x.window, x.part, _names(x.files)) for x in part]
             key = digest([made_from, versions(), code_digests()])
             shards.append(Shard(key, (folder / f"{split}-{index:06d}.tar").resolve(), tuple(part)))
     return shards
@@ -146,12 +146,12 @@ def _earlier(folder: Path) -> Lines:
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
     hash_of_scene = scene_hash(opened)
-    planes = tuple(name for name in order.planes if "surfaces" in facts["files"] or name not in SURFACES)
     samples = dict[str, Sample]()
     for cell in cells:
         mosaic = processor_of(cell.processor).mosaic
         parts = (*frame_labels(cell).values(), mosaic)
         frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
+        files = plane_files(job, facts, cell)
         windows = _windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop)
         if not windows:
             raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
@@ -166,8 +166,8 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
                 mosaic=mosaic,
                 scene_hash=hash_of_scene,
                 split=split_of(hash_of_scene),
-                truth=truth_of(job, facts, cell),
-                planes=planes,
+                files={name: files[name] for name in order.planes if name in files},
+                illuminants=facts["illuminants"][cell.condition.spectrum],
                 part=index if len(windows) > 1 else None,
                 window=window,
             )
@@ -180,11 +180,9 @@ def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, i
     return [(row, column, height, width) for row, column in corners]
 
 
-def _file_names(sample: Sample) -> list[str]:
-    """Names of the files that a sample reads: each is its content's digest."""
-    truth, cell = sample.truth, sample.cell
-    paths = (truth.channels, truth.lit, truth.surfaces, cell.electrons, cell.errors, cell.truth)
-    return [path.name for path in paths if path]
+def _names(files: Mapping[str, Path]) -> dict[str, str]:
+    """Names of a sample's files, which are the digests of their content."""
+    return {plane: path.name for plane, path in files.items()}
 
 
 def _scene_line(opened: OpenedScene, facts: Facts) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """A sample of a data set: a raw frame, or a part of one, and what is true of it."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
 from math import log10
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from sensor.capture import expose
-from sensor.cfa import channels, mask
+from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.raw import RawImage
@@ -32,31 +32,8 @@ PLANES = {
     "ids": "numbers of object and material in the scene's lists, from 1; 0 for none",
     "shares": "share of each light group in Y, in the order of `groups`",
 }
-SURFACES = ("depth", "normals", "ids")  # a picture file has none
 
 Arrays = dict[str, NDArray[Any]]
-
-
-@dataclass(frozen=True)
-class TruthFiles:
-    """Arrays that samples of one frame are cut from, float32.
-
-    Attributes
-    ----------
-    channels : Path
-        Expected electrons behind every filter at 1 cd/m^2 and 1 s, (h, w, channel).
-    lit : Path
-        XYZ at 1 cd/m^2, then the share of each light group in Y, (h, w, 3 + group).
-    surfaces : Path or None
-        Depth, normal, object and material, (h, w, 6); None of a picture file.
-    illuminants : mapping of str to any
-        Bands [nm], and by light group its emission in them at 1 cd/m^2 of the scene.
-    """
-
-    channels: Path
-    lit: Path
-    surfaces: Path | None
-    illuminants: Mapping[str, Any]
 
 
 @dataclass(frozen=True)
@@ -74,9 +51,11 @@ class Sample:
     scene_hash : str
         Of the scene's shapes, whatever its light.
     split : str
-    truth : TruthFiles
-    planes : tuple of str
-        Of `PLANES`.
+    files : mapping of str to Path
+        Array of the whole frame that each of its `PLANES` is cut from; electrons are at 1 cd/m^2 and 1 s, XYZ at
+        1 cd/m^2.
+    illuminants : mapping of str to any
+        Bands [nm], and by light group its emission in them at 1 cd/m^2 of the scene.
     part : int or None
         Number among the parts of the frame, each exposed as a frame of its own; None of a whole frame, the sweep's to
         the bit.
@@ -89,8 +68,8 @@ class Sample:
     mosaic: str
     scene_hash: str
     split: str
-    truth: TruthFiles
-    planes: tuple[str, ...]
+    files: Mapping[str, Path]
+    illuminants: Mapping[str, Any]
     part: int | None
     window: tuple[int, int, int, int]
 
@@ -106,20 +85,11 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     sensor = as_read(cell.sensor, _opened(cell.electrons) * light) if cell.sensor.chip.channels else cell.sensor
     raw = _exposed(sample, sensor, expected_e)
     arrays: Arrays = {"raw": raw.dn}
-    made: dict[str, Callable[[], NDArray[Any]]] = {
-        "mosaic_e": lambda: expected_e,
-        "channels_e": lambda: _opened(sample.truth.channels)[place] * light,
-        "rgb": lambda: _opened(cell.truth)[place],
-        "xyz": lambda: _opened(sample.truth.lit)[place][..., :3] * cell.luminance_cd_m2,
-        "depth": lambda: _surfaces(sample)[place][..., 0],
-        "normals": lambda: _surfaces(sample)[place][..., 1:4],
-        "ids": lambda: _surfaces(sample)[place][..., 4:].astype(np.uint16),
-        "shares": lambda: _opened(sample.truth.lit)[place][..., 3:],
-    }
-    for name in sample.planes:
-        array = made[name]()
-        arrays[name] = array if array.dtype == np.uint16 else np.ascontiguousarray(array, dtype=np.float32)
-    return arrays, _facts(sample, sensor, raw, expected_e)
+    scales = {"mosaic_e": light, "channels_e": light, "xyz": cell.luminance_cd_m2}
+    for name, path in sample.files.items():
+        plane = _opened(path)[place] * scales.get(name, 1)
+        arrays[name] = np.ascontiguousarray(plane, dtype=np.uint16 if name == "ids" else np.float32)
+    return arrays, _facts(sample, sensor, raw, expected_e, _opened(cell.errors)[:, *place] * light)
 
 
 def _exposed(sample: Sample, sensor: SensorConfig, expected_e: NDArray[np.float64]) -> RawImage:
@@ -131,15 +101,14 @@ def _exposed(sample: Sample, sensor: SensorConfig, expected_e: NDArray[np.float6
     return expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
 
 
-def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDArray[np.float64]) -> dict[str, Any]:
-    cell, shape = sample.cell, raw.shape
-    row, column, height, width = sample.window
-    light = cell.luminance_cd_m2 * cell.exposure_s
-    errors_e = _opened(cell.errors)[:, row : row + height, column : column + width] * light
+def _facts(
+    sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDArray[np.float64], errors_e: NDArray[Any]
+) -> dict[str, Any]:
+    cell = sample.cell
     variance_e2 = noise_variance(expected_e, sensor, cell.exposure_s)
     # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
     shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
-    mean_e = {name: float(expected_e[mask(sensor.cfa, name, shape)].mean()) for name in channels(sensor.cfa)}
+    mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     alone = {name: of_channel(sensor, name) for name in mean_e}
     dark_e = {
         name: (x.pixel.dark_current_e_per_s * cell.exposure_s - dark_level_dn(x, cell.exposure_s) * x.gain_e_per_dn) / s
@@ -150,7 +119,7 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
         **frame_labels(cell),
         "mosaic": sample.mosaic,
         "tile": list(sensor.cfa),
-        "channels": list(channels(sensor.cfa)),
+        "channels": list(sensor.channels),
         "seed": cell.seed,
         "window": list(sample.window),
         **{name: getattr(cell, name) for name in ("luminance_cd_m2", "exposure_s", "white_cd_m2")},
@@ -166,8 +135,8 @@ def _facts(sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDAr
             "mean": charged_share(errors_e, expected_e, sensor, cell.exposure_s),
             "of_95_percent": float(np.quantile(shares, OF_PIXELS)),
         },
-        "groups": list(sample.truth.illuminants["groups"]),
-        "illuminants": dict(sample.truth.illuminants),
+        "groups": list(sample.illuminants["groups"]),
+        "illuminants": dict(sample.illuminants),
         "lens": asdict(sensor.lens),
     }
 
@@ -182,22 +151,14 @@ def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dic
 
     b holds all that doesn't depend on light, a x the shot noise, c x^2 what is in proportion to it: PRNU.
     """
-    scale_e, gain = sensor.pixel.full_well_e, sensor.gain_e_per_dn
-    shape = 2 * len(sensor.cfa), 2 * len(sensor.cfa[0])
-    dark, half, full = (noise_variance(np.full(shape, x * scale_e), sensor, exposure_s) for x in (0.0, 0.5, 1.0))
+    full_e, gain = sensor.pixel.full_well_e, sensor.gain_e_per_dn
     result = {}
-    for name in channels(sensor.cfa):
-        at = mask(sensor.cfa, name, shape)
-        low, middle, high = (float(variance[at].mean()) for variance in (dark, half, full))
-        square = (high - 2 * middle + low) * 2 / scale_e**2
-        slope = (high - low) / scale_e - square * scale_e
+    for name in sensor.channels:
+        low, middle, high = noise_variance(np.array([0.0, 0.5, 1.0]) * full_e, sensor, exposure_s, name).tolist()
+        square = (high - 2 * middle + low) * 2 / full_e**2
+        slope = (high - low) / full_e - square * full_e
         result[name] = {"a": slope / gain, "b": low / gain**2, "c": square}
     return result
-
-
-def _surfaces(sample: Sample) -> NDArray[Any]:
-    assert sample.truth.surfaces is not None
-    return _opened(sample.truth.surfaces)
 
 
 @lru_cache(maxsize=64)

@@ -5,11 +5,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.cache import file_digests
 from render.combine import emission
 from render.photometry import luminance, tristimulus
-from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import files_of
 from render.surfaces import see_surfaces
 from render.transport import Transport
@@ -17,7 +17,6 @@ from rodcone.digests import digest, digest_file, digest_inputs
 from rodcone.types import Floats
 from sensor.optics import form_image
 from sensor.response import channel_electrons
-from studies.dataset.sample import TruthFiles
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.sweep.cells import Cell
 from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
@@ -42,22 +41,20 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
     terms = [cells[0].render.content, opened.identity, job.study.spectra, sorted(frames), versions(), code_digests()]
     key = digest_inputs(terms)
     facts = read_facts(folder, key)
-    if facts is None or not all(is_whole(folder / name) for name in facts["files"].values()):
-        folder.mkdir(parents=True, exist_ok=True)
+    if facts is None or not all(
+        is_whole(folder / name) for names in facts["files"].values() for name in names.values()
+    ):
         facts = _made(job, opened, frames, scene_transport(job, opened, progress)[0])
         keep_facts(folder, key, facts)
     return facts
 
 
-def truth_of(job: Job, facts: Facts, cell: Cell) -> TruthFiles:
-    """Files that samples of a cell's frame are cut from."""
-    folder, files, spectrum = (job.out / PLANES).resolve(), facts["files"], cell.condition.spectrum
-    return TruthFiles(
-        channels=folder / files[f"channels of {_frame_name(cell)}"],
-        lit=folder / files[f"light of {spectrum}"],
-        surfaces=folder / files["surfaces"] if "surfaces" in files else None,
-        illuminants=facts["illuminants"][spectrum],
-    )
+def plane_files(job: Job, facts: Facts, cell: Cell) -> dict[str, Path]:
+    """Files that planes of samples of a cell's frame are cut from; a picture file has none of surfaces."""
+    folder, files = (job.out / PLANES).resolve(), facts["files"]
+    names = files["surfaces"] | files[cell.condition.spectrum] | files[_frame_name(cell)]
+    made = {plane: folder / name for plane, name in names.items()}
+    return {"mosaic_e": cell.electrons, "rgb": cell.truth, **made}
 
 
 def scene_hash(opened: OpenedScene) -> str:
@@ -77,29 +74,27 @@ def code_digests() -> list[str]:
 
 
 def _made(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: Transport) -> dict[str, Any]:
-    folder, files, illuminants = job.out / PLANES, dict[str, str](), dict[str, Any]()
-    objects: tuple[str, ...] = ()
-    materials: tuple[str, ...] = ()
+    def kept(**planes: NDArray[Any]) -> dict[str, str]:
+        return {name: keep_array(job.out / PLANES, plane) for name, plane in planes.items()}
+
+    facts: dict[str, Any] = {"files": {"surfaces": {}}, "illuminants": {}, "objects": (), "materials": ()}
+    files = facts["files"]
     if opened.scene is not None:
         seen = see_surfaces(opened.scene, opened.size)
-        ids = np.stack([seen.object_id, seen.material_id], axis=-1).astype(np.float32)
-        planes = np.concatenate([seen.depth_m[..., None], seen.normal, ids], axis=-1)
-        files["surfaces"], objects, materials = keep_array(folder, planes), seen.objects, seen.materials
+        ids = np.stack([seen.object_id, seen.material_id], axis=-1)
+        files["surfaces"] = kept(depth=seen.depth_m, normals=seen.normal, ids=ids)
+        facts |= {"objects": seen.objects, "materials": seen.materials}
     for spectrum in job.study.spectra:
         lit = under(transport, spectrum)
         view = photographed(lit, 1.0)
         xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm)
-        planes = np.concatenate([xyz, group_shares(lit)], axis=-1).astype(np.float32)
-        files[f"light of {spectrum}"] = keep_array(folder, planes)
-        illuminants[spectrum] = _illuminants(lit)
+        files[spectrum] = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit).astype(np.float32))
+        facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():
             if cell.condition.spectrum == spectrum:
-                files[f"channels of {name}"] = keep_array(folder, _channels(view, cell))
-    return {"files": files, "illuminants": illuminants, "objects": objects, "materials": materials}
-
-
-def _channels(view: SpectralRadiance, cell: Cell) -> Any:
-    return channel_electrons(form_image(view, cell.sensor), cell.sensor, 1.0).astype(np.float32)
+                electrons = channel_electrons(form_image(view, cell.sensor), cell.sensor, 1.0)
+                files[name] = kept(channels_e=electrons.astype(np.float32))
+    return facts
 
 
 def group_shares(lit: Transport) -> Floats:

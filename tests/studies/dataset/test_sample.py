@@ -11,7 +11,7 @@ import sweep_sample as SAMPLE
 from sensor.chip import ChannelReading
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.presets import low_noise
-from studies.dataset.sample import Arrays, Sample, TruthFiles, make_sample, noise_coefficients
+from studies.dataset.sample import Arrays, Sample, make_sample, noise_coefficients
 
 SIZE = (128, 128)
 LIGHT = {"wavelength_nm": [], "width_nm": [], "groups": {}}
@@ -45,8 +45,8 @@ def sample_of(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> Sample:
     for name, array in files.items():
         np.save(folder / f"{name}.npy", array)
     cell = replace(cell, sensor=sensor, luminance_cd_m2=level_cd_m2, **{x: folder / f"{x}.npy" for x in files})
-    truth = TruthFiles(channels=folder, lit=folder, surfaces=None, illuminants=LIGHT)
-    return Sample("key", cell, "bayer", "0" * 32, "train", truth, ("mosaic_e",), None, (0, 0, *SIZE))
+    files = {"mosaic_e": cell.electrons}
+    return Sample("key", cell, "bayer", "0" * 32, "train", files, LIGHT, None, (0, 0, *SIZE))
 
 
 def taken(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> list[Made]:
