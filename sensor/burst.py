@@ -23,7 +23,7 @@ _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of t
 
 # Fields that all frames must share; and those of one exposure time, with which dark current goes.
 _CAMERA = ("cfa", "shape", "white_dn", "gain_e_per_dn", "prnu", "column_gain_spread")
-_EXPOSURE = ("black_dn", "read_noise_e", "dsnu_e", "noise_steps", "channel_noise")
+_EXPOSURE = ("black_dn", "read_noise_e", "dsnu_e", "noise_steps", "channel_noise", "dark_current_e")
 
 
 @dataclass(frozen=True)
@@ -59,6 +59,7 @@ class _Group:
     temporal_e2: _Sites
     dsnu_e: _Sites
     shot: _Sites
+    dark_current_e: _Sites
     clear_e: _Sites
 
 
@@ -71,9 +72,7 @@ def merge(frames: Sequence[RawImage]) -> Merged:
 
     In the dark the stated temporal variance is too large by the factor 1 + 0.4 / (temporal dark noise [e-]): a noisy
     pixel's light isn't known better. Fixed offsets are common to all frames, and no weight averages them away; where
-    they exceed the temporal noise several times they disturb the weights, and are better subtracted first. Frames don't
-    hold their dark current, so that what columns' gains make of it counts as such an offset: the fixed variance lacks
-    2 x spread^2 x light x dark current.
+    they exceed the temporal noise several times they disturb the weights, and are better subtracted first.
 
     Parameters
     ----------
@@ -96,7 +95,9 @@ def merge(frames: Sequence[RawImage]) -> Merged:
             np.where(full, new, old) for new, old in zip(shorter, (rate, variance, offset), strict=True)
         )
         full &= rate * groups[start].exposure_s >= groups[start].clear_e
-    fixed = offset**2 + (frames[0].prnu * rate) ** 2
+    dark_rate = groups[-1].dark_current_e / groups[-1].exposure_s
+    both = 2 * frames[0].column_gain_spread ** 2 * dark_rate * np.maximum(rate, 0.0)  # as in `noise_at_sites`
+    fixed = offset**2 + (frames[0].prnu * rate) ** 2 + both
     return Merged(rate_e_per_s=rate, temporal_variance=variance, fixed_variance=fixed, saturated=full)
 
 
@@ -137,8 +138,10 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
     for noise in shortest.channel_noise:
         alone = [frame.noise_of(noise.channel) for frame in frames]
         read_e, offset_e = _dark_noise(times, [(x.read_noise_e**2, x.dsnu_e) for x in alone])
-        well_e = noise.full_well_e * deeper
-        channel_noise.append(replace(noise, full_well_e=well_e, read_noise_e=read_e, dsnu_e=offset_e))
+        well_e, dark_e = noise.full_well_e * deeper, noise.dark_current_e * deeper
+        channel_noise.append(
+            replace(noise, full_well_e=well_e, read_noise_e=read_e, dsnu_e=offset_e, dark_current_e=dark_e)
+        )
     full = np.all([frame.saturated for frame in frames if frame.exposure_s == times.min()], axis=0)
     electrons = np.where(full, full_e, np.minimum(merged.rate_e_per_s * whole_s, full_e))
     return replace(
@@ -160,6 +163,7 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
             for step in first.noise_steps
         ),
         channel_noise=tuple(channel_noise),
+        dark_current_e=shortest.dark_current_e * deeper,
     )
 
 
@@ -210,12 +214,12 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
     for exposure_s in sorted({frame.exposure_s for frame in frames}, reverse=True):
         same = [frame for frame in frames if frame.exposure_s == exposure_s]
         rate = np.asarray(sum(frame.electrons for frame in same)) / (len(same) * exposure_s)
-        temporal_e2, dsnu_e, shot, full_e = _at_sites(same[0])
+        temporal_e2, dsnu_e, shot, dark_e, full_e = _at_sites(same[0])
         gains_e = same[0].column_gain_spread * full_e
         spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + gains_e**2) ** 0.5
         # Half, lest a well of a few electrons never count.
         clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-        groups.append(_Group(exposure_s, len(same), rate, temporal_e2, dsnu_e, shot, clear_e))
+        groups.append(_Group(exposure_s, len(same), rate, temporal_e2, dsnu_e, shot, dark_e, clear_e))
     return groups
 
 
@@ -231,16 +235,16 @@ def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, floa
     return float(whole_s / np.sqrt(weights.sum())), float(whole_s * offset)
 
 
-def _at_sites(raw: RawImage) -> tuple[_Sites, _Sites, _Sites, _Sites]:
-    """Temporal dark variance, DSNU, shot noise's factor and full well of a frame's samples, each a number or (h, w)."""
-    plain = raw.read_noise_e**2 + raw.rounding_e2, raw.dsnu_e, 1.0, raw.full_well_e
+def _at_sites(raw: RawImage) -> tuple[_Sites, ...]:
+    """Temporal dark variance, DSNU, shot noise's factor, dark current and full well of samples, numbers or (h, w)."""
+    plain = raw.read_noise_e**2 + raw.rounding_e2, raw.dsnu_e, 1.0, raw.dark_current_e, raw.full_well_e
     if not raw.channel_noise:
         return plain
     sites = np.stack([np.full(raw.shape, value) for value in plain])
     for noise in raw.channel_noise:
-        values = noise.read_noise_e**2, noise.dsnu_e, noise.shot, noise.full_well_e
+        values = noise.read_noise_e**2, noise.dsnu_e, noise.shot, noise.dark_current_e, noise.full_well_e
         sites[:, mask(raw.cfa, noise.channel, raw.shape)] = np.array(values)[:, None]
-    return sites[0], sites[1], sites[2], sites[3]
+    return tuple(sites)
 
 
 def _weighted(groups: Sequence[_Group]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:

@@ -120,6 +120,8 @@ class ChannelNoise:
         Electrons at which its samples are full.
     shot, read_noise_e, dsnu_e, prnu : float
         As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
+    dark_current_e : float
+        As `RawImage` has it.
     """
 
     channel: str
@@ -128,6 +130,7 @@ class ChannelNoise:
     read_noise_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
     dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
     prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
+    dark_current_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")] = 0.0
 
     __repr__ = brief
 

@@ -60,6 +60,8 @@ class RawImage:
     channel_noise : tuple of ChannelNoise
         Of channels that are read apart; what the others say of noise and well doesn't hold there. Their samples may
         read more than `white_dn`.
+    dark_current_e : float
+        Mean of the dark current in `black_dn` [e-], on which the columns' gains act as on light.
 
     Raises
     ------
@@ -86,6 +88,7 @@ class RawImage:
     defects: NDArray[np.intp] | None = None
     noise_steps: tuple[NoiseStep, ...] = ()
     channel_noise: tuple[ChannelNoise, ...] = ()
+    dark_current_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")] = 0.0
 
     __repr__ = brief
 
@@ -166,7 +169,7 @@ class RawImage:
         return next((noise for noise in self.channel_noise if noise.channel == channel), self._plain(channel))
 
     def _plain(self, channel: str) -> ChannelNoise:
-        return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu)
+        return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu, self.dark_current_e)
 
     @property
     def saturation_e(self) -> float:
@@ -205,16 +208,17 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
         Of the mosaic, or of a part of it that begins with a whole tile.
     """
     light = np.maximum(electrons, 0.0)
+    both = 2 * raw.column_gain_spread**2  # of a column's gain, which light and dark current have in common
     variance = light * raw.prnu
     variance *= variance
-    variance += light
+    variance += light * (1 + both * raw.dark_current_e)
     variance += raw.dark_noise_e**2
-    parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise]]
-    parts = [(light >= step.from_e, step) for step in raw.noise_steps]
-    parts += [(mask(raw.cfa, noise.channel, light.shape), noise) for noise in raw.channel_noise]
-    for where, noise in parts:
-        bright_e = light[where]
-        variance[where] = noise.shot * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
+    parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise, float]]
+    parts = [(light >= step.from_e, step, raw.dark_current_e) for step in raw.noise_steps]
+    parts += [(mask(raw.cfa, noise.channel, light.shape), noise, noise.dark_current_e) for noise in raw.channel_noise]
+    for where, noise, dark_e in parts:
+        bright_e, slope = light[where], noise.shot + both * dark_e
+        variance[where] = slope * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
     return np.asarray(variance)
 
 

@@ -291,6 +291,7 @@ def as_raw(
         exposure_s=float(exposure_s),
         engine=engine,
         defects=None if hot is None else np.argwhere(hot),
+        dark_current_e=dark_e,
     )
 
 

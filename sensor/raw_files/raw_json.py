@@ -14,7 +14,7 @@ from sensor.raw import RawImage
 FORMAT = "rodcone raw image"
 VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
-_OPTIONAL = ("defects", "noise_steps", "channel_noise")  # left out where there are none
+_OPTIONAL = ("defects", "noise_steps", "channel_noise", "dark_current_e")  # left out where there are none
 _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file may hold a mebibyte there
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 
@@ -22,8 +22,8 @@ MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 
 def to_json(raw: RawImage, **more: Any) -> str:
     """Everything of a raw image but its pixels, and the keys of `more`.
 
-    Python writes the shortest decimals that read back as the same float64. The keys ``defects``, ``noise_steps`` and
-    ``channel_noise`` are left out where there are none.
+    Python writes the shortest decimals that read back as the same float64. Keys of `_OPTIONAL` are left out
+    where there is none.
 
     Raises
     ------
@@ -33,18 +33,16 @@ def to_json(raw: RawImage, **more: Any) -> str:
     calibration: dict[str, Any] = {key: getattr(raw, key) for key in KEYS}
     if raw.colour is not None:
         calibration["colour"] = {key: value.tolist() for key, value in asdict(raw.colour).items()}
-    defects, *lists = (calibration.pop(key) for key in _OPTIONAL)
-    if defects is not None:
-        calibration["defects"] = defects.tolist()
-    calibration |= {
-        key: [asdict(x) for x in values] for key, values in zip(_OPTIONAL[1:], lists, strict=True) if values
-    }
+    calibration["defects"] = defects = [] if raw.defects is None else raw.defects.tolist()
+    for key in ("noise_steps", "channel_noise"):
+        calibration[key] = [asdict(x) for x in calibration[key]]
+    calibration = {key: value for key, value in calibration.items() if value or key not in _OPTIONAL}
     content = {"format": FORMAT, "version": VERSION, **more, **calibration}
     text = json.dumps(content, allow_nan=False, default=float)
     if len(text) > MOST_BYTES:
         raise InputError(
-            f"defects: {0 if defects is None else len(defects)} pixels don't fit a raw file; allowed: a calibration of "
-            f"{MOST_BYTES} bytes; list fewer"
+            f"defects: {len(defects)} pixels don't fit a raw file; allowed: a calibration of {MOST_BYTES} bytes; "
+            "list fewer"
         )
     return text
 

@@ -131,6 +131,7 @@ def read_by_channel(
                 read_noise_e=hypot(raw.read_noise_e, sqrt(raw.rounding_e2)) / share,
                 dsnu_e=raw.dsnu_e / share,
                 prnu=raw.prnu,
+                dark_current_e=raw.dark_current_e / share,
             )
         )
     read_noise_e = hypot(plain.read_noise_e, sqrt(plain.rounding_e2))

@@ -60,6 +60,7 @@ def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: f
         exposure_s=whole * exposure_s,
         defects=np.concatenate(hot) if hot else None,
         noise_steps=tuple(steps),
+        dark_current_e=min(dark_current_e, sensor.pixel.full_well_e) * whole,
     )
 
 

@@ -202,6 +202,9 @@ def test_a_burst_keeps_each_channel_s_noise_and_well():
     dark_e = 2000 * TIME_S  # on the scale of the whole time, and half a DN of it may stay
     assert merged.noise_of("W").full_well_e == pytest.approx(4 * (60_000 - dark_e), rel=1e-4)
     assert not merged.saturated.any()
+    columns = camera(WAYS[0], prnu=0.0)
+    told = noise_at_sites(merged_raw([shot(columns, scene(), 1)] * 4), 4 * scene())
+    np.testing.assert_allclose(told, noise_variance(4 * scene(), merged_sensor(columns, 4), 4 * TIME_S), rtol=1e-3)
 
 
 def test_raw_files_give_every_channel_s_noise_back(tmp_path):
@@ -212,7 +215,7 @@ def test_raw_files_give_every_channel_s_noise_back(tmp_path):
             back = read_raw(write_raw(raw, tmp_path / f"{number}{name}")[0])
             np.testing.assert_array_equal(back.dn, raw.dn)
             assert back.channel_noise == raw.channel_noise
-            assert back.read_noise_e == raw.read_noise_e
+            assert (back.read_noise_e, back.dark_current_e) == (raw.read_noise_e, raw.dark_current_e)
 
 
 def test_another_mosaic_drops_the_channel_that_it_lacks(tmp_path):

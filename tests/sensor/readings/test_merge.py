@@ -65,6 +65,18 @@ def test_a_merged_frame_without_light_has_no_mean_and_the_noise_that_it_states(n
     assert raw.electrons.var() == pytest.approx(raw.dark_noise_e**2, rel=4 * np.sqrt(2 / raw.dn.size))
 
 
+@loop("name", ["low_noise", "white_apart", *HDR])
+def test_a_raw_image_states_what_columns_gains_make_of_light_and_dark_current_together(name):
+    """2 s^2 light dark current: 40 % of the variance of a single reading. Charges share it as `noise_variance` says."""
+    sensor = preset(name)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, prnu=0.0, column_gain_spread=0.03, dark_current_e_per_s=1e4))
+    light, device = np.full((8, 8), 1000.0), draw_device(sensor, (8, 8), np.random.default_rng(3))
+    raw = expose(light, sensor, 0.1, device, np.random.default_rng(4))
+    whole = whole_share(sensor) if name in HDR else 1.0
+    stated = noise_at_sites(raw, whole * light) / whole**2
+    np.testing.assert_allclose(stated, noise_variance(light, sensor, 0.1), rtol=0.01)
+
+
 @loop("share", [0.9, 1.05, 1.3])
 @loop("name", HDR)
 def test_a_reading_that_dark_current_fills_is_left_out(name, share):
