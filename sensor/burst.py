@@ -215,8 +215,8 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
         same = [frame for frame in frames if frame.exposure_s == exposure_s]
         rate = np.asarray(sum(frame.electrons for frame in same)) / (len(same) * exposure_s)
         temporal_e2, dsnu_e, shot, dark_e, full_e = _at_sites(same[0])
-        gains_e = same[0].column_gain_spread * full_e
-        spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + gains_e**2) ** 0.5
+        gains_e2 = (same[0].column_gain_spread * full_e) ** 2 + 2 * same[0].column_gain_spread ** 2 * full_e * dark_e
+        spread_e = (shot * full_e + temporal_e2 + dsnu_e**2 + gains_e2) ** 0.5
         # Half, lest a well of a few electrons never count.
         clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
         groups.append(_Group(exposure_s, len(same), rate, temporal_e2, dsnu_e, shot, dark_e, clear_e))

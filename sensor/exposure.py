@@ -149,7 +149,7 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     """
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
-    return float(np.where(under_well(expected_e, sensor), bits, 0.0).mean())
+    return float(np.where(under_well(expected_e, sensor, exposure_s), bits, 0.0).mean())
 
 
 def warn_if_full(raw: RawImage) -> None:

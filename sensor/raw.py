@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from math import hypot
+from math import hypot, sqrt
 from typing import Annotated, Any
 
 import numpy as np
@@ -177,11 +177,13 @@ class RawImage:
         return self._saturation_e(self._plain(""))
 
     def _saturation_e(self, noise: ChannelNoise) -> float:
-        """Level from which a channel's sample counts as saturated [e-]: noise comes after the well clips."""
-        dark_e = noise.dark_noise_e
-        if self.noise_steps:
-            dark_e = hypot(self.noise_steps[-1].read_noise_e, self.noise_steps[-1].dsnu_e)
-        spread_e = hypot(dark_e, self.column_gain_spread * noise.full_well_e)
+        """Level from which a channel's sample counts as saturated [e-]: but for dark current's, noise comes after the
+        well clips; columns' gains act on the whole well.
+        """
+        last, dark_e = self.noise_steps[-1] if self.noise_steps else noise, noise.dark_current_e
+        before_e2 = last.shot * dark_e + (self.column_gain_spread * dark_e) ** 2
+        after_e = sqrt(max(hypot(last.read_noise_e, last.dsnu_e) ** 2 - before_e2, 0.0))
+        spread_e = hypot(after_e, self.column_gain_spread * (noise.full_well_e + dark_e))
         return noise.full_well_e - SATURATION_SIGMAS * spread_e - noise.shot * self.gain_e_per_dn / 2
 
     @property

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 from sensor.calibration import ChannelNoise
 from sensor.cfa import mask
-from sensor.chip import ChannelReading, Chip
+from sensor.chip import ChannelReading, Chip, PixelConfig
 from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.raw import RawImage
 
@@ -44,18 +44,22 @@ def of_channel(sensor: SensorConfig, channel: str | None) -> tuple[SensorConfig,
     return (replace(sensor, chip=replace(sensor.chip, channels=())) if sensor.chip.channels else sensor), 1.0
 
 
-def wells_e(sensor: SensorConfig, shape: tuple[int, ...]) -> float | NDArray[np.float64]:
-    """Electrons at which each pixel of a mosaic is full; one number where all channels are read alike."""
-    return at_sites(sensor, shape, sensor.pixel.full_well_e, lambda x: x.pixel_of(sensor.pixel).full_well_e / x.share)
+def under_well(
+    expected_e: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None
+) -> NDArray[np.bool_]:
+    """Which pixels of a frame light and dark current do not fill; parameters as of `sensor.readout.noise_variance`."""
 
+    def room_e(pixel: PixelConfig) -> float:
+        return pixel.full_well_e - pixel.dark_current_e_per_s * exposure_s
 
-def under_well(expected_e: Floats, sensor: SensorConfig, channel: str | None = None) -> NDArray[np.bool_]:
-    """Which pixels of a frame the light does not fill; parameters as of `as_metered`."""
     sensor = as_metered(sensor, expected_e, channel)
-    if channel is None:
-        return np.asarray(expected_e < wells_e(sensor, expected_e.shape))
-    alone, share = of_channel(sensor, channel)
-    return np.asarray(expected_e < alone.pixel.full_well_e / share)
+    if channel is not None:
+        alone, share = of_channel(sensor, channel)
+        return np.asarray(expected_e < room_e(alone.pixel) / share)
+    plain_e, pixel = room_e(sensor.pixel), sensor.pixel
+    return np.asarray(
+        expected_e < at_sites(sensor, expected_e.shape, plain_e, lambda x: room_e(x.pixel_of(pixel)) / x.share)
+    )
 
 
 def at_sites(

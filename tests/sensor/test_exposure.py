@@ -104,6 +104,14 @@ def test_information_of_a_flat_tile_in_closed_form(read_noise_e):
     assert found == pytest.approx(bits(1500, 1500, 3000, dark_e2=dark_e2) / 4, rel=1e-9)
 
 
+def test_dark_current_leaves_less_of_the_well_to_light():
+    """10 500 e- of it leave 4500 of 15 000, which white's 5000 fill."""
+    sensor = ideal()
+    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1000.0))
+    expected = bits(500, 500, 1000, dark_e2=10_500 + sensor.gain_e_per_dn**2 / 12) / 4
+    assert information_bits(tiles(1000.0), sensor, 10.5) == pytest.approx(expected, rel=1e-9)
+
+
 def test_where_nothing_is_full_the_longer_time_wins_and_where_only_w_counts_the_shorter():
     sensor = ideal()
     assert most_informative_s(tiles(100.0), sensor, (5.0, 1.0)) == 5.0

@@ -32,6 +32,15 @@ def test_saturation_begins_four_sigmas_of_the_dark_and_half_a_dn_under_the_well(
     np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
 
 
+def test_dark_current_fills_the_well_and_columns_gains_act_on_both():
+    """Its own noise is clipped with the light's: columns and readout alone spread a full pixel."""
+    read_e2, dark_e, spread = 3.0**2 + 4.0**2 + 2.0**2 / 12, 900.0, 0.01
+    dark = {"read_noise_e": np.sqrt(3.0**2 + dark_e), "dsnu_e": np.hypot(4.0, spread * dark_e)}
+    raw = replace(RAW, **dark, dark_current_e=dark_e, column_gain_spread=spread)
+    expected_e = 2000 - 4 * np.sqrt(read_e2 + (spread * (2000 + dark_e)) ** 2) - 1
+    assert raw.saturation_e == pytest.approx(expected_e, rel=1e-12)
+
+
 def test_a_channel_read_apart_has_its_own_noise_and_saturation():
     """Four times the shot noise, read noise 6, DSNU 8 and a well of 6000: 3000 DN over black."""
     white = ChannelNoise("W", full_well_e=6000.0, shot=4.0, read_noise_e=6.0, dsnu_e=8.0, prnu=0.01)

@@ -20,7 +20,7 @@ from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, preset_file
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.readings.by_channel import as_metered, of_channel
+from sensor.readings.by_channel import as_metered, of_channel, under_well
 from sensor.readout import noise_sources, noise_variance, read_out
 from sensor.variations import vary
 from studies.photograph.camera import calibrate
@@ -111,6 +111,19 @@ def test_a_channel_is_full_where_its_own_well_is_and_the_others_where_theirs(rea
     assert not shot(sensor, scene(0.8 * full_e), 1).saturated.any()
     green = shot(sensor, np.where(white, 10.0, 20_000.0), 1)
     np.testing.assert_array_equal(green.saturated, ~white)
+
+
+@loop("reading", WAYS)
+def test_dark_current_takes_its_part_of_each_channel_s_well(reading):
+    sensor = camera(reading)
+    well_e, dark_e = reading.full_well_e or 15_000, 2000 * TIME_S * reading.time_share
+    full_e = np.array([15_000 - 2000 * TIME_S, (well_e - dark_e) / (reading.time_share * reading.light_share)])
+    for channel, white in (("G", 0), ("W", 1)):
+        at = mask(RGBW, channel, SHAPE)
+        for part in (0.999, 1.001):
+            light = np.full(SHAPE, part * full_e[white])
+            assert (under_well(light, sensor, TIME_S)[at] == (part < 1)).all()
+            assert (under_well(light[at], sensor, TIME_S, channel) == (part < 1)).all()
 
 
 def test_the_other_channels_draw_what_they_draw_where_nothing_is_apart():
