@@ -12,7 +12,7 @@ from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorCo
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
 from sensor.readings.by_channel import under_well
-from sensor.readout import noise_variance
+from sensor.readout import as_read, noise_variance
 from sensor.response import behind_filters, channel_electrons
 
 MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
@@ -147,6 +147,7 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     expected_e : (h, w) float64
         Photo-electrons, as `sensor.response.expected_electrons`.
     """
+    sensor = as_read(sensor, expected_e)
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
     return float(np.where(under_well(expected_e, sensor, exposure_s), bits, 0.0).mean())

@@ -47,12 +47,11 @@ def of_channel(sensor: SensorConfig, channel: str | None) -> tuple[SensorConfig,
 def under_well(
     expected_e: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> NDArray[np.bool_]:
-    """Which pixels of a frame light and dark current do not fill; parameters as of `sensor.readout.noise_variance`."""
+    """Which pixels of a frame light and dark current do not fill; the camera as `sensor.readout.as_read` gives it."""
 
     def room_e(pixel: PixelConfig) -> float:
         return pixel.full_well_e - pixel.dark_current_e_per_s * exposure_s
 
-    sensor = as_metered(sensor, expected_e, channel)
     if channel is not None:
         alone, share = of_channel(sensor, channel)
         return np.asarray(expected_e < room_e(alone.pixel) / share)

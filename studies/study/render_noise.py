@@ -15,7 +15,7 @@ from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
 from sensor.readings.by_channel import under_well
-from sensor.readout import noise_variance
+from sensor.readout import as_read, noise_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
 # What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result, and for how
@@ -70,6 +70,7 @@ def _noise_and_room(
     expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
+    sensor = as_read(sensor, expected_e, channel)
     return noise_variance(expected_e, sensor, exposure_s, channel), under_well(expected_e, sensor, exposure_s, channel)
 
 

@@ -112,6 +112,16 @@ def test_dark_current_leaves_less_of_the_well_to_light():
     assert information_bits(tiles(1000.0), sensor, 10.5) == pytest.approx(expected, rel=1e-9)
 
 
+def test_a_pixel_that_the_chosen_gain_cannot_hold_tells_nothing():
+    """A lamp in 400 dim pixels: the frame is read by the quiet gain, whose well it fills, not the other's."""
+    sensor = preset("dual_gain")
+    sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
+    quiet, deep = sorted(reading.full_well_e for reading in sensor.chip.readings)
+    dim, lamp = np.full((20, 20), 10.0), np.full((20, 20), 10.0)
+    dim[7, 7], lamp[7, 7] = 0.0, (quiet + deep) / 2
+    assert information_bits(lamp, sensor, 0.01) == pytest.approx(information_bits(dim, sensor, 0.01), rel=1e-9)
+
+
 def test_where_nothing_is_full_the_longer_time_wins_and_where_only_w_counts_the_shorter():
     sensor = ideal()
     assert most_informative_s(tiles(100.0), sensor, (5.0, 1.0)) == 5.0
