@@ -20,22 +20,21 @@ _BAR = 30  # characters of the longest
 
 def card(lines: Sequence[dict[str, Any]]) -> str:
     """Card as Markdown, of a manifest's lines."""
-    of_kind = {kind: [line for line in lines if line["kind"] == kind] for kind in ("set", "scene", "shard", "sample")}
-    (head,), samples = of_kind["set"], of_kind["sample"]
-    size = sum(line["bytes"] for line in of_kind["shard"]) / 1e9
-    licences = Counter(line["licence"] for line in of_kind["scene"])
-    splits = {
-        split: [sum(line["samples"] for line in of_kind["shard"] if line["split"] == split),
-                sum(line["split"] == split for line in of_kind["scene"])]
-        for split in dict.fromkeys(line["split"] for line in of_kind["shard"])
-    }  # fmt: skip
+    kinds = ("set", "scene", "shard", "sample")
+    (head,), scenes, shards, samples = ([line for line in lines if line["kind"] == kind] for kind in kinds)
+    size = sum(line["bytes"] for line in shards) / 1e9
+    licences = Counter(line["licence"] for line in scenes)
+    splits = [
+        (split, sum(x["samples"] for x in shards if x["split"] == split), sum(x["split"] == split for x in scenes))
+        for split in dict.fromkeys(line["split"] for line in shards)
+    ]
     noise = {name: [line["render_noise"][name] for line in samples] for name in ("mean", "of_95_percent")}
     parts = [
         f"# {head['name']}",
         f"{len(samples)} raw frames of simulated cameras with the truth behind them, {size:.3g} GB in "
-        f"{len(of_kind['shard'])} shards. Made by rodcone {head['rodcone']}:",
+        f"{len(shards)} shards. Made by rodcone {head['rodcone']}:",
         f"    {head['command']}",
-        table(("split", "samples", "scenes"), [(split, *counts) for split, counts in splits.items()]),
+        table(("split", "samples", "scenes"), splits),
         "A scene is in one split alone, chosen by its hash. Shards are tar files in WebDataset's layout: "
         "`KEY.raw.npy` (DN), `KEY.json` (facts: mosaic, black and white level, gain, noise, exposure, light) and",
         table(("file", "what it holds"), [(f"`KEY.{name}.npy`", PLANES[name]) for name in head["planes"]]),

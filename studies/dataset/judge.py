@@ -12,12 +12,12 @@ from PIL import Image
 
 from isp.processors.catalogue import NAMED
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from rodcone.errors import InputError, one_line
+from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
 from sensor.presets import names, preset
 from sensor.variations import vary
 from studies.dataset.make_set import Runner
-from studies.dataset.shards import Lines, LinesMade, read_manifest, read_shard, shards_of, stands
+from studies.dataset.shards import Lines, LinesMade, Shard, read_manifest, read_shard, shards_of, stands
 from studies.design.expect import expect
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.confidence import half_width
@@ -27,7 +27,6 @@ from studies.study.levels import parse_exposure
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import SET
-from studies.sweep.run_cell import limit_threads
 
 MEASURED = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
 EXPECTED_UNDER = "D65"
@@ -45,20 +44,6 @@ _MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = 
 _NEARER_DB = 3.0
 
 Row = dict[str, Any]
-
-
-@dataclass(frozen=True)
-class Judging:
-    """Pictures of one shard's samples, by their keys: a task of `studies.sweep.workers`; its own key is the shard's."""
-
-    key: str
-    path: Path
-    pictures: Mapping[str, Path]
-
-    @property
-    def kind(self) -> tuple[object, ...]:
-        """Each shard is of a kind of its own."""
-        return (self.key,)
 
 
 @dataclass(frozen=True)
@@ -115,9 +100,8 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     for made in shards_of(manifest):
         if not stands(out / SET, made):
             raise InputError(f"of: {made.lines[0]['name']} isn't what was written; run rodcone dataset again")
-        here = {line["key"]: found[line["key"]] for line in made.lines[1:] if line["key"] in found}
-        name = made.lines[0]["name"]
-        tasks += [Judging(name, (out / SET / name).resolve(), here)] if here else []
+        if here := {line["key"]: found[line["key"]] for line in made.lines[1:] if line["key"] in found}:
+            tasks.append(Shard(made.key, (out / SET / made.lines[0]["name"]).resolve(), here))
     rows = [row for judged in runner(tasks, make=judge_shard) for row in judged.lines]
     _check_encoding(rows)
     result = scores(rows, developer)
@@ -144,27 +128,25 @@ def expected(samples: Lines, study: str) -> list[Score]:
     if study == FROZEN_LIST:  # another study's file of the same name is another sensor
         known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
     conditions = {_condition(line): line for line in samples if line["sensor"] in known}
+    nothing = {metric.key: math.nan for metric in MEASURED}
     result = []
     for (camera, level), line in conditions.items():
         light = line["luminance_cd_m2"]
         exposure = parse_exposure(line["exposure"]) or line["exposure"]
         sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # with its filters, of which a tile doesn't tell
         error = expect(sensor, [light], EXPECTED_UNDER, exposure)[0]
-        nothing = {metric.key: math.nan for metric in MEASURED}
         means = nothing | {"psnr_db": error.psnr_db}
         result.append(Score(camera, level, f"expect, {EXPECTED_UNDER}", light, 0, means, nothing))
     return result
 
 
-def judge_shard(task: Judging, most_threads: int | None = None) -> LinesMade:
+def judge_shard(task: Shard[Mapping[str, Path]]) -> LinesMade:
     """Measure the pictures of a shard's samples."""
-    if most_threads is not None:
-        limit_threads(most_threads)
     rows = []
     for arrays, facts in read_shard(task.path):
-        if facts["key"] in task.pictures:
+        if facts["key"] in task.content:
             truth = true_picture(arrays["rgb"].astype(np.float64))
-            encoded = read_picture(task.pictures[facts["key"]], truth.encoded.shape[:2])
+            encoded = read_picture(task.content[facts["key"]], truth.encoded.shape[:2])
             figures = vars(measure(encoded, truth.encoded, truth.lab))
             linear = decode_srgb(encoded)
             figures |= vars(appearance(linear, encode_srgb(linear), truth, facts["white_cd_m2"]))
@@ -182,7 +164,8 @@ def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
     InputError
         For a file that can't be read, of another size or with values beyond.
     """
-    try:
+    # damaged files fail in many ways
+    with read_errors(f"{path}: it is no picture of this set", "write it again", Exception):
         ending = path.suffix.lower()
         if ending == ".npy":
             values = np.load(path, allow_pickle=False)
@@ -201,8 +184,6 @@ def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
             raise ValueError(f"values of type {values.dtype}, or not finite; allowed: finite floats from 0 to 1")
         if values.min() < -_OVERSHOOT or values.max() > 1 + _OVERSHOOT:
             raise ValueError(f"values from {values.min():.3g} to {values.max():.3g}; allowed: 0 to 1, 1 is white")
-    except Exception as error:  # damaged files fail in many ways
-        raise InputError(f"{path}: it is no picture of this set ({one_line(error)})") from None
     return np.asarray(np.clip(values, 0, 1), dtype=np.float64)
 
 
@@ -211,14 +192,13 @@ def scores(rows: Sequence[Row], developer: str) -> list[Score]:
     conditions: dict[tuple[str, str], dict[str, list[Row]]] = {}
     for row in rows:
         conditions.setdefault(_condition(row), {}).setdefault(row["scene"], []).append(row)
+    keys = [metric.key for metric in MEASURED]
     result = []
     for (camera, level), by_scene in conditions.items():
-        keys = ("luminance_cd_m2", *(metric.key for metric in MEASURED))
-        figures = {key: np.array([np.mean([row[key] for row in x]) for x in by_scene.values()]) for key in keys}
-        luminance = float(figures.pop("luminance_cd_m2").mean())
-        means = {key: float(values.mean()) for key, values in figures.items()}
+        luminance = float(np.mean([x[0]["luminance_cd_m2"] for x in by_scene.values()]))
+        figures = np.array([[np.mean([row[key] for row in x]) for x in by_scene.values()] for key in keys])
         with np.errstate(invalid="ignore"):  # the truth itself has an infinite PSNR
-            halves = {key: float(half_width(values)) for key, values in figures.items()}
+            means, halves = (dict(zip(keys, x.tolist(), strict=True)) for x in (figures.mean(1), half_width(figures)))
         result.append(Score(camera, level, developer, luminance, len(by_scene), means, halves))
     return result
 

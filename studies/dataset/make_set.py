@@ -1,7 +1,7 @@
 """From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
 
 import re
-from collections.abc import Callable, Generator, Mapping, Sequence
+from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
 from importlib import metadata
@@ -21,7 +21,7 @@ from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
 from studies.dataset.sample import Sample, frame_labels
 from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
-from studies.dataset.truth_files import Facts, code_digests, plane_files, scene_facts, scene_hash
+from studies.dataset.truth_files import Facts, code_digests, plane_files, scene_facts
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.study import Study, label
 from studies.sweep.cells import Cell
@@ -121,7 +121,7 @@ def split_of(scene: str) -> str:
     return next(split for split, end in SPLITS.items() if place < end)
 
 
-def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
+def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard[tuple[Sample, ...]]]:
     """Shards of each split, in proportion to its samples, which lie in the order of their keys' hashes: mixed."""
     shards = []
     for split in SPLITS:
@@ -129,7 +129,7 @@ def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Sha
         number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
         parts = [chosen[len(chosen) * i // number : len(chosen) * (i + 1) // number] for i in range(number)]
         for index, part in enumerate(parts):
-            made_from = [(x.key, x.cell.key, x.window, x.part, _names(x.files)) for x in part]
+            made_from = [(x.key, x.cell.key, x.window, x.part, [path.name for path in x.files.values()]) for x in part]
             key = digest([made_from, versions(), code_digests()])
             shards.append(Shard(key, (folder / f"{split}-{index:06d}.tar").resolve(), tuple(part)))
     return shards
@@ -145,33 +145,31 @@ def _earlier(folder: Path) -> Lines:
 
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
-    hash_of_scene = scene_hash(opened)
-    samples = dict[str, Sample]()
+    frames = dict[str, Cell]()
     for cell in cells:
-        mosaic = processor_of(cell.processor).mosaic
-        parts = (*frame_labels(cell).values(), mosaic)
-        frame = "_".join(_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
-        files = plane_files(job, facts, cell)
-        windows = _windows(np.load(cell.electrons, mmap_mode="r").shape[:2], order.crop)
-        if not windows:
-            raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
-        for index, window in enumerate(windows):
-            key = f"{frame}_s{cell.seed}" + (f"_{window[0]}-{window[1]}" if order.crop else "")
-            known = samples.get(key)
-            if known and frame_labels(known.cell) != frame_labels(cell):
-                raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
-            samples[key] = known or Sample(
-                key=key,
-                cell=cell,
-                mosaic=mosaic,
-                scene_hash=hash_of_scene,
-                split=split_of(hash_of_scene),
-                files={name: files[name] for name in order.planes if name in files},
-                illuminants=facts["illuminants"][cell.condition.spectrum],
-                part=index if len(windows) > 1 else None,
-                window=window,
-            )
-    return list(samples.values())
+        parts = (*frame_labels(cell).values(), processor_of(cell.processor).mosaic)
+        words = (_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
+        key = f"{'_'.join(words)}_s{cell.seed}"
+        if frame_labels(frames.setdefault(key, cell)) != frame_labels(cell):
+            raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
+    windows = _windows(np.load(cells[0].electrons, mmap_mode="r").shape[:2], order.crop)
+    if not windows:
+        raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
+    return [
+        Sample(
+            key=key + (f"_{window[0]}-{window[1]}" if order.crop else ""),
+            cell=cell,
+            mosaic=processor_of(cell.processor).mosaic,
+            scene_hash=facts["hash"],
+            split=split_of(facts["hash"]),
+            files=plane_files(job, facts, cell, order.planes),
+            illuminants=facts["illuminants"][cell.condition.spectrum],
+            part=index if len(windows) > 1 else None,
+            window=window,
+        )
+        for key, cell in frames.items()
+        for index, window in enumerate(windows)
+    ]
 
 
 def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:
@@ -180,18 +178,13 @@ def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, i
     return [(row, column, height, width) for row, column in corners]
 
 
-def _names(files: Mapping[str, Path]) -> dict[str, str]:
-    """Names of a sample's files, which are the digests of their content."""
-    return {plane: path.name for plane, path in files.items()}
-
-
 def _scene_line(opened: OpenedScene, facts: Facts) -> dict[str, Any]:
     source = opened.choice.source
     return {
         "kind": "scene",
         "name": opened.choice.label,
-        "hash": scene_hash(opened),
-        "split": split_of(scene_hash(opened)),
+        "hash": facts["hash"],
+        "split": split_of(facts["hash"]),
         "licence": "its owner's" if Path(source).suffix else "MIT, as rodcone; no texture of others",
         "objects": facts["objects"],
         "materials": facts["materials"],

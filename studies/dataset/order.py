@@ -9,8 +9,7 @@ from typing import Annotated, Any
 
 from render.radiance_files.radiance_source import extent_of
 from rodcone.digests import digest
-from rodcone.errors import InputError, require_absent, require_fields, require_whole, unknown
-from sensor.cfa import channels
+from rodcone.errors import InputError, require_absent, require_fields, require_keys, require_whole
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
@@ -44,9 +43,7 @@ class SetOrder:
     crop: Annotated[int | None, (16, 8192, "give the side of a part in pixels")] = None
 
     def __post_init__(self) -> None:
-        for name in self.planes:
-            if name not in PLANES:
-                raise unknown("truth", name, PLANES)
+        require_keys("truth", self.planes, PLANES)
         require_fields(self)
 
 
@@ -60,11 +57,10 @@ def check_cameras(study: Study, order: SetOrder) -> None:
     """Raise `InputError` for what a sample can't hold: raw frames of other than one reading, a tile that parts cut."""
     require_absent(
         "in a data set, whose frames are single ones at a scene's own pixels",
+        frames=None if study.frames == (1,) else list(study.frames),
         sensor_side_um=study.sensor_side_um,
         shake=study.lens.shake,
     )
-    if study.frames != (1,):
-        raise InputError(f"frames: {list(study.frames)} in a data set; allowed: [1]; leave it out")
     for name in study.sensors:
         if preset(name).chip.sites > 1 or preset(name).chip.readings:
             raise InputError(
@@ -92,9 +88,9 @@ def bytes_needed(
             pixels, groups, bands = prod(opened.size), len(opened.scene.groups), len(renders[choice].wavelength_nm)
         total += 3 * 4 * pixels * bands * groups
         for sensor in _cameras(study):
-            by = {**_BYTES, "channels_e": 4 * len(channels(sensor.cfa)), "shares": 4 * groups}
+            by = {**_BYTES, "channels_e": 4 * len(sensor.channels), "shares": 4 * groups}
             of_sample = pixels * (2 + sum(by[name] for name in order.planes)) + _SAMPLE_BYTES
-            total += conditions * of_sample + len(study.spectra) * 4 * pixels * (20 + len(channels(sensor.cfa)))
+            total += conditions * of_sample + len(study.spectra) * 4 * pixels * (20 + len(sensor.channels))
     return total
 
 

@@ -5,8 +5,9 @@ import tarfile
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import pairwise
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 
@@ -14,31 +15,31 @@ from rodcone.digests import digest_file
 from rodcone.errors import read_errors
 from rodcone.files import inside, replacing, write_files
 from studies.dataset.sample import Arrays, Sample, make_sample
-from studies.sweep.run_cell import limit_threads
 
 MANIFEST = "manifest.jsonl"
 # Of a sample in a manifest.
 _TOLD = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
          "snr_db", "saturated", "render_noise")  # fmt: skip
 Lines = list[dict[str, Any]]
+Content = TypeVar("Content")
 
 
 @dataclass(frozen=True)
-class Shard:
-    """A shard to make: a task of `studies.sweep.workers`.
+class Shard(Generic[Content]):
+    """A shard to make, or to judge pictures by: a task of `studies.sweep.workers`.
 
     Attributes
     ----------
     key : str
-        Hash of all that decides its bytes.
+        Hash of all that decides the result.
     path : Path
-    samples : tuple of Sample
-        In the shard's order.
+    content : Content
+        Samples in the shard's order; or pictures by their samples' keys.
     """
 
     key: str
     path: Path
-    samples: tuple[Sample, ...]
+    content: Content
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -54,7 +55,7 @@ class LinesMade:
     lines: Lines
 
 
-def make_shard(shard: Shard, most_threads: int | None = None) -> LinesMade:
+def make_shard(shard: Shard[tuple[Sample, ...]]) -> LinesMade:
     """Write a shard, whole or not at all; the same samples give the same bytes, whoever writes them and when.
 
     Raises
@@ -62,12 +63,10 @@ def make_shard(shard: Shard, most_threads: int | None = None) -> LinesMade:
     OSError
         Where an array can't be read, or the file not be written.
     """
-    if most_threads is not None:
-        limit_threads(most_threads)
     lines: Lines = []
     with replacing(shard.path) as (place,):
         with tarfile.open(place, "w", format=tarfile.GNU_FORMAT) as tar:
-            for sample in shard.samples:
+            for sample in shard.content:
                 arrays, facts = make_sample(sample)
                 for name, array in arrays.items():
                     file = BytesIO()
@@ -76,8 +75,8 @@ def make_shard(shard: Shard, most_threads: int | None = None) -> LinesMade:
                 _add(tar, f"{sample.key}.json", json.dumps(facts).encode())
                 lines.append({"kind": "sample", **{name: facts[name] for name in _TOLD}})
         size, made = place.stat().st_size, digest_file(place)
-    first = shard.samples[0]
-    head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.samples)}
+    first = shard.content[0]
+    head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.content)}
     return LinesMade(shard.key, [head | {"bytes": size, "digest": made, "made_from": shard.key}, *lines])
 
 
@@ -112,13 +111,8 @@ def read_manifest(folder: Path) -> Lines:
 
 def shards_of(lines: Lines) -> list[LinesMade]:
     """Shards that a manifest lists, each with its samples' lines."""
-    made: list[LinesMade] = []
-    for line in lines:
-        if line["kind"] == "shard":
-            made.append(LinesMade(line["made_from"], [line]))
-        elif line["kind"] == "sample":
-            made[-1].lines.append(line)
-    return made
+    places = [place for place, line in enumerate(lines) if line["kind"] == "shard"]
+    return [LinesMade(lines[at]["made_from"], lines[at:end]) for at, end in pairwise([*places, len(lines)])]
 
 
 def stands(folder: Path, made: LinesMade) -> bool:

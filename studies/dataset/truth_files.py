@@ -27,7 +27,7 @@ Facts = Mapping[str, Any]
 
 
 def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: Progress) -> Facts:
-    """Names of the files of a scene, of its objects and materials; made where one is missing or damaged.
+    """Hash of a scene, names of its files, objects and materials; files are made where one is missing or damaged.
 
     Parameters
     ----------
@@ -49,12 +49,12 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
     return facts
 
 
-def plane_files(job: Job, facts: Facts, cell: Cell) -> dict[str, Path]:
-    """Files that planes of samples of a cell's frame are cut from; a picture file has none of surfaces."""
+def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
+    """Files that planes of a cell's frame are cut from; a picture file has none of surfaces."""
     folder, files = (job.out / PLANES).resolve(), facts["files"]
     names = files["surfaces"] | files[cell.condition.spectrum] | files[_frame_name(cell)]
-    made = {plane: folder / name for plane, name in names.items()}
-    return {"mosaic_e": cell.electrons, "rgb": cell.truth, **made}
+    paths = {"mosaic_e": cell.electrons, "rgb": cell.truth, **{plane: folder / name for plane, name in names.items()}}
+    return {plane: paths[plane] for plane in planes if plane in paths}
 
 
 def scene_hash(opened: OpenedScene) -> str:
@@ -77,8 +77,8 @@ def _made(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: 
     def kept(**planes: NDArray[Any]) -> dict[str, str]:
         return {name: keep_array(job.out / PLANES, plane) for name, plane in planes.items()}
 
-    facts: dict[str, Any] = {"files": {"surfaces": {}}, "illuminants": {}, "objects": (), "materials": ()}
-    files = facts["files"]
+    facts: dict[str, Any] = {"hash": scene_hash(opened), "illuminants": {}, "objects": (), "materials": ()}
+    files = facts["files"] = {"surfaces": {}}
     if opened.scene is not None:
         seen = see_surfaces(opened.scene, opened.size)
         ids = np.stack([seen.object_id, seen.material_id], axis=-1)

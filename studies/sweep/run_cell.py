@@ -4,7 +4,7 @@ import json
 import platform
 import threading
 from datetime import UTC, datetime
-from functools import cache, lru_cache
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from rodcone.jit import backend, dr
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import block_sums, mask
@@ -41,14 +40,8 @@ from studies.sweep.stored import is_whole, keep
 Image = NDArray[np.float64]
 
 
-def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
+def run_cell(cell: Cell) -> Row:
     """Make the picture of a cell and measure it against the truth.
-
-    Parameters
-    ----------
-    cell : Cell
-    most_threads : int, optional
-        For Dr.Jit in this process; left out, as many as it has.
 
     Raises
     ------
@@ -60,8 +53,6 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))  # a user's own: the same bytes, or none
     _check_provenance(cell, processor)
-    if most_threads is not None:
-        limit_threads(most_threads)
     sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
@@ -149,13 +140,6 @@ def run_cell(cell: Cell, most_threads: int | None = None) -> Row:
         machine=machine(),
         worker=threading.get_native_id(),
     )
-
-
-@cache
-def limit_threads(most: int) -> None:
-    """Set Dr.Jit's number of threads in this process; only the LLVM backend has any."""
-    if backend() == "llvm":
-        dr.set_thread_count(most)
 
 
 def _check_provenance(cell: Cell, processor: Processor) -> None:

@@ -8,7 +8,7 @@ from collections import Counter, deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
 from contextlib import contextmanager, suppress
-from functools import partial
+from functools import cache, partial
 from multiprocessing import active_children
 from multiprocessing.connection import wait as wait_for
 from multiprocessing.process import BaseProcess
@@ -16,6 +16,7 @@ from typing import Any, Protocol
 
 from rodcone.child_process import SAFE_PATH
 from rodcone.errors import InputError
+from rodcone.jit import backend, dr
 from studies.sweep.run_cell import run_cell
 
 LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
@@ -99,7 +100,7 @@ def run(
     WorkerLostError
         Where the executor broke; rows that were ready have been given.
     """
-    call, waiting = partial(make, most_threads=threads), dict[Hashable, deque[Task]]()
+    call, waiting = partial(_made, make, threads), dict[Hashable, deque[Task]]()
     for cell in cells:
         waiting.setdefault(cell.kind, deque()).append(cell)
     running: dict[Future[Any], Task] = {}
@@ -123,6 +124,20 @@ def run(
     finally:
         for future in running:
             future.cancel()
+
+
+def _made(make: Callable[[Any], Any], threads: int | None, task: Task) -> Any:
+    """Result of a task, by so many threads of Dr.Jit; by all that it has where none are given."""
+    if threads is not None:
+        _limit_threads(threads)
+    return make(task)
+
+
+@cache
+def _limit_threads(most: int) -> None:
+    """Set Dr.Jit's number of threads in this process; only the LLVM backend has any."""
+    if backend() == "llvm":
+        dr.set_thread_count(most)
 
 
 def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task:

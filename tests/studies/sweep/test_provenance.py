@@ -90,7 +90,7 @@ from pathlib import Path
 from rodcone.jit import dr, arrays, backend
 sys.path.insert(0, sys.argv[1])
 import sweep_sample as SAMPLE
-from studies.sweep.run_cell import run_cell
+from studies.sweep.workers import InThisProcess, run
 folder = Path(sys.argv[2])
 study = SAMPLE.small_study(folder, processors=("interleaved",), levels=("1cd/m2",), seeds=(0,))
 cells = SAMPLE.made_cells(folder, study)
@@ -102,7 +102,7 @@ def threads():  # once their number has stood still for half a second: one that 
     return seen[-1]
 dr.set_thread_count(1)
 others = threads() - 1
-row = run_cell(cells[0], int(sys.argv[3]))
+(row,) = run(cells[:1], InThisProcess(), threads=int(sys.argv[3]))
 dr.eval(dr.arange(arrays().Float, 1 << 20) * 2)
 dr.sync_thread()
 print(json.dumps([row.threads, threads() - others, backend()]))
