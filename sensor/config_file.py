@@ -73,9 +73,10 @@ def _warn_of_window(sensor: SensorConfig, range_nm: Sequence[float], path: str |
     inside = (nm >= sensor.window_nm[0]) & (nm < sensor.window_nm[1])
     if (seen[:, ~inside].sum(axis=1) > MOST_OUTSIDE * seen.sum(axis=1)).any():
         (low, high), (first, last) = sensor.window_nm, range_nm
+        cut = f", or range_nm = [{max(low, first):g}, {min(high, last):g}]" if inside.any() else ""
         warnings.warn(
             f"sensor file {str(path)!r}: of its responses' {first:g} to {last:g} nm it lets in {low:g} to {high:g}; "
-            f"give window_nm = [{first:g}, {last:g}] too, or range_nm = [{low:g}, {high:g}]",
+            f"give window_nm = [{first:g}, {last:g}] too{cut}",
             stacklevel=3,
         )
 

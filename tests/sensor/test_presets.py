@@ -156,6 +156,9 @@ def test_a_window_that_is_not_stated_is_told_where_it_takes_some_of_a_response(t
     stated = '[responses]\ncsv = "nir.csv"\nrange_nm = [350, 1000]\nquantum_efficiency = "included"\n'
     with pytest.warns(UserWarning, match=r"350 to 1000 nm it lets in 380 to 780; give window_nm = \[350, 1000\] too"):
         read_sensor(write(tmp_path, mono + stated))
+    for first, fix in ((500, r"too, or range_nm = \[500, 780\]$"), (790, r"give window_nm = \[790, 1000\] too$")):
+        with pytest.warns(UserWarning, match=fix):
+            read_sensor(write(tmp_path, mono + stated.replace("350,", f"{first},")))
     for whole in ("window_nm = [380, 780]\n" + mono + stated, mono + stated + "ir_cut = 700\n"):
         read_sensor(write(tmp_path, whole.replace("350,", "375,")))
 
