@@ -45,7 +45,8 @@ def require_consent(what: str, name: str, trust_code: bool) -> None:
             f"{what}: {name!r} of rodcone 0.1.0 is gone; allowed: rodcone list processors; use {_RENAMED[name]}"
         )
     if user_code is None and name.endswith((".py", ".whl")):
-        raise InputError(f"{what}: {name!r} names no function; allowed: FILE.py:NAME; write {name}:develop")
+        function = "develop" if name.endswith(".py") else network.NAMES[0]
+        raise InputError(f"{what}: {name!r} names no function; allowed: FILE:NAME; write {name}:{function}")
     if user_code is None and name not in NAMED:
         raise unknown(what, name, PROCESSORS)
     if user_code is not None and user_code[0].suffix == ".py" and not trust_code:

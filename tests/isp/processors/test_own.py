@@ -55,8 +55,9 @@ def test_nothing_runs_without_consent_nor_where_the_bytes_are_others(tmp_path: P
     )
     with pytest.raises(InputError, match=r"^isp: .*mine.py:develop' is Python code.*--trust-code .*trust_code=True"):
         require_consent("isp", name, trust_code=False)
-    with pytest.raises(InputError, match=r"^isp: 'mine.py' names no function; .*; write mine.py:develop"):
-        require_consent("isp", "mine.py", trust_code=True)
+    for file, function in (("mine.py", "develop"), ("demosaicnet.whl", "bayer_net")):
+        words = f"^isp: '{file}' names no function; .*; write {file}:{function}$"
+        refusal(require_consent, "isp", file, trust_code=True, match=words)
     assert own_version(name) == {"mine.py": digest_file(tmp_path / "mine.py")}
     for expected in ({}, {"mine.py": "0" * 32}, {"other.py": digest_file(tmp_path / "mine.py")}):
         refusal(processor_of, name, expected, match="isn't the file that the sweep began with")
