@@ -54,7 +54,7 @@ def _picture_bound(raw: RawImage, situation: Situation) -> Image:
 
 
 def raw_unbiased(situation: Situation) -> Margin | None:
-    """The mean over chips and exposures of each channel's pixels is what was expected, dark current included."""
+    """The mean over chips and exposures of each channel's pixels is what was expected over black."""
     margins = []
     for name in CAMERAS:
         sensor = behind(situation, name).sensor
