@@ -52,7 +52,8 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
     falls = np.flatnonzero(~(table[1:, 0] > table[:-1, 0]))
     if falls.size:
         pair = " then ".join(f"{nm:g}" for nm in table[falls[0] : falls[0] + 2, 0])
-        raise InputError(f"{what}: {str(path)!r} has wavelengths {pair}; allowed: strictly increasing; sort its rows")
+        fix = "allowed: strictly increasing; sort its rows, each wavelength once"
+        raise InputError(f"{what}: {str(path)!r} has wavelengths {pair}; {fix}")
     return dict(zip(names, table.T, strict=True))
 
 

@@ -81,6 +81,7 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
         ("wavelength_nm,R\n400,-0.1\n500,0.2\n", ("finite numbers >= 0",)),
         ("wavelength_nm,R\n500,0.1\n400,0.2\n", ("has wavelengths 500 then 400; allowed: strictly increasing",)),
         ("wavelength_nm,R\n400,0.5\ninf,0.5\n", ("strictly increasing",)),
+        ("wavelength_nm,R\n400,0.1\n400,0.2\n", ("has wavelengths 400 then 400;", "each wavelength once")),
         ("wavelength_nm,R\ninf,0.5\ninf,0.5\n", ("has wavelengths inf then inf; allowed: strictly increasing",)),
     ],
 )
