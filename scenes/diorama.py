@@ -18,6 +18,7 @@ from scenes.reflectances import color_checker, grey
 # Grey pictures in scikit-image's wheel on which no page judges. CC0: brick and gravel (CC0Textures), grass
 # (linolafett), camera (L. Varshney), horse (A. Preuss); public domain: text; no known restrictions: coins (Brooklyn
 # Museum). All but horse and text also trained the prior of `ple` (`studies.training.pictures`).
+PICTURES_LICENCE = "scikit-image's pictures are CC0 or public domain, its coins without known restrictions"
 TILES = ("brick", "grass", "gravel")
 PRINTS = ("camera", "coins", "horse", "text")
 LAMPS = ("A", "F2", "F11", "LED-B1", "LED-B3", "LED-B5", "LED-RGB1", "LED-V1", "sodium_high")

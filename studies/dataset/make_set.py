@@ -16,6 +16,7 @@ from rodcone.digests import digest
 from rodcone.errors import InputError
 from rodcone.files import is_half_written, write_files
 from rodcone.progress import Step, progress_bar, render_words
+from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
 from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
@@ -180,12 +181,13 @@ def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, i
 
 def _scene_line(opened: OpenedScene, facts: Facts) -> dict[str, Any]:
     source = opened.choice.source
+    textures = PICTURES_LICENCE if source.startswith("diorama") else "no texture of others"
     return {
         "kind": "scene",
         "name": opened.choice.label,
         "hash": facts["hash"],
         "split": split_of(facts["hash"]),
-        "licence": "its owner's" if Path(source).suffix else "MIT, as rodcone; no texture of others",
+        "licence": "its owner's" if Path(source).suffix else f"MIT, as rodcone; {textures}",
         "objects": facts["objects"],
         "materials": facts["materials"],
     }
@@ -197,6 +199,7 @@ def _head(study: Study, order: SetOrder, samples: Sequence[Sample], command: str
         "kind": "set",
         "name": study.name,
         "rodcone": metadata.version("rodcone"),
+        "versions": versions(),
         "command": command,
         "identity": digest([sorted(sample.key for sample in samples), vars(order)]),
         "samples": len(samples),

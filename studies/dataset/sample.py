@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from functools import lru_cache
+from importlib import metadata
 from math import log10
 from pathlib import Path
 from typing import Any
@@ -17,6 +18,7 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readings.by_channel import of_channel
+from sensor.readings.noise import dark_electrons
 from sensor.readout import as_read, dark_level_dn, noise_sources, noise_variance
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
@@ -111,10 +113,11 @@ def _facts(
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     alone = {name: of_channel(sensor, name) for name in mean_e}
     dark_e = {
-        name: (x.pixel.dark_current_e_per_s * cell.exposure_s - dark_level_dn(x, cell.exposure_s) * x.gain_e_per_dn) / s
-        for name, (x, s) in alone.items()
+        name: (dark_electrons(x, cell.exposure_s) - dark_level_dn(x, cell.exposure_s) * x.gain_e_per_dn) / share
+        for name, (x, share) in alone.items()
     }
     return {
+        "rodcone": metadata.version("rodcone"),
         **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
         **frame_labels(cell),
         "mosaic": sample.mosaic,

@@ -18,15 +18,19 @@ import pytest
 import sweep_sample as SAMPLE
 from refusal import refusal
 
+from render.surfaces import see_surfaces
 from rodcone.digests import digest
+from scenes.catalog import load
 from studies.dataset import order as order_module
 from studies.dataset.card import CARD
 from studies.dataset.make_set import make_set, split_of
 from studies.dataset.order import SetOrder, drawn_scenes
 from studies.dataset.shards import MANIFEST, LinesMade, Shard, read_manifest, read_shard
 from studies.study.lit_scene import open_all
+from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
+from studies.sweep.provenance import versions
 from studies.sweep.run_sweep import sweep
 from studies.sweep.workers import InThisProcess, run, run_in_processes
 
@@ -117,6 +121,25 @@ def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
         light = facts["illuminants"]
         per_nm = np.array(light["groups"][facts["groups"][0]])
         assert per_nm.shape == SAMPLE.NM.shape == np.array(light["wavelength_nm"]).shape
+
+
+@pytest.mark.thorough
+def test_a_rendered_scene_has_its_surfaces_versions_and_the_licences_of_its_pictures(tmp_path: Path) -> None:
+    limits = RenderLimits(size=16, spp=4, band_nm=100.0)
+    folder = made(tmp_path, order=SetOrder(shards=1), scenes=(SceneChoice("diorama-5"),), render=limits)
+    seen = see_surfaces(load("diorama-5"), (16, 16))
+    head, scene = read_manifest(folder)[:2]
+    samples = list(read_shard(next(folder.glob("*.tar"))))
+    assert len(samples) == 8
+    for arrays, facts in samples:
+        np.testing.assert_array_equal(arrays["depth"], seen.depth_m, strict=True)
+        np.testing.assert_array_equal(arrays["normals"], seen.normal, strict=True)
+        np.testing.assert_array_equal(arrays["ids"], np.stack([seen.object_id, seen.material_id], -1), strict=True)
+        assert facts["rodcone"] == head["rodcone"]
+    assert (tuple(scene["objects"]), tuple(scene["materials"])) == (seen.objects, seen.materials)
+    assert head["versions"] == versions()
+    assert "scikit-image" in scene["licence"]
+    assert scene["licence"] in (folder / CARD).read_text("utf-8")
 
 
 @pytest.mark.thorough

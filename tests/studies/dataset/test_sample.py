@@ -25,6 +25,7 @@ SOURCES: dict[str, dict[str, float]] = {
     "column gains": {"column_gain_spread": 0.02, "prnu": 0.0},
     "column offsets": {"column_offset_e": 20.0},
     "dark current": {"dark_current_e_per_s": 2000.0, "prnu": 0.0},
+    "hot pixels": {"hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 3000.0, "prnu": 0.0},
     "all": {"read_noise_e": 5.0, "dsnu_e": 4.0, "prnu": 0.02, "dark_current_e_per_s": 300.0},
 }
 
@@ -78,7 +79,7 @@ def z_of(samples: list[Made]) -> float:
     return float((values.mean() - 1) / (values.std(ddof=1) / np.sqrt(values.size)))
 
 
-# 24 conditions, and a normal's 4.5 standard errors are passed by 7e-6 of them: one false alarm in 6 000 runs.
+# 27 conditions, and a normal's 4.5 standard errors are passed by 7e-6 of them: one false alarm in 5 000 runs.
 @pytest.mark.sample(3)
 @pytest.mark.parametrize("level_cd_m2", [0.05, 1.0, 100.0])
 @pytest.mark.parametrize("source", SOURCES)
@@ -97,6 +98,11 @@ def test_channels_read_apart_have_the_stated_variance_and_well(reading, level_cd
     assert wells_e["R"] == sensor.pixel.full_well_e
     deeper = max(1.0, level_cd_m2 * 90 / (0.8 * wells_e["R"])) if reading.metered else 1 / 0.3
     assert wells_e["G"] / wells_e["R"] == pytest.approx(deeper, rel=0.05)  # steps of a sixteenth of an octave
+
+
+def test_a_set_whose_prnu_is_twice_what_it_states_is_found(tmp_path: Path) -> None:
+    stated, doubled = (taken(tmp_path, with_pixel(prnu=prnu), 100.0) for prnu in (0.01, 0.02))
+    assert z_of([(arrays, facts) for (arrays, _), (_, facts) in zip(doubled, stated, strict=True)]) > 20
 
 
 def test_coefficients_are_those_of_the_data_sheet() -> None:
