@@ -49,11 +49,12 @@ ROLO = np.array(
 )
 
 
-def test_other_lights_of_colour_science_are_known_by_its_names():
-    other, table = illuminant("FL3.12"), colour_science().SDS_ILLUMINANTS["FL3.12"]
-    assert np.array_equal(other.wavelength_nm, table.wavelengths)
-    assert other.values == pytest.approx(table.values * (other.values.max() / table.values.max()), rel=1e-12)
-    assert luminance(other.band_average(NM, WIDTH_NM), NM, WIDTH_NM) == pytest.approx(1.0, rel=1e-9)
+def test_lights_of_colour_science_are_known_by_its_names_and_by_ours():
+    for name, its_name in {"FL3.12": "FL3.12", "F2": "FL2", "F11": "FL11", "sodium_high": "HP1", "A": "A"}.items():
+        light, table = illuminant(name), colour_science().SDS_ILLUMINANTS[its_name]
+        assert np.array_equal(light.wavelength_nm, table.wavelengths)
+        assert light.values == pytest.approx(table.values * (light.values.max() / table.values.max()), rel=1e-12)
+        assert luminance(light.band_average(NM, WIDTH_NM), NM, WIDTH_NM) == pytest.approx(1.0, rel=1e-9)
 
 
 def test_moonlight_is_sunlight_times_the_rolo_model_of_the_full_moon():
