@@ -77,11 +77,13 @@ class DesignOrder:
     behind_in_luminance: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.5
     light: str = "D65"
     prior: str = "drawn"
-    steps: int = 500
-    seed: int = 0
+    steps: Annotated[int, (0, 100_000, "give 500 or so")] = 500
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
 
     def __post_init__(self) -> None:
         require_fields(self)
+        if not self.letters:
+            raise InputError("letters: '' names no channel; allowed: some of the sensor's; give RGBW or so")
         if self.tile not in SIDES and "/" not in self.tile:
             raise unknown("tile", self.tile, SIDES)
         count = len(self.levels)

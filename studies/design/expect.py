@@ -116,8 +116,7 @@ def metric_rows(prior: SpectralPrior, view: LitPrior, reflectance: float) -> tup
 
 
 def _lab_root(relative: Floats) -> Floats:
-    shown = np.maximum(relative, 0.0)
-    return np.where(shown > _LAB_LINEAR, np.cbrt(shown), (shown * 24389 / 27 + 16) / 116)
+    return np.where(relative > _LAB_LINEAR, np.cbrt(relative), (np.maximum(relative, 0.0) * 24389 / 27 + 16) / 116)
 
 
 def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats:
@@ -174,11 +173,13 @@ def expect(
     Raises
     ------
     InputError
-        For an unknown light, prior or rule of exposure, or a pixel of several readings.
+        For an unknown light, prior or rule of exposure, a pixel of several readings, or a tile too large.
     """
     require_name("prior", prior, PRIORS)
     if count := len(sensor.chip.readings):
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
+    if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # else a patch's middle lacks sites
+        raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")
     spectral, forms = load_prior(prior), _forms(prior, light)
     responses, lens = responses_e(sensor, view_of(prior, light)), lens_of(sensor, blur)
     sampling, frame_e = sampling_of(sensor, responses, lens), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
@@ -212,8 +213,7 @@ def expect(
 def _forms(prior: str, light: str) -> Floats:
     """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
     spectral, seen = load_prior(prior), view_of(prior, light)
-    by_reflectance = (metric_rows(spectral, seen, reflectance) for reflectance in spectral.reflectances)
-    return np.array([[row.swapaxes(-1, -2) @ row for row in rows] for rows in by_reflectance])
+    return np.array([[r.swapaxes(-1, -2) @ r for r in metric_rows(spectral, seen, m)] for m in spectral.reflectances])
 
 
 @cache

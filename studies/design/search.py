@@ -120,6 +120,7 @@ def best_tile(goal: Goal, side: int, steps: int, seed: int, known: Known, progre
             look_at(tile, (index + 1) / len(tiles))
         return best
     starts = [tile for tile in MOSAICS.values() if len(tile) in (2, 4) and set("".join(tile)) <= set(goal.letters)]
+    starts = starts or [(goal.letters[0],)]
     starts = sorted({standing_for(_whole(tile, side)) for tile in starts}, key=score, reverse=True)[:4]
     steps_per_start = steps // len(starts)
     for number, start in enumerate(starts):

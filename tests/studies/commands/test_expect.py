@@ -43,6 +43,7 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
     rows = (
         ("--mosaic bayr", "did you mean 'bayer'"),
         ("--mosaic RG/B", "differ in length"),
+        ("--mosaic RGRGRG/GBGBGB", "isn't 1, 2 or 4 pixels high and wide"),
         ("--over street:moon", "over: 'street:moon' is not a range of levels"),
         ("--over 'sunlit day:moonlight'", "the darker first"),
         ("--level 25", "has no unit"),

@@ -147,6 +147,21 @@ def test_a_turned_or_mirrored_tile_has_the_same_error() -> None:
     assert np.ptp(db, axis=0).max() < 0.05  # patches were turned at random: the prior is symmetric up to chance
 
 
+def test_a_tile_and_a_prior_turned_or_mirrored_together_have_the_same_error() -> None:
+    seen, sharp, patches = view_of("drawn", "D65"), lens_of(RGBW, False), load_prior("drawn").patches
+    pixels, forms = np.arange(64).reshape(8, 8), np.broadcast_to(np.eye(8), (1, 48, 16, 8, 8))
+
+    def error(moved: np.ndarray, tile: Tile) -> float:
+        prior = replace(patches, means=patches.means[:, moved.ravel()], factors=patches.factors[:, moved.ravel()])
+        sensor = preset("low_noise", tile)
+        samples = sampled(prior, sampling_of(sensor, responses_e(sensor, seen), sharp), MIDDLE, sharp)
+        return float(expected_error(samples, 5.0, Noise(dark_e=2.0, prnu=0.0, full_e=np.inf), forms)[0])
+
+    still = error(pixels, ("RG", "BW"))
+    assert error(np.rot90(pixels), ("GW", "RB")) == pytest.approx(still, rel=1e-9)
+    assert error(pixels[:, ::-1], ("GR", "WB")) == pytest.approx(still, rel=1e-9)
+
+
 @pytest.mark.thorough
 def test_error_falls_with_light_and_rises_with_noise_a_smaller_well_and_crosstalk() -> None:
     def db(sensor: SensorConfig, level: float = 2.0) -> float:

@@ -53,6 +53,14 @@ def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_know
     assert again == [BAYER]  # what gains are over
 
 
+def test_letters_of_no_published_mosaic_are_searched_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(searching, "tile_db", lambda _, tile: np.full((3, 2), float("".join(tile).count("W"))))
+    known: searching.Known = {}
+    best = best_tile(goal(letters="RW"), 4, 20, 0, known, lambda *_: None)
+    assert set("".join(best)) <= set("RW")
+    assert len(known) > 5
+
+
 def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
     gains = np.zeros((3, 2))
     assert goal().score(gains) == 0.0
