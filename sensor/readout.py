@@ -272,7 +272,7 @@ def as_raw(
 ) -> RawImage:
     """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
 
-    Black is what covered pixels read. Dark current raises it by its mean and adds to both kinds of dark noise: its own
+    Black is the mean that covered pixels read. Dark current raises it and adds to both kinds of dark noise: its own
     shot noise, and what the columns' gains make of it.
     """
     hot = None if hot is None else sensor.pixel_sums(hot)
@@ -281,7 +281,7 @@ def as_raw(
     return RawImage(
         dn=dn,
         cfa=sensor.cfa,
-        black_dn=min(sensor.black_dn + dark_level_dn(sensor, exposure_s), sensor.white_dn - 1),
+        black_dn=min(sensor.black_dn + dark_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
         white_dn=sensor.white_dn,
         gain_e_per_dn=sensor.gain_e_per_dn,
         read_noise_e=hypot(pixel.read_noise_e, sqrt(dark_e)),
@@ -293,8 +293,3 @@ def as_raw(
         defects=None if hot is None else np.argwhere(hot),
         dark_current_e=dark_e,
     )
-
-
-def dark_level_dn(sensor: SensorConfig, exposure_s: float) -> int:
-    """Mean of dark current in whole DN, as raw converters take black; up to half a DN of it stays in the samples."""
-    return round(sensor.pixel.dark_current_e_per_s * exposure_s / sensor.gain_e_per_dn)

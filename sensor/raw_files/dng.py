@@ -43,6 +43,8 @@ _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
 def write_dng(raw: RawImage, path: Path) -> Path:
     """Write a digital negative; gives its path. LibRaw and what is built on it open frames from 22 pixels a side.
 
+    BlackLevel is a whole number, since raw converters cut fractions off; `read_dng` gives back the exact one.
+
     Raises
     ------
     InputError
@@ -50,12 +52,7 @@ def write_dng(raw: RawImage, path: Path) -> Path:
     OSError
         Where the folder is missing or can't be written.
     """
-    if raw.black_dn != int(raw.black_dn):
-        raise InputError(
-            f"black_dn: {raw.black_dn!r} is no whole number, and raw converters cut its fraction off; allowed: whole "
-            "DN; write a .tif instead"
-        )
-    tags = dng_tags(raw)
+    tags = {**dng_tags(raw), BLACK_LEVEL: ("2I", rational(round(raw.black_dn)))}
     with replacing(path) as (part,):
         write_mosaic(part, raw.dn, CFA, tags, exif_tags(raw))
     return path
@@ -81,7 +78,7 @@ def read_dng(path: Path) -> RawImage:
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
         of_file, of_calibration = (directory[code][1] if code in directory else None for directory in (tags, expected))
-        if of_file != of_calibration:
+        if of_file != of_calibration and (code, of_file) != (BLACK_LEVEL, rational(round(raw.black_dn))):
             stated, right = ("missing" if x is None else tuple(x[:8]) for x in (of_file, of_calibration))
             raise InputError(
                 f"{path}: {name} is {stated}, the calibration says {right}; allowed: an unchanged file; write it anew"
@@ -136,7 +133,7 @@ def dng_tags(raw: RawImage) -> Tags:
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
         50710: ("B", bytes(_COLOURS[channel] for channel in raw.channels)),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
-        BLACK_LEVEL: ("2I", rational(raw.black_dn)),
+        BLACK_LEVEL: ("2I", rational(raw.black_dn)),  # as files of version 0.1 have it
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
         50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
         50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, for illuminant A

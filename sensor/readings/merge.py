@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from sensor.calibration import NoiseStep
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import RawImage
-from sensor.readings.noise import Floats, best_weights, covariances, of_reading, seams, shares, whole_share
+from sensor.readings.noise import Floats, best_weights, covariances, seams, shares, whole_share
 
 MERGED_WHITE_DN = 2**24 - 1  # linear words of 24 bits, as chips that merge give them; single precision holds them all
 _ROUNDS = 6  # of the weights, as of `sensor.burst`
@@ -34,11 +34,7 @@ def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: f
     """
     whole, last = whole_share(sensor), seams(sensor, exposure_s).order[-1]
     dark_current_e = sensor.pixel.dark_current_e_per_s * exposure_s
-    estimates_e = []
-    for number, (raw, share) in enumerate(zip(raws, shares(sensor), strict=True)):
-        # Dark current goes with its fraction of a DN, which the reading's own black leaves in.
-        collected_e = (raw.dn.astype(np.float64) - of_reading(sensor, number).black_dn) * raw.gain_e_per_dn
-        estimates_e.append(collected_e / share - dark_current_e)
+    estimates_e = [raw.electrons / share for raw, share in zip(raws, shares(sensor), strict=True)]
     electrons = merged_electrons(np.stack(estimates_e), sensor, exposure_s) * whole
     base, *steps = noise_of_merged(sensor, exposure_s)
 

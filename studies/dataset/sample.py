@@ -19,7 +19,7 @@ from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import dark_electrons
-from sensor.readout import as_read, dark_level_dn, noise_sources, noise_variance
+from sensor.readout import as_read, noise_sources, noise_variance
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
@@ -113,7 +113,7 @@ def _facts(
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     alone = {name: of_channel(sensor, name) for name in mean_e}
     dark_e = {
-        name: (dark_electrons(x, cell.exposure_s) - dark_level_dn(x, cell.exposure_s) * x.gain_e_per_dn) / share
+        name: dark_electrons(x, cell.exposure_s) / share - raw.noise_of(name).dark_current_e
         for name, (x, share) in alone.items()
     }
     return {

@@ -14,7 +14,7 @@ from rodcone.colour_spaces import encode_srgb
 from sensor.cfa import channel_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage
-from sensor.readout import dark_level_dn, noise_variance, spread_charge
+from sensor.readout import noise_variance, spread_charge
 
 ROUNDING = 1e-5  # a weighted mean in single precision leaves the range of its samples by less
 RAW_FRAMES, PICTURES = 32, 12  # each with a chip and noise of its own; a picture takes five times as long
@@ -101,15 +101,8 @@ def flat_field(situation: Situation) -> Situation:
 
 
 def _above_black(situation: Situation) -> Image:
-    """Mean of each sound pixel's electrons: light, and what black leaves of dark current."""
-    pixel, time_s = situation.sensor.pixel, situation.exposure_s
-    electrons = spread_charge(expected(situation), pixel.crosstalk)
-    return np.asarray(electrons + pixel.dark_current_e_per_s * time_s - _dark_black_e(situation.sensor, time_s))
-
-
-def _dark_black_e(sensor: SensorConfig, exposure_s: float) -> float:
-    """Electrons by which dark current raises black."""
-    return dark_level_dn(sensor, exposure_s) * sensor.gain_e_per_dn
+    """Mean of each sound pixel's electrons above black."""
+    return spread_charge(expected(situation), situation.sensor.pixel.crosstalk)
 
 
 def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDArray[np.bool_]:
@@ -121,7 +114,7 @@ def _leaves_room(mean_e: Image, sensor: SensorConfig, exposure_s: float) -> NDAr
     top_e = pixel.full_well_e * (1 - SATURATION_SIGMAS * pixel.column_gain_spread)
     dark_current_e = pixel.dark_current_e_per_s * exposure_s
     top_e -= SATURATION_SIGMAS * float(np.hypot(np.hypot(dark_e, dark_current_e**0.5), sensor.gain_e_per_dn))
-    top_e -= _dark_black_e(sensor, exposure_s)
+    top_e -= dark_current_e
     fits = sensor.black_dn * sensor.gain_e_per_dn >= BLACK_SIGMAS * dark_e * (1 - 1e-12)
     return np.asarray(fits & (mean_e + ROOM_SIGMAS * sigma_e < top_e))
 

@@ -80,7 +80,6 @@ def test_mean_and_variance_of_each_channel_are_the_closed_form(reading):
         columns = chips * 32
         common = 0.01**2 * light_e**2 + (2 / apart.share) ** 2
         mean_error = np.sqrt(variance / values.size + common / columns)
-        mean_error += 0.5 * sensor.gain_e_per_dn / apart.share  # of dark current half a DN may stay
         assert abs(values.mean() - light_e) < stats.norm.isf(5e-6) * mean_error, channel
         spread = variance * np.sqrt(2 / values.size) + common * np.sqrt(2 / columns)
         assert abs(values.var() - variance) < stats.norm.isf(5e-6) * spread, channel
@@ -212,8 +211,8 @@ def test_a_burst_keeps_each_channel_s_noise_and_well():
     for at in (white, mask(RGBW, "G", SHAPE)):
         assert told[at].mean() == pytest.approx(expected[at].mean(), rel=1e-3)
         assert merged.electrons[at].var() == pytest.approx(expected[at].mean(), rel=5 * np.sqrt(2 / at.sum()))
-    dark_e = 2000 * TIME_S  # on the scale of the whole time, and half a DN of it may stay
-    assert merged.noise_of("W").full_well_e == pytest.approx(4 * (60_000 - dark_e), rel=1e-4)
+    dark_e = 2000 * TIME_S  # on the scale of the whole time
+    assert merged.noise_of("W").full_well_e == pytest.approx(4 * (60_000 - dark_e), rel=1e-12)
     assert not merged.saturated.any()
     columns = camera(WAYS[0], prnu=0.0)
     told = noise_at_sites(merged_raw([shot(columns, scene(), 1)] * 4), 4 * scene())
