@@ -24,17 +24,17 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
+from isp.ple.curve import TOGETHER, on_the_curve
 from isp.ple.overlap import STRIDE, Patches, overlapped
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
-from isp.ple.tables import PILOT_VARIANCE, STEP, Doubles, Sampling, Singles, Table, table, window
+from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
 
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 COARSE_STEPS = 2  # of light from table to table where a scale only tells the finer one
 DOUBT = 2.0  # power by which a patch that its component explains badly counts less
 INFLATE = 2.0  # of the pilot's variance: it has seen the same samples
-ROUNDS = 4  # in which a patch under black is brought to the curve
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
 
 
@@ -234,7 +234,7 @@ def _solve_one_light(
     at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
-    noise = sure = None
+    noise, below = None, [np.empty(0, np.intp)]  # patches whose straight line falls under black
     parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
     if pilot is not None:
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
@@ -264,31 +264,16 @@ def _solve_one_light(
             )
             rows *= weight[:, None]
             over = np.matmul(rows, linear, out=values[: group.size])
-            if sure is not None and at.mix.size == PATCH:
-                under = np.flatnonzero(over.min(axis=1) < 0.0)
-                if under.size:
-                    over[under] = weight[under, None] * _on_the_curve(at, k, evidence[group[under]], sure[under])
+            if noise is not None and at.mix.size == PATCH:
+                below.append(group[over.min(axis=1) < 0.0])
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[place] = variance * (by.noise / by.variance)
             patches.values[place] = over
-
-
-def _on_the_curve(at: Table, k: int, evidence: Singles, sure: Doubles) -> Singles:
-    """Estimate patches by component k where its straight line falls under black; over black, times the window.
-
-    Samples read t(m g u^2), a component knows t along a line in u. Each sample, and the pilot, is moved by the line
-    less the curve at the last estimate of u, 0 or more: there the line is right. The patch is t at the last u.
-    """
-    count, taper = len(at.rows), np.repeat(window(at.mix.size).ravel(), 4)
-    line = at.values[k] - np.tile(at.sampling.black, at.mix.size**2)
-    linear, bend = at.estimator(k).linear / taper, np.zeros((len(evidence), taper.size), np.float32)
-    for _ in range(ROUNDS + 1):
-        rows = evidence.copy()
-        rows[:, :count] += bend[:, at.rows]
-        rows[:, -4:] += bend @ at.average.T
-        rows[:, -4:] = rows @ at.reads[k][:, -4:] * sure
-        straight = rows @ linear
-        over = at.over_black(np.maximum(at.mix.means[k] + (straight - line) / at.slopes[k], 0.0))
-        bend = straight - over
-    return np.asarray(over * taper, np.float32)
+    if noise is not None:
+        for group in blocks(np.concatenate(below), TOGETHER):
+            place = index[group]
+            weight = patches.weight[place, None]
+            straight = patches.values[place] / weight
+            curved = on_the_curve(at, component[group], evidence[group], noise[group], straight)
+            patches.values[place] = weight * curved

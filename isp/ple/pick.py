@@ -52,9 +52,9 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
     return component, misfit
 
 
-def blocks(index: NDArray[np.intp]) -> Iterator[NDArray[np.intp]]:
-    """Parts of an index, `BLOCK` long."""
-    return (index[first : first + BLOCK] for first in range(0, len(index), BLOCK))
+def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.intp]]:
+    """Parts of an index, `length` long."""
+    return (index[first : first + length] for first in range(0, len(index), length))
 
 
 def _candidates(at: Table, evidence: Singles) -> NDArray[np.bool_]:

@@ -8,7 +8,6 @@ one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
 
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Any
 
 import numpy as np
 import scipy
@@ -191,12 +190,13 @@ class Table:
         middle[size // 4 : -(size // 4), size // 4 : -(size // 4)] = 1.0
         return np.asarray((middle.ravel()[:, None, None] * np.eye(4)).reshape(-1, 4).T / middle.sum())
 
-    def over_black(self, roots: NDArray[Any]) -> Singles:
-        """Mean readings of roots of signals (patch, value), over those of black."""
-        electrons, over = self.unit_e * np.square(roots), np.empty(roots.shape, np.float32)
-        for channel, (dark_e, black) in enumerate(zip(self.sampling.dark_e, self.sampling.black, strict=True)):
-            over[:, channel::4] = readings(dark_e).mean(electrons[:, channel::4]) - black
-        return over
+    @cached_property
+    def roots(self) -> tuple[Singles, Singles]:
+        """Twice the roots of electrons over what `Estimator.linear` gives: slope and start, (component, value)."""
+        root, black = 2.0 * np.sqrt(self.unit_e), np.tile(self.sampling.black, self.mix.size**2)
+        start = root * (self.mix.means - (self.values - black) / self.slopes)
+        taper = np.repeat(window(self.mix.size).ravel(), 4)
+        return (root / (self.slopes * taper)).astype(np.float32), start.astype(np.float32)
 
     def estimator(self, k: int) -> Estimator:
         """Estimator of component k."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from isp.ple.curve import over_black
 from isp.ple.units import readings, transform
 
 DRAWS, SIGMAS = 400_000, 4.5
@@ -37,3 +38,12 @@ def test_electrons_fall_with_the_reading_under_that_of_no_light_to_minus_the_dar
     least = readings(1.8).electrons(np.linspace(-3.0, 7.5, 50))
     assert np.all(np.diff(least) >= 0.0)
     assert least[0] > -14.0
+
+
+def test_channels_side_by_side_read_over_black_as_by_the_curve_of_each():
+    dark_e, electrons = (0.5, 1.8, 6.0, 30.0), np.geomspace(0.05, 20_000.0, 60)
+    roots = np.repeat(2.0 * np.sqrt(electrons), 4).reshape(3, -1).astype(np.float32)
+    expected = [readings(noise_e).mean(electrons) - readings(noise_e).mean(np.zeros(1)) for noise_e in dark_e]
+    over = over_black(roots.copy(), dark_e).reshape(-1, 4).T
+    assert over == pytest.approx(np.array(expected), rel=1e-4, abs=1e-3)
+    assert over_black(-roots, dark_e) == pytest.approx(0.0, abs=1e-4)
