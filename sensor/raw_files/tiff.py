@@ -14,7 +14,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, read_errors
 
 Values = bytes | tuple[int, ...] | tuple[float, ...]
 Tags = Mapping[int, tuple[str, Values]]  # by code: format of one value (below), values; a rational is two numbers
@@ -99,14 +99,9 @@ def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tu
         mosaic of this photometric interpretation, of 16-bit whole numbers or single-precision floats.
     """
     name = str(path)
-    if not path.is_file():
-        raise InputError(f"{name}: there is no such file; give the path of a raw file")
-    try:
-        with path.open("rb") as file:
-            tags = read_tags(file, {*_LAYOUT, STRIP_BYTE_COUNTS, SAMPLE_FORMAT, *codes}, name)
-            return _read_strips(file, tags, photometric, name), tags
-    except OSError as error:
-        raise InputError(f"{name}: can't be read ({error.strerror or error}); give the path of a raw file") from error
+    with read_errors(f"{name}: can't be read", "give the path of a raw file", OSError), path.open("rb") as file:
+        tags = read_tags(file, {*_LAYOUT, STRIP_BYTE_COUNTS, SAMPLE_FORMAT, *codes}, name)
+        return _read_strips(file, tags, photometric, name), tags
 
 
 def read_tags(file: BinaryIO, codes: Collection[int], name: str) -> Tags:
