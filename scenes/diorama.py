@@ -22,7 +22,9 @@ PICTURES_LICENCE = "scikit-image's pictures are CC0 or public domain, its coins 
 TILES = ("brick", "grass", "gravel")
 PRINTS = ("camera", "coins", "horse", "text")
 LAMPS = ("A", "F2", "F11", "LED-B1", "LED-B3", "LED-B5", "LED-RGB1", "LED-V1", "sodium_high")
-HOURS = ("day", "dusk", "night")
+KELVIN = {"day": (5500, 9000), "dusk": (8000, 20000), "night": (4100, 6000)}  # of daylight, between two bounds
+SKY_LUX = {"day": (6e3, 2e4), "dusk": (5, 40), "night": (0.1, 1)}
+WINDOW_CD_M2 = {"day": (1500, 4000), "dusk": (20, 100)}
 SUN_RADIUS_DEG, SUN_DISTANCE_M = 0.27, 400.0
 SUN_SR = 2 * pi * (1 - cos(radians(SUN_RADIUS_DEG)))
 Rng = np.random.Generator
@@ -67,7 +69,7 @@ def diorama(seed: int = 0) -> Scene:
     for index, (x, z) in enumerate(stage.cells):
         if rng.random() < 0.6:
             nodes |= {f"thing{index:02d}_{key}": node for key, node in _thing(rng, x, z, stage.unit_m).items()}
-    lights, groups = _lights(rng, HOURS[rng.integers(3)], stage)
+    lights, groups = _lights(rng, list(KELVIN)[rng.integers(3)], stage)
     nodes |= {key: nodes.get(key, {}) | node for key, node in lights.items()}  # a lamp, or the light of a pane
     name = f"diorama-{seed:x}" if seed else "diorama"
     return Scene(name, {"type": "scene", "sensor": stage.view, **nodes}, groups, reference_plane="meter_card")
@@ -161,21 +163,19 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
     nodes: Nodes = {}
     groups: dict[str, LightGroup] = {}
     area: Node = {"emitter": {"type": "area"}}
-    if stage.window is not None:
-        if hour != "night":
-            size_m = rng.uniform(1.0, 1.6)
-            nodes["window"] = panel(stage.window, size_m, size_m, matte(grey(0.04)), **area)
-            luminance = rng.uniform(1500, 4000) if hour == "day" else rng.uniform(20, 100)
-            groups["window"] = LightGroup(("window/emitter",), illuminant(_daylight(rng, hour)), luminance)
-    else:
+    if stage.window is None:
         nodes["sky"] = {"type": "constant"}
-        lux = {"day": rng.uniform(6e3, 2e4), "dusk": rng.uniform(5, 40), "night": rng.uniform(0.1, 1)}[hour]
-        groups["sky"] = LightGroup(("sky",), illuminant(_daylight(rng, hour)), lux / pi)
+        lux = {name: rng.uniform(*bounds) for name, bounds in SKY_LUX.items()}[hour]
+        groups["sky"] = LightGroup(("sky",), illuminant(f"D{rng.integers(*KELVIN[hour])}K"), lux / pi)
         if hour == "day" and rng.random() < 0.7:
             height, bearing = radians(rng.uniform(15, 65)), radians(rng.uniform(-130, 130))
             towards = sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height)
             nodes["sun"] = far_disk(towards, SUN_DISTANCE_M, SUN_RADIUS_DEG)
             groups["sun"] = LightGroup(("sun/emitter",), illuminant("sunlight"), rng.uniform(2e4, 9e4) / SUN_SR)
+    elif hour in WINDOW_CD_M2:
+        size_m, luminance = rng.uniform(1.0, 1.6), rng.uniform(*WINDOW_CD_M2[hour])
+        nodes["window"] = panel(stage.window, size_m, size_m, matte(grey(0.04)), **area)
+        groups["window"] = LightGroup(("window/emitter",), illuminant(f"D{rng.integers(*KELVIN[hour])}K"), luminance)
     if hour == "day":
         return nodes, groups
     # lamps light the ground below by 10 to 100 lux; those of one spectrum are of one luminance
@@ -196,11 +196,6 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
         emitters = [f"{pane}/emitter" for pane in stage.panes]
         groups["panes"] = LightGroup(tuple(emitters), illuminant("3000K"), rng.uniform(3, 30))
     return nodes, groups
-
-
-def _daylight(rng: Rng, hour: str) -> str:
-    low, high = {"day": (5500, 9000), "dusk": (8000, 20000), "night": (4100, 6000)}[hour]
-    return f"D{rng.integers(low, high)}K"
 
 
 def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
