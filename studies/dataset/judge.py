@@ -95,6 +95,8 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     if "rgb" not in manifest[0]["planes"]:
         raise InputError(f"of: {out} was made without rgb; allowed: a set with it; make one with --truth rgb")
     samples = [line for line in manifest if line["kind"] == "sample"]
+    if len(samples) < manifest[0]["samples"]:
+        raise InputError(f"of: {len(samples)} of {manifest[0]['samples']} samples are made; run rodcone dataset again")
     found = _pictures_of(pictures, samples)
     tasks = []
     for made in shards_of(manifest):

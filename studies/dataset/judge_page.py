@@ -1,6 +1,7 @@
 """Scores as one self-contained page: for each camera a chart of PSNR over light, and a table of every metric."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -14,10 +15,8 @@ from studies.pages.plots import CHART, COLOURS, STYLE, blank, name_at_ends, plai
 
 
 def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
-    """Return the page of what `studies.dataset.judge.judge` gives."""
-    by_camera = dict[str, list[Score]]()
-    for score in scores:
-        by_camera.setdefault(score.camera, []).append(score)
+    """Return the page of what `studies.dataset.judge.judge` gives, in order of cameras."""
+    by_camera = {camera: list(lines) for camera, lines in groupby(scores, key=lambda score: score.camera)}
     charts = {camera: svg_address(svg_text(psnr_chart(x))) for camera, x in by_camera.items()}
     return write_out("judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text)
 

@@ -4,7 +4,6 @@ import re
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from importlib import metadata
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
 from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
-from studies.dataset.sample import Sample, frame_labels
+from studies.dataset.sample import VERSION, Sample, frame_labels
 from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
 from studies.dataset.truth_files import Facts, code_digests, plane_files, scene_facts
 from studies.study.lit_scene import OpenedScene, open_all
@@ -198,7 +197,7 @@ def _head(study: Study, order: SetOrder, samples: Sequence[Sample], command: str
     return {
         "kind": "set",
         "name": study.name,
-        "rodcone": metadata.version("rodcone"),
+        "rodcone": VERSION,
         "versions": versions(),
         "command": command,
         "identity": digest([sorted(sample.key for sample in samples), vars(order)]),

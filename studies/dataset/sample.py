@@ -35,6 +35,7 @@ PLANES = {
     "shares": "share of each light group in Y, in the order of `groups`",
 }
 
+VERSION = metadata.version("rodcone")
 Arrays = dict[str, NDArray[Any]]
 
 
@@ -117,7 +118,7 @@ def _facts(
         for name, (x, share) in alone.items()
     }
     return {
-        "rodcone": metadata.version("rodcone"),
+        "rodcone": VERSION,
         **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
         **frame_labels(cell),
         "mosaic": sample.mosaic,
