@@ -22,7 +22,7 @@ _Sites: TypeAlias = float | NDArray[np.float64]
 _ROUNDS = 6  # of the weights: a further one changes less than a thousandth of the merged noise
 
 # Fields that all frames must share; and those of one exposure time, with which dark current goes.
-_CAMERA = ("cfa", "shape", "white_dn", "gain_e_per_dn", "prnu", "column_gain_spread")
+_CAMERA = ("cfa", "shape", "white_dn", "column_gain_spread")
 _EXPOSURE = ("black_dn", "read_noise_e", "dsnu_e", "noise_steps", "channel_noise", "dark_current_e")
 
 
@@ -202,6 +202,8 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
         same_time = first_of_time[frame.exposure_s]
         pairs = [(name, getattr(frame, name), getattr(frames[0], name)) for name in _CAMERA]
         pairs += [(name, getattr(frame, name), getattr(same_time, name)) for name in _EXPOSURE]
+        like = same_time if frame.noise_steps else frames[0]  # readings merge over what dark current leaves of the well
+        pairs += [(name, getattr(frame, name), getattr(like, name)) for name in ("gain_e_per_dn", "prnu")]
         apart = [[(noise.channel, noise.shot) for noise in x.channel_noise] for x in (frame, frames[0])]
         for name, value, other in (*pairs, ("channel_noise", *apart)):
             if value != other:

@@ -117,6 +117,16 @@ def test_dark_current_is_taken_off_frames_of_any_times():
     assert abs(merged.rate_e_per_s.mean() - 2e4) < noise * (4 / np.sqrt(PIXELS) + 0.02)
 
 
+@loop("name", ["dual_gain", "split_pixel", "staggered"])
+def test_frames_of_several_readings_and_dark_current_merge_over_times(name):
+    sensor = preset(name)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=500.0))
+    device = draw_device(sensor, SHAPE, np.random.default_rng(5))
+    merged = merge(shoot(sensor, 2e4, [0.01, 0.04], device))
+    noise = np.sqrt(merged.temporal_variance.mean() + merged.fixed_variance.mean())
+    assert abs(merged.rate_e_per_s.mean() - 2e4) < noise * (4 / np.sqrt(PIXELS) + 0.02)
+
+
 def test_a_bracket_of_photographs_gives_back_the_scene_from_shadow_to_light():
     nm = np.arange(385.0, 780.0, 10.0)
     values = np.full((64, 64, nm.size), 2e-3)
