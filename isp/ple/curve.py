@@ -10,7 +10,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.ple.tables import Singles, Table, window
+from isp.ple.tables import Singles, Table
 from isp.ple.units import readings
 
 ROUNDS = 4
@@ -36,7 +36,7 @@ def on_the_curve(
     (patch, value) float32
         Over black, times the window.
     """
-    taper, dark_e = np.repeat(window(at.mix.size).ravel(), 4), at.sampling.dark_e
+    taper, dark_e = at.taper, at.sampling.dark_e
     average, (slope, start) = at.average.T.astype(np.float32), (part[component] for part in at.roots)
     sure = (1.0 / (noise[:, None] + at.spread[component])).astype(np.float32)
     bounds = np.flatnonzero(np.diff(component, prepend=-1, append=-1)).tolist()

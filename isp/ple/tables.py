@@ -112,6 +112,7 @@ class Table:
             places, curve = (slice(None), slice(channel, None, 4)), readings(dark_e)
             self.values[places] = curve.mean(electrons[places])
             steep[places], noise[places] = curve.slope(electrons[places]), curve.variance(electrons[places])
+        self.over_black, self.taper = self.values - np.tile(sampling.black, pixels), np.repeat(window(mix.size), 4)
         noise += (sampling.prnu * electrons * steep) ** 2
         self.slopes = 2.0 * gains * light * mix.means * steep
         information = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
@@ -193,10 +194,9 @@ class Table:
     @cached_property
     def roots(self) -> tuple[Singles, Singles]:
         """Twice the roots of electrons over what `Estimator.linear` gives: slope and start, (component, value)."""
-        root, black = 2.0 * np.sqrt(self.unit_e), np.tile(self.sampling.black, self.mix.size**2)
-        start = root * (self.mix.means - (self.values - black) / self.slopes)
-        taper = np.repeat(window(self.mix.size).ravel(), 4)
-        return (root / (self.slopes * taper)).astype(np.float32), start.astype(np.float32)
+        root = 2.0 * np.sqrt(self.unit_e)
+        start = root * (self.mix.means - self.over_black / self.slopes)
+        return (root / (self.slopes * self.taper)).astype(np.float32), start.astype(np.float32)
 
     def estimator(self, k: int) -> Estimator:
         """Estimator of component k."""
@@ -207,18 +207,17 @@ class Table:
     def _make_estimator(self, k: int) -> Estimator:
         at = self.rows
         factor = self.reads[k, : len(at), : len(at)].T.astype(np.float64)
-        covariance = self.mix.covariances[k] * self.slopes[k] * self.slopes[k][:, None]
-        covariance += self.drift[k] * self.drift[k][:, None]
-        half = covariance[:, at] @ factor.T
+        covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
+        half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
         linear = half @ factor
-        # What is left given the samples: of every pixel, of the middle's mean, and with the pilot's directions.
-        variance = self.average @ (np.diagonal(covariance) - (half**2).sum(axis=1))
-        inner = ((self.inner @ covariance) * self.inner).sum(axis=1) - ((self.inner @ half) ** 2).sum(axis=1)
-        pilot = self.turn[k] @ (self.average @ covariance - (self.average @ half) @ half.T)
-        taper = np.repeat(window(self.mix.size).ravel(), 4)
-        offset = self.values[k] - linear @ self.values[k, at] - np.tile(self.sampling.black, self.mix.size**2)
+        # What is left given the samples: of every pixel, of the pilot's means and of the middle's.
+        variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
+        means = np.concatenate([self.average, self.inner])
+        left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T
+        pilot, inner = self.turn[k] @ left[:4], (left[4:] * self.inner).sum(axis=1)
+        offset = self.over_black[k] - linear @ self.values[k, at]
         return Estimator(
-            linear=(np.concatenate([linear.T, offset[None], pilot]) * taper).astype(np.float32),
+            linear=(np.concatenate([linear.T, offset[None], pilot]) * self.taper).astype(np.float32),
             variance=variance,
             noise=variance * (self.average @ self.unit[k]),
             inner=inner,
