@@ -143,7 +143,7 @@ def test_a_full_disk_is_one_line_that_says_what_is_kept(study, tmp_path, monkeyp
 
 def test_new_cluster_writes_settings_and_both_refuse_what_they_cannot_do(tmp_path: Path) -> None:
     assert call(["new", "cluster", "-o", tmp_path / "dask.yaml"])[0] == 0
-    assert "MALLOC_TRIM_THRESHOLD_: null" in (tmp_path / "dask.yaml").read_text("utf-8")
+    assert "MALLOC_TRIM_THRESHOLD_: 67108864" in (tmp_path / "dask.yaml").read_text("utf-8")
     rows = (
         ("study spectrum -o s.toml", "did you mean 'spectra'?"),
         ("cluster -o dask.toml", "allowed: .yaml; rename it"),
