@@ -1,6 +1,7 @@
 """From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
 
 import re
+from collections import Counter
 from collections.abc import Callable, Generator, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -91,6 +92,9 @@ def make_set(
             facts = scene_facts(job, opened, cells, rendering)
             samples += _samples_of(job, opened, cells, facts, order)
             scene_lines.append(_scene_line(opened, facts))
+        key, count = Counter(sample.key for sample in samples).most_common(1)[0]
+        if count > 1:
+            raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
         # the shards
         shards = into_shards(samples, order.shards, folder)
         head = [_head(study, order, samples, command), *scene_lines]
@@ -145,21 +149,17 @@ def _earlier(folder: Path) -> Lines:
 
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
-    frames = dict[str, Cell]()
+    frames = dict[tuple[str, ...], Cell]()
     for cell in cells:
-        parts = (*frame_labels(cell).values(), processor_of(cell.processor).mosaic)
-        words = (_NOT_IN_KEYS.sub("-", str(part).removesuffix(".toml").replace(".", "p")) for part in parts)
-        key = f"{'_'.join(words)}_s{cell.seed}"
-        if frame_labels(frames.setdefault(key, cell)) != frame_labels(cell):
-            raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
+        frames.setdefault((*frame_labels(cell).values(), processor_of(cell.processor).mosaic, f"s{cell.seed}"), cell)
     windows = _windows(np.load(cells[0].electrons, mmap_mode="r").shape[:2], order.crop)
     if not windows:
         raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
     return [
         Sample(
-            key=key + (f"_{window[0]}-{window[1]}" if order.crop else ""),
+            key="_".join(map(_word, (*parts, f"{window[0]}-{window[1]}") if order.crop else parts)),
             cell=cell,
-            mosaic=processor_of(cell.processor).mosaic,
+            mosaic=parts[-2],
             scene_hash=facts["hash"],
             split=split_of(facts["hash"]),
             files=plane_files(job, facts, cell, order.planes),
@@ -167,9 +167,14 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
             part=index if len(windows) > 1 else None,
             window=window,
         )
-        for key, cell in frames.items()
+        for parts, cell in frames.items()
         for index, window in enumerate(windows)
     ]
+
+
+def _word(part: str) -> str:
+    """Part of a sample's key, in letters that any reader takes."""
+    return _NOT_IN_KEYS.sub("-", part.removesuffix(".toml").replace(".", "p"))
 
 
 def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:

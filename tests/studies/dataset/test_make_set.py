@@ -224,6 +224,12 @@ def test_what_no_set_can_hold_is_told_in_a_line(changes: dict[str, Any], words: 
     refusal(made, tmp_path, **changes, match=words)
 
 
+def test_scenes_whose_samples_would_share_a_key_are_told_in_a_line(tmp_path: Path) -> None:
+    scenes = [SceneChoice(str(SAMPLE.picture(tmp_path / name)), "E") for name in ("a b.exr", "a-b.exr")]
+    words = r"two frames would be named 'a-bpexr_own_1cd-m2_.*_s0_0-0'; allowed: names that differ; rename one"
+    refusal(made, tmp_path, scenes=tuple(scenes), match=words)
+
+
 def test_a_wrong_order_is_told_in_a_line() -> None:
     for values, words in (
         ({"planes": ("depht",)}, "did you mean 'depth'"),
