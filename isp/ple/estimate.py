@@ -265,7 +265,7 @@ def _solve_one_light(
             rows *= weight[:, None]
             over = np.matmul(rows, linear, out=values[: group.size])
             if noise is not None and at.mix.size == PATCH:
-                below.append(group[over.min(axis=1) < 0.0])
+                below.append(group[(over < 0.0).any(axis=1)])
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[place] = variance * (by.noise / by.variance)
