@@ -1,7 +1,8 @@
 """Expected gains of mosaics beside those of simulation: `docs/make/design.py HASH`, a quarter of an hour on a core.
 
 HASH is a commit's: ten scenes are drawn from it that no setting was chosen on. Each is lit by D65, photographed by each
-mosaic at five levels of light, and developed by `ple`, whose prior is trained anew where a mosaic's curves need it.
+mosaic at five levels of light, in the dark several times, and developed by `ple`, whose prior is trained anew where a
+mosaic's curves need it.
 Radiance, priors and rows are kept in out/design; the page's table and docs/results/design.csv are written from them.
 Without HASH simulated gains are those of docs/results/design.csv, and expected ones are computed anew: half a minute.
 """
@@ -9,6 +10,7 @@ Without HASH simulated gains are those of docs/results/design.csv, and expected 
 import csv
 import json
 import sys
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -46,6 +48,7 @@ FOLDER, TABLE = Path("out/design"), RESULTS / "design.csv"
 SCENES, SIDE, SPP = 10, 96, 256
 T = 2.262  # half a 95 % interval over ten scenes, over the standard error
 SENSORS = ("low_noise", "table1_output")
+SEEDS = {"moonlight": 2}  # of chip and noise; 1 at other levels
 LEVELS = {level.name: level.luminance_cd_m2 for level in DEMO_LEVELS[:5]}  # by day the exposures are the same
 BAYER = "bayer"
 # Mosaics by name or rows. `ple` knows R, G, B and W: other curves stand in their places, with a prior of their own.
@@ -59,8 +62,6 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
     "cygm": {"C": "R", "M": "B", "Y": "W"},
     "cmyw": {"C": "R", "M": "G", "Y": "B"},
 }
-# By the seed of the sensor's noise; the first is Bayer.
-RUNS = {0: tuple(MOSAICS), 1: (BAYER, "rgbw", "cyym", "cygm", "cmyw")}
 FIGURES = ("psnr_db", "luminance_db", "colour")
 
 
@@ -85,14 +86,14 @@ def prior_of(mosaic: str) -> Prior:
     return load_prior(path)
 
 
-def scene_rows(name: str, transport: Transport, mosaic: str, seed: int) -> Iterator[dict[str, str | float]]:
-    """Errors of each sensor and level of a mosaic in one scene."""
+def scene_rows(name: str, transport: Transport, mosaic: str, level: str) -> Iterator[dict[str, str | float]]:
+    """Errors of each sensor and seed of a mosaic in one scene at a level."""
     for sensor_name in SENSORS:
         sensor = in_places(vary(preset(sensor_name), mosaic), MOSAICS[mosaic])
         processor = replace(NAMED["ple"], picture=partial(picture_ple, prior=prior_of(mosaic)))
-        for level, luminance_cd_m2 in LEVELS.items():
+        for seed in range(SEEDS.get(level, 1)):
             rng = np.random.default_rng([int(name.split("-")[1], 16) % 2**32, list(MOSAICS).index(mosaic), seed])
-            pictures = developed(transport, luminance_cd_m2, sensor, processor, rng)
+            pictures = developed(transport, LEVELS[level], sensor, processor, rng)
             shown, truth = (encode_srgb(picture) for picture in pictures)
             off = rgb2lab(shown) - rgb2lab(truth)
             yield {
@@ -120,35 +121,34 @@ def developed(
 def simulated(commit: str) -> list[dict[str, str | float]]:
     """Rows of all scenes drawn from a commit's hash; those of finished scenes are read."""
     rows = []
-    for seed, mosaic in [(seed, mosaic) for seed, mosaics in RUNS.items() for mosaic in mosaics]:
+    for level, mosaic in product(LEVELS, MOSAICS):
         for number in range(SCENES):
             name = f"generated-{int(commit, 16) + number:x}"
-            path = FOLDER / f"{name}-{mosaic.replace('/', '_')}-{seed}.json"
+            path = FOLDER / f"{name}-{mosaic.replace('/', '_')}-{level}.json"
             if not path.exists():
                 transport = render(load(name, light="D65"), (SIDE, SIDE), spp=SPP, cache=FOLDER / "renders")
-                path.write_text(json.dumps(list(scene_rows(name, transport, mosaic, seed))))
+                path.write_text(json.dumps(list(scene_rows(name, transport, mosaic, level))))
             rows += json.loads(path.read_text())
-        print(seed, mosaic, file=sys.stderr)
+        print(level, mosaic, file=sys.stderr)
     return rows
 
 
 def gains(rows: Sequence[Mapping[str, str | float]]) -> list[dict[str, str | float]]:
-    """Simulated gains over Bayer of each sensor, mosaic and level, with half the 95 % interval over scenes."""
-    by_picture = {(row["seed"], row["scene"], row["sensor"], row["mosaic"], row["level"]): row for row in rows}
-    scenes, result = sorted({str(row["scene"]) for row in rows}), []
-    for (seed, mosaics), sensor in product(RUNS.items(), SENSORS):
-        for mosaic, level in product(mosaics[1:], LEVELS):
-            line: dict[str, str | float] = {"seed": str(seed), "sensor": sensor, "mosaic": mosaic, "level": level}
-            for figure in FIGURES:
-                gain = np.array([
-                    np.subtract(*(_decibels(figure, float(by_picture[seed, scene, sensor, m, level][figure]))
-                                  for m in (mosaic, BAYER)))
-                    for scene in scenes
-                ])  # fmt: skip
-                line[f"{figure}_simulated"] = float(gain.mean())
-                line[f"{figure}_interval"] = float(half_width(gain))
-            result.append(line)
-    return result
+    """Simulated gains over Bayer of each sensor, mosaic and level, with half the 95 % interval over scenes.
+
+    A scene's gain is the mean of its seeds.
+    """
+    errors, lines = defaultdict(list), []
+    for row, figure in product(rows, FIGURES):
+        errors[row["sensor"], row["mosaic"], row["level"], figure].append(_decibels(figure, float(row[figure])))
+    for sensor, mosaic, level in product(SENSORS, list(MOSAICS)[1:], LEVELS):
+        line: dict[str, str | float] = {"sensor": sensor, "mosaic": mosaic, "level": level}
+        for figure in FIGURES:  # scene by scene, seed by seed
+            of, beside = (errors[sensor, m, level, figure] for m in (mosaic, BAYER))
+            gain = np.subtract(of, beside).reshape(SCENES, -1).mean(axis=1)
+            line |= {f"{figure}_simulated": float(gain.mean()), f"{figure}_interval": half_width(gain)}
+        lines.append(line)
+    return lines
 
 
 def with_expected(lines: Sequence[dict[str, str | float]]) -> Sequence[Mapping[str, str | float]]:
@@ -167,16 +167,16 @@ def _decibels(figure: str, value: float) -> float:
 
 
 def write(lines: Sequence[Mapping[str, str | float]]) -> None:
-    """Write the table of all gains, and the page's from those of the first seed."""
+    """Write the table of all gains, and the page's."""
     kinds = ("expected", "simulated", "interval")
-    keys = ["seed", "sensor", "mosaic", "level", *(f"{figure}_{kind}" for figure in FIGURES for kind in kinds)]
+    keys = ["sensor", "mosaic", "level", *(f"{figure}_{kind}" for figure in FIGURES for kind in kinds)]
     cells = [[x if isinstance(x := line[key], str) else f"{x:.3f}" for key in keys] for line in lines]
     TABLE.write_text(csv_text(keys, cells))
     agreement = [f"| RMS [dB], sign | {' | '.join(FIGURES)} |", "|---|---|---|---|"]
     for sensor in SENSORS:
         cells = []
         for figure in FIGURES:
-            of_sensor = [x for x in lines if (x["seed"], x["sensor"]) == ("0", sensor)]
+            of_sensor = [x for x in lines if x["sensor"] == sensor]
             expected_db, simulated_db, interval_db = np.array(
                 [[x[f"{figure}_{kind}"] for x in of_sensor] for kind in kinds], float
             )
