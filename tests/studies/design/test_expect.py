@@ -23,6 +23,7 @@ from sensor.variations import vary
 from studies.design.expect import MIDDLE, expect, lens_of, metric_rows, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate
+from studies.study.study_file import read_study
 
 ROOT = Path(__file__).resolve().parents[3]
 LEVELS = (0.036, 2.0, 25.0)
@@ -209,10 +210,13 @@ def test_no_mosaic_is_given_a_patchs_brightness() -> None:
 
 
 def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
-    tiles = (("V",), ("VLVM", "LVLV", "VMVS", "LVLV"), ("VVLL", "VVLM", "LMVV", "LSVV"))
-    cameras = [read_sensor(ROOT / "docs/eye/eye.toml", tile) for tile in tiles]
-    rods, interleaved, clumped = ([row.psnr_db for row in expect(x, [0.01, 10.0], exposure=0.1)] for x in cameras)
-    assert np.sign(np.subtract(interleaved, rods)).tolist() == [-1.0, 1.0]
+    cameras = [read_sensor(Path(file)) for file in read_study(ROOT / "docs/eye/study.toml").sensors]
+    cameras = [vary(cameras[0], "V/V"), *cameras]
+    rods, interleaved, clumped, cones = (
+        [row.psnr_db for row in expect(x, [0.01, 10.0], exposure=0.1)] for x in cameras
+    )
+    for paying in (interleaved, cones):
+        assert np.sign(np.subtract(paying, rods)).tolist() == [-1.0, 1.0]
     assert interleaved[0] > clumped[0]
     assert interleaved[1] > clumped[1] + 0.1
 
