@@ -64,7 +64,7 @@ def test_the_study_has_small_photographs_and_the_network(tmp_path: Path) -> None
     with zipfile.ZipFile(tmp_path / "scikit_learn-1-any.whl", "w") as wheel:
         for name, folder in PHOTOGRAPHS.items():
             wheel.writestr(f"{folder}/{name}", picture.getvalue())
-    write_study(tmp_path)
+    main(["study", str(tmp_path)])
     with Image.open(tmp_path / "china.png") as china:
         assert china.size == (SIDE, SIDE * 3 // 4)
     text = (tmp_path / "study.toml").read_text("utf-8")

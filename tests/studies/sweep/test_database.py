@@ -94,7 +94,7 @@ def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -
         add(base, ROW)
         want(base, [ROW.key, None])
         refusal(last_run, tmp_path, match="has made no cell yet")
-        for study, seconds in (('{"b": 1}', 10.0), ('{"a": 1}', 1.0), ('{"a": 1}', 100.0)):
+        for study, seconds in (('{"b": 1}', 10.0), ('{"A": 1}', 1000.0), ('{"a": 1}', 1.0), ('{"a": 1}', 100.0)):
             run = note_run(base, "2026-01-01T00:00:00+00:00", "here", study)
             note_stages(base, run, {"renders": 99.0})
             note_stages(base, run, {"renders": seconds, "other": 0.5})
