@@ -8,6 +8,8 @@ import pytest
 from refusal import refusal
 
 from sensor.capture import expose
+from sensor.chip import ChannelReading
+from sensor.config import with_channel_readings
 from sensor.device import draw_device
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, table1_output
@@ -33,6 +35,13 @@ def test_a_channel_is_asked_for_where_channels_are_read_apart_and_has_to_be_the_
     refusal(snr, electrons, low_noise(), EXPOSURE_S, "Q", match="channel: 'Q' is unknown; allowed: B, G, R, W")
 
 
+def test_a_channel_that_is_read_apart_has_its_snr_at_its_light() -> None:
+    apart = with_channel_readings(low_noise(), [ChannelReading(channel="W", time_share=0.25)])
+    for channel in ("W", "G"):
+        electrons = electrons_at_snr(10.0, apart, EXPOSURE_S, channel)
+        assert snr(np.array([electrons]), apart, EXPOSURE_S, channel) == pytest.approx(10.0, rel=1e-9)
+
+
 def test_a_well_that_dark_current_fills_has_no_snr() -> None:
     """Light of 60 % of the well, and dark electrons of 50 % in the exposure."""
     sensor = low_noise("bayer")
@@ -43,6 +52,16 @@ def test_a_well_that_dark_current_fills_has_no_snr() -> None:
     assert np.isnan(snr_at(light, hot, "D65", EXPOSURE_S)["G"]).tolist() == [False, True]
     assert np.isnan(snr_at(light, sensor, "D65", EXPOSURE_S)["G"]).tolist() == [False, False]
     assert electrons_at_snr(0.999 * snr(np.array([[0.51 * well_e]]), hot, EXPOSURE_S)[0, 0], hot, EXPOSURE_S) == inf
+
+
+def test_light_and_dark_current_of_several_readings_fit_the_well_together() -> None:
+    """Half the well is dark current: light of less than the other half has an SNR, more hasn't."""
+    for sensor in map(preset, ("split_pixel", "staggered", "dual_gain")):
+        well_e = sensor.pixel.full_well_e
+        hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=0.5 * well_e / EXPOSURE_S))
+        below, beyond = (float(snr(np.array([[share * well_e]]), hot, EXPOSURE_S)[0, 0]) for share in (0.49, 0.51))
+        assert electrons_at_snr(below, hot, EXPOSURE_S) == pytest.approx(0.49 * well_e, rel=1e-4)
+        assert electrons_at_snr(beyond, hot, EXPOSURE_S) == inf
 
 
 def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
