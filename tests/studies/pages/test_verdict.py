@@ -146,6 +146,8 @@ def test_the_same_method_on_both_mosaics_is_compared_first_else_what_varies() ->
     four = noisy(cameras=("interleaved", "bayer", "ple_rgbw", "ple_bayer"), levels=1)
     assert (first_comparison(four).compared, first_comparison(four).a, first_comparison(four).b) == (CAMERA, 2, 3)
     assert first_comparison(noisy()) == Comparison(CAMERA, BRIGHTNESS, SENSOR, 0, 1)
+    three = noisy(cameras=("interleaved", "bayer", "ple_bayer"), levels=1)
+    assert (first_comparison(three).a, first_comparison(three).b) == (0, 1)
     sensors = noisy(cameras=("interleaved",), exposures=("auto", "10ms"))
     assert first_comparison(sensors) == Comparison(SENSOR, BRIGHTNESS, EXPOSURE, 0, 1)
     times = noisy(cameras=("bayer",), sensors=SAMPLE.SENSORS[:1], exposures=("auto", "10ms"), levels=1)
