@@ -144,7 +144,7 @@ def test_nothing_beyond_the_frame_is_averaged(tile, patch):
         np.testing.assert_allclose(planes, expected, rtol=1e-6, err_msg=f"{white} {settings}")
 
 
-@pytest.mark.sample(4)
+@pytest.mark.sample(12)
 @needs_kernel
 @pytest.mark.parametrize("shape", [(2, 2), (3, 9), (9, 3), (2, 30), (30, 2), (30, 4)])
 @pytest.mark.parametrize("tile", [("RW",), ("R", "W")])
