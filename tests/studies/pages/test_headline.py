@@ -191,6 +191,14 @@ def test_a_balance_that_misses_the_light_by_more_than_the_lead_is_told(misses, l
     assert said("as-shot") == "", "as shot knows the light"
 
 
+def test_a_missed_balance_is_told_where_sensors_are_compared() -> None:
+    missed = SAMPLE.sample_report(
+        lambda row: replace(row, delta_e_median=9.0, balance_delta_e=4.0),
+        levels=2, seeds=SEEDS, cameras=("bayer",), balances=("gray-world",),
+    )  # fmt: skip
+    assert comparisons(missed)[SENSOR]["answers"]["0 1"][0]["balance"].startswith(MISS)
+
+
 def test_the_papers_reference_is_named_where_it_is_bilinear_and_gray_world() -> None:
     both = SAMPLE.sample_report(levels=1, seeds=SEEDS, balances=("as-shot", "gray-world"), sensors=SAMPLE.SENSORS[:1])
     found = [one["times"] for one in comparisons(both)[CAMERA]["answers"]["0 1"]]

@@ -22,7 +22,7 @@ from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
-from studies.sweep.stored import is_whole, keep, read_whole
+from studies.sweep.stored import is_whole, keep, keep_facts, read_facts, read_whole
 
 
 def test_a_kept_file_has_its_contents_name_and_any_other_content_is_told(tmp_path: Path) -> None:
@@ -38,6 +38,16 @@ def test_a_kept_file_has_its_contents_name_and_any_other_content_is_told(tmp_pat
     assert not is_whole(tmp_path / name)
     refusal(read_whole, tmp_path, name, match=r"can't be read .*; run rodcone sweep again")
     refusal(read_whole, tmp_path, "../x", match="does not lie in")
+
+
+def test_facts_that_are_not_what_was_kept_are_none(tmp_path: Path) -> None:
+    keep_facts(tmp_path, "a", {"x": 1})
+    assert read_facts(tmp_path, "a") == {"x": 1}
+    file = tmp_path / "a.json"
+    for text in (file.read_text("utf-8").replace("1", "2", 1), "[]", "{", ""):
+        file.write_text(text, "utf-8")
+        assert read_facts(tmp_path, "a") is None, text
+    assert read_facts(tmp_path, "b") is None
 
 
 def flip(path: Path, place: int) -> None:
