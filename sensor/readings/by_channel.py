@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 from sensor.calibration import ChannelNoise
 from sensor.cfa import mask
-from sensor.chip import ChannelReading, Chip, PixelConfig
+from sensor.chip import ChannelReading, Chip, room_e
 from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.raw import RawImage
 
@@ -48,17 +48,14 @@ def under_well(
     expected_e: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> NDArray[np.bool_]:
     """Which pixels of a frame light and dark current do not fill; the camera as `sensor.readout.as_read` gives it."""
-
-    def room_e(pixel: PixelConfig) -> float:
-        return pixel.full_well_e - pixel.dark_current_e_per_s * exposure_s
-
     if channel is not None:
         alone, share = of_channel(sensor, channel)
-        return np.asarray(expected_e < room_e(alone.pixel) / share)
-    plain_e, pixel = room_e(sensor.pixel), sensor.pixel
-    return np.asarray(
-        expected_e < at_sites(sensor, expected_e.shape, plain_e, lambda x: room_e(x.pixel_of(pixel)) / x.share)
-    )
+        return np.asarray(expected_e < room_e(alone.pixel, exposure_s) / share)
+
+    def of_reading_e(reading: ChannelReading) -> float:
+        return room_e(reading.pixel_of(sensor.pixel), exposure_s) / reading.share
+
+    return np.asarray(expected_e < at_sites(sensor, expected_e.shape, room_e(sensor.pixel, exposure_s), of_reading_e))
 
 
 def at_sites(

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sensor.calibration import NoiseStep
+from sensor.chip import room_e
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import RawImage
 from sensor.readings.noise import Floats, best_weights, covariances, seams, shares, whole_share
@@ -38,7 +39,7 @@ def merge_readings(raws: Sequence[RawImage], sensor: SensorConfig, exposure_s: f
     electrons = merged_electrons(np.stack(estimates_e), sensor, exposure_s) * whole
     base, *steps = noise_of_merged(sensor, exposure_s)
 
-    full_e = max(sensor.pixel.full_well_e - dark_current_e, 1.0) * whole
+    full_e = max(room_e(sensor.pixel, exposure_s), 1.0) * whole
     dark_e = BLACK_SIGMAS * hypot(base.read_noise_e, base.dsnu_e)
     black_dn = ceil(MERGED_WHITE_DN * dark_e / (full_e + dark_e))
     gain_e = full_e / (MERGED_WHITE_DN - black_dn)

@@ -20,6 +20,7 @@ from sensor.raw import RawImage
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import dark_electrons
 from sensor.readout import as_read, noise_sources, noise_variance
+from studies.photograph.snr import noise_parabola
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
@@ -155,13 +156,10 @@ def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dic
 
     b holds all that doesn't depend on light, a x the shot noise, c x^2 what is in proportion to it: PRNU.
     """
-    full_e, gain = sensor.pixel.full_well_e, sensor.gain_e_per_dn
-    result = {}
+    gain, result = sensor.gain_e_per_dn, {}
     for name in sensor.channels:
-        low, middle, high = noise_variance(np.array([0.0, 0.5, 1.0]) * full_e, sensor, exposure_s, name).tolist()
-        square = (high - 2 * middle + low) * 2 / full_e**2
-        slope = (high - low) / full_e - square * full_e
-        result[name] = {"a": slope / gain, "b": low / gain**2, "c": square}
+        dark, slope, square = noise_parabola(sensor, exposure_s, name)
+        result[name] = {"a": slope / gain, "b": dark / gain**2, "c": square}
     return result
 
 

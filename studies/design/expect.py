@@ -16,6 +16,7 @@ from render.spectrum import Floats
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import InputError, require_name
 from sensor.cfa import Tile, channel_map, channels
+from sensor.chip import room_e
 from sensor.config import SensorConfig
 from sensor.diffraction import sampled_otf
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
@@ -245,7 +246,7 @@ def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
         pixel, rounding_e = alone.pixel, alone.gain_e_per_dn / sqrt(12)
         dark_current_e = pixel.dark_current_e_per_s * exposure_s
         dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
-        return dark_e / share, pixel.fixed_gain, (pixel.full_well_e - dark_current_e) / share, 1 / share
+        return dark_e / share, pixel.fixed_gain, room_e(pixel, exposure_s) / share, 1 / share
 
     dark_e, prnu, full_e, shot = np.array([of(name) for name in channels(sensor.cfa)])[sites_of(sensor.cfa)].T
     return Noise(dark_e=dark_e, prnu=prnu, full_e=full_e, shot=shot)

@@ -7,6 +7,7 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.errors import require_name
+from sensor.chip import room_e
 from sensor.config import SensorConfig
 from sensor.readings.by_channel import of_channel
 from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
@@ -80,16 +81,25 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     ratios = {}
     for name, e in electrons.items():
         alone, share = of_channel(sensor, name)
-        full_e = (alone.pixel.full_well_e - alone.pixel.dark_current_e_per_s * exposure_s) / share
+        full_e = room_e(alone.pixel, exposure_s) / share
         metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # in time, before the well is full
         ratios[name] = np.where(metered | (e < full_e), snr(e, sensor, exposure_s, name), np.nan)
     return ratios
 
 
+def noise_parabola(sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> tuple[float, float, float]:
+    """a, b, c of the variance a + b e + c e^2 of a pixel in an even field [e-^2]; parameters as of `noise_variance`."""
+    well_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
+    fields = (np.full((1, 1), share * well_e) for share in (0.0, 0.5, 1.0))
+    a, half, full = (float(noise_variance(field, sensor, exposure_s, channel)[0, 0]) for field in fields)
+    c = (full - 2 * half + a) * 2 / well_e**2
+    return a, (full - a) / well_e - c * well_e, c
+
+
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> float:
     """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
 
-    The variance is a + b e + c e^2, so that e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
+    By `noise_parabola` e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before. A metered channel is seen in its
     longest time, for light that a shorter one is needed for has more SNR than a full well.
     """
@@ -98,16 +108,12 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channe
         return electrons_at_snr(snr, alone, exposure_s) / share
     if sensor.chip.readings:
         return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
-    scale_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
-    a, half, full = (float(noise_variance(np.full((1, 1), x * scale_e), sensor, exposure_s)[0, 0]) for x in (0, 0.5, 1))
-    c = (full - 2 * half + a) * 2 / scale_e**2
-    b = (full - a) / scale_e - c * scale_e
+    a, b, c = noise_parabola(sensor, exposure_s)
     lead = 1 - snr**2 * c
     if lead <= 0:
         return float("inf")
     electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
-    dark_e = sensor.pixel.dark_current_e_per_s * exposure_s
-    return float(electrons) if electrons + dark_e < sensor.pixel.full_well_e else float("inf")
+    return float(electrons) if electrons < room_e(sensor.pixel, exposure_s) else float("inf")
 
 
 def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
