@@ -52,7 +52,7 @@ def write_dng(raw: RawImage, path: Path) -> Path:
     OSError
         Where the folder is missing or can't be written.
     """
-    tags = {**dng_tags(raw), BLACK_LEVEL: ("2I", rational(round(raw.black_dn)))}
+    tags = dng_tags(raw)
     with replacing(path) as (part,):
         write_mosaic(part, raw.dn, CFA, tags, exif_tags(raw))
     return path
@@ -78,7 +78,8 @@ def read_dng(path: Path) -> RawImage:
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
         of_file, of_calibration = (directory[code][1] if code in directory else None for directory in (tags, expected))
-        if of_file != of_calibration and (code, of_file) != (BLACK_LEVEL, rational(round(raw.black_dn))):
+        # Files of version 0.1 have black's fraction there.
+        if of_file != of_calibration and (code, of_file) != (BLACK_LEVEL, rational(raw.black_dn)):
             stated, right = ("missing" if x is None else tuple(x[:8]) for x in (of_file, of_calibration))
             raise InputError(
                 f"{path}: {name} is {stated}, the calibration says {right}; allowed: an unchanged file; write it anew"
@@ -133,7 +134,7 @@ def dng_tags(raw: RawImage) -> Tags:
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
         50710: ("B", bytes(_COLOURS[channel] for channel in raw.channels)),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
-        BLACK_LEVEL: ("2I", rational(raw.black_dn)),  # as files of version 0.1 have it
+        BLACK_LEVEL: ("2I", rational(round(raw.black_dn))),
         WHITE_LEVEL: ("I", (int(raw.white_dn),)),
         50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
         50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, for illuminant A

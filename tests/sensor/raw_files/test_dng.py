@@ -16,7 +16,17 @@ from render.illuminants import illuminant
 from sensor.cfa import MOSAICS, RGBW, Tile, is_bayer
 from sensor.presets import preset
 from sensor.raw import RawImage
-from sensor.raw_files.dng import OPCODES, PRIVATE_DATA, dng_tags, exif_tags, is_own, read_dng, write_dng
+from sensor.raw_files.dng import (
+    BLACK_LEVEL,
+    OPCODES,
+    PRIVATE_DATA,
+    dng_tags,
+    exif_tags,
+    is_own,
+    rational,
+    read_dng,
+    write_dng,
+)
 from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
 from sensor.readout import as_raw
 from studies.photograph.camera import calibrate
@@ -74,7 +84,8 @@ def test_other_programs_get_a_whole_black_and_ours_the_exact_one(tmp_path: Path)
 
 def test_a_file_of_an_earlier_version_with_a_fraction_in_its_black_level_is_still_read(tmp_path: Path) -> None:
     raw = replace(exposure(), black_dn=9.84)
-    write_mosaic(tmp_path / "shot.dng", raw.dn, CFA, dng_tags(raw), exif_tags(raw))
+    tags = {**dng_tags(raw), BLACK_LEVEL: ("2I", rational(9.84))}
+    write_mosaic(tmp_path / "shot.dng", raw.dn, CFA, tags, exif_tags(raw))
     assert same(read_dng(tmp_path / "shot.dng"), raw)
 
 
