@@ -19,6 +19,7 @@ from math import log10, sqrt
 from pathlib import Path
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 from page_parts import RESULTS, csv_text, fill
 from skimage.color import rgb2lab
@@ -46,7 +47,7 @@ from studies.training.train import train_prior
 PAGE = Path(__file__).resolve().parents[1] / "design.md"
 FOLDER, TABLE = Path("out/design"), RESULTS / "design.csv"
 SCENES, SIDE, SPP = 10, 96, 256
-T = 2.262  # half a 95 % interval over ten scenes, over the standard error
+T = float(scipy.special.stdtrit(SCENES - 1, 0.975))  # half a 95 % interval over scenes, over the standard error
 SENSORS = ("low_noise", "table1_output")
 SEEDS = {"moonlight": 2}  # of chip and noise; 1 at other levels
 LEVELS = {level.name: level.luminance_cd_m2 for level in DEMO_LEVELS[:5]}  # by day the exposures are the same
