@@ -23,6 +23,8 @@ def test_a_failure_leaves_everything_as_it_was(tmp_path):
     path.write_text("old")
     with pytest.raises(UnicodeEncodeError), replacing(path) as (place,):
         place.write_text("half\n\ud800", "utf-8")
+    with pytest.raises(FileNotFoundError), replacing(path, tmp_path / "b.txt") as (_, second):
+        second.write_text("the first was never written")
     assert [(found, found.read_text()) for found in tmp_path.iterdir()] == [(path, "old")]
 
 

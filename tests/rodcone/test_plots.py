@@ -1,7 +1,6 @@
 """Plots of values: the lines that Matplotlib is given are the values themselves."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,7 +15,6 @@ from rodcone.plots import CHANNEL_COLOURS
 from sensor.curves import rgbw
 from sensor.emva1288.characterise import characterise
 from sensor.presets import low_noise
-from sensor.readout import noise_sources, noise_variance
 
 
 @pytest.fixture(autouse=True)
@@ -77,15 +75,3 @@ def test_photon_transfer_is_noise_over_signal() -> None:
     signal, noise = measured.get_data()
     ruled = (signal > 1000) & (signal < 7500)
     assert noise[ruled] == pytest.approx(np.sqrt(signal[ruled]), rel=0.055)
-
-
-def test_sources_of_noise_sum_to_the_noise() -> None:
-    own = low_noise()
-    pixel = {"dark_current_e_per_s": 40.0, "column_gain_spread": 0.02, "column_offset_e": 3.0}
-    pixel |= {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 900.0}
-    for sensor in (own, replace(own, pixel=replace(own.pixel, **pixel))):
-        for signal_e in (0.0, 100.0, 7500.0):
-            sources = noise_sources(signal_e, sensor, 0.5)
-            assert all(value >= 0 for value in sources.values())
-            expected = float(noise_variance(np.array([[signal_e]]), sensor, 0.5)[0, 0])
-            assert sum(value**2 for value in sources.values()) == pytest.approx(expected, rel=1e-12)

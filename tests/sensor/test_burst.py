@@ -110,15 +110,8 @@ def test_fixed_patterns_have_the_stated_variance_over_a_chip():
         assert merged.fixed_variance.mean() > 0.2 * stated
 
 
-def test_dark_current_is_taken_off_frames_of_any_times():
-    sensor = camera(dark_current_e_per_s=5e4, read_noise_e=2.0)
-    merged = merge(shoot(sensor, 2e4, [0.01, 0.04]))
-    noise = np.sqrt(merged.temporal_variance.mean())
-    assert abs(merged.rate_e_per_s.mean() - 2e4) < noise * (4 / np.sqrt(PIXELS) + 0.02)
-
-
-@loop("name", ["dual_gain", "split_pixel", "staggered"])
-def test_frames_of_several_readings_and_dark_current_merge_over_times(name):
+@loop("name", ["low_noise", "dual_gain", "split_pixel", "staggered"])
+def test_frames_of_one_reading_or_several_and_dark_current_merge_over_times(name):
     sensor = preset(name)
     sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=500.0))
     device = draw_device(sensor, SHAPE, np.random.default_rng(5))

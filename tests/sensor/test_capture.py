@@ -80,7 +80,7 @@ def test_a_chip_of_another_size_is_refused_in_one_line(exact):
         device,
         np.random.default_rng(0),
         exact=exact,
-        match=r"expected_e: shape \(33, 48\) is not the device's \(33, 47\)",
+        words=("expected_e: shape (33, 48) is not the device's (33, 47)", "draw the device with the frame's shape"),
     )
 
 

@@ -5,7 +5,7 @@ from builders import RGBW_4X4
 from loop import loop
 from refusal import refusal
 
-from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_covers, check_tile, tile_of
+from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_tile, tile_of
 
 
 def test_the_paper_s_tile_is_r_g_over_b_w_with_its_first_row_on_top():
@@ -32,11 +32,6 @@ def test_channels_come_as_r_g_b_w_and_others_behind_them():
 @loop("tile", ["RGBW", (), ("",), ("R1",), ("RG", 3), ("R G",)])
 def test_what_is_no_tile_of_letters_is_refused_with_an_example(tile):
     assert repr(tile) in refusal(check_tile, tile, match=r"not a tile.*allowed")
-
-
-@loop("shape", [(1, 8), (8, 1), (8,), (8, 8, 3), (0, 0)])
-def test_a_frame_that_does_not_hold_a_tile_is_refused_with_its_shape(shape):
-    refusal(check_covers, RGBW, shape, words=(str(shape), "at least 2x2"))
 
 
 # Mosaics by name

@@ -62,7 +62,7 @@ def test_a_saturated_pixel_is_missed_with_at_most_the_stated_probability(sigma_d
     assert missed <= STATED
 
 
-@loop("shape", [(1, 4), (4, 1), (4,), (4, 4, 1)])
+@loop("shape", [(1, 4), (4, 1), (4,), (4, 4, 1), (0, 0)])
 def test_a_frame_that_does_not_hold_a_tile_is_refused(shape):
     assert str(shape) in refusal(
         replace, RAW, dn=np.zeros(shape, np.uint16), match=r"mosaic: shape .* doesn't fit the tile .*at least 2x2"

@@ -16,7 +16,6 @@ from loop import loop
 from refusal import refusal
 
 from rodcone.errors import InputError
-from rodcone.files import replacing
 from sensor.cfa import MOSAICS, Tile
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
@@ -159,20 +158,6 @@ def test_a_part_of_a_calibration_keeps_rows_and_columns_of_its_channels() -> Non
         forth, back = f"xyz_to_camera_{light}", f"camera_to_xyz_{light}"
         np.testing.assert_array_equal(getattr(part, forth), getattr(whole, forth)[:3])
         np.testing.assert_array_equal(getattr(part, back), getattr(whole, back)[:, :3])
-
-
-def test_files_are_replaced_together_or_not_at_all(tmp_path: Path) -> None:
-    one, two = tmp_path / "one", tmp_path / "two"
-    one.write_text("old")
-    with pytest.raises(FileNotFoundError), replacing(one, two) as (_, second):
-        second.write_text("the first was never written")
-    assert one.read_text() == "old"
-    assert list(tmp_path.iterdir()) == [one]
-    with replacing(one, two) as (first, second):
-        first.write_text("new")
-        second.write_text("beside")
-    assert (one.read_text(), two.read_text()) == ("new", "beside")
-    assert sorted(tmp_path.iterdir()) == [one, two]
 
 
 @pytest.mark.timeout(10)
