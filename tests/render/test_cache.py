@@ -53,12 +53,6 @@ def assert_equal(one, other):
     assert one.relight().relative_mc_error == other.relight().relative_mc_error
 
 
-def test_a_real_render_is_found_again(tmp_path, monkeypatch):
-    one = small(tmp_path)
-    monkeypatch.setattr(engine, "_render", None)  # a second render would fail
-    assert_equal(one, small(tmp_path))
-
-
 def test_a_scene_without_a_reference_plane_is_found_again(tmp_path, rendered, monkeypatch):
     scene = replace(load("flat_field"), reference_plane=None)
     monkeypatch.setattr(engine, "_render", lambda *args: rendered)

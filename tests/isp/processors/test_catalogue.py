@@ -12,8 +12,6 @@ from refusal import refusal
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import NAMED, PROCESSORS, libraries
 from rodcone.colour_spaces import luminance_of_srgb
-from rodcone.errors import InputError
-from rodcone.optional import optional_library
 from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channel_map, channels, unit_channel
 from sensor.raw import RawImage
 from sensor.variations import VARIATIONS
@@ -133,11 +131,6 @@ def test_another_mosaic_is_refused_in_one_line() -> None:
         raw = raw_image(np.full((16, 16), 500), MOSAICS["rccc"] if "bayer" in name else BAYER)
         for matrix in (IDENTITY, fit):
             refusal(PROCESSORS[name].develop, raw, matrix, match=r"\Araw: mosaic .* allowed here: .*\Z")
-
-
-def test_a_missing_library_names_its_extra() -> None:
-    with pytest.raises(InputError, match=r"^nowhere_to_be_found: not installed .*pip install 'rodcone\[opponents\]'"):
-        optional_library("nowhere_to_be_found", "opponents")
 
 
 @pytest.mark.parametrize("name", SLOW)

@@ -147,14 +147,6 @@ def test_stored_photons_of_which_over_a_hundredth_is_below_zero_are_refused(form
         read_iset_scene(in_form(form, photons, tmp_path))
 
 
-@pytest.mark.thorough
-def test_uneven_wavelengths_are_told(tmp_path: Path) -> None:
-    with pytest.warns(UserWarning, match="half-way"):
-        read = read_iset_scene(save(tmp_path, photons=PHOTONS[:, :, :3], wave=np.array([400.0, 410.0, 430.0])))
-    assert read.widths_nm.tolist() == [10, 15, 20]
-    assert read.wavelength_nm.tolist() == [400, 412.5, 430]  # bands meet at 405 and 420 nm
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize(
     ("variables", "told"),
