@@ -154,8 +154,8 @@ def matched_transmittance(responses: Responses) -> float:
 
 def neutral_density(responses: Responses) -> Responses:
     """Responses with W behind the neutral density of `matched_transmittance`."""
-    dimmed = responses.curves["W"] * matched_transmittance(responses)
-    return Responses({**responses.curves, "W": dimmed}, responses.relative)
+    transmittance = matched_transmittance(responses)
+    return Responses({**responses.curves, "W": responses.curves["W"] * transmittance}, responses.relative)
 
 
 def _require_channels(responses: Responses, channels: str) -> None:

@@ -87,6 +87,8 @@ def test_what_cannot_be_made_is_refused() -> None:
     with pytest.raises(InputError, match=r"responses: no curve of B; allowed: R, G, B and W; add it"):
         complementary(Responses({channel: rgbw().curves[channel] for channel in "RG"}))
     dim = Responses({"G": rgbw().curves["W"], "W": rgbw().curves["G"]})
+    without = Responses({name: rgbw().curves[name] for name in "RGB"})
+    refusal(neutral_density, without, match=r"responses: no curve of W; allowed: R, G, B and W; add it")
     refusal(matched_transmittance, dim, match=r"responses: W collects .* allowed: W more than G")
     bright = {channel: Spectrum(np.array([400.0, 700.0]), np.array([0.6, 0.6])) for channel in "RGB"}
     refusal(complementary, Responses(bright), match=r"responses: C reaches 1.2 electrons a photon")
