@@ -19,7 +19,7 @@ from studies.commands.console import print_json, print_table, require_place
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.design_page import gain_svg
-from studies.study.levels import NAMED, UNITS, parse_exposure, parse_level
+from studies.study.levels import UNITS, levels_between, parse_exposure, parse_level
 
 
 def expect(
@@ -98,16 +98,6 @@ def expect(
 def _luminance(text: str) -> float:
     value, unit = parse_level(text)
     return value if unit == UNITS[0] else value * AVERAGE_REFLECTANCE / pi
-
-
-def levels_between(over: str) -> dict[str, float]:
-    """Named levels from one to another, such as street:classroom."""
-    names = list(NAMED)
-    first, colon, last = over.partition(":")
-    if not colon or first not in names or last not in names or names.index(first) > names.index(last):
-        raise InputError(f"over: {over!r} is not a range of levels; allowed: two of {', '.join(names)}, the darker "
-                         f"first; write {names[0]}:{names[-1]}")  # fmt: skip
-    return {name: NAMED[name].luminance_cd_m2 for name in names[names.index(first) : names.index(last) + 1]}
 
 
 def _csv(by_camera: dict[str, list[ExpectedError]]) -> str:

@@ -1,71 +1,132 @@
 """Search for the tile of the least expected error over several levels of light."""
 
-from collections.abc import Callable, MutableMapping
+from collections.abc import MutableMapping
 from dataclasses import dataclass
 from itertools import product
+from math import inf
+from typing import Annotated
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.spectrum import Floats
+from rodcone.errors import InputError, require_fields, unknown
+from rodcone.progress import Step
+from scenes.levels import DEMO_LEVELS
 from sensor.cfa import MOSAICS, Tile
 from sensor.config import SensorConfig, with_tile
 from sensor.exposure import AUTO_INFORMATION
-from studies.design.expect import expect
+from sensor.variations import vary
+from studies.design.expect import ExpectedError, expect
+from studies.study.levels import levels_between, parse_exposure
 
+SIDES = {"2x2": 2, "4x4": 4}
 BEHIND = 100.0  # what the square of a decibel beyond the bound costs, in decibels of mean gain
 COOLING_DB = 0.05  # temperature of the first step
 Known = MutableMapping[str, list[list[float]]]  # gains of the tiles that were tried, by their rows
-Progress = Callable[[str, float], None]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, kw_only=True)
 class Goal:
-    """What a mosaic is sought for.
+    """What a mosaic is sought for, and among which.
 
     Attributes
     ----------
-    sensor : SensorConfig
-        Pixel, lens and responses of the letters; its own mosaic doesn't count.
-    levels_cd_m2 : (level,) float64
-        Mean luminances of scenes.
-    weights : (level,) float64
-        Of the levels in the mean gain; sum 1.
-    reference : tuple of str
-        Tile that gains are over.
-    behind_db : (3,) float64
-        How far a design may fall behind the reference at any level in PSNR, in luminance, and in a* and b*.
+    tile : str
+        Size of the tile: 2x2, all of which are tried, or 4x4, by annealing; or its rows, such as RG/BW.
     letters : str
-        Channels to choose from.
-    light, exposure, prior
-        As `studies.design.expect.expect` takes them.
+        Channels to choose from; the sensor has a curve of each.
+    filters : bool
+        Shape the filters' transmittances too, in front of a pixel of channel W.
+    rounds : int
+        Rounds of the filters, each at the exposures that its first filters take.
+    over : str
+        Named levels of light, from one to another.
+    weights : tuple of float
+        Weight of each level in the mean gain; equal by default.
+    never_worse_than : str
+        Mosaic that gains are over, by name or by rows.
+    behind : float
+        Decibels that the design may lose to it at any level, in PSNR, and in a* and b*; below 0: must gain.
+    behind_in_luminance : float
+        The same in luminance; half a decibel is the least that a person sees.
+    light : str
+        Illuminant; the camera knows it.
+    exposure : str
+        Rule of exposure, or a time such as 20ms.
+    prior : str
+        Prior over patches: drawn or photographs.
+    steps : int
+        Tiles of 4x4 to look at.
+    seed : int
+        Seed of the search.
     """
 
-    sensor: SensorConfig
-    levels_cd_m2: Floats
-    weights: Floats
-    reference: Tile
-    behind_db: Floats
+    tile: str = "4x4"
     letters: str = "RGBW"
+    filters: bool = False
+    rounds: Annotated[int, (1, 100, "give 4 or so")] = 4
+    over: str = f"{DEMO_LEVELS[0].name}:{DEMO_LEVELS[-1].name}"
+    weights: tuple[float, ...] = ()
+    never_worse_than: str = "bayer"
+    behind: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.1
+    behind_in_luminance: Annotated[float, (-100.0, 100.0, "give decibels, such as 0.1")] = 0.5
     light: str = "D65"
     exposure: str = AUTO_INFORMATION
     prior: str = "drawn"
+    steps: Annotated[int, (0, 100_000, "give 500 or so")] = 500
+    seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
 
-    def behind(self, gains_db: Floats) -> Floats:
+    def __post_init__(self) -> None:
+        require_fields(self)
+        if not self.letters:
+            raise InputError("letters: '' names no channel; allowed: some of the sensor's; give RGBW or so")
+        if self.tile not in SIDES and "/" not in self.tile:
+            raise unknown("tile", self.tile, SIDES)
+        count = len(self.levels)
+        if self.weights and (len(self.weights) != count or min(self.weights) < 0 or not sum(self.weights)):
+            raise InputError(
+                f"weights: {list(self.weights)} for {count} levels; allowed: 0 or more; give --weights once for each"
+            )
+
+    @property
+    def levels(self) -> dict[str, float]:
+        """Luminances [cd m^-2] by the levels' names."""
+        return levels_between(self.over)
+
+    @property
+    def time_s(self) -> str | float:
+        """Rule of exposure, or a time [s]."""
+        return parse_exposure(self.exposure, "exposure") or self.exposure
+
+    @property
+    def shares(self) -> Floats:
+        """Weights of the levels in the mean gain; sum 1."""
+        weights = np.array(self.weights or [1.0] * len(self.levels))
+        return np.asarray(weights / weights.sum())
+
+    def beyond(self, gains_db: Floats) -> Floats:
         """How far gains lie beyond the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
-        return np.maximum(0.0, -gains_db - self.behind_db[:, None])
+        behind_db = np.array([self.behind, self.behind_in_luminance, self.behind])
+        return np.asarray(np.maximum(0.0, -gains_db - behind_db[:, None]))
 
     def score(self, gains_db: Floats) -> float:
         """Mean gain in PSNR, less what lies behind the bound."""
-        return float(self.weights @ gains_db[0] - BEHIND * (self.behind(gains_db) ** 2).sum())
+        return float(self.shares @ gains_db[0] - BEHIND * (self.beyond(gains_db) ** 2).sum())
 
 
-def tile_db(goal: Goal, tile: Tile) -> Floats:
+def expected(goal: Goal, camera: SensorConfig) -> list[ExpectedError]:
+    """Expected error of a camera's pictures at each level of the goal."""
+    return expect(camera, list(goal.levels.values()), goal.light, goal.time_s, goal.prior)
+
+
+def tile_db(goal: Goal, sensor: SensorConfig, tile: Tile) -> Floats:
     """Expected error of a tile's pictures at each level, component known, shape (3, level) [dB, more is better].
 
-    Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab.
+    Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab. The sensor lends pixel, lens and
+    responses; its own mosaic doesn't count.
     """
-    sensor = with_tile(goal.sensor, tile, goal.sensor.responses)
-    errors = expect(sensor, goal.levels_cd_m2, goal.light, goal.exposure, goal.prior)
+    errors = expected(goal, with_tile(sensor, tile, sensor.responses))
     return np.array([(x.psnr_db, x.luminance_db, -20 * np.log10(x.colour)) for x in errors]).T
 
 
@@ -73,69 +134,56 @@ def standing_for(tile: Tile) -> Tile:
     """One of the tiles that a tile turns into by turning, mirroring and shifting: the first by the alphabet."""
     cells = np.array([list(row) for row in tile])
     turned = [np.rot90(mirrored, turns) for mirrored in (cells, cells.T) for turns in range(4)]
-    moved = (np.roll(cell, shift, (0, 1)) for cell in turned for shift in np.ndindex(cell.shape))
-    return min(tuple("".join(row) for row in cell) for cell in moved)
+    return min(_tile(np.roll(cell, shift, (0, 1))) for cell in turned for shift in np.ndindex(cell.shape))
 
 
-def best_tile(goal: Goal, side: int, steps: int, seed: int, known: Known, progress: Progress) -> Tile:
-    """Tile of the best score: of all where `side` is 2, else by annealing with several starts.
+def best_tile(goal: Goal, sensor: SensorConfig, known: Known, progress: Step) -> Tile:
+    """Tile of the best score: of all of 2x2 pixels, or of 4x4 by annealing with several starts.
 
     Parameters
     ----------
     goal : Goal
-    side : int
-        Pixels of the tile, 2 or 4.
-    steps : int
-        Tiles to look at where `side` is 4.
-    seed : int
+        Its `tile` is 2x2 or 4x4.
+    sensor : SensorConfig
     known : mapping
         Gains of the tiles that were tried: what is in it isn't computed again, and what is computed is put into it.
     progress : callable
         Called with the best tile and the share that is done.
     """
-    reference_db = tile_db(goal, goal.reference)
+    side, reference = SIDES[goal.tile], vary(sensor, goal.never_worse_than).cfa
+    reference_db = tile_db(goal, sensor, reference)
+    best, best_score = reference, -inf
 
-    def score(tile: Tile) -> float:
-        if (key := "/".join(tile)) not in known:
-            known[key] = (tile_db(goal, tile) - reference_db).tolist()
-        return goal.score(np.array(known[key]))
-
-    best = standing_for(goal.reference)
-    best_score = score(best)
-
-    def look_at(tile: Tile, share: float) -> float:
+    def look_at(tile: Tile, share: float = 0.0) -> float:
         nonlocal best, best_score
-        value = score(tile)
-        if value > best_score:
-            best, best_score = tile, value
+        if (key := "/".join(tile)) not in known:
+            known[key] = (tile_db(goal, sensor, tile) - reference_db).tolist()
+        score = goal.score(np.array(known[key]))
+        if score > best_score:
+            best, best_score = tile, score
         progress(f"{'/'.join(best)} {best_score:+.2f} dB", share)
-        return value
+        return score
 
-    for tile in [tuple(key.split("/")) for key in known]:
-        if len(tile) == side:
-            look_at(tile, 0.0)
+    for tile in [standing_for(reference), *(tuple(key.split("/")) for key in known if key.count("/") == side - 1)]:
+        look_at(tile)
     if side == 2:
         tiles = sorted({standing_for(("".join(t[:2]), "".join(t[2:]))) for t in product(goal.letters, repeat=4)})
         for index, tile in enumerate(tiles):
             look_at(tile, (index + 1) / len(tiles))
         return best
-    starts = [tile for tile in MOSAICS.values() if len(tile) in (2, 4) and set("".join(tile)) <= set(goal.letters)]
-    starts = starts or [(goal.letters[0],)]
-    starts = sorted({standing_for(_whole(tile, side)) for tile in starts}, key=score, reverse=True)[:4]
-    steps_per_start = steps // len(starts)
+    # Annealing from the best of the published tiles.
+    published = [tile for tile in MOSAICS.values() if len(tile) in (2, 4) and set("".join(tile)) <= set(goal.letters)]
+    repeated = [np.tile([list(row) for row in x], 2 * [side // len(x)]) for x in published or [(goal.letters[0],)]]
+    starts = sorted(sorted({standing_for(_tile(cells)) for cells in repeated}), key=look_at, reverse=True)[:4]
+    steps_per_start = goal.steps // len(starts)
     for number, start in enumerate(starts):
-        rng = np.random.default_rng([seed, number])
-        tile, value = start, look_at(start, number / len(starts))
+        rng, tile, value = np.random.default_rng([goal.seed, number]), start, look_at(start, number / len(starts))
         for step in range(steps_per_start):
             changed = standing_for(_changed(tile, goal.letters, rng))
             new = look_at(changed, (number * steps_per_start + step + 1) / (steps_per_start * len(starts)))
             if new > value or rng.random() < np.exp((new - value) / (COOLING_DB * (1 - step / steps_per_start))):
                 tile, value = changed, new
     return best
-
-
-def _whole(tile: Tile, side: int) -> Tile:
-    return tuple(row * (side // len(row)) for row in tile * (side // len(tile)))
 
 
 def _changed(tile: Tile, letters: str, rng: np.random.Generator) -> Tile:
@@ -146,4 +194,8 @@ def _changed(tile: Tile, letters: str, rng: np.random.Generator) -> Tile:
         cells[one] = rng.choice(list(letters))
     else:
         cells[one], cells[other] = cells[other], cells[one]
+    return _tile(cells)
+
+
+def _tile(cells: NDArray[np.str_]) -> Tile:
     return tuple("".join(row) for row in cells)

@@ -8,10 +8,11 @@ from matplotlib import rc_context
 from rodcone.plots import CHANNEL_COLOURS
 from sensor.cfa import Tile
 from sensor.config import SensorConfig
+from sensor.curves import Responses
 from studies.design.expect import ExpectedError
 from studies.design.search import Goal
 from studies.pages.page import svg_address, write_out
-from studies.pages.plots import CHART, INK, SOFT, STYLE, blank, plain_ticks, svg_text
+from studies.pages.plots import CHART, SOFT, STYLE, blank, plain_ticks, responses_svg, svg_text
 
 
 def tile_text(tile: Tile) -> str:
@@ -19,18 +20,12 @@ def tile_text(tile: Tile) -> str:
     return "/".join(tile)
 
 
-def design_page(
-    goal: Goal,
-    camera: SensorConfig,
-    levels: Mapping[str, float],
-    by_camera: Mapping[str, Sequence[ExpectedError]],
-    tried: int,
-) -> str:
+def design_page(goal: Goal, camera: SensorConfig, by_camera: Mapping[str, Sequence[ExpectedError]], tried: int) -> str:
     """Return the page's HTML; the first of `by_camera` is the reference, the second the design."""
     reference, design, *_ = by_camera.values()
     given_up = [
         f"{level}: {figure} {loss:.2f} {unit}"
-        for level, error, compared in zip(levels, design, reference, strict=True)
+        for level, error, compared in zip(goal.levels, design, reference, strict=True)
         for figure, loss, unit in (
             ("PSNR", compared.psnr_db - error.psnr_db, "dB"),
             ("luminance", compared.luminance_db - error.luminance_db, "dB"),
@@ -43,38 +38,21 @@ def design_page(
          [f"{compared.colour - error.colour:+.2f}" for error, compared in zip(errors, reference, strict=True)])
         for name, errors in list(by_camera.items())[1:]
     ]  # fmt: skip
+    responses = Responses({name: camera.responses.curves[name] for name in camera.channels})
     return write_out(
         "design.html.j2",
         tile=tile_text(camera.cfa),
         reference=next(iter(by_camera)),
         goal=goal,
-        levels=list(levels),
+        levels=list(goal.levels),
         rows=rows,
         given_up=given_up,
         tried=tried,
-        pictures=[svg_address(svg) for svg in (_drawn(camera), gain_svg(by_camera))],
+        colours=CHANNEL_COLOURS,
+        responses=svg_address(responses_svg({"electrons per photon": responses})),
+        gains=svg_address(gain_svg(by_camera)),
         version=metadata.version("rodcone"),
     )
-
-
-@rc_context(STYLE)
-def _drawn(camera: SensorConfig) -> str:
-    """Draw the tile and the responses of its channels."""
-    figure = blank(2 * CHART[0], CHART[1])
-    tile, responses = figure.subplots(1, 2)
-    for y, row in enumerate(camera.cfa):
-        for x, letter in enumerate(row):
-            colour = "#eeeeee" if letter == "W" else CHANNEL_COLOURS.get(letter, INK)
-            tile.fill((x, x + 1, x + 1, x), (-y, -y, -y - 1, -y - 1), color=colour, ec=INK)
-            tile.text(x + 0.5, -y - 0.5, letter, ha="center", va="center", color=INK if letter == "W" else "white")
-    tile.set(aspect="equal", title="tile")
-    tile.axis("off")
-    for letter in dict.fromkeys("".join(camera.cfa)):
-        curve = camera.responses.curves[letter]
-        responses.plot(curve.wavelength_nm, curve.values, color=CHANNEL_COLOURS.get(letter, INK))
-    responses.set(xlim=(380, 780), ylim=(0, 1.05), title="electrons per photon", xlabel="nm")
-    plain_ticks(responses)
-    return svg_text(figure)
 
 
 @rc_context(STYLE)

@@ -40,6 +40,16 @@ def parse_level(text: str) -> tuple[float, str]:
     return value, unit
 
 
+def levels_between(over: str) -> dict[str, float]:
+    """Named levels from one to another, such as street:classroom."""
+    names = list(NAMED)
+    first, colon, last = over.partition(":")
+    if not colon or first not in names or last not in names or names.index(first) > names.index(last):
+        raise InputError(f"over: {over!r} is not a range of levels; allowed: two of {', '.join(names)}, the darker "
+                         f"first; write {names[0]}:{names[-1]}")  # fmt: skip
+    return {name: NAMED[name].luminance_cd_m2 for name in names[names.index(first) : names.index(last) + 1]}
+
+
 def parse_exposure(text: str, name: str = "exposures", least_s: float = 1e-9) -> float | None:
     """Exposure time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; None for a rule of `sensor.exposure.RULES`.
 

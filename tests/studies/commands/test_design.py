@@ -24,7 +24,8 @@ def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) 
     camera = preset(tmp_path / "found" / "sensor.toml")
     assert camera.cfa == tile
     assert camera.pixel == preset("low_noise").pixel
-    held = json.loads((tmp_path / "found" / "tried.json").read_text("utf-8"))["gains_db"]
+    tried = json.loads((tmp_path / "found" / "tried.json").read_text("utf-8"))
+    held = tried["gains_db"]
     one, other = (expect(preset("low_noise", rows), [25.0])[0].psnr_db for rows in (tile, ("BG", "GR")))
     assert abs(held["/".join(tile)][0][0] - (one - other)) < 0.05  # a tile's place in the patch
     assert max(gains[0][0] for gains in held.values()) == held["/".join(tile)][0][0]
@@ -32,6 +33,10 @@ def test_the_camera_found_is_a_preset_and_its_study_can_be_read(tmp_path: Path) 
     page = (tmp_path / "found" / "design.html").read_text("utf-8")
     assert "/".join(tile) in page
     assert "rgbw_4x4" in page
+    # What another version of the forecast tried doesn't count.
+    other = {"question": tried["question"] + "1", "gains_db": {"BB/BB": [[99.0]] * 3}}
+    (tmp_path / "found" / "tried.json").write_text(json.dumps(other))
+    assert call(asked)[:2] == (0, out)
 
 
 @pytest.mark.thorough
@@ -50,6 +55,10 @@ def test_a_camera_with_curves_of_its_own_takes_them_along(tmp_path: Path) -> Non
     assert (taken.lens, taken.pixel) == (given.lens, given.pixel)
     assert [x.channel for x in taken.chip.channels] == ["B"]  # G is read apart where there is one
     assert call(["sweep", tmp_path / "found" / "study.toml", "--as-stated", "--dry-run"])[0] == 0
+    check_refusals(
+        f"design {tmp_path / 'mine' / 's.toml'} --letters RGB", [(f"--filters -o {tmp_path}/no", "no W")], tmp_path
+    )
+    assert not (tmp_path / "no").exists()
     (tmp_path / "found" / "tried.json").write_text("[1, 2]")
     code, _, err = call(few)
     assert code == 2
@@ -68,10 +77,13 @@ def test_filters_are_written_as_curves_that_read_back(tmp_path: Path) -> None:
     assert max(changes) > 0.02
 
 
-def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
+def test_a_wrong_option_is_refused_and_leaves_no_folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
     rows = (
         ("--tile 3x3 -o found", "tile: '3x3' is unknown"),
         ("--tile RG/B -o found", "cfa: rows of ('RG', 'B') differ in length"),
+        ("--tile RGB/GBR/BRG -o found", "cfa: ('RGB', 'GBR', 'BRG') isn't 1, 2 or 4 pixels high and wide"),
+        ("--exposure 20 -o found", "exposure: '20'"),
         ("--rounds 0 -o found", "rounds: 0"),
         ("--letters RGQ -o found", "letters: 'Q' is unknown"),
         ("--letters '' -o found", "letters: '' names no channel"),
@@ -85,3 +97,4 @@ def test_a_wrong_option_is_refused(tmp_path: Path) -> None:
         ("--prior draw -o found", "did you mean 'drawn'"),
     )
     check_refusals("design low_noise", rows, tmp_path)
+    assert not (tmp_path / "found").exists()

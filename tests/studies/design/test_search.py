@@ -13,13 +13,9 @@ from studies.design.expect import drawn_pixels
 from studies.design.filters import best_filters
 from studies.design.search import Goal, best_tile, standing_for, tile_db
 
-LEVELS = np.array([0.036, 25.0])
+SENSOR = preset("low_noise")
 BAYER: Tile = ("RG", "GB")
-
-
-def goal(**changes: object) -> Goal:
-    """Two levels of equal weight, Bayer as the reference."""
-    return replace(Goal(preset("low_noise"), LEVELS, np.array([0.5, 0.5]), BAYER, np.full(3, 0.1)), **changes)
+TWO = Goal(over="moonlight:street", behind_in_luminance=0.1)
 
 
 def test_exposure_meters_no_surface_that_reflects_more_than_all_light() -> None:
@@ -39,8 +35,8 @@ def test_turned_mirrored_and_shifted_tiles_are_one() -> None:
 @pytest.mark.thorough
 def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_known(monkeypatch):
     # Three letters: 3^4 tiles are 21 but for turns, mirrors and shifts (Burnside's lemma over the 32 moves).
-    wanted, known, shares = goal(letters="RGB"), {}, []
-    best = best_tile(wanted, 2, 0, 0, known, lambda _, share: shares.append(share))
+    wanted, known, shares = replace(TWO, tile="2x2", letters="RGB"), {}, []
+    best = best_tile(wanted, SENSOR, known, lambda _, share: shares.append(share))
     assert len(known) == 21
     assert shares[-1] == 1.0
     assert shares == sorted(shares)
@@ -48,36 +44,38 @@ def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_know
     assert scores["/".join(best)] == max(scores.values())
 
     again = []
-    monkeypatch.setattr(searching, "tile_db", lambda _, tile: again.append(tile) or np.zeros((3, 2)))
-    assert best_tile(wanted, 2, 0, 0, known, lambda *_: None) == best
+    monkeypatch.setattr(searching, "tile_db", lambda _goal, _sensor, tile: again.append(tile) or np.zeros((3, 2)))
+    assert best_tile(wanted, SENSOR, known, lambda *_: None) == best
     assert again == [BAYER]  # what gains are over
 
 
 def test_letters_of_no_published_mosaic_are_searched_too(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(searching, "tile_db", lambda _, tile: np.full((3, 2), float("".join(tile).count("W"))))
+    monkeypatch.setattr(
+        searching, "tile_db", lambda _goal, _sensor, tile: np.full((3, 2), float("".join(tile).count("W")))
+    )
     known: searching.Known = {}
-    best = best_tile(goal(letters="RW"), 4, 20, 0, known, lambda *_: None)
+    best = best_tile(replace(TWO, letters="RW", steps=20), SENSOR, known, lambda *_: None)
     assert set("".join(best)) <= set("RW")
     assert len(known) > 5
 
 
 def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
     gains = np.zeros((3, 2))
-    assert goal().score(gains) == 0.0
+    assert TWO.score(gains) == 0.0
     gains[0], gains[1, 1] = 0.5, -0.1
-    assert goal().score(gains) == pytest.approx(0.5)
+    assert TWO.score(gains) == pytest.approx(0.5)
     gains[1, 1] = -0.2
-    assert goal().score(gains) < 0.0
+    assert TWO.score(gains) < 0.0
 
 
 @pytest.mark.thorough
 def test_filters_get_better_and_stay_filters() -> None:
-    wanted = goal(levels_cd_m2=LEVELS[1:], weights=np.ones(1), behind_db=np.full(3, 100.0))
-    before = tile_db(wanted, BAYER)
-    camera = best_filters(wanted, BAYER, 1, lambda *_: None)
-    after = tile_db(replace(wanted, sensor=camera), BAYER)
+    wanted = Goal(over="classroom:classroom", behind=100.0, behind_in_luminance=100.0, rounds=1)
+    before = tile_db(wanted, SENSOR, BAYER)
+    camera = best_filters(wanted, SENSOR, BAYER, lambda *_: None)
+    after = tile_db(wanted, camera, BAYER)
     assert after[0, 0] > before[0, 0] + 0.3
-    clear = preset("low_noise").responses.curves["W"]
+    clear = SENSOR.responses.curves["W"]
     for name in "RGB":
         curve = camera.responses.curves[name]
         assert np.all(curve.values >= 0)

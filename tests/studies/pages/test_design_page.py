@@ -2,7 +2,6 @@
 
 import re
 from html import unescape
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -12,6 +11,7 @@ from sensor.presets import low_noise
 from studies.dataset.judge import MEASURED, Score
 from studies.dataset.judge_page import judge_page, psnr_chart
 from studies.design.expect import ExpectedError
+from studies.design.search import Goal
 from studies.pages import design_page
 
 LIGHT = (0.1, 10.0)
@@ -38,9 +38,8 @@ def cells(html: str) -> list[list[str]]:
 def test_a_design_is_ahead_behind_and_gives_up_as_its_rows_say(monkeypatch: pytest.MonkeyPatch) -> None:
     figures: list[Any] = []
     monkeypatch.setattr(design_page, "svg_text", lambda figure: figures.append(figure) or "<svg/>")
-    goal: Any = SimpleNamespace(light="D65", prior="drawn", behind_db=(0.1, 0.5))
-    page = design_page.design_page(goal, low_noise("rgbw"), dict(zip(("dim", "day"), LIGHT, strict=True)), BY_CAMERA, 7)
-    decibels, colours = [["Mosaic", "dim", "day"]] * 2
+    page = design_page.design_page(Goal(over="moonlight:street"), low_noise("rgbw"), BY_CAMERA, 7)
+    decibels, colours = [["Mosaic", "moonlight", "street"]] * 2
     assert cells(page) == [
         decibels,
         ["W/R", "+1.50", "-0.25"],
@@ -49,8 +48,8 @@ def test_a_design_is_ahead_behind_and_gives_up_as_its_rows_say(monkeypatch: pyte
         ["W/R", "+1.00", "-0.25"],
         ["rgbw", "-0.50", "+0.00"],
     ]
-    lost = "at dim: luminance 0.50 dB; at day: PSNR 0.25 dB; at day: luminance 0.50 dB; at day: a*, b* 0.25 in Lab."
-    assert f"Behind bayer {lost}" in " ".join(unescape(page).split())
+    lost = "PSNR 0.25 dB; at street: luminance 0.50 dB; at street: a*, b* 0.25 in Lab."
+    assert f"Behind bayer at moonlight: luminance 0.50 dB; at street: {lost}" in " ".join(unescape(page).split())
     assert "The best of 7 tiles" in page
     tables = cells(page)[1:3], cells(page)[4:6]
     for axes, rows in zip(figures[-1].axes, tables, strict=True):
