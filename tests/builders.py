@@ -16,7 +16,7 @@ from render.error_estimates import Halves
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.transport import Transport
-from sensor.cfa import BAYER, RGBW, Tile, channel_map
+from sensor.cfa import BAYER, RGBW, Tile, channel_map, channels
 from sensor.device import Device
 from sensor.raw import RawImage
 
@@ -53,10 +53,24 @@ def any_order(terms: int) -> float:
     return terms * float(np.finfo(float).eps)
 
 
+def single_precision(largest: NDArray[np.float64], full_e: float) -> NDArray[np.float64]:
+    """Bound of the kernel's error [e-]: 1e-4 of full scale, or what rounding makes of the largest log weight.
+
+    A log weight is right to some 16 roundings of 2^-24 (squares and their sum, of planes that are rounded). Two samples
+    that share a pixel then share it wrongly by up to half of the sum of both errors.
+    """
+    return full_e * np.maximum(1e-4, 16 * 2.0**-24 * -largest)
+
+
 def mosaic_of(planes: Mapping[str, ArrayLike], cfa: Tile, shape: tuple[int, int]) -> NDArray[np.float64]:
     """What each site sees of its own channel: a plane (h, w), or one number."""
     names = channel_map(cfa, shape)
     return np.select([names == name for name in planes], [np.broadcast_to(x, shape) for x in planes.values()], 0.0)
+
+
+def behind(planes: NDArray[np.float64], cfa: Tile) -> NDArray[np.float64]:
+    """What each site sees of planes (h, w, channel), channels in the mosaic's order."""
+    return mosaic_of(dict(zip(channels(cfa), np.moveaxis(planes, -1, 0), strict=True)), cfa, planes.shape[:2])
 
 
 def even_device(shape: tuple[int, int]) -> Device:

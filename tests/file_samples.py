@@ -1,15 +1,18 @@
 """Files that tests and the fuzzer begin from: raw images with hard numbers, and what other programs write."""
 
+import json
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from builders import raw_image
 
 from sensor.calibration import ColourCalibration
 from sensor.cfa import BAYER, Tile, channels
 from sensor.raw import RawImage
 from sensor.raw_files.dng import rational
+from sensor.raw_files.raw_file import write_raw
 from sensor.raw_files.tiff import CFA, Values, write_mosaic
 from sensor.raw_files.tiff import text as ascii_text
 
@@ -43,6 +46,14 @@ def exposure(cfa: Tile = BAYER, shape: tuple[int, int] = (30, 41), bits: int = 1
         colour=colour(len(names)) if set("RGB") <= set(names) else None,
         engine="numpy",
     )
+
+
+def profiled(path: Path) -> Path:
+    """Bayer negative of 0.8 electrons a DN over black 100, read noise 3 e-, with colours and so a noise profile."""
+    plain = ColourCalibration(np.ones(3), np.eye(3), *[np.eye(3)] * 4)
+    dark = {"gain_e_per_dn": 0.8, "read_noise_e": 3.0, "dsnu_e": 0.0, "iso": 400.0}
+    write_raw(raw_image(np.full((16, 16), 500), BAYER, colour=plain, **dark), path)
+    return path
 
 
 def same(one: RawImage, other: RawImage) -> bool:
@@ -150,6 +161,16 @@ def camera_json(**changes: Any) -> dict[str, Any]:
             part = part[parent]
         part[key] = value
     return content
+
+
+def library_copy(folder: Path, *cameras: Any) -> Path:
+    """Copy of rawtoaces-data with these cameras: their JSON, or its text."""
+    (folder / "data" / "camera").mkdir(parents=True)
+    (folder / "LICENSE").write_text("Apache License, Version 2.0", "utf-8")
+    for index, each in enumerate(cameras):
+        held = each if isinstance(each, str) else json.dumps(each)
+        (folder / "data" / "camera" / f"{index}.json").write_text(held, "utf-8")
+    return folder
 
 
 ENVI_NM = np.arange(400.0, 701.0, 50.0)

@@ -7,7 +7,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import RGBW_4X4, raw_image
+from builders import RGBW_4X4, mosaic_of, raw_image, single_precision
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
@@ -33,7 +33,7 @@ def scene(shape, level, tile=RGBW, seed=0):
     rng = np.random.default_rng(seed)
     y, x = np.indices(shape)
     base = 1.0 + 0.5 * np.sin(x / 3.0) * np.cos(y / 5.0) + 0.8 * ((x // 7 + y // 9) % 2)
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
+    response = mosaic_of({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}, tile, shape)
     electrons = np.minimum(rng.poisson(level * base * response), FULL)
     return exposure(electrons + rng.normal(0.0, 2.0, shape), tile)
 
@@ -180,15 +180,6 @@ KERNEL_CASES = [
 ]
 
 
-def single_precision(raw, settings):
-    """Bound of the kernel's error [e-]: 1e-4 of full scale, or what rounding makes of the largest log weight.
-
-    A log weight is right to some 16 roundings of 2^-24 (25 squares and their sum, of planes that are rounded). Two
-    samples that share a pixel then share it wrongly by up to half of the sum of both errors.
-    """
-    return FULL * np.maximum(1e-4, 16 * 2.0**-24 * -sum_weights(raw, settings).largest)
-
-
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("sigma_s", [0.1, 4.0])
 @pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
@@ -198,7 +189,8 @@ def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, s
     settings = Settings(patch=5, sigma_s=sigma_s)
     reference = reference_with_noise(raw, settings)
     assert kernel.engine == backend()
-    assert (np.abs(kernel.estimate - reference.estimate) < single_precision(raw, settings)).all()
+    bound = single_precision(sum_weights(raw, settings).largest, FULL)
+    assert (np.abs(kernel.estimate - reference.estimate) < bound).all()
     assert np.abs(kernel.noise_gain - reference.noise_gain).max() < 2e-3
 
 

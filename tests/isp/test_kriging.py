@@ -4,21 +4,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import behind, raw_image
 
 from isp.kriging import RADIUS, krige, reconstruct_linear
 from sensor.capture import expose
-from sensor.cfa import MOSAICS, channel_map, channels, mask
+from sensor.cfa import MOSAICS, channels, mask
 from sensor.device import draw_device
 from sensor.presets import preset
 
 TILES = ["bayer", "rgbw", "quad_bayer", "quad_rgbw", "rgbw_4x4", "rccb", "mono"]
-
-
-def mosaic(planes, tile):
-    """Samples of planes (h, w, channel) behind a tile."""
-    shape = planes.shape[:2]
-    return np.choose(np.vectorize(channels(tile).index)(channel_map(tile, shape)), np.moveaxis(planes, -1, 0))
 
 
 @pytest.mark.sample(2)
@@ -29,7 +23,7 @@ def test_constant_and_linear_planes_come_out_exactly_to_the_border(name, slopes)
     level = 40.0 + 10.0 * np.arange(len(channels(tile)))
     # every channel has a slope of its own: nothing is taken for granted between channels
     planes = level + (slopes[0] * rows + slopes[1] * columns)[..., None] * (1 + np.arange(level.size))
-    found, _ = krige(mosaic(planes, tile), tile, np.linspace(5.0, 20.0, level.size))
+    found, _ = krige(behind(planes, tile), tile, np.linspace(5.0, 20.0, level.size))
     np.testing.assert_allclose(found, planes, rtol=0, atol=1e-7)
 
 
@@ -52,7 +46,7 @@ def response(name, period, grey):
     planes = np.repeat(100.0 + 20.0 * wave[..., None], len(channels(tile)), axis=-1)
     if not grey:
         planes[..., [channel != "G" for channel in channels(tile)]] = 100.0
-    found, _ = krige(mosaic(planes, tile), tile, np.full(len(channels(tile)), 14.0))
+    found, _ = krige(behind(planes, tile), tile, np.full(len(channels(tile)), 14.0))
     inner = np.s_[12:-12, 12:-12]  # 48 columns: whole periods of 2, 3, 4, 6, 8 and 16
     return float(2 * ((found[..., channels(tile).index("G")][inner] - 100.0) / 20.0 * wave[inner]).mean())
 
@@ -72,9 +66,9 @@ def test_quad_bayer_resolves_grey_well_and_a_colour_by_itself_less():
 def test_a_full_w_does_not_tell_the_others_what_they_are(name):
     tile = MOSAICS[name]
     planes = np.broadcast_to([500.0, 1000.0, 400.0, 20_000.0], (32, 32, 4))
-    raw = raw_image(np.minimum(mosaic(planes, tile) + 100, 15_100), tile)
+    raw = raw_image(np.minimum(behind(planes, tile) + 100, 15_100), tile)
     ramp = np.linspace(0.5, 1.5, 32)[:, None, None] * planes
-    found = reconstruct_linear(raw_image(np.minimum(mosaic(ramp, tile) + 100, 15_100), tile)).estimate
+    found = reconstruct_linear(raw_image(np.minimum(behind(ramp, tile) + 100, 15_100), tile)).estimate
     assert raw.saturated[mask(tile, "W", raw.shape)].all()
     np.testing.assert_allclose(reconstruct_linear(raw).estimate[..., :3], planes[..., :3], rtol=2e-3)
     np.testing.assert_allclose(found[..., :3], ramp[..., :3], rtol=2e-2)

@@ -4,7 +4,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import RGBW_4X4, RGBW_PHASES, raw_image
+from builders import RGBW_4X4, RGBW_PHASES, behind, raw_image
 from scipy.ndimage import gaussian_filter
 
 from isp.colour import edges
@@ -29,10 +29,7 @@ def engine(request, monkeypatch):
 
 def frame(picture, tile=RGBW):
     """What the mosaic reads of a picture's channels."""
-    electrons = np.zeros(picture.shape[:2])
-    for index, name in enumerate(channels(tile)):
-        electrons += np.where(mask(tile, name, electrons.shape), picture[..., index], 0.0)
-    return raw_image(np.rint(electrons) + 100, tile)
+    return raw_image(np.rint(behind(picture, tile)) + 100, tile)
 
 
 def shaded(light):

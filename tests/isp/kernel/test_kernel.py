@@ -5,7 +5,7 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import RGBW_4X4, RGBW_PHASES, raw_image
+from builders import RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image, single_precision
 
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.reference import reconstruct_reference, sum_weights
@@ -37,22 +37,17 @@ def random_scene(rng, tile):
     y, x = np.indices(shape)
     base = 1.0 + rng.uniform(0, 1) * np.sin(x / rng.uniform(1, 9) + y / rng.uniform(1, 9))
     base += rng.uniform(0, 3) * ((x // int(rng.integers(2, 12)) + y // int(rng.integers(2, 12))) % 2)
-    response = np.vectorize({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}.get)(channel_map(tile, shape))
+    response = mosaic_of({"R": 0.1, "G": 1 / 6, "B": 0.1, "W": 1.0}, tile, shape)
     level = 10.0 ** rng.uniform(-1.0, 5.0)
     electrons = np.minimum(rng.poisson(level * base * response), FULL) + rng.normal(0.0, 2.0, shape)
     return exposure(electrons, tile)
 
 
 def assert_single_precision(raw, settings):
-    """The kernel is the reference within 1e-4 of full scale, or what rounding makes of the largest log weight.
-
-    A log weight is right to some 16 roundings of 2^-24 (squares and their sum, of planes that are rounded). Two samples
-    that share a pixel then share it wrongly by up to half of the sum of both errors.
-    """
     sums = sum_weights(raw, settings)
     error = np.abs(reconstruct(raw, settings) - sums.value / sums.weight)
     scale = FULL * raw.gain_e_per_dn
-    assert (error <= scale * np.maximum(1e-4, 16 * 2.0**-24 * -sums.largest)).all()
+    assert (error <= single_precision(sums.largest, scale)).all()
     # The bound is not slack: nearly all pixels are far better than 1e-4, by the exponential's own 3.8e-5.
     assert np.quantile(error, 0.98) < 2.5e-5 * scale + scale * 2.0**-20 * np.quantile(-sums.largest, 0.98)
 

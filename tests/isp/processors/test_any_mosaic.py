@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raw_image
+from builders import mosaic_of, raw_image
 
 from isp.colour.calibrated_colours import fit_of_calibration
 from isp.colour.white_balance import WhiteBalance
@@ -14,7 +14,6 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import luminance_of_srgb
 from scenes.reflectances import color_checker
-from sensor.cfa import channel_map
 from sensor.presets import preset
 from sensor.raw import RawImage
 from studies.metrics.truth import light_in_bands, neutral_electrons
@@ -33,7 +32,7 @@ def patch(mosaic: str, number: int) -> tuple[RawImage, np.ndarray, np.ndarray]:
     level_e = 1e6 / neutral[unit]
     fit = colour_fit(sensor, PROCESSORS[mosaic], D65)
     expected = fit.matrix(sensor.channels) @ (seen / neutral) * 1e6
-    e = np.vectorize(dict(zip(sensor.channels, seen * level_e, strict=True)).get)(channel_map(sensor.cfa, (12, 12)))
+    e = mosaic_of(dict(zip(sensor.channels, seen * level_e, strict=True)), sensor.cfa, (12, 12))
     quiet = {"white_dn": 60_000.0, "black_dn": 0.0, "gain_e_per_dn": 100.0, "read_noise_e": 0.0, "dsnu_e": 0.0}
     return replace(raw_image(np.zeros((12, 12)), sensor.cfa, **quiet), dn=e / 100.0), neutral, expected
 

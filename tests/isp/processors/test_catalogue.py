@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from builders import raw_image, require_library
+from builders import mosaic_of, raw_image, require_library
 from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import NAMED, PROCESSORS, libraries
 from rodcone.colour_spaces import luminance_of_srgb
-from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channel_map, channels, unit_channel
+from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channels, unit_channel
 from sensor.raw import RawImage
 from sensor.variations import VARIATIONS
 
@@ -52,8 +52,7 @@ def phases(tile: Tile) -> Iterator[Tile]:
 
 def grey(name: str, tile: Tile, level_e: np.ndarray) -> RawImage:
     """Noise-free exposure of a neutral scene whose unit collects `level_e` (h, w), one electron a DN, black 100."""
-    names = channel_map(tile, level_e.shape)
-    share = np.vectorize(neutral_of(name).get)(names) / neutral_of(name)[unit_of(name)]
+    share = mosaic_of(neutral_of(name), tile, level_e.shape) / neutral_of(name)[unit_of(name)]
     return raw_image(np.clip(np.rint(level_e * share) + 100, 0, FULL_E + 100), tile, white_dn=FULL_E + 100)
 
 

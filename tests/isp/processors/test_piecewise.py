@@ -4,14 +4,14 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
+from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image
 
 from isp.colour.colour_fit import ColourFit
 from isp.ple.prior import own_prior
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.piecewise import curves_differ
 from rodcone.errors import InputError
-from sensor.cfa import MOSAICS, channel_map, channels
+from sensor.cfa import MOSAICS, channels
 from sensor.presets import preset
 from studies.training.pictures import neutral_electrons
 
@@ -25,7 +25,7 @@ LARGE += [(RGBW_4X4, (0, 0)), *((MOSAICS["quad_rgbw"], at) for at in [(0, 0), (1
 def grey(tile, level_e):
     """Exposure of a grey scene without noise; one electron a DN."""
     share = dict(zip("RGBW", own_prior().neutral_e, strict=True))
-    electrons = level_e * np.vectorize(share.get)(channel_map(tile, level_e.shape))
+    electrons = level_e * mosaic_of(share, tile, level_e.shape)
     return raw_image(np.rint(np.minimum(electrons, FULL_E)) + 100, tile)
 
 

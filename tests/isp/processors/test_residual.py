@@ -4,18 +4,12 @@ from itertools import product
 
 import numpy as np
 import pytest
-from builders import BAYER_PHASES
+from builders import BAYER_PHASES, behind
 from skimage import data
 
 from isp.processors.demosaic import menon
 from isp.processors.residual import REACH, residual_interpolation
-from sensor.cfa import Tile, channel_map
 from studies.metrics.quality import psnr_db
-
-
-def mosaic_of(picture: np.ndarray, cfa: Tile) -> np.ndarray:
-    sites = channel_map(cfa, picture.shape[:2])
-    return np.select([sites == name for name in "RGB"], list(np.moveaxis(picture, -1, 0)))
 
 
 def test_stripes_of_any_width_come_back_where_colours_are_linear_in_green() -> None:
@@ -25,13 +19,13 @@ def test_stripes_of_any_width_come_back_where_colours_are_linear_in_green() -> N
         green = np.broadcast_to(np.random.default_rng(6).uniform(100, 1000, 46), (40, 46))
         picture = np.stack([0.5 * green + 100, green, 2 * green - 30], axis=-1)
         picture = picture.transpose(1, 0, 2) if turned else picture
-        assert residual_interpolation(mosaic_of(picture, cfa), cfa) == pytest.approx(picture, abs=1e-6), (cfa, turned)
+        assert residual_interpolation(behind(picture, cfa), cfa) == pytest.approx(picture, abs=1e-6), (cfa, turned)
 
 
 def test_samples_stay_what_they_are() -> None:
     for cfa in BAYER_PHASES:
         mosaic = np.random.default_rng(7).uniform(0, 1000, (37, 34))
-        np.testing.assert_allclose(mosaic_of(residual_interpolation(mosaic, cfa), cfa), mosaic, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(behind(residual_interpolation(mosaic, cfa), cfa), mosaic, rtol=0, atol=1e-9)
 
 
 def test_darkness_beside_a_bright_lamp_stays_dark() -> None:
@@ -57,7 +51,7 @@ def test_on_photographs_it_is_ahead_of_menon_as_published() -> None:
     # The paper's own pictures come in no wheel; on these two it reads 39.1 dB, Menon 38.1 and 37.4.
     pytest.importorskip("colour_demosaicing", reason="rodcone[opponents] is not installed")
     for picture in (data.astronaut()[:256, :256] * 1.0, data.coffee()[:256, 100:356] * 1.0):
-        mosaic = mosaic_of(picture, ("RG", "GB"))
+        mosaic = behind(picture, ("RG", "GB"))
         theirs, ours = (
             psnr_db(demosaic(mosaic, ("RG", "GB")) / 255, picture / 255) for demosaic in (menon, residual_interpolation)
         )

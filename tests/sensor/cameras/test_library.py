@@ -1,28 +1,18 @@
 """Measured responses: reading a copy by name, and white balances beside LibRaw's."""
 
-import json
 import shutil
 from pathlib import Path
 
 import numpy as np
 import pytest
 from file_samples import LIBRARY_NM as NM
-from file_samples import camera_json
+from file_samples import camera_json, library_copy
 from loop import loop
 from refusal import refusal
 
 from render.illuminants import illuminant
 from render.photometry import photons_per_joule
 from sensor.cameras.library import VARIABLE, measured_camera, measured_cameras, read_library
-
-
-def copy_of(folder: Path, *cameras) -> Path:
-    (folder / "data" / "camera").mkdir(parents=True)
-    (folder / "LICENSE").write_text("Apache License, Version 2.0", "utf-8")
-    for index, each in enumerate(cameras):
-        held = each if isinstance(each, str) else json.dumps(each)
-        (folder / "data" / "camera" / f"{index}.json").write_text(held, "utf-8")
-    return folder
 
 
 @pytest.fixture
@@ -32,7 +22,7 @@ def library(tmp_path, monkeypatch) -> Path:
         most = max(row[channel] for row in own["spectral_data"]["data"]["main"].values())
         for row in own["spectral_data"]["data"]["main"].values():
             row[channel] /= most
-    copy = copy_of(tmp_path / "copy", camera_json(), own)
+    copy = library_copy(tmp_path / "copy", camera_json(), own)
     monkeypatch.setenv(VARIABLE, str(copy))
     return copy
 
@@ -78,7 +68,7 @@ def test_a_camera_whose_channels_were_divided_each_by_its_own_maximum_is_told(li
     ],
 )
 def test_a_damaged_camera_is_refused_in_one_line(tmp_path, camera, words):
-    copy = copy_of(tmp_path / "copy", camera_json(), camera)
+    copy = library_copy(tmp_path / "copy", camera_json(), camera)
     assert words in refusal(read_library, copy)
     shutil.rmtree(copy)  # the next one lies there too
 

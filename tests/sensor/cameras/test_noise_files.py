@@ -3,22 +3,16 @@
 import numpy as np
 import pytest
 from builders import raw_image
+from file_samples import profiled
 from refusal import refusal
 
-from sensor.calibration import ColourCalibration
 from sensor.cameras.noise_files import dng_numbers
 from sensor.cfa import BAYER
 from sensor.raw_files.raw_file import write_raw
 
-COLOUR = ColourCalibration(np.ones(3), np.eye(3), *[np.eye(3)] * 4)
-
 
 def test_a_noise_profile_gives_the_electrons_at_white_and_the_read_noise(tmp_path):
-    raw = raw_image(
-        np.full((16, 16), 500), BAYER, gain_e_per_dn=0.8, read_noise_e=3.0, dsnu_e=0.0, iso=400.0, colour=COLOUR
-    )
-    write_raw(raw, tmp_path / "a.dng")
-    numbers = dng_numbers(tmp_path / "a.dng")
+    numbers = dng_numbers(profiled(tmp_path / "a.dng"))
     assert numbers.pixel["full_well_e"].value == pytest.approx(15_000 * 0.8)
     assert numbers.pixel["read_noise_e"].value == pytest.approx(3.0)
     assert {key: each.value for key, each in numbers.settings.items()} == {"bits": 14, "black_level_dn": 100}

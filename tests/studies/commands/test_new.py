@@ -2,20 +2,16 @@
 
 import json
 import tomllib
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
-import numpy as np
 import pytest
-from builders import raw_image
 from command_line import call, check_refusals
+from file_samples import camera_json, library_copy, profiled
 
-from sensor.calibration import ColourCalibration
 from sensor.cameras.library import VARIABLE
 from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
 from sensor.presets import names, preset, preset_file
-from sensor.raw_files.raw_file import write_raw
 from studies.commands import new as new_command
 from studies.study.study_file import read_study
 
@@ -71,19 +67,12 @@ def test_bad_input_is_refused_and_writes_nothing(tmp_path, monkeypatch):
 
 # `rodcone new preset --camera --noise`, `rodcone list sensors`: cameras that exist.
 
-_PATH = Path(__file__).parents[2] / "sensor" / "cameras" / "test_library.py"
-_SPEC = spec_from_file_location("library_sample", _PATH)
-sample = module_from_spec(_SPEC)
-_SPEC.loader.exec_module(sample)
-
-COLOUR = ColourCalibration(np.ones(3), np.eye(3), *[np.eye(3)] * 4)
 REPORT = Path(__file__).parents[3] / "sensor" / "cameras" / "reports" / "framos_imx900_lcg.toml"
 
 
 @pytest.fixture
 def cameras(tmp_path, monkeypatch):
-    copy = sample.copy_of(tmp_path / "copy", sample.camera_json())
-    monkeypatch.setenv(VARIABLE, str(copy))
+    monkeypatch.setenv(VARIABLE, str(library_copy(tmp_path / "copy", camera_json())))
 
 
 @pytest.mark.filterwarnings("default::sensor.curves.RelativeResponsesWarning")
@@ -138,10 +127,7 @@ def test_a_report_gives_a_camera_of_its_own_or_the_noise_and_the_anchor_of_a_mea
 
 
 def test_an_anchor_beside_a_digital_negative_needs_curves_that_it_scales(tmp_path):
-    raw = raw_image(
-        np.full((16, 16), 500), BAYER, gain_e_per_dn=0.8, read_noise_e=3.0, dsnu_e=0.0, iso=400.0, colour=COLOUR
-    )
-    write_raw(raw, tmp_path / "shot.dng")
+    profiled(tmp_path / "shot.dng")
     asked = ("--noise", tmp_path / "shot.dng", "--anchor", "0.5@540", "-o", tmp_path / "mine.toml")
     code, out, err = call(["new", "preset", *asked])
     assert (code, out, len(err.splitlines())) == (2, "", 1)

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from builders import EVERY_TERM
 from explore_sample import small_transport
 from matplotlib import colormaps
 from refusal import refusal
@@ -14,14 +15,9 @@ from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls
 from studies.explore.views import MOST_SIGMAS, MOST_SNR_DB, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
 
-ALL_TERMS = {
-    "read_noise_e": 3.0, "dsnu_e": 2.0, "prnu": 0.02, "dark_current_e_per_s": 100.0, "column_gain_spread": 0.01,
-    "column_offset_e": 1.5, "hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 1e4, "crosstalk": 0.05,
-}  # fmt: skip
-
 
 def test_the_sources_of_noise_add_up_to_the_noise_model():
-    for terms in [{}, ALL_TERMS, {"crosstalk": 0.1}, {"column_gain_spread": 0.02}]:
+    for terms in [{}, EVERY_TERM, {"crosstalk": 0.1}, {"column_gain_spread": 0.02}]:
         exposed = photograph(small_transport(), Controls(pixel=terms)).exposed
         variance = noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
         for row, column in ((0, 0), (13, 21), (39, 47)):
@@ -33,7 +29,7 @@ def test_the_sources_of_noise_add_up_to_the_noise_model():
 
 def test_without_shot_noise_the_budget_is_that_of_the_other_terms():
     """By hand: PRNU, hot pixels as a chip has them, column gains, fixed offsets, read noise, steps of the converter."""
-    for terms in [{}, ALL_TERMS, {"column_gain_spread": 0.02, "hot_pixel_share": 0.0}]:
+    for terms in [{}, EVERY_TERM, {"column_gain_spread": 0.02, "hot_pixel_share": 0.0}]:
         exposed = photograph(small_transport(), Controls(pixel=terms, shot_noise=False)).exposed
         pixel_, time_s, sources = exposed.sensor.pixel, exposed.exposure_s, noise_sources_e(exposed, 13, 21)
         signal_e = spread_charge(exposed.expected_e, pixel_.crosstalk)[13, 21]
