@@ -244,8 +244,8 @@ def _tree(rng: Rng, x: float, z: float) -> Nodes:
     for index in range(16):
         away = rng.normal(size=3)
         middle = np.array([x, height_m + radius_m, z]) + radius_m * rng.uniform(0.4, 1) * away / np.linalg.norm(away)
-        at_x, at_y, at_z = map(float, middle)
-        nodes[f"tuft{index}"] = ball(at_x, at_y, at_z, float(radius_m * rng.uniform(0.25, 0.5)), leaf)
+        at_x, at_y, at_z = middle.tolist()
+        nodes[f"tuft{index}"] = ball(at_x, at_y, at_z, radius_m * rng.uniform(0.25, 0.5), leaf)
     return nodes
 
 
@@ -272,9 +272,6 @@ def _thing(rng: Rng, x: float, z: float, unit_m: float) -> Nodes:
             "lower": block(turned, size_m, 0.5 * size_m, size_m, surface),
             "upper": block(upper, 0.6 * size_m, 0.4 * size_m, 0.6 * size_m, _surface(rng)),
         }
-    nodes = {}
-    for index in range(12):
-        radius_m = float(size_m * rng.uniform(0.05, 0.15))
-        dx, dz = rng.uniform(-0.5, 0.5, 2) * size_m
-        nodes[f"bit{index:02d}"] = ball(float(x + dx), radius_m, float(z + dz), radius_m, surface)
-    return nodes
+    bits = [(rng.uniform(0.05, 0.15), *rng.uniform(-0.5, 0.5, 2).tolist()) for _ in range(12)]  # radius, place
+    sized = ((size_m * r, x + dx * size_m, z + dz * size_m) for r, dx, dz in bits)
+    return {f"bit{index:02d}": ball(at_x, r_m, at_z, r_m, surface) for index, (r_m, at_x, at_z) in enumerate(sized)}
