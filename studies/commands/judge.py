@@ -8,9 +8,8 @@ from rodcone.csv_file import csv_text
 from rodcone.files import write_files
 from studies.commands.console import print_json, print_table, require_place
 from studies.commands.sweep import Workers
-from studies.dataset.judge import Score
+from studies.dataset.judge import Score, judge_page
 from studies.dataset.judge import judge as judge_pictures
-from studies.dataset.judge_page import judge_page
 from studies.metrics.metric import DECIDING
 
 

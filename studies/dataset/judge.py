@@ -2,11 +2,15 @@
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from PIL import Image
 
@@ -16,13 +20,15 @@ from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
 from sensor.presets import names, preset
 from sensor.variations import vary
-from studies.dataset.make_set import Runner
-from studies.dataset.shards import Lines, LinesMade, Shard, read_manifest, read_shard, shards_of, stands
+from studies.dataset.shards import Lines, Runner, Shard, read_manifest, read_shard, shards_of, stands
 from studies.design.expect import expect
 from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import METRICS, ON_TARGETS
 from studies.metrics.quality import measure, psnr_db
+from studies.pages import report_text as text
+from studies.pages.page import svg_address, write_out
+from studies.pages.plots import CHART, COLOURS, STYLE, blank, name_at_ends, plain_ticks, svg_text
 from studies.study.levels import parse_exposure
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
@@ -42,6 +48,7 @@ _MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = 
     "mirrored": lambda picture: picture[:, ::-1],
 }
 _NEARER_DB = 3.0
+_PLACE = ("sensor", "mosaic", "spectrum", "exposure", "level")  # of a condition: camera, then level
 
 Row = dict[str, Any]
 
@@ -97,14 +104,12 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     samples = [line for line in manifest if line["kind"] == "sample"]
     if len(samples) < manifest[0]["samples"]:
         raise InputError(f"of: {len(samples)} of {manifest[0]['samples']} samples are made; run rodcone dataset again")
-    found = _pictures_of(pictures, samples)
-    tasks = []
-    for made in shards_of(manifest):
-        if not stands(out / SET, made):
-            raise InputError(f"of: {made.lines[0]['name']} isn't what was written; run rodcone dataset again")
-        if here := {line["key"]: found[line["key"]] for line in made.lines[1:] if line["key"] in found}:
-            tasks.append(Shard(made.key, (out / SET / made.lines[0]["name"]).resolve(), here))
-    rows = [row for judged in runner(tasks, make=judge_shard) for row in judged.lines]
+    files, shards = _pictures_of(pictures, samples), shards_of(out / SET, manifest)
+    for shard in shards:
+        if not stands(shard):
+            raise InputError(f"of: {shard.path.name} isn't what was written; run rodcone dataset again")
+    tasks = [shard for shard in shards if any(line["key"] in files for line in shard.lines[1:])]
+    rows = [row for judged in runner(tasks, make=partial(judge_shard, files)) for row in judged.lines[1:]]
     _check_encoding(rows)
     result = scores(rows, developer)
     at = {(score.camera, score.level) for score in result}
@@ -113,9 +118,6 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     result += [score for score in scores_of_sweep(swept) if (score.camera, score.level) in at]
     result += expected([line for line in samples if _condition(line) in at], manifest[0]["name"])
     return manifest[0], sorted(result, key=lambda score: (score.camera, score.luminance_cd_m2))
-
-
-_PLACE = ("sensor", "mosaic", "spectrum", "exposure", "level")
 
 
 def _condition(row: Row) -> tuple[str, str]:
@@ -142,20 +144,20 @@ def expected(samples: Lines, study: str) -> list[Score]:
     return result
 
 
-def judge_shard(task: Shard[Mapping[str, Path]]) -> LinesMade:
-    """Measure the pictures of a shard's samples."""
+def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
+    """Shard with a row of figures in the place of each sample's line; `files` are pictures by their samples' keys."""
     rows = []
-    for arrays, facts in read_shard(task.path):
-        if facts["key"] in task.content:
+    for arrays, facts in read_shard(shard.path):
+        if facts["key"] in files:
             truth = true_picture(arrays["rgb"].astype(np.float64))
-            encoded = read_picture(task.content[facts["key"]], truth.encoded.shape[:2])
+            encoded = read_picture(files[facts["key"]], truth.encoded.shape[:2])
             figures = vars(measure(encoded, truth.encoded, truth.lab))
             linear = decode_srgb(encoded)
             figures |= vars(appearance(linear, encode_srgb(linear), truth, facts["white_cd_m2"]))
             mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}
             place = {name: facts[name] for name in ("scene", "luminance_cd_m2", *_PLACE)}
             rows.append({**place, **figures, "mistakes": mistakes})
-    return LinesMade(task.key, rows)
+    return replace(shard, lines=[shard.lines[0], *rows])
 
 
 def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
@@ -218,13 +220,11 @@ def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
 
 def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:
     """Files by the set's keys: of each condition all or none."""
-    paths = [path for path in sorted(folder.glob("*")) if path.suffix.lower() in ENDINGS]
-    files = {path.stem: path for path in paths}
-    if twice := [path for path in paths if files[path.stem] != path]:
-        also = files[twice[0].stem].name
-        raise InputError(
-            f"pictures: {twice[0].name!r} and {also!r} are of one key; allowed: one file; remove the other"
-        )
+    files: dict[str, Path] = {}
+    for path in sorted(path for path in folder.glob("*") if path.suffix.lower() in ENDINGS):
+        also = files.setdefault(path.stem, path).name
+        if also != path.name:
+            raise InputError(f"pictures: {also!r} and {path.name!r} are of one key; allowed: one; remove the other")
     keys = {line["key"] for line in samples}
     if unknown := sorted(files.keys() - keys):
         raise InputError(f"pictures: {unknown[0]!r} is no key of the set; allowed: such as {min(keys)!r}; rename it")
@@ -249,3 +249,28 @@ def _check_encoding(rows: Sequence[Row]) -> None:
             f"pictures: they look {words} (PSNR {undone[words]:.1f} dB after that, {psnr:.1f} dB as they are); "
             "allowed: encoded sRGB, R, G, B, upright"
         )
+
+
+def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
+    """Scores of `judge` as a self-contained page: for each camera a chart of PSNR over light, and every metric."""
+    by_camera = {camera: list(lines) for camera, lines in groupby(scores, key=lambda score: score.camera)}
+    charts = {camera: svg_address(svg_text(psnr_chart(x))) for camera, x in by_camera.items()}
+    return write_out("judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text)
+
+
+@rc_context(STYLE)
+def psnr_chart(scores: Sequence[Score]) -> Figure:
+    """Draw each developer's PSNR over luminance with its interval; what is expected is a line without one."""
+    figure = blank(*CHART)
+    axes, ends = figure.subplots(), []
+    for index, developer in enumerate(dict.fromkeys(score.developer for score in scores)):
+        line, colour = [score for score in scores if score.developer == developer], COLOURS[index % len(COLOURS)]
+        values = np.array([score.means["psnr_db"] for score in line])
+        halves = np.nan_to_num([score.halves["psnr_db"] for score in line])
+        light = [score.luminance_cd_m2 for score in line]
+        axes.errorbar(light, values, halves, color=colour, capsize=3, linestyle="-" if line[0].scenes else ":")
+        ends.append((developer, float(values[-1]), colour))
+    axes.set(title="PSNR, dB, mean over scenes and its 95 % interval", xlabel="cd/m²", xscale="log")
+    plain_ticks(axes)
+    name_at_ends(axes, ends)
+    return figure

@@ -1,11 +1,11 @@
-"""From a study to shards: what is asked for, whether there is room, the scenes' files, the samples, the shards."""
+"""From a study to a set: what is asked for, whether there is room, the scenes' files, samples, shards and card."""
 
 import re
 from collections import Counter
-from collections.abc import Callable, Generator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import partial
-from itertools import product
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 
@@ -18,40 +18,31 @@ from rodcone.files import is_half_written, write_files
 from rodcone.progress import Step, progress_bar, render_words
 from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
-from studies.dataset.card import CARD, card
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
-from studies.dataset.sample import VERSION, Sample, frame_labels
-from studies.dataset.shards import MANIFEST, Lines, Shard, make_shard, read_manifest, shards_of, stands, write_manifest
-from studies.dataset.truth_files import Facts, code_digests, plane_files, scene_facts
+from studies.dataset.sample import PLANES, VERSION, Sample, frame_labels
+from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
+from studies.dataset.truth_files import Facts, plane_files, scene_facts
+from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
-from studies.study.study import Study, label
+from studies.study.render_noise import noise_note
+from studies.study.study import Condition, Study, conditions, label, mosaics
 from studies.sweep.cells import Cell
 from studies.sweep.database import open_results
 from studies.sweep.prepare import SET, Job, scene_cells
 from studies.sweep.provenance import versions
 from studies.sweep.run_sweep import at_work
 
-SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
-PREPARED = 0.5  # of the progress bar, for the scenes' files
+CARD = "README.md"
 _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_-]")
 _SHARD = re.compile(rf"({'|'.join(SPLITS)})-\d{{6}}\.tar")
-
-Runner = Callable[..., Generator[Any, None, None]]
-
-
-@dataclass(frozen=True)
-class SetMade:
-    """What was done: the folder of the set, its samples and shards, and how many of these this run made."""
-
-    folder: Path
-    samples: int
-    shards: int
-    made: int
+# Bounds of the card's histograms.
+_SNR_DB = (0.0, 10.0, 20.0, 30.0)
+_NOISE = (0.01, 0.03, 0.1, 0.3, 1.0)
 
 
 def make_set(
     study: Study, out: Path, order: SetOrder, command: str, runner: Runner, step: Step | None = None
-) -> SetMade:
+) -> dict[str, Any]:
     """Make the shards of a set that are missing, their manifest and card, in the folder ``set`` of a sweep's folder.
 
     After Ctrl-C, a kill or a full disk the next call goes on. The processors of the study stand for their mosaics.
@@ -69,6 +60,11 @@ def make_set(
     step : callable, optional
         Called with what is being done and the share that is done.
 
+    Returns
+    -------
+    dict
+        The set's `folder`, its numbers of `samples` and `shards`, and the number of shards that this call `made`.
+
     Raises
     ------
     InputError
@@ -79,87 +75,73 @@ def make_set(
     """
     check_cameras(study, order)
     scenes, folder = open_all(study), out / SET
+    identity = _identity(study, scenes.values(), order)
     with at_work(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)
-        earlier = _earlier(folder)
+        earlier = _earlier(folder, identity)
         job = Job(study, as_stated(study), out, base)
-        require_room(bytes_needed(study, job.plan.renders, scenes, order), out)
+        require_room(bytes_needed(study, job.plan, scenes.values(), order), out)
         # the files that samples are cut from
-        samples, scene_lines = list[Sample](), list[dict[str, Any]]()
+        samples, scene_lines = list[Sample](), Lines()
         for index, opened in enumerate(scenes.values()):
             rendering = partial(_show_render, show, index, len(scenes))
             cells = scene_cells(job, opened, rendering)
             facts = scene_facts(job, opened, cells, rendering)
             samples += _samples_of(job, opened, cells, facts, order)
             scene_lines.append(_scene_line(opened, facts))
-        key, count = Counter(sample.key for sample in samples).most_common(1)[0]
-        if count > 1:
-            raise InputError(f"study: two frames would be named {key!r}; allowed: names that differ; rename one")
-        # the shards
         shards = into_shards(samples, order.shards, folder)
-        head = [_head(study, order, samples, command), *scene_lines]
-        if earlier and earlier[0]["identity"] != head[0]["identity"]:
-            raise InputError(
-                f"out: {folder} holds another set, {earlier[0]['command']!r}; allowed: a new folder or that of the "
-                "same set; choose another with --out"
-            )
-        wanted = {shard.key for shard in shards}
-        standing = {made.key: made for made in shards_of(earlier) if made.key in wanted and stands(folder, made)}
-        missing = [shard for shard in shards if shard.key not in standing]
-        write_manifest(folder, head, standing.values())
-        for count, made in enumerate(runner(missing, make=make_shard), start=1):
-            standing[made.key] = made
-            write_manifest(folder, head, standing.values())
-            show(f"shard {count} of {len(missing)}", PREPARED + (1 - PREPARED) * count / len(missing))
+        head = [_head(study, order, identity, len(samples), command), *scene_lines]
+        made = make_shards(folder, shards, earlier, head, runner, show)
         write_files({folder / CARD: card(read_manifest(folder))})
-    return SetMade(folder, len(samples), len(shards), len(missing))
+    return {"folder": str(folder), "samples": len(samples), "shards": len(shards), "made": made}
 
 
 def _show_render(show: Step, index: int, count: int, share: float, error: float) -> None:
-    show(f"scene {index + 1} of {count}: {render_words(error)}", PREPARED * (index + share) / count)
+    show(f"scene {index + 1} of {count}: {render_words(error)}", (index + share) / count / 2)  # then shards
 
 
-def split_of(scene: str) -> str:
-    """Split of a scene by its hash alone, so that it never is in two."""
-    place = int(scene[:12], 16) / 16**12
-    return next(split for split, end in SPLITS.items() if place < end)
+def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:
+    """Hash of all that parts a set from another one: its scenes, its frames' names, and the order.
+
+    Raises
+    ------
+    InputError
+        For two frames of one name.
+    """
+    alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # they differ in what is done later
+    names = [_name(*frame) for frame in product(alike, mosaics(study), study.seeds)]
+    name, count = Counter(names).most_common(1)[0]
+    if count > 1:
+        raise InputError(f"study: two frames would be named {name!r}; allowed: names that differ; rename one")
+    contents = sorted(opened.identity for opened in scenes), sorted(names)
+    return digest([*contents, order.planes, order.shards, order.crop])
 
 
-def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard[tuple[Sample, ...]]]:
-    """Shards of each split, in proportion to its samples, which lie in the order of their keys' hashes: mixed."""
-    shards = []
-    for split in SPLITS:
-        chosen = sorted((x for x in samples if x.split == split), key=lambda x: digest(x.key))
-        number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
-        parts = [chosen[len(chosen) * i // number : len(chosen) * (i + 1) // number] for i in range(number)]
-        for index, part in enumerate(parts):
-            made_from = [(x.key, x.cell.key, x.window, x.part, [path.name for path in x.files.values()]) for x in part]
-            key = digest([made_from, versions(), code_digests()])
-            shards.append(Shard(key, (folder / f"{split}-{index:06d}.tar").resolve(), tuple(part)))
-    return shards
-
-
-def _earlier(folder: Path) -> Lines:
-    """Manifest of the set in a folder; nothing of a new one. Foreign files are refused."""
+def _earlier(folder: Path, identity: str) -> Lines:
+    """Manifest of the set in a folder; nothing of a new one. Foreign files and another set are refused."""
     for path in folder.iterdir():
         if path.name not in (MANIFEST, CARD) and not _SHARD.fullmatch(path.name) and not is_half_written(path):
             raise InputError(f"out: {folder} holds a foreign file, {path.name!r}; allowed: a set; move it away")
-    return read_manifest(folder) if (folder / MANIFEST).exists() else []
+    lines = read_manifest(folder) if (folder / MANIFEST).exists() else []
+    if lines and lines[0]["identity"] != identity:
+        raise InputError(
+            f"out: {folder} holds another set, {lines[0]['command']!r}, of other scenes, frames or options; allowed: a "
+            "new folder or that of the same set; choose another with --out"
+        )
+    return lines
 
 
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
-    frames = dict[tuple[str, ...], Cell]()
-    for cell in cells:
-        frames.setdefault((*frame_labels(cell).values(), processor_of(cell.processor).mosaic, f"s{cell.seed}"), cell)
+    frames = {_name(x.condition, processor_of(x.processor).mosaic, x.seed): x for x in reversed(cells)}
     windows = _windows(np.load(cells[0].electrons, mmap_mode="r").shape[:2], order.crop)
     if not windows:
         raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
     return [
         Sample(
-            key="_".join(map(_word, (*parts, f"{window[0]}-{window[1]}") if order.crop else parts)),
+            key=f"{name}_{window[0]}-{window[1]}" if order.crop else name,
             cell=cell,
-            mosaic=parts[-2],
+            mosaic=processor_of(cell.processor).mosaic,
             scene_hash=facts["hash"],
             split=split_of(facts["hash"]),
             files=plane_files(job, facts, cell, order.planes),
@@ -167,14 +149,15 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
             part=index if len(windows) > 1 else None,
             window=window,
         )
-        for parts, cell in frames.items()
+        for name, cell in frames.items()
         for index, window in enumerate(windows)
     ]
 
 
-def _word(part: str) -> str:
-    """Part of a sample's key, in letters that any reader takes."""
-    return _NOT_IN_KEYS.sub("-", part.removesuffix(".toml").replace(".", "p"))
+def _name(condition: Condition, mosaic: str, seed: int) -> str:
+    """Name of a frame, in letters that any reader takes."""
+    parts = (*frame_labels(condition).values(), mosaic, f"s{seed}")
+    return "_".join(_NOT_IN_KEYS.sub("-", part.removesuffix(".toml").replace(".", "p")) for part in parts)
 
 
 def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:
@@ -192,12 +175,11 @@ def _scene_line(opened: OpenedScene, facts: Facts) -> dict[str, Any]:
         "hash": facts["hash"],
         "split": split_of(facts["hash"]),
         "licence": "its owner's" if Path(source).suffix else f"MIT, as rodcone; {textures}",
-        "objects": facts["objects"],
-        "materials": facts["materials"],
+        **{name: facts[name] for name in ("objects", "materials")},
     }
 
 
-def _head(study: Study, order: SetOrder, samples: Sequence[Sample], command: str) -> dict[str, Any]:
+def _head(study: Study, order: SetOrder, identity: str, samples: int, command: str) -> dict[str, Any]:
     axes = ("levels", "spectra", "exposures", "sensors", "processors", "seeds")
     return {
         "kind": "set",
@@ -205,8 +187,31 @@ def _head(study: Study, order: SetOrder, samples: Sequence[Sample], command: str
         "rodcone": VERSION,
         "versions": versions(),
         "command": command,
-        "identity": digest([sorted(sample.key for sample in samples), vars(order)]),
-        "samples": len(samples),
+        "identity": identity,
+        "samples": samples,
         "planes": order.planes,
         "axes": {name: [label(value) for value in getattr(study, name)] for name in axes},
     }
+
+
+def card(lines: Lines) -> str:
+    """Card of a set as Markdown, of its manifest's lines: what is in it, how bright and noisy, and who may use it."""
+    by_kind = {kind: [line for line in lines if line["kind"] == kind] for kind in ("scene", "shard", "sample")}
+    samples = sorted(by_kind["sample"], key=lambda line: line["luminance_cd_m2"])
+    noise = {name: [line["render_noise"][name] for line in samples] for name in ("mean", "of_95_percent")}
+    counts = {
+        "level": Counter(line["level"] for line in samples),
+        "SNR, dB": _histogram([line["snr_db"] for line in samples], _SNR_DB),
+        "render's variance over the sensor's, in 95 % of the pixels": _histogram(noise["of_95_percent"], _NOISE),
+    }
+    note = noise_note(max(noise["mean"], default=0.0), 0)
+    texts = {"planes": PLANES, "manifest": MANIFEST, "note": note}
+    return write_out("card.md.j2", head=lines[0], **by_kind, **texts, counts=counts)
+
+
+def _histogram(values: Sequence[float], edges: Sequence[float]) -> dict[str, int]:
+    """Number of values between edges, by the words of the card."""
+    between = (f"{low:g} to {high:g}" for low, high in pairwise(edges))
+    names = (f"under {edges[0]:g}", *between, f"{edges[-1]:g} and more")
+    counts = np.bincount(np.searchsorted(edges, values, side="right"), minlength=len(names))
+    return dict(zip(names, counts.tolist(), strict=True))

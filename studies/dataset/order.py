@@ -1,56 +1,71 @@
-"""What is asked of a data set beside its study, what its samples can hold, and the room that it takes."""
+"""What a data set has beside its study: drawn scenes, planes of truth, shards; what it can't hold, and its room."""
 
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass
 from math import prod
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from render.radiance_files.radiance_source import extent_of
 from rodcone.digests import digest
-from rodcone.errors import InputError, require_absent, require_fields, require_keys, require_whole
+from rodcone.errors import InputError, require_absent, require_fields, require_keys
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
+from studies.budget.ledger import Plan
 from studies.dataset.sample import PLANES
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, mosaics
 
-MOST_GENERATED = 100_000
+_SCENES = 0, 100_000, "give a number of scenes"
 _BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # a pixel; others by channel, group
 _SAMPLE_BYTES = 20_000  # heads of its files, and its facts
-GB = 1e9
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SetOrder:
-    """What is asked of a set beside its study.
+    """What a set has beside its study.
 
     Attributes
     ----------
-    planes : tuple of str
-        Truth that goes into a sample, of `studies.dataset.sample.PLANES`.
+    generated : int
+        Number of drawn tables under a softbox, beside the study's own scenes.
+    seed : int
+        Seed of the drawn scenes.
+    truth : str
+        Planes of truth in a sample, joined by commas; raw frame and facts are always there.
     shards : int
-        Number of files, at least one for each split that has scenes.
-    crop : int or None
-        Side of the parts that a frame is cut into [pixels]; what is left at its right and lower edge is left out. None
-        for whole frames.
+        Number of tar files, at least one for each split that has scenes.
+    crop : int, optional
+        Side of the parts that frames are cut into [pixels], without the rest at right and below; whole frames by
+        default.
+    diorama : int, optional
+        Number of drawn streets, rooms and tables by day, dusk and night.
     """
 
-    planes: tuple[str, ...] = tuple(PLANES)
+    generated: Annotated[int, _SCENES] = 0
+    seed: int = 0
+    truth: str = ",".join(PLANES)
     shards: Annotated[int, (1, 100_000, "give a number of files")] = 64
     crop: Annotated[int | None, (16, 8192, "give the side of a part in pixels")] = None
+    diorama: Annotated[int | None, _SCENES] = None
 
     def __post_init__(self) -> None:
-        require_keys("truth", self.planes, PLANES)
         require_fields(self)
+        require_keys("truth", self.planes, PLANES)
 
+    @property
+    def planes(self) -> tuple[str, ...]:
+        """Names of the planes of truth, of `studies.dataset.sample.PLANES`."""
+        return tuple(name.strip() for name in self.truth.split(","))
 
-def drawn_scenes(count: int, seed: int, family: str = "generated") -> tuple[SceneChoice, ...]:
-    """Scenes drawn by one of `scenes.catalog.DRAWN`, their hashes counted from a seed."""
-    require_whole(family, count, 0, MOST_GENERATED, "give a number of scenes")
-    return tuple(SceneChoice(f"{family}-{digest([seed, index])[:12]}") for index in range(count))
+    @property
+    def drawn_scenes(self) -> tuple[SceneChoice, ...]:
+        """Scenes whose hashes are counted from the seed."""
+        counts = {"generated": self.generated, "diorama": self.diorama or 0}
+        hashes = ((family, digest([self.seed, index])[:12]) for family in counts for index in range(counts[family]))
+        return tuple(SceneChoice("-".join(drawn)) for drawn in hashes)
 
 
 def check_cameras(study: Study, order: SetOrder) -> None:
@@ -75,17 +90,16 @@ def check_cameras(study: Study, order: SetOrder) -> None:
             )
 
 
-def bytes_needed(
-    study: Study, renders: Mapping[SceneChoice, Any], scenes: Mapping[SceneChoice, OpenedScene], order: SetOrder
-) -> float:
+def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order: SetOrder) -> float:
     """Bytes of a set with the renders and frames that it is made from, at most."""
     total = 0.0
     conditions = len(study.spectra) * len(study.levels) * len(study.exposures) * len(study.seeds)
-    for choice, opened in scenes.items():
+    for opened in scenes:
         if opened.scene is None:
-            (pixels, _, _), groups, bands = extent_of(choice.source), 1, 0
+            (pixels, _, _), groups, bands = extent_of(opened.choice.source), 1, 0
         else:
-            pixels, groups, bands = prod(opened.size), len(opened.scene.groups), len(renders[choice].wavelength_nm)
+            pixels, groups = prod(opened.size), len(opened.scene.groups)
+            bands = len(plan.renders[opened.choice].wavelength_nm)
         total += 3 * 4 * pixels * bands * groups
         for sensor in _cameras(study):
             by = {**_BYTES, "channels_e": 4 * len(sensor.channels), "shares": 4 * groups}
@@ -100,7 +114,7 @@ def require_room(needed: float, out: Path) -> None:
     free = shutil.disk_usage(out).free
     if needed - held > free:
         raise InputError(
-            f"out: the set needs about {(needed - held) / GB:.3g} GB more; allowed: {free / GB:.3g} GB, which is "
+            f"out: the set needs about {(needed - held) / 1e9:.3g} GB more; allowed: {free / 1e9:.3g} GB, which is "
             f"free at {out}; make room, or ask for less by --truth, levels or seeds"
         )
 

@@ -22,6 +22,7 @@ from sensor.readings.noise import dark_electrons
 from sensor.readout import as_read, noise_sources, noise_variance
 from studies.photograph.snr import noise_parabola
 from studies.study.render_noise import OF_PIXELS, charged_share
+from studies.study.study import Condition
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
 # Truth that a sample may hold beside its raw frame; channel, group and colour are last axes.
@@ -87,22 +88,17 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     expected_e = np.asarray(_opened(cell.electrons)[place], dtype=np.float64) * light
     # a channel's metered time is the frame's, in its parts too
     sensor = as_read(cell.sensor, _opened(cell.electrons) * light) if cell.sensor.chip.channels else cell.sensor
-    raw = _exposed(sample, sensor, expected_e)
+    stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
+    if sample.part is not None:
+        stream = stream.spawn(sample.part + 1)[-1]
+    device = draw_device(sensor, (height, width), device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
+    raw = expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
     arrays: Arrays = {"raw": raw.dn}
     scales = {"mosaic_e": light, "channels_e": light, "xyz": cell.luminance_cd_m2}
     for name, path in sample.files.items():
         plane = _opened(path)[place] * scales.get(name, 1)
         arrays[name] = np.ascontiguousarray(plane, dtype=np.uint16 if name == "ids" else np.float32)
     return arrays, _facts(sample, sensor, raw, expected_e, _opened(cell.errors)[:, *place] * light)
-
-
-def _exposed(sample: Sample, sensor: SensorConfig, expected_e: NDArray[np.float64]) -> RawImage:
-    cell, shape = sample.cell, (expected_e.shape[0], expected_e.shape[1])
-    stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
-    if sample.part is not None:
-        stream = stream.spawn(sample.part + 1)[-1]
-    device = draw_device(sensor, shape, device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
-    return expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
 
 
 def _facts(
@@ -114,14 +110,10 @@ def _facts(
     shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     alone = {name: of_channel(sensor, name) for name in mean_e}
-    dark_e = {
-        name: dark_electrons(x, cell.exposure_s) / share - raw.noise_of(name).dark_current_e
-        for name, (x, share) in alone.items()
-    }
     return {
         "rodcone": VERSION,
         **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
-        **frame_labels(cell),
+        **frame_labels(cell.condition),
         "mosaic": sample.mosaic,
         "tile": list(sensor.cfa),
         "channels": list(sensor.channels),
@@ -132,8 +124,11 @@ def _facts(
         "noise": noise_coefficients(sensor, cell.exposure_s),
         "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
         "mean_e": mean_e,
-        "dark_above_black_e": dark_e,
-        "full_well_e": {name: x.pixel.full_well_e / s for name, (x, s) in alone.items()},
+        "dark_above_black_e": {
+            name: dark_electrons(x, cell.exposure_s) / share - raw.noise_of(name).dark_current_e
+            for name, (x, share) in alone.items()
+        },
+        "full_well_e": {name: x.pixel.full_well_e / share for name, (x, share) in alone.items()},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
         "render_noise": {
@@ -146,9 +141,9 @@ def _facts(
     }
 
 
-def frame_labels(cell: Cell) -> dict[str, Any]:
+def frame_labels(condition: Condition) -> dict[str, Any]:
     """Scene, spectrum, level, exposure and sensor by their names: of a condition what decides a single frame."""
-    return {name: value for name, value in labels(cell.condition).items() if name not in ("white_balance", "frames")}
+    return {name: value for name, value in labels(condition).items() if name not in ("white_balance", "frames")}
 
 
 def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dict[str, float]]:
@@ -166,5 +161,4 @@ def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dic
 @lru_cache(maxsize=64)
 def _opened(path: Path) -> NDArray[Any]:
     """Array that is read where it is looked at."""
-    array: NDArray[Any] = np.load(path, mmap_mode="r", allow_pickle=False)
-    return array
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))

@@ -2,44 +2,52 @@
 
 import json
 import tarfile
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from platform import node
+from typing import Any
 
 import numpy as np
 
-from rodcone.digests import digest_file
-from rodcone.errors import read_errors
+from rodcone.digests import digest, digest_file
+from rodcone.errors import InputError, read_errors
 from rodcone.files import inside, replacing, write_files
+from rodcone.progress import Step
 from studies.dataset.sample import Arrays, Sample, make_sample
+from studies.sweep.provenance import deciding_modules, versions
 
 MANIFEST = "manifest.jsonl"
-# Of a sample in a manifest.
-_TOLD = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
-         "snr_db", "saturated", "render_noise")  # fmt: skip
+# Facts of a sample that stand in its manifest line.
+_LISTED = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
+           "snr_db", "saturated", "render_noise")  # fmt: skip
+SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
 Lines = list[dict[str, Any]]
-Content = TypeVar("Content")
+Runner = Callable[..., Generator[Any, None, None]]  # of tasks, by `make`; such as `studies.sweep.workers.run`
 
 
 @dataclass(frozen=True)
-class Shard(Generic[Content]):
-    """A shard to make, or to judge pictures by: a task of `studies.sweep.workers`.
+class Shard:
+    """A file of samples: a task of `studies.sweep.workers`.
 
     Attributes
     ----------
     key : str
-        Hash of all that decides the result.
+        `shard_key` of its samples.
     path : Path
-    content : Content
-        Samples in the shard's order; or pictures by their samples' keys.
+    samples : tuple of Sample
+        That it is made from; none of one that is made.
+    lines : sequence of dict
+        In the manifest, once it is made: its own line, then one a sample.
     """
 
     key: str
     path: Path
-    content: Content
+    samples: tuple[Sample, ...] = ()
+    lines: Sequence[dict[str, Any]] = ()
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -47,37 +55,87 @@ class Shard(Generic[Content]):
         return (self.path.name,)
 
 
-@dataclass(frozen=True)
-class LinesMade:
-    """What a worker gives: a task's key, and lines; of a shard those in the manifest, its own and one a sample."""
-
-    key: str
-    lines: Lines
+def split_of(scene: str) -> str:
+    """Split of a scene by its hash alone, so that it never is in two."""
+    place = int(scene[:12], 16) / 16**12
+    return next(split for split, end in SPLITS.items() if place < end)
 
 
-def make_shard(shard: Shard[tuple[Sample, ...]]) -> LinesMade:
+def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
+    """Shards of each split, in proportion to its samples, which lie in the order of their keys' hashes: mixed."""
+    shards = []
+    for split in SPLITS:
+        chosen = sorted((x for x in samples if x.split == split), key=lambda x: digest(x.key))
+        number = min(len(chosen), max(1, round(count * len(chosen) / max(len(samples), 1))))
+        for index in range(number):
+            part = tuple(chosen[len(chosen) * index // number : len(chosen) * (index + 1) // number])
+            shards.append(Shard(shard_key(part), (folder / f"{split}-{index:06d}.tar").resolve(), part))
+    return shards
+
+
+def shard_key(samples: Sequence[Sample]) -> str:
+    """Hash of all that decides a shard: its samples, and the versions and code that make it."""
+    made_from = [(x.key, x.cell.key, x.window, x.part, [path.name for path in x.files.values()]) for x in samples]
+    return digest([made_from, versions(), code_digests()])
+
+
+@cache
+def code_digests() -> list[str]:
+    """Digests of the modules of `studies` that decide a sample: with other code a set is made anew."""
+    makers = [f"studies.dataset.{name}" for name in ("shards", "truth_files")]
+    return [digest_file(path) for path in deciding_modules(names=makers)]
+
+
+def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lines, runner: Runner, step: Step) -> int:
+    """Make those shards that don't stand, and list in the manifest what stands; returns the number made.
+
+    Parameters
+    ----------
+    earlier : list of dict
+        Manifest of the folder; empty where there is none.
+    head : list of dict
+        Lines that the manifest begins with.
+    """
+    wanted = {shard.key for shard in shards}
+    standing = {made.key: made for made in shards_of(folder, earlier) if made.key in wanted and stands(made)}
+    missing = [shard for shard in shards if shard.key not in standing]
+    _write_manifest(folder, head, standing.values())
+    for count, made in enumerate(runner(missing, make=make_shard), start=1):
+        standing[made.key] = made
+        _write_manifest(folder, head, standing.values())
+        step(f"shard {count} of {len(missing)}", (1 + count / len(missing)) / 2)  # after the scenes
+    return len(missing)
+
+
+def make_shard(shard: Shard) -> Shard:
     """Write a shard, whole or not at all; the same samples give the same bytes, whoever writes them and when.
 
     Raises
     ------
+    InputError
+        Where this process has another rodcone or other packages than the one that asks.
     OSError
         Where an array can't be read, or the file not be written.
     """
+    if shard.key != shard_key(shard.samples):
+        raise InputError(
+            f"worker on {node()}: its rodcone or packages aren't the set's; allowed: the same; install them"
+        )
     lines: Lines = []
     with replacing(shard.path) as (place,):
         with tarfile.open(place, "w", format=tarfile.GNU_FORMAT) as tar:
-            for sample in shard.content:
+            for sample in shard.samples:
                 arrays, facts = make_sample(sample)
                 for name, array in arrays.items():
                     file = BytesIO()
                     np.save(file, array)
                     _add(tar, f"{sample.key}.{name}.npy", file.getvalue())
                 _add(tar, f"{sample.key}.json", json.dumps(facts).encode())
-                lines.append({"kind": "sample", **{name: facts[name] for name in _TOLD}})
+                lines.append({"kind": "sample", **{name: facts[name] for name in _LISTED}})
         size, made = place.stat().st_size, digest_file(place)
-    first = shard.content[0]
-    head = {"kind": "shard", "name": shard.path.name, "split": first.split, "samples": len(shard.content)}
-    return LinesMade(shard.key, [head | {"bytes": size, "digest": made, "made_from": shard.key}, *lines])
+    head = {"kind": "shard", "name": shard.path.name, "split": shard.samples[0].split, "samples": len(lines)}
+    head |= {"bytes": size, "digest": made, "made_from": shard.key}
+    return replace(shard, samples=(), lines=[head, *lines])
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
@@ -86,9 +144,9 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
     tar.addfile(member, BytesIO(content))
 
 
-def write_manifest(folder: Path, head: Lines, shards: Iterable[LinesMade]) -> None:
+def _write_manifest(folder: Path, head: Lines, shards: Iterable[Shard]) -> None:
     """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
-    lines = head + [line for made in sorted(shards, key=lambda made: made.lines[0]["name"]) for line in made.lines]
+    lines = head + [line for shard in sorted(shards, key=lambda shard: shard.path) for line in shard.lines]
     write_files({folder / MANIFEST: "".join(f"{json.dumps(line)}\n" for line in lines)})
 
 
@@ -109,16 +167,16 @@ def read_manifest(folder: Path) -> Lines:
     return lines
 
 
-def shards_of(lines: Lines) -> list[LinesMade]:
-    """Shards that a manifest lists, each with its samples' lines."""
+def shards_of(folder: Path, lines: Lines) -> list[Shard]:
+    """Shards that the manifest of a folder lists."""
     places = [place for place, line in enumerate(lines) if line["kind"] == "shard"]
-    return [LinesMade(lines[at]["made_from"], lines[at:end]) for at, end in pairwise([*places, len(lines)])]
+    parts = [lines[at:end] for at, end in pairwise([*places, len(lines)])]
+    return [Shard(x[0]["made_from"], inside(folder, x[0]["name"]).resolve(), lines=x) for x in parts]
 
 
-def stands(folder: Path, made: LinesMade) -> bool:
+def stands(shard: Shard) -> bool:
     """Whether a shard's file is what was written."""
-    head = made.lines[0]
-    path = inside(folder, head["name"])
+    path, head = shard.path, shard.lines[0]
     return path.is_file() and path.stat().st_size == head["bytes"] and digest_file(path) == head["digest"]
 
 

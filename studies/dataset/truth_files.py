@@ -17,6 +17,7 @@ from rodcone.digests import digest, digest_file, digest_inputs
 from rodcone.types import Floats
 from sensor.optics import form_image
 from sensor.response import channel_electrons
+from studies.dataset.shards import code_digests
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.sweep.cells import Cell
 from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
@@ -41,18 +42,17 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
     terms = [cells[0].render.content, opened.identity, job.study.spectra, sorted(frames), versions(), code_digests()]
     key = digest_inputs(terms)
     facts = read_facts(folder, key)
-    if facts is None or not all(
-        is_whole(folder / name) for names in facts["files"].values() for name in names.values()
-    ):
-        facts = _made(job, opened, frames, scene_transport(job, opened, progress)[0])
-        keep_facts(folder, key, facts)
-    return facts
+    if facts and all(is_whole(folder / name) for names in facts["files"].values() for name in names.values()):
+        return facts
+    made = _made(job, opened, frames, scene_transport(job, opened, progress)[0])
+    keep_facts(folder, key, made)
+    return made
 
 
 def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
     """Files that planes of a cell's frame are cut from; a picture file has none of surfaces."""
-    folder, files = (job.out / PLANES).resolve(), facts["files"]
-    names = files["surfaces"] | files[cell.condition.spectrum] | files[_frame_name(cell)]
+    folder = (job.out / PLANES).resolve()
+    names = facts["files"][_frame_name(cell)]
     paths = {"mosaic_e": cell.electrons, "rgb": cell.truth, **{plane: folder / name for plane, name in names.items()}}
     return {plane: paths[plane] for plane in planes if plane in paths}
 
@@ -65,35 +65,30 @@ def scene_hash(opened: OpenedScene) -> str:
 
 
 def _frame_name(cell: Cell) -> str:
-    return f"{cell.electrons.stem} {'/'.join(cell.sensor.cfa)}"
-
-
-def code_digests() -> list[str]:
-    """Digests of the modules of this package that decide a sample's bytes: with other code a set is made anew."""
-    return [digest_file(Path(__file__).with_name(f"{name}.py")) for name in ("sample", "shards", "truth_files")]
+    return f"{cell.condition.spectrum} {cell.electrons.stem} {'/'.join(cell.sensor.cfa)}"
 
 
 def _made(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: Transport) -> dict[str, Any]:
     def kept(**planes: NDArray[Any]) -> dict[str, str]:
         return {name: keep_array(job.out / PLANES, plane) for name, plane in planes.items()}
 
-    facts: dict[str, Any] = {"hash": scene_hash(opened), "illuminants": {}, "objects": (), "materials": ()}
-    files = facts["files"] = {"surfaces": {}}
+    facts: dict[str, Any] = {"hash": scene_hash(opened), "illuminants": {}, "objects": (), "materials": (), "files": {}}
+    surfaces = {}
     if opened.scene is not None:
         seen = see_surfaces(opened.scene, opened.size)
         ids = np.stack([seen.object_id, seen.material_id], axis=-1)
-        files["surfaces"] = kept(depth=seen.depth_m, normals=seen.normal, ids=ids)
+        surfaces = kept(depth=seen.depth_m, normals=seen.normal, ids=ids)
         facts |= {"objects": seen.objects, "materials": seen.materials}
     for spectrum in job.study.spectra:
         lit = under(transport, spectrum)
         view = photographed(lit, 1.0)
         xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm)
-        files[spectrum] = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit).astype(np.float32))
+        of_light = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit).astype(np.float32))
         facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():
             if cell.condition.spectrum == spectrum:
                 electrons = channel_electrons(form_image(view, cell.sensor), cell.sensor, 1.0)
-                files[name] = kept(channels_e=electrons.astype(np.float32))
+                facts["files"][name] = surfaces | of_light | kept(channels_e=electrons.astype(np.float32))
     return facts
 
 

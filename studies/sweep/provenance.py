@@ -31,9 +31,9 @@ def code_version(root: Path = ROOT) -> str:
     return f"{metadata.version('rodcone')}+{digest(contents)[:12]}"
 
 
-def deciding_modules(root: Path = ROOT) -> list[Path]:
-    """Modules of `studies` that decide a picture: `_DECIDING`, and all that these import."""
-    paths, waiting = set[Path](), list(_DECIDING)
+def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> list[Path]:
+    """Modules of `studies` that decide a picture, or another result: those named, and all that these import."""
+    paths, waiting = set[Path](), list(names)
     while waiting:
         name = waiting.pop()
         path = root.joinpath(*name.split(".")).with_suffix(".py")

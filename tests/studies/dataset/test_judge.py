@@ -50,7 +50,7 @@ def made(folder: Path, sensor: str) -> Path:
         path = SAMPLE.picture(folder / f"scene{index}.exr", (16, 20 + 2 * index))
         scenes.append(SceneChoice(str(path), "E"))
     study = Study(tuple(scenes), ("1cd/m2", "25cd/m2"), sensors=(sensor,), processors=("bayer",))
-    make_set(study, folder / "out", SetOrder(planes=("rgb",), shards=2), "rodcone dataset", HERE)
+    make_set(study, folder / "out", SetOrder(truth="rgb", shards=2), "rodcone dataset", HERE)
     SAMPLE.swept(study, folder / "out")
     return folder / "out"
 

@@ -21,11 +21,12 @@ from refusal import refusal
 from render.surfaces import see_surfaces
 from rodcone.digests import digest
 from scenes.catalog import load
+from studies.dataset import make_set as make_set_module
 from studies.dataset import order as order_module
-from studies.dataset.card import CARD
-from studies.dataset.make_set import make_set, split_of
-from studies.dataset.order import SetOrder, drawn_scenes
-from studies.dataset.shards import MANIFEST, LinesMade, Shard, read_manifest, read_shard
+from studies.dataset import shards as shards_module
+from studies.dataset.make_set import CARD, make_set
+from studies.dataset.order import SetOrder
+from studies.dataset.shards import MANIFEST, Shard, read_manifest, read_shard, split_of
 from studies.study.lit_scene import open_all
 from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
@@ -47,7 +48,7 @@ seeds = 2
 def made(folder: Path, out: str = "out", runner: Any = HERE, order: SetOrder = ORDER, **changes: Any) -> Path:
     """Set of the small study: 16x20 pixels at two levels, two seeds, Bayer and RGBW."""
     study = SAMPLE.small_study(folder, processors=("bayer", "interleaved"), **changes)
-    return make_set(study, folder / out, order, "rodcone dataset", runner).folder
+    return Path(make_set(study, folder / out, order, "rodcone dataset", runner)["folder"])
 
 
 def content(folder: Path) -> dict[str, bytes]:
@@ -147,6 +148,22 @@ def test_the_same_bits_over_workers(stored: Path, tmp_path: Path) -> None:
     assert content(made(tmp_path, runner=partial(run_in_processes, workers=4))) == content(stored)
 
 
+@pytest.mark.parametrize("name", ["versions", "code_digests"])
+def test_a_worker_with_another_rodcone_is_refused(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def elsewhere(shards: Sequence[Shard], make: Any) -> Generator[Shard, None, None]:
+        monkeypatch.setattr(shards_module, name, lambda: {"rodcone": "another"})
+        yield from map(make, shards)
+
+    refusal(made, tmp_path, runner=elsewhere, match=r"worker on .*: its rodcone or packages aren't the set's")
+    assert not list((tmp_path / "out" / "set").glob("*.tar"))
+
+
+def test_a_shards_key_covers_all_code_that_decides_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(shards_module, "digest_file", lambda path: path.name)
+    covered = set(shards_module.code_digests.__wrapped__())
+    assert {"shards.py", "sample.py", "snr.py", "render_noise.py", "truth_files.py", "frames.py"} <= covered
+
+
 @pytest.mark.slow
 def test_the_same_bits_over_a_cluster(stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     distributed = pytest.importorskip("distributed")
@@ -161,7 +178,7 @@ def test_the_same_bits_over_a_cluster(stored: Path, tmp_path: Path, monkeypatch:
 def test_a_set_goes_on_where_it_was_stopped_and_mends_a_shard_cut_in_half(stored: Path, tmp_path: Path) -> None:
     calls: list[str] = []
 
-    def stopped(shards: Sequence[Shard], make: Any, most: int = 1) -> Generator[LinesMade, None, None]:
+    def stopped(shards: Sequence[Shard], make: Any, most: int = 1) -> Generator[Shard, None, None]:
         for count, shard in enumerate(shards):
             if count == most:
                 raise KeyboardInterrupt
@@ -202,7 +219,7 @@ def test_the_same_bits_after_a_kill(stored: Path, tmp_path: Path) -> None:
 @pytest.mark.thorough
 def test_the_whole_frame_is_that_of_the_sweep(tmp_path: Path) -> None:
     """The same study swept in the same folder develops the frames that the set holds: nothing is rendered twice."""
-    folder = made(tmp_path, order=SetOrder(planes=("rgb",), shards=1))
+    folder = made(tmp_path, order=SetOrder(truth="rgb", shards=1))
     frames = {path.name for path in (tmp_path / "out" / "frames").rglob("*.npy")}
     study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
     sweep(study, tmp_path / "out", SAMPLE.stated(study), SAMPLE.here)
@@ -226,24 +243,31 @@ def test_what_no_set_can_hold_is_told_in_a_line(changes: dict[str, Any], words: 
 
 def test_scenes_whose_samples_would_share_a_key_are_told_in_a_line(tmp_path: Path) -> None:
     scenes = [SceneChoice(str(SAMPLE.picture(tmp_path / name)), "E") for name in ("a b.exr", "a-b.exr")]
-    words = r"two frames would be named 'a-bpexr_own_1cd-m2_.*_s0_0-0'; allowed: names that differ; rename one"
+    words = r"two frames would be named 'a-bpexr_own_1cd-m2_.*_s0'; allowed: names that differ; rename one"
     refusal(made, tmp_path, scenes=tuple(scenes), match=words)
 
 
 def test_a_wrong_order_is_told_in_a_line() -> None:
     for values, words in (
-        ({"planes": ("depht",)}, "did you mean 'depth'"),
+        ({"truth": "rgb,depht"}, "did you mean 'depth'"),
+        ({"generated": -1}, "generated: -1"),
         ({"shards": 0}, "shards: 0"),
         ({"crop": 3}, "crop: 3"),
     ):
         refusal(SetOrder, **values, match=words)  # type: ignore[arg-type]
 
 
-def test_another_set_and_foreign_files_are_refused_and_left_alone(stored: Path, tmp_path: Path) -> None:
+def test_another_set_and_foreign_files_are_refused_before_any_render_and_left_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     folder = tmp_path / "out" / "set"
     made(tmp_path)
     before = content(folder)
-    refusal(made, tmp_path, seeds=(0, 1, 2), match="holds another set, 'rodcone dataset'")
+    monkeypatch.setattr(make_set_module, "scene_cells", lambda *_: pytest.fail("a scene is rendered"))
+    other_scene = (SceneChoice(str(SAMPLE.picture(tmp_path / "scene.exr", (16, 24))), "E"),)
+    for changes in ({"seeds": (0, 1, 2)}, {"order": SetOrder(shards=2, crop=16)}, {"scenes": other_scene}):
+        refusal(made, tmp_path, **changes, match="holds another set, 'rodcone dataset'")
+    SAMPLE.picture(tmp_path / "scene.exr")
     (folder / "thesis.tar").write_bytes(b"mine")
     refusal(made, tmp_path, match=r"holds a foreign file, 'thesis.tar'; allowed: a set; move it away")
     assert content(folder) == before | {"thesis.tar": b"mine"}
@@ -264,7 +288,7 @@ def test_the_room_asked_for_is_that_of_the_set(tmp_path: Path) -> None:
     """It is over what is written, and not by more than heads and rounding: 20 kB a sample."""
     folder = made(tmp_path, order=SetOrder(shards=1))
     study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
-    needed = order_module.bytes_needed(study, {}, open_all(study), SetOrder(shards=1))
+    needed = order_module.bytes_needed(study, SAMPLE.stated(study), open_all(study).values(), SetOrder(shards=1))
     written = sum(path.stat().st_size for path in (tmp_path / "out").rglob("*.npy")) + sum(
         path.stat().st_size for path in folder.glob("*.tar")
     )
@@ -301,13 +325,15 @@ def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
 
 
 def test_drawn_scenes_are_counted_from_a_seed() -> None:
-    first, more, other = drawn_scenes(3, 0), drawn_scenes(5, 0), drawn_scenes(3, 1)
+    first, more, other = (SetOrder(generated=n, seed=x).drawn_scenes for n, x in ((3, 0), (5, 0), (3, 1)))
     assert more[:3] == first
     assert not {x.source for x in first} & {x.source for x in other}
     assert len({x.source for x in more}) == 5
+    names = [x.source.split("-")[0] for x in SetOrder(generated=1, diorama=2).drawn_scenes]
+    assert names == ["generated", "diorama", "diorama"]
 
 
 def test_the_frozen_list_is_counted_from_37_without_two() -> None:
-    counted = {x.source for x in drawn_scenes(32, 37)}
+    counted = {x.source for x in SetOrder(generated=32, seed=37).drawn_scenes}
     too_noisy = {"generated-aaee6ca8b349", "generated-05288180474c"}
     assert sorted(x.source for x in read_study("benchmark").scenes) == sorted(counted - too_noisy)

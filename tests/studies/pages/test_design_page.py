@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from sensor.presets import low_noise
-from studies.dataset.judge import MEASURED, Score
-from studies.dataset.judge_page import judge_page, psnr_chart
+from studies.dataset.judge import MEASURED, Score, judge_page, psnr_chart
 from studies.design.expect import ExpectedError
 from studies.design.search import Goal
 from studies.pages import design_page
