@@ -107,10 +107,3 @@ def copied_python(page: Any, index: int = 0) -> str:
     """What the button under a picture copies."""
     text: str = page.evaluate(COPY % index)
     return text
-
-
-def ran(code: str) -> Any:
-    """The picture that a copied program makes."""
-    names: dict[str, Any] = {}
-    exec(code, names)
-    return names["picture"]

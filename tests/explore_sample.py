@@ -1,5 +1,6 @@
 """A small rendered scene of two lights, and random settings of the explorer's controls."""
 
+import ast
 import random
 from dataclasses import replace
 from functools import cache
@@ -24,6 +25,17 @@ GAUSSIAN = tuple((float(nm), float(np.exp(-(((nm - 600) / 40) ** 2)))) for nm in
 def small_transport() -> Transport:
     """What `RENDER` makes."""
     return public.render("still_life_outdoor", (40, 48), spp=4, **BANDS)
+
+
+def ran(code: str) -> dict[str, Any]:
+    """Names that copied Python makes, which imports what a user has: rodcone, NumPy, the standard library."""
+    names: dict[str, Any] = {}
+    nodes = list(ast.walk(ast.parse(code)))
+    modules = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    modules |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    assert modules <= {"rodcone", "numpy", "dataclasses"}, code
+    exec(code, names)
+    return names
 
 
 def random_controls(rng: random.Random) -> Controls:

@@ -14,6 +14,7 @@ pytest.importorskip("uvicorn", reason="needs rodcone[explore]")
 pytest.importorskip("websockets", reason="needs rodcone[explore]")
 
 import explore_browser as EXPLORE
+from explore_sample import ran
 
 import render.engine as ENGINE
 from sensor.presets import preset_file
@@ -61,7 +62,7 @@ def check_changes(page: Any, count: int, seed: int) -> int:
         painted += 1
         index = number % 2
         code = EXPLORE.copied_python(page, index)
-        assert np.array_equal(EXPLORE.picture(page, index), EXPLORE.ran(code)), (told, code)
+        assert np.array_equal(EXPLORE.picture(page, index), ran(code)["picture"]), (told, code)
     return painted
 
 
@@ -131,7 +132,7 @@ def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered,
     EXPLORE.settle(page)
     code = EXPLORE.copied_python(page)
     assert all(each in code for each in ("'color_checker'", "level_cd_m2=0.036", "sensor='chip.toml'"))
-    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
+    assert np.array_equal(EXPLORE.picture(page), ran(code)["picture"])
     page.evaluate("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
     EXPLORE.settle(page)
     assert "explorer_view(transport, 'picture')" in EXPLORE.copied_python(page)
@@ -240,7 +241,7 @@ def test_a_lamp_from_a_csv_file_is_in_the_copied_python(browser, address, one_re
     EXPLORE.settle(page)
     code = EXPLORE.copied_python(page)
     assert "'table': [[380.0, 0.25], [650.0, 1.0], [780.0, 2.0]]" in code
-    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
+    assert np.array_equal(EXPLORE.picture(page), ran(code)["picture"])
     assert not np.array_equal(EXPLORE.picture(page), before)
 
 
@@ -356,4 +357,4 @@ def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_slider
     )
     code = EXPLORE.copied_python(page)
     assert "ple_rgbw" in code
-    assert np.array_equal(EXPLORE.picture(page), EXPLORE.ran(code))
+    assert np.array_equal(EXPLORE.picture(page), ran(code)["picture"])

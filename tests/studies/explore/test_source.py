@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from command_line import check_refusals
+from explore_sample import ran
 
 import rodcone as public
 from studies.explore.answers import python_of
@@ -32,9 +33,8 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     (state,) = source.states(go_on)
     assert source.groups == {next(iter(state.transport.groups)): True}
     assert photograph(state.transport, Controls()).picture.shape == (16, 20, 3)
-    names: dict[str, object] = {}
-    exec(python_of(state.code, Controls()), names)
-    assert np.array_equal(names["picture"], photograph(state.transport, Controls()).picture)  # type: ignore[arg-type]
+    picture = ran(python_of(state.code, Controls()))["picture"]
+    assert np.array_equal(picture, photograph(state.transport, Controls()).picture)
 
 
 def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path: Path):
@@ -45,9 +45,7 @@ def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path
     (state,) = source.states(go_on)
     assert source.groups == {"light": False}
     shot, own = (photograph(state.transport, Controls(lamps=lamps)) for lamps in ({"light": Lamp("A")}, {}))
-    names: dict[str, object] = {}
-    exec(python_of(state.code, Controls()), names)
-    assert np.array_equal(names["picture"], own.picture)  # type: ignore[arg-type]
+    assert np.array_equal(ran(python_of(state.code, Controls()))["picture"], own.picture)
     assert not np.array_equal(own.exposed.light.spectrum, shot.exposed.light.spectrum)
 
 

@@ -1,13 +1,12 @@
 """Python that the explorer writes: it makes the same bits."""
 
-import ast
 import random
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from explore_sample import GAUSSIAN, RENDER, random_controls, small_transport
+from explore_sample import GAUSSIAN, RENDER, ran, random_controls, small_transport
 from refusal import refusal
 
 import rodcone as public
@@ -23,17 +22,6 @@ ROOM = """<scene version="3.0.0">
   <emitter type="constant"><spectrum name="radiance" filename="../$lamp.spd"/></emitter>
 </scene>
 """
-
-
-def ran(code: str) -> dict[str, object]:
-    """Names that copied Python makes, which imports what a user has: rodcone, NumPy, the standard library."""
-    names: dict[str, object] = {}
-    nodes = list(ast.walk(ast.parse(code)))
-    modules = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    modules |= {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
-    assert modules <= {"rodcone", "numpy", "dataclasses"}, code
-    exec(code, names)
-    return names
 
 
 @pytest.mark.sample(1)
@@ -60,7 +48,7 @@ def test_the_python_of_a_source_makes_its_transport():
     assert [state.last for state in states] == [False, True]
     for state in states:
         names = ran(python_of(state.code, Controls()))
-        assert np.array_equal(names["transport"].radiance, state.transport.radiance)  # type: ignore[attr-defined]
+        assert np.array_equal(names["transport"].radiance, state.transport.radiance)
 
 
 def test_the_python_of_a_file_opens_it_with_what_it_names_anywhere(tmp_path: Path):
@@ -71,7 +59,7 @@ def test_the_python_of_a_file_opens_it_with_what_it_names_anywhere(tmp_path: Pat
     options = RenderOptions(size=16, spp=1, band_nm=100.0, trust_scene=True, define=("lamp=lamp",))
     (state,) = open_source(str(path), options).states(go_on)
     names = ran(python_of(state.code, Controls()))
-    lit, wanted = (each.relight().values for each in (names["transport"], state.transport))  # type: ignore[attr-defined]
+    lit, wanted = (each.relight().values for each in (names["transport"], state.transport))
     assert np.array_equal(lit, wanted)
 
 
