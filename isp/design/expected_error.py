@@ -181,8 +181,8 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
     )
 
 
-def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles) -> Doubles:
-    """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
+def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Doubles, Doubles]:
+    """G of the best linear estimate, (component, sample, pixel, coefficient), and what it leaves unknown, as `within`.
 
     Parameters
     ----------
@@ -190,12 +190,22 @@ def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles)
     scale : float
         Light times exposure, over the unit of `samples`.
     noise : Noise
-    forms : (metric, component, pixel, coefficient, coefficient) float64
-        W: the squared error of a pixel is e' W e, e that of its coefficients.
     """
     variance = sample_variance(scale * samples.means, scale**2 * samples.spread, noise)
-    total = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1])
-    cross, beside = scale * samples.cross, scale * samples.beside
-    gain = np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1)).reshape(cross.shape)
-    left = samples.within - np.einsum("kspc,kspe->kpce", beside, gain, optimize=True)  # W leaves its even part
+    total, cross = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1]), scale * samples.cross
+    gain = np.asarray(np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1))).reshape(*cross.shape)
+    return gain, samples.within - np.einsum("kspc,kspe->kpce", scale * samples.beside, gain, optimize=True)
+
+
+def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles) -> Doubles:
+    """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
+
+    Parameters
+    ----------
+    samples, scale, noise
+        As `best_estimate` has them.
+    forms : (metric, component, pixel, coefficient, coefficient) float64
+        W: the squared error of a pixel is e' W e, e that of its coefficients; only its even part counts.
+    """
+    left = best_estimate(samples, scale, noise)[1]
     return np.asarray(np.einsum("k,mkpce,kpce->m", samples.weights, forms, left, optimize=True) / left.shape[1])

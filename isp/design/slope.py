@@ -13,7 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.design.expected_error import FAR, Doubles, Gaussians, Noise, opening, sample_variance
+from isp.design.expected_error import FAR, Doubles, Gaussians, Noise, best_estimate, opening, sampled
 
 
 def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[Doubles, Doubles]:
@@ -55,39 +55,36 @@ def error_slopes(
     errors : (light, metric) float64
     slopes : (light, metric, sample, pixel, coefficient) float64
     """
-    # Signals in unit light: H C, H C H', C of the middle pixels with all, and among each one's coefficients.
+    # Signals in unit light.
     components, pixels, coefficients = patches.means.shape
     h, means = sampling.reshape(len(sampling), -1), patches.means.reshape(components, -1)
-    f, rest = patches.directions.reshape(components, pixels * coefficients, -1), patches.rest[:, None, None]
-    chosen = (middle[:, None] * coefficients + np.arange(coefficients)).ravel()
-    hc = (h @ f) @ f.swapaxes(1, 2) + rest * h
-    at_middle = f[:, chosen] @ f.swapaxes(1, 2) + rest * np.eye(h.shape[1])[chosen]
-    hch, hm, eye = hc @ h.T, means @ h.T, np.eye(len(h))
-    cross = hc[..., chosen].reshape(components, len(h), len(middle), coefficients)
-    within = np.einsum("kpcpe->kpce", at_middle[..., chosen].reshape(components, *cross.shape[2:] * 2))
+    samples, eye = sampled(patches, sampling, middle, np.eye(pixels)), np.eye(len(h))
     weights = patches.weights[:, None, None, None] / len(middle) / len(rows)
     errors = np.zeros((len(lights), len(rows[0])))
     # Slopes by what H C, C at the middle pixels, and mu are multiplied with.
-    by_hc, by_middle, by_mean = (np.zeros((*errors.shape, *x.shape)) for x in (hch, cross, hm))
+    parts = samples.signal, samples.cross, samples.means
+    by_hc, by_middle, by_mean = (np.zeros((*errors.shape, *x.shape)) for x in parts)
     for index, (scales, noise) in enumerate(lights):
         for t, scene in zip(scales, rows, strict=True):
-            mean = t * hm
-            spread = t**2 * np.diagonal(hch, axis1=1, axis2=2) - (patches.brightness * mean) ** 2
-            total = t**2 * hch + sample_variance(mean, spread, noise)[..., None] * eye
-            g = np.linalg.solve(total, t * cross.reshape(*hm.shape, -1)).reshape(cross.shape)
-            left = within - np.einsum("kspc,kspe->kpce", t * cross, g, optimize=True)
-            by_noise_mean, by_noise_spread = variance_slopes(mean, spread, noise)
+            g, left = best_estimate(samples, t, noise)
+            mean = t * samples.means
+            by_noise_mean, by_noise_spread = variance_slopes(mean, t**2 * samples.spread, noise)
             by_noise_mean = by_noise_mean - 2 * patches.brightness**2 * mean * by_noise_spread
             for metric, r in enumerate(scene):
                 gr = weights * np.einsum("kspc,kpdc->kspd", g, r, optimize=True)
                 errors[index, metric] += np.einsum("k,kpdc,kpce,kpde->", weights[:, 0, 0, 0], r, left, r, optimize=True)
                 by_middle[index, metric] += t * np.einsum("kspd,kpdc->kspc", gr, r, optimize=True)
-                gr = gr.reshape(*hm.shape, -1)
+                gr = gr.reshape(*mean.shape, -1)
                 d = gr @ gr.swapaxes(1, 2) / weights[..., 0]
                 by_noise = np.diagonal(d, axis1=1, axis2=2)
                 by_hc[index, metric] += t**2 * (d + (by_noise * by_noise_spread)[..., None] * eye)
                 by_mean[index, metric] += t * by_noise * by_noise_mean
-    over, by_middle = ([2, 4], [0, 1]), by_middle.reshape(*errors.shape, *hm.shape, -1)
+    # H C, and C of the middle pixels with all.
+    f, rest = patches.directions.reshape(components, pixels * coefficients, -1), patches.rest[:, None, None]
+    chosen = (middle[:, None] * coefficients + np.arange(coefficients)).ravel()
+    hc = (h @ f) @ f.swapaxes(1, 2) + rest * h
+    at_middle = f[:, chosen] @ f.swapaxes(1, 2) + rest * np.eye(h.shape[1])[chosen]
+    over, by_middle = ([2, 4], [0, 1]), by_middle.reshape(*errors.shape, *samples.means.shape, -1)
     slopes = 2 * np.tensordot(by_hc, hc, over) - 2 * np.tensordot(by_middle, at_middle, over)
     slopes += np.tensordot(by_mean, means, (2, 0))
     return errors, slopes.reshape(*errors.shape, *sampling.shape)
