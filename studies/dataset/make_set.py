@@ -19,7 +19,7 @@ from rodcone.progress import Step, progress_bar, render_words
 from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
-from studies.dataset.sample import PLANES, VERSION, Sample, frame_labels
+from studies.dataset.sample import TRUTH, VERSION, Sample, frame_labels
 from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
 from studies.dataset.truth_files import Facts, plane_files, scene_facts
 from studies.pages.page import write_out
@@ -108,7 +108,7 @@ def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> s
     InputError
         For two frames of one name.
     """
-    alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # they differ in what is done later
+    alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # which develop one frame
     names = [_name(*frame) for frame in product(alike, mosaics(study), study.seeds)]
     name, count = Counter(names).most_common(1)[0]
     if count > 1:
@@ -205,7 +205,7 @@ def card(lines: Lines) -> str:
         "render's variance over the sensor's, in 95 % of the pixels": _histogram(noise["of_95_percent"], _NOISE),
     }
     note = noise_note(max(noise["mean"], default=0.0), 0)
-    texts = {"planes": PLANES, "manifest": MANIFEST, "note": note}
+    texts = {"planes": TRUTH, "manifest": MANIFEST, "note": note}
     return write_out("card.md.j2", head=lines[0], **by_kind, **texts, counts=counts)
 
 

@@ -14,7 +14,7 @@ from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.variations import vary
 from studies.budget.ledger import Plan
-from studies.dataset.sample import PLANES
+from studies.dataset.sample import TRUTH
 from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, mosaics
 
@@ -46,18 +46,18 @@ class SetOrder:
 
     generated: Annotated[int, _SCENES] = 0
     seed: int = 0
-    truth: str = ",".join(PLANES)
+    truth: str = ",".join(TRUTH)
     shards: Annotated[int, (1, 100_000, "give a number of files")] = 64
     crop: Annotated[int | None, (16, 8192, "give the side of a part in pixels")] = None
     diorama: Annotated[int | None, _SCENES] = None
 
     def __post_init__(self) -> None:
         require_fields(self)
-        require_keys("truth", self.planes, PLANES)
+        require_keys("truth", self.planes, TRUTH)
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Names of the planes of truth, of `studies.dataset.sample.PLANES`."""
+        """Names of the planes of truth, of `studies.dataset.sample.TRUTH`."""
         return tuple(name.strip() for name in self.truth.split(","))
 
     @property

@@ -26,7 +26,7 @@ from studies.study.study import Condition
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 
 # Truth that a sample may hold beside its raw frame; channel, group and colour are last axes.
-PLANES = {
+TRUTH = {
     "mosaic_e": "expected photo-electrons of the mosaic",
     "channels_e": "expected photo-electrons behind every filter at every pixel, in the order of `channels`",
     "rgb": "linear sRGB adapted to D65, 1 is white, not clipped",
@@ -57,7 +57,7 @@ class Sample:
         Of the scene's shapes, whatever its light.
     split : str
     files : mapping of str to Path
-        Array of the whole frame that each of its `PLANES` is cut from; electrons are at 1 cd/m^2 and 1 s, XYZ at
+        Array of the whole frame that each of its `TRUTH` is cut from; electrons are at 1 cd/m^2 and 1 s, XYZ at
         1 cd/m^2.
     illuminants : mapping of str to any
         Bands [nm], and by light group its emission in them at 1 cd/m^2 of the scene.

@@ -62,7 +62,7 @@ def split_of(scene: str) -> str:
 
 
 def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
-    """Shards of each split, in proportion to its samples, which lie in the order of their keys' hashes: mixed."""
+    """Samples of each split cut into shards, whose number is in proportion; the order of keys' hashes mixes scenes."""
     shards = []
     for split in SPLITS:
         chosen = sorted((x for x in samples if x.split == split), key=lambda x: digest(x.key))

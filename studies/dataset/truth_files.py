@@ -28,7 +28,7 @@ Facts = Mapping[str, Any]
 
 
 def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: Progress) -> Facts:
-    """Hash of a scene, names of its files, objects and materials; files are made where one is missing or damaged.
+    """Facts of a scene; its files are made where one is missing or damaged.
 
     Parameters
     ----------
@@ -36,9 +36,15 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
         Of the scene, with their frames.
     progress : callable
         As of `studies.sweep.prepare.scene_transport`.
+
+    Returns
+    -------
+    dict
+        The scene's `hash`, names of its `objects` and `materials`, `illuminants` by spectrum, and the names of its
+        `files` by frame and plane.
     """
     folder = job.out / PLANES
-    frames = {_frame_name(cell): cell for cell in cells}
+    frames = {_frame_key(cell): cell for cell in cells}
     terms = [cells[0].render.content, opened.identity, job.study.spectra, sorted(frames), versions(), code_digests()]
     key = digest_inputs(terms)
     facts = read_facts(folder, key)
@@ -52,7 +58,7 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
 def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
     """Files that planes of a cell's frame are cut from; a picture file has none of surfaces."""
     folder = (job.out / PLANES).resolve()
-    names = facts["files"][_frame_name(cell)]
+    names = facts["files"][_frame_key(cell)]
     paths = {"mosaic_e": cell.electrons, "rgb": cell.truth, **{plane: folder / name for plane, name in names.items()}}
     return {plane: paths[plane] for plane in planes if plane in paths}
 
@@ -64,7 +70,7 @@ def scene_hash(opened: OpenedScene) -> str:
     return digest_inputs([opened.scene.geometry, file_digests(opened.scene.geometry)])
 
 
-def _frame_name(cell: Cell) -> str:
+def _frame_key(cell: Cell) -> str:
     return f"{cell.condition.spectrum} {cell.electrons.stem} {'/'.join(cell.sensor.cfa)}"
 
 
