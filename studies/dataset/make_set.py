@@ -19,9 +19,8 @@ from rodcone.progress import Step, progress_bar, render_words
 from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
-from studies.dataset.sample import TRUTH, VERSION, Sample, frame_labels
+from studies.dataset.sample import TRUTH, VERSION, Facts, Sample, frame_labels, plane_files, scene_facts
 from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
-from studies.dataset.truth_files import Facts, plane_files, scene_facts
 from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note

@@ -4,7 +4,6 @@ import json
 import tarfile
 from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
 from io import BytesIO
 from itertools import pairwise
 from pathlib import Path
@@ -17,8 +16,8 @@ from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, read_errors
 from rodcone.files import inside, replacing, write_files
 from rodcone.progress import Step
-from studies.dataset.sample import Arrays, Sample, make_sample
-from studies.sweep.provenance import deciding_modules, versions
+from studies.dataset.sample import Arrays, Sample, code_digests, make_sample
+from studies.sweep.provenance import versions
 
 MANIFEST = "manifest.jsonl"
 # Facts of a sample that stand in its manifest line.
@@ -77,13 +76,6 @@ def shard_key(samples: Sequence[Sample]) -> str:
     """Hash of all that decides a shard: its samples, and the versions and code that make it."""
     made_from = [(x.key, x.cell.key, x.window, x.part, [path.name for path in x.files.values()]) for x in samples]
     return digest([made_from, versions(), code_digests()])
-
-
-@cache
-def code_digests() -> list[str]:
-    """Digests of the modules of `studies` that decide a sample: with other code a set is made anew."""
-    makers = [f"studies.dataset.{name}" for name in ("shards", "truth_files")]
-    return [digest_file(path) for path in deciding_modules(names=makers)]
 
 
 def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lines, runner: Runner, step: Step) -> int:
