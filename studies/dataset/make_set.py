@@ -74,6 +74,9 @@ def make_set(
     """
     check_cameras(study, order)
     scenes, folder = open_all(study), out / SET
+    for opened in scenes.values():
+        if opened.scene is not None:  # a picture's size is known once it is read
+            _windows(opened.size, order.crop)
     identity = _identity(study, scenes.values(), order)
     with at_work(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)
@@ -134,8 +137,6 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
     frames = {_name(x.condition, processor_of(x.processor).mosaic, x.seed): x for x in reversed(cells)}
     windows = _windows(np.load(cells[0].electrons, mmap_mode="r").shape[:2], order.crop)
-    if not windows:
-        raise InputError(f"crop: {order.crop} exceeds the frames' side; allowed: up to that; raise render.size")
     return [
         Sample(
             key=f"{name}_{window[0]}-{window[1]}" if order.crop else name,
@@ -160,6 +161,9 @@ def _name(condition: Condition, mosaic: str, seed: int) -> str:
 
 
 def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:
+    """Parts of a frame: first row and column, height and width; `InputError` where none fits."""
+    if crop and crop > min(shape):
+        raise InputError(f"crop: {crop} exceeds the frames' side, {min(shape)}; allowed: up to that; raise render.size")
     height, width = (crop, crop) if crop else shape
     corners = product(range(0, shape[0] - height + 1, height), range(0, shape[1] - width + 1, width))
     return [(row, column, height, width) for row, column in corners]
@@ -203,8 +207,7 @@ def card(lines: Lines) -> str:
         "SNR, dB": _histogram([line["snr_db"] for line in samples], _SNR_DB),
         "render's variance over the sensor's, in 95 % of the pixels": _histogram(noise["of_95_percent"], _NOISE),
     }
-    note = noise_note(max(noise["mean"], default=0.0), 0)
-    texts = {"planes": TRUTH, "manifest": MANIFEST, "note": note}
+    texts = {"planes": TRUTH, "manifest": MANIFEST, "note": noise_note(max(noise["mean"], default=0.0), 0)}
     return write_out("card.md.j2", head=lines[0], **by_kind, **texts, counts=counts)
 
 

@@ -242,6 +242,14 @@ def test_what_no_set_can_hold_is_told_in_a_line(changes: dict[str, Any], words: 
     refusal(made, tmp_path, **changes, match=words)
 
 
+def test_parts_that_exceed_a_scenes_frame_are_refused_before_its_render(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(make_set_module, "scene_cells", lambda *_: pytest.fail("a scene is rendered"))
+    drawn = {"scenes": (SceneChoice("generated-1f"),), "render": RenderLimits(size=32)}
+    refusal(made, tmp_path, **drawn, order=SetOrder(crop=34), match="crop: 34 exceeds the frames' side, 32; allowed")
+
+
 def test_scenes_whose_samples_would_share_a_key_are_told_in_a_line(tmp_path: Path) -> None:
     scenes = [SceneChoice(str(SAMPLE.picture(tmp_path / name)), "E") for name in ("a b.exr", "a-b.exr")]
     words = r"two frames would be named 'a-bpexr_own_1cd-m2_.*_s0'; allowed: names that differ; rename one"
