@@ -23,10 +23,6 @@ def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(tmp_path
     check_refusals("demo", [("-o file/out", "choose another place with --out")], tmp_path, code=1)
 
 
-def test_version() -> None:
-    assert call(["--version"])[:2] == (0, metadata.version("rodcone") + "\n")
-
-
 def test_the_package_runs_as_the_command() -> None:
     done = subprocess.run([sys.executable, "-m", "rodcone", "--version"], capture_output=True, text=True, check=True)
     assert (done.stdout, done.stderr) == (metadata.version("rodcone") + "\n", "")

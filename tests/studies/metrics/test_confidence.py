@@ -1,4 +1,4 @@
-"""Student's interval: a table's value, one seed."""
+"""Student's interval: a table's value."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,3 @@ def test_five_figures_have_the_interval_of_the_printed_table() -> None:
     figures = np.array([1.0, 2.0, 3.0, 4.0, 5.0])
     assert half_width(figures) == pytest.approx(2.776 * np.sqrt(0.5), abs=0.0005)
     assert half_width(figures, 0.99) == pytest.approx(4.604 * np.sqrt(0.5), abs=0.0005)
-
-
-def test_one_seed_has_no_interval() -> None:
-    assert np.isnan(half_width(np.ones((3, 1)))).all()
