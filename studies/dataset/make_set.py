@@ -20,7 +20,17 @@ from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
 from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
 from studies.dataset.sample import TRUTH, VERSION, Facts, Sample, frame_labels, plane_files, scene_facts
-from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
+from studies.dataset.shards import (
+    MANIFEST,
+    RENDERS,
+    SPLITS,
+    Lines,
+    Runner,
+    into_shards,
+    make_shards,
+    read_manifest,
+    split_of,
+)
 from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note
@@ -99,7 +109,7 @@ def make_set(
 
 
 def _show_render(show: Step, index: int, count: int, share: float, error: float) -> None:
-    show(f"scene {index + 1} of {count}: {render_words(error)}", (index + share) / count / 2)  # then shards
+    show(f"scene {index + 1} of {count}: {render_words(error)}", RENDERS * (index + share) / count)
 
 
 def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:
