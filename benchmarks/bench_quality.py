@@ -33,16 +33,14 @@ from render.engine import render
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
-from sensor.capture import expose
+from sensor.capture import auto_exposure_s, expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.response import expected_electrons
-from sensor.variations import vary
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import Quality, measure
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb

@@ -27,8 +27,8 @@ from numpy.typing import NDArray
 
 from render.engine import render
 from render.loader import mitsuba_module, variant
-from render.photometry import photons_per_joule
 from render.scene import Scene
+from render.spectrum import photons_per_joule
 from rodcone.jit import backend, dr
 from scenes.catalog import load
 from sensor.curves import rgbw

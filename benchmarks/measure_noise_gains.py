@@ -28,11 +28,10 @@ from sensor.cfa import channels
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import form_image
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from sensor.variations import vary
 from studies.metrics.quality import measure
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import colour_fit, develop_to_scale

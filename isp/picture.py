@@ -8,8 +8,7 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
-from isp.colour.highlights import clip_highlights, highlight_level
-from isp.colour.white_balance import BalanceSource, WhiteBalance
+from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level
 from isp.substitution import COLOUR_ERROR
 from rodcone.brief import brief
 from rodcone.colour_spaces import white_of

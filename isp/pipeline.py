@@ -2,8 +2,7 @@
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.edges import sharpen
-from isp.colour.highlights import clip_highlights, highlight_level
-from isp.colour.white_balance import WhiteBalance
+from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
 from isp.planes import bilinear, rows_at

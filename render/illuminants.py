@@ -5,9 +5,16 @@ from functools import cache
 
 import numpy as np
 
-from render.photometry import LUMINOUS_EFFICACY_LM_W, colour_matching_functions, luminance
-from render.published_spectra import published_spectra
-from render.spectrum import Spectrum, black_body, flat, line_spectrum
+from render.spectrum import (
+    LUMINOUS_EFFICACY_LM_W,
+    Spectrum,
+    black_body,
+    colour_matching_functions,
+    flat,
+    line_spectrum,
+    luminance,
+    published_spectra,
+)
 from rodcone.csv_file import read_columns
 from rodcone.errors import InputError, one_line, require_range, unknown
 from rodcone.optional import quietly_imported

@@ -5,8 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.photometry import luminance, tristimulus
-from render.spectrum import band_widths
+from render.spectrum import band_widths, luminance, tristimulus
 from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.doors import method

@@ -8,8 +8,7 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
-from render.published_spectra import optical_constant
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, optical_constant
 from rodcone.brief import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, one_line, require_fields, require_keys, unknown

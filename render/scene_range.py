@@ -7,9 +7,8 @@ from operator import getitem
 
 import numpy as np
 
-from render.published_spectra import optical_constant
 from render.scene import Node, Scene, emitter_paths, table_of, walk
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, optical_constant
 from rodcone.errors import InputError
 from rodcone.types import Floats
 

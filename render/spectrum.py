@@ -1,9 +1,19 @@
-"""Spectra as piecewise linear functions, and their averages over wavelength bands."""
+"""Spectra as piecewise linear functions and their averages over bands; published tables; photons, luminance and colour.
 
+The published tables are colour-science's, to the last digit, in a file of this package: importing that library takes
+1 to 2 s. ``python tests/render/test_illuminants.py`` writes the file. Tables of refractive indices are Mitsuba's own,
+SI constants are exact and defined once.
+"""
+
+import json
+import re
 from dataclasses import dataclass
+from functools import cache
+from importlib import metadata
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from rodcone.brief import brief
 from rodcone.doors import method
@@ -196,3 +206,78 @@ def black_body(temperature_k: float) -> Spectrum:
     exponent = second_radiation_constant_nm_k / temperature_k
     relative = (560.0 / nm) ** 5 * np.expm1(exponent / 560.0) / np.expm1(exponent / nm)
     return Spectrum(nm, relative)
+
+
+PUBLISHED = Path(__file__).parent / "data" / "published_spectra.json"
+
+
+@cache
+def published_spectra(collection: str) -> dict[str, tuple[Floats, Floats]]:
+    """Wavelengths [nm] and values of each table of a collection, in its published order.
+
+    Parameters
+    ----------
+    collection : str
+        ``observer`` (CIE 1931, 2 degrees; CIE 018:2019), ``illuminants`` and ``daylight`` (CIE 015:2018), ``sun`` (ASTM
+        G173-03, direct and circumsolar, in 1 nm means), ``color_checker`` (Ohta 1997) or ``nikon_d5100`` (Darrodi
+        et al. 2015, response of R, G and B to equal power).
+    """
+    tables = json.loads(PUBLISHED.read_text(encoding="utf-8"))[collection]
+    return {
+        name: (table["first_nm"] + table["step_nm"] * np.arange(len(table["values"])), np.array(table["values"]))
+        for name, table in tables.items()
+    }
+
+
+_NAME = re.compile(r"[\w-]+")
+
+
+@cache
+def optical_constant(material: str, part: str) -> Spectrum | None:
+    """Table of one part, ``eta`` or ``k``, of a complex index; found without importing Mitsuba.
+
+    None for a material that Mitsuba has no table of, such as ``none``, its perfect mirror.
+    """
+    path = metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{material}.{part}.spd")
+    if not _NAME.fullmatch(material) or not Path(str(path)).is_file():
+        return None
+    table = np.loadtxt(str(path))
+    return Spectrum(table[:, 0], table[:, 1])
+
+
+PLANCK_J_S = 6.62607015e-34  # exact, SI 2019
+LIGHT_M_S = 299792458.0  # exact
+LUMINOUS_EFFICACY_LM_W = 683.0  # SI: K_cd at 540 THz
+
+
+@cache
+def colour_matching_functions() -> tuple[Spectrum, Spectrum, Spectrum]:
+    """CIE 1931 2-degree x, y, z at 1 nm from 360 to 830 nm (CIE 018:2019)."""
+    x, y, z = (Spectrum(nm, np.maximum(values, 0.0)) for nm, values in published_spectra("observer").values())
+    return x, y, z
+
+
+def luminous_efficiency(wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
+    """Mean of V(lambda) in each band; V is the y of the CIE 1931 observer."""
+    return colour_matching_functions()[1].band_average(wavelength_nm, width_nm)
+
+
+def luminance(spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> NDArray[np.float64]:
+    """Photometric value of a spectral radiometric one over its last axis (band): K_m sum L V d_lambda.
+
+    Radiance [W m^-2 sr^-1 nm^-1] gives luminance [cd m^-2]; irradiance [W m^-2 nm^-1] gives illuminance [lux].
+    """
+    weights = luminous_efficiency(wavelength_nm, width_nm) * np.asarray(width_nm)
+    return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
+
+
+def tristimulus(spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> NDArray[np.float64]:
+    """XYZ [cd m^-2] of spectral radiance over its last axis (band): shape (..., 3), Y is luminance."""
+    curves = [curve.band_average(wavelength_nm, width_nm) for curve in colour_matching_functions()]
+    weights = np.stack(curves, axis=-1) * np.asarray(width_nm)[:, None]
+    return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
+
+
+def photons_per_joule(wavelength_nm: ArrayLike) -> Floats:
+    """Photons in a joule of light: lambda / (h c)."""
+    return np.asarray(wavelength_nm, dtype=np.float64) * 1e-9 / (PLANCK_J_S * LIGHT_M_S)

@@ -12,11 +12,10 @@ from render.denoised.denoise import Denoised
 from render.error_estimates import Halves, SharedPaths, relative_error, warn_of_wide_bands, within_band_error
 from render.illuminants import illuminant
 from render.level import Irradiance, Level, SceneMeans
-from render.photometry import luminance
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, luminance
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes

@@ -3,9 +3,8 @@
 from math import radians, tan
 
 from render.geometry import look_at, rotate, scale, to_world, translate
-from render.published_spectra import optical_constant
 from render.scene import Node, spectrum_node
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Floats, Spectrum, optical_constant
 from rodcone.errors import InputError
 from scenes.reflectances import grey, resampled
 

@@ -5,9 +5,8 @@ from functools import cache
 import numpy as np
 
 from render.illuminants import illuminant
-from render.photometry import tristimulus
 from render.scene import Scene
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, tristimulus
 from scenes.color_checker import chart_scene
 from scenes.reflectances import color_checker, grey
 

@@ -5,8 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from render.published_spectra import published_spectra
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Floats, Spectrum, published_spectra
 from rodcone.csv_file import read_columns
 from rodcone.errors import InputError, in_place
 

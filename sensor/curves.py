@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from render.illuminants import illuminant
-from render.photometry import photons_per_joule
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, photons_per_joule
 from rodcone.brief import brief
 from rodcone.csv_file import read_columns
 from rodcone.doors import method

@@ -14,9 +14,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance, check_values
-from render.spectrum import Floats, band_widths
+from render.spectrum import Floats, band_widths, luminance, photons_per_joule
 from rodcone.brief import brief
 from rodcone.errors import InputError, require_whole
 from sensor.config import LONGEST_S, LensConfig, SensorConfig

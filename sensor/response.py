@@ -5,8 +5,7 @@ import warnings
 import numpy as np
 from numpy.typing import NDArray
 
-from render.photometry import photons_per_joule
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import VISIBLE_NM, Floats, photons_per_joule
 from rodcone.errors import InputError
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig

@@ -42,8 +42,7 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
-from sensor.presets import preset
-from sensor.variations import vary
+from sensor.presets import preset, vary
 from studies.design.expect import MIDDLE, expect, lens_of, noise_of, responses_e, sampling_of, view_of
 from studies.design.search import Goal, best_tile
 from studies.metrics.confidence import half_width

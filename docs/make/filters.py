@@ -25,11 +25,9 @@ from render.transport import Transport
 from rodcone.colour_spaces import luminance_of_srgb
 from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
-from sensor.presets import preset
-from sensor.variations import vary
-from studies.metrics.appearance import flip, true_picture
+from sensor.presets import preset, vary
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import measure
+from studies.metrics.quality import flip, measure, true_picture
 
 FOUND = {name: Path(__file__).resolve().parents[1] / "filters" / f"{name}.toml" for name in ("strict", "loose")}
 FOLDER = Path("out/filters")

@@ -16,8 +16,7 @@ from rodcone.errors import InputError
 from scenes.catalog import load
 from sensor.cameras.emva_report import read_report
 from sensor.config import SensorConfig
-from sensor.presets import preset
-from sensor.variations import vary
+from sensor.presets import preset, vary
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import DELTA_E, METRICS, ON_TARGETS, PSNR, Metric
 from studies.metrics.truth import light_in_bands

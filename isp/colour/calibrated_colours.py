@@ -3,9 +3,8 @@
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, grey_of
-from render.photometry import tristimulus
 from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
-from render.spectrum import Floats, Spectrum, band_widths
+from render.spectrum import Floats, Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
 

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import rows_at
-from render.photometry import photons_per_joule, tristimulus
-from render.spectrum import Floats, band_widths
+from render.spectrum import Floats, band_widths, photons_per_joule, tristimulus
 from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError

@@ -6,8 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.highlights import clip_highlights, highlight_level
-from isp.colour.white_balance import WhiteBalance
+from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Reconstruction, Settings

@@ -39,7 +39,7 @@ class Processor:
     Attributes
     ----------
     mosaic : str
-        Name that `sensor.variations.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with curves of its own, or
+        Name that `sensor.presets.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with curves of its own, or
         ``own``, the sensor's own.
     picture : callable
         ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`; `develop` calls it.

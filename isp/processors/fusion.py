@@ -23,8 +23,7 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import saturated_nearby
-from isp.colour.white_balance import WhiteBalance, neutral_response
+from isp.colour.white_balance import WhiteBalance, neutral_response, saturated_nearby
 from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane, fill, fill_channels, tent
 from isp.processors.mosaic import balance_mosaic, to_rgb

@@ -18,8 +18,7 @@ and Adams' interpolation after it. Where W is full its sub-image is flat, and th
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import saturated_nearby
-from isp.colour.white_balance import WhiteBalance
+from isp.colour.white_balance import WhiteBalance, saturated_nearby
 from isp.picture import Image, Picture, require_letters
 from isp.planes import Plane, fill_channels
 from isp.processors.fusion import CHANNELS

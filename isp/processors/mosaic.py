@@ -5,8 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.highlights import clip_highlights, highlight_level, saturated_nearby
-from isp.colour.white_balance import BalanceSource, WhiteBalance
+from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level, saturated_nearby
 from isp.picture import Image
 from isp.planes import Plane, bilinear
 from sensor.cfa import channel_map
@@ -36,7 +35,7 @@ def balance_mosaic(
         sample no colour reads more than the level that follows, so that a neutral highlight is neutral in the mosaic
         already.
     float
-        `isp.colour.highlights.highlight_level` [e-].
+        `isp.colour.white_balance.highlight_level` [e-].
     mapping of str to str
         Where each channel's gain comes from, as `Picture.balance` has it.
     """

@@ -13,8 +13,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.highlights import clip_highlights, highlight_level
-from isp.colour.white_balance import WhiteBalance
+from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
 from isp.ple.overlap import STRIDE

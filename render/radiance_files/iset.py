@@ -13,11 +13,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.illuminants import unit_luminance
-from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, photons_per_joule
 from rodcone.errors import InputError, in_place
 from rodcone.types import Floats
 

@@ -10,8 +10,7 @@ from render.illuminants import illuminant
 from render.level import SceneMeans
 from render.radiance import SpectralRadiance
 from render.radiance_files import cube, photo
-from render.radiance_files.cube import REFLECTANCE, cube_holds, description, read_cube
-from render.radiance_files.envi import data_file
+from render.radiance_files.cube import REFLECTANCE, cube_holds, data_file, description, read_cube
 from render.radiance_files.exr import read_exr
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.reference import open_reference

@@ -13,8 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from render.published_spectra import published_spectra
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Floats, Spectrum, published_spectra
 from rodcone.errors import InputError, one_line, unknown
 from rodcone.files import read_bounded
 from sensor.curves import Responses

@@ -14,8 +14,7 @@ from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
-from sensor.presets import preset
-from sensor.variations import vary
+from sensor.presets import preset, vary
 from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
 from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, weigh

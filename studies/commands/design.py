@@ -17,8 +17,7 @@ from rodcone.progress import progress
 from sensor.cameras.numbers import responses_csv
 from sensor.cfa import MOSAICS
 from sensor.config import SensorConfig, with_tile
-from sensor.presets import preset, preset_file
-from sensor.variations import VARIATIONS, vary
+from sensor.presets import VARIATIONS, preset, preset_file, vary
 from studies.design.filters import best_filters
 from studies.design.search import SIDES, Goal, Known, best_tile, expected
 from studies.pages.design_page import design_page, tile_text

@@ -5,8 +5,7 @@ from pathlib import Path
 from rodcone.errors import InputError, require_absent, require_whole, unknown
 from rodcone.files import write_files
 from studies.pages.report import render_report
-from studies.pages.report_compare import CAMERA, first_comparison
-from studies.pages.report_markdown import markdown
+from studies.pages.report_compare import CAMERA, first_comparison, markdown
 from studies.pages.report_sweep import sweep_report
 from studies.sweep.export import results_json
 

@@ -18,14 +18,12 @@ from isp.processors.catalogue import NAMED
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
-from sensor.presets import names, preset
-from sensor.variations import vary
+from sensor.presets import names, preset, vary
 from studies.dataset.shards import Lines, Runner, Shard, read_manifest, read_shard, shards_of, stands
 from studies.design.expect import expect
-from studies.metrics.appearance import appearance, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import METRICS, ON_TARGETS
-from studies.metrics.quality import measure, psnr_db
+from studies.metrics.quality import appearance, measure, psnr_db, true_picture
 from studies.pages import report_text as text
 from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, COLOURS, STYLE, blank, name_at_ends, plain_ticks, svg_text

@@ -11,8 +11,7 @@ from render.radiance_files.radiance_source import extent_of
 from rodcone.digests import digest
 from rodcone.errors import InputError, require_absent, require_fields, require_keys
 from sensor.config import SensorConfig
-from sensor.presets import preset
-from sensor.variations import vary
+from sensor.presets import preset, vary
 from studies.budget.ledger import Plan
 from studies.dataset.sample import TRUTH
 from studies.study.lit_scene import OpenedScene

@@ -14,8 +14,8 @@ from scipy.ndimage import uniform_filter
 
 from render.cache import file_digests
 from render.combine import emission
-from render.photometry import luminance, tristimulus
 from render.radiance_files.radiance_source import files_of
+from render.spectrum import luminance, tristimulus
 from render.surfaces import see_surfaces
 from render.transport import Transport
 from rodcone.digests import digest, digest_file, digest_inputs
@@ -66,7 +66,7 @@ class Sample:
     cell : Cell
         The frame. Its processor and white balance don't matter.
     mosaic : str
-        As `sensor.variations.vary` takes it.
+        As `sensor.presets.vary` takes it.
     scene_hash : str
         Of the scene's shapes, whatever its light.
     split : str

@@ -14,8 +14,8 @@ from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses
 from sensor.optics import camera_equation
+from sensor.presets import vary
 from sensor.response import electrons_per_irradiance
-from sensor.variations import vary
 from studies.design.expect import MIDDLE, LitPrior, drawn_pixels, exposed, metric_rows, sites_of, spread_of, view_of
 from studies.design.search import BEHIND, Goal, tile_db
 

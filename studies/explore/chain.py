@@ -19,17 +19,15 @@ from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
 from sensor.burst import merged_raw
-from sensor.capture import expose
+from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W, expose, exposure_of_electrons_s, most_informative_s
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s, most_informative_s
 from sensor.optics import SpectralIrradiance, form_image
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
-from sensor.variations import vary
 from studies.explore.controls import TIME, Controls, Lamp, options_of
 from studies.explore.equipment import alone, camera_of, lit_transport
 from studies.explore.memo import Memo

@@ -11,12 +11,11 @@ from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, is_light_file
 from rodcone.errors import InputError, require_fields, require_keys, require_name, require_range
 from rodcone.toml_file import strict_converter, structured
+from sensor.capture import AUTO_INFORMATION, RULES
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.config import LONGEST_S
-from sensor.exposure import AUTO_INFORMATION, RULES
-from sensor.presets import names
-from sensor.variations import VARIATIONS
+from sensor.presets import VARIATIONS, names
 from studies.study.scene_source import LIGHT
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
@@ -65,13 +64,13 @@ class Controls:
     reference_light : str
         Illuminant that colours are judged under where the first light group has colours of its own, as a file has.
     exposure : str
-        A rule of `sensor.exposure.RULES`, or ``time``.
+        A rule of `sensor.capture.RULES`, or ``time``.
     exposure_s : float
         Where `exposure` is ``time``; else the longest that the rule may choose.
     sensor : str
         A preset's name, or a ``.toml`` file.
     mosaic : str
-        A name of `sensor.cfa.MOSAICS` or `sensor.variations.VARIATIONS`, or ``own``, the sensor's own.
+        A name of `sensor.cfa.MOSAICS` or `sensor.presets.VARIATIONS`, or ``own``, the sensor's own.
     lens, pixel : mapping of str to float
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
     bits : int or None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from render.photometry import photons_per_joule
+from render.spectrum import photons_per_joule
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_name, require_whole
@@ -22,7 +22,7 @@ from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
 from studies.explore.memo import Memo
-from studies.metrics.appearance import flip
+from studies.metrics.quality import flip
 
 Bytes = NDArray[np.uint8]
 Image = NDArray[np.float64]

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.illuminants import illuminant
-from render.photometry import tristimulus
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import SRGB_TO_XYZ, WHITE_AT, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from scenes.metamers import pairs
 from scenes.reflectances import color_checker

@@ -1,13 +1,21 @@
-"""How far a picture is from the truth: PSNR, SSIM, CIEDE2000 on sRGB in [0, 1]."""
+"""How far a picture is from the truth: PSNR, SSIM, CIEDE2000 on sRGB in [0, 1]; and to the eye: S-CIELAB, FLIP, and
+PSNR of absolute luminance on PU21's scale of equally visible steps.
+
+Source of PU21: Mantiuk & Azimi, "PU21: A novel perceptually uniform encoding for adapting existing quality metrics for
+HDR", Picture Coding Symposium 2021; constants as the authors publish them with the paper (gfxdisp/pu21).
+"""
 
 from dataclasses import dataclass
 
+import flip_evaluator  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from skimage.color import deltaE_ciede2000, rgb2lab
+from skimage.color import deltaE_cie76, deltaE_ciede2000, rgb2lab
 from skimage.metrics import structural_similarity
 
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import InputError
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, eye_lab
 
 
 @dataclass(frozen=True)
@@ -69,3 +77,147 @@ def measure(
     )
     delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth) if truth_lab is None else truth_lab)
     return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
+
+
+def flip(
+    picture: NDArray[np.float64], truth: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE
+) -> NDArray[np.float64]:
+    """LDR-FLIP of each pixel, shape (h, w), from 0 (no difference) to 1; its mean is the usual figure of a picture.
+
+    Andersson et al., "FLIP: A difference evaluator for alternating images", Proc. ACM Comput. Graph. Interact. Tech.
+    3(2), 2020. The program computes in float32 and on all processors that OpenMP gives it.
+
+    Parameters
+    ----------
+    picture, truth : (h, w, 3) float64
+        Encoded sRGB in [0, 1].
+    pixels_per_degree : float
+        Of the eye's view; the default is FLIP's own.
+    """
+    first, second = (np.ascontiguousarray(values, dtype=np.float32) for values in (truth, picture))
+    error, _, _ = flip_evaluator.evaluate(
+        first, second, "LDR", applyMagma=False, computeMeanError=False, parameters={"ppd": float(pixels_per_degree)}
+    )
+    return np.asarray(error[..., 0], dtype=np.float64)
+
+
+Image = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TruePicture:
+    """The noise-free picture, and what comparisons need of it, computed once for all pictures compared with it.
+
+    Attributes
+    ----------
+    linear : (h, w, 3) float64
+        sRGB, not clipped; white is 1.
+    encoded, lab : (h, w, 3) float64
+        As a display shows it, and its CIELAB.
+    eye_lab : (h, w, 3) float64
+        CIELAB after the eye's blur.
+    """
+
+    linear: Image
+    encoded: Image
+    lab: Image
+    eye_lab: Image
+
+
+@dataclass(frozen=True)
+class Appearance:
+    """Differences that an eye sees.
+
+    Attributes
+    ----------
+    s_cielab_median, s_cielab_p95 : float
+        Median and 95th percentile over pixels; 1 is about what can just be seen.
+    flip_mean : float
+        0 (no difference) to 1.
+    pu21_psnr_db : float
+        Of luminance in cd/m^2.
+    """
+
+    s_cielab_median: float
+    s_cielab_p95: float
+    flip_mean: float
+    pu21_psnr_db: float
+
+
+def true_picture(linear: Image) -> TruePicture:
+    """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
+    require_finite(truth=linear)
+    encoded = encode_srgb(linear)
+    return TruePicture(linear, encoded, rgb2lab(encoded), eye_lab(encoded))
+
+
+def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
+    """Compare a picture with the truth, both of one scale: nothing is fitted to the picture.
+
+    Parameters
+    ----------
+    linear : (h, w, 3) float64
+        sRGB, not clipped; 1 stands for `white_cd_m2`.
+    encoded : (h, w, 3) float64
+        The same by `rodcone.colour_spaces.encode_srgb`.
+    truth : TruePicture
+    white_cd_m2 : float
+        Luminance of white. FLIP and S-CIELAB compare the pictures as a display shows them, whatever this is; PU21
+        compares the scene's own luminance, adapted to D65.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
+    """
+    require_finite(picture=linear)
+    difference = deltaE_cie76(eye_lab(encoded), truth.eye_lab)
+    luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
+    return Appearance(
+        float(np.median(difference)),
+        float(np.percentile(difference, 95)),
+        float(flip(encoded, truth.encoded).mean()),
+        pu21_psnr_db(*luminances),
+    )
+
+
+LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # the encoding's range: luminance outside counts as its end
+PEAK = 256.0  # the authors' peak for PSNR: about the value of a 100 cd/m^2 display's white, as 255 is in 8 bits
+# Fit "banding_glare", the authors' own choice: steps in smooth gradients are seen, through the glare of the eye.
+_P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0.9099517204, 596.3148142)
+
+
+def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
+    """Perceptually uniform value, 0 to 595.4, of luminance [cd/m^2] of any shape; 100 cd/m^2 give 256.4.
+
+    Luminance outside 0.005 to 10 000 cd/m^2, noise below 0 included, counts as the nearer end.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
+    """
+    luminance = np.asarray(luminance_cd_m2, dtype=np.float64)
+    require_finite(luminance_cd_m2=luminance)
+    power = np.clip(luminance, LEAST_CD_M2, MOST_CD_M2) ** _P[3]
+    return np.maximum(_P[6] * (((_P[0] + _P[1] * power) / (1 + _P[2] * power)) ** _P[4] - _P[5]), 0.0)
+
+
+def pu21_psnr_db(picture_cd_m2: ArrayLike, truth_cd_m2: ArrayLike) -> float:
+    """PSNR [dB] of luminance on PU21's scale, peak 256 (the authors' PSNRY); inf where pictures look the same.
+
+    Parameters
+    ----------
+    picture_cd_m2, truth_cd_m2 : (h, w) array_like
+        Absolute luminance, not clipped at white: the same error counts for less in daylight than at dusk.
+
+    Raises
+    ------
+    InputError
+        Where the shapes differ, or a value is NaN or infinite.
+    """
+    first, second = pu21_encode(picture_cd_m2), pu21_encode(truth_cd_m2)
+    if first.shape != second.shape:
+        raise InputError(f"picture_cd_m2: shape {first.shape} is not allowed; give the truth's, {second.shape}")
+    mean_square = float(np.mean((first - second) ** 2))
+    return float(10 * np.log10(PEAK**2 / mean_square)) if mean_square > 0 else float("inf")

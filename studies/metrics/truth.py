@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.illuminants import illuminant
-from render.photometry import tristimulus
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM, Floats, Spectrum
+from render.spectrum import VISIBLE_NM, Floats, Spectrum, tristimulus
 from render.transport import Transport
 from rodcone.brief import brief
 from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb

@@ -1,9 +1,9 @@
-"""Which two of a report's pictures are compared, and every comparison's figures and words, as the script reads them."""
+"""Which two of a report's pictures are compared; all comparisons' figures and words, for the script and in Markdown."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations, permutations, product
-from math import isfinite
+from math import isfinite, isnan
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from studies.pages.headline import (
     pair_words,
 )
 from studies.pages.report_data import ReportCell, ReportData
-from studies.pages.verdict import OUTCOMES, Leads, counts, leads
+from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
 from studies.study.study import OWN
 
 # Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
@@ -210,3 +210,77 @@ def _flat(lead: Leads) -> list[Any]:
 def shown_metrics(cells: Sequence[ReportCell]) -> list[Metric]:
     """Return the metrics that are known for some cell: those of targets are so on their own scene alone."""
     return [metric for metric in METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]
+
+
+def markdown(report: ReportData, command: str, a: int) -> str:
+    """Return the page of one value of what the report compares first, beside all the others.
+
+    Parameters
+    ----------
+    report : ReportData
+    command : str
+        That makes the page.
+    a : int
+        The value, by its place.
+    """
+    of = first_comparison(report)
+    axis = axes_of(report)[of.compared]
+    b = of.b if a == of.a else next(value for value in range(len(axis.values)) if value != a)
+    groups = groups_of(report, of.compared, a, b)
+    places = report.by_group if of.compared == CAMERA else [()] * len(groups)
+    words = [
+        " ".join(
+            filter(
+                None,
+                (
+                    "-",
+                    code(group.title) if group.title else "",
+                    answer(group.pair),
+                    in_light(group.pair),
+                    balance_words(group) if of.compared != BALANCE else "",
+                    best_words(group, place),
+                ),
+            )
+        )
+        for group, place in zip(groups, places, strict=True)
+    ]
+    parts = [
+        f"# {code(report.title)}",
+        f"    {command}",
+        f"rodcone {report.rodcone}, study {code(report.name)}, {len(report.seeds)} seeds. {code(axis.values[a])} "
+        f"beside {code(axis.values[b])}:",
+        "\n".join(words),
+        f"Lead of {code(axis.values[a])}, half the 95 % interval over seeds after ±. **Bold**: behind by what a person "
+        "sees. In brackets: less than that, or undecided. Last: light levels ahead, level, behind; equal light once.",
+        *(lead_table(report, of.compared, a, metric) for metric in shown_metrics(report.cells)),
+    ]
+    return "\n\n".join(parts) + "\n"
+
+
+def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
+    """Return the leads of one value of an axis over the others: others and places down, light across."""
+    names, rows = axes_of(report)[axis].values, []
+    for other in (value for value in range(len(names)) if value != a):
+        groups = groups_of(report, axis, a, other)
+        counted = [counts(group.pair.ours, group.pair.theirs)[metric.key] for group in groups]
+        last = " / ".join(str(sum(count[outcome] for count in counted)) for outcome in OUTCOMES)
+        for group in (*groups, *means_over_scenes(report, groups)):
+            title = f"{code(names[other])}, {code(group.title)}" if group.title else code(names[other])
+            rows.append([title, *lead_cells(metric, group.pair.leads[metric.key]), last])
+    unit = f" [{metric.unit}]" if metric.unit else ""
+    return text.table([f"{metric.name}{unit}", *(code(level.name) for level in report.levels), "counted"], rows)
+
+
+def lead_cells(metric: Metric, lead: Leads) -> list[str]:
+    """Write leads as cells of a table: a loss that is seen in bold, what isn't seen or isn't decided in brackets."""
+    cells = []
+    for mean, half, outcome in zip(lead.mean, lead.half, lead.outcome, strict=True):
+        words = text.MISSING if isnan(mean) else text.lead_text(metric, float(mean))
+        words += "" if isnan(half) else f" ± {text.fixed(float(half), metric.digits)}"
+        cells.append({BEHIND: f"**{words}**", AHEAD: words}.get(str(outcome), f"({words})"))
+    return cells
+
+
+def code(words: str) -> str:
+    """Write a name as Markdown's code, whatever is in it: in code no sign has a meaning but the backtick and |."""
+    return "`" + " ".join(words.split()).replace("`", "'").replace("|", "\\|") + "`"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import uniform_filter
 
-from studies.metrics.appearance import flip
+from studies.metrics.quality import flip
 from studies.pages.report_compare import Comparison
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole

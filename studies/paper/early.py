@@ -20,7 +20,7 @@ from sensor.device import draw_device
 from sensor.readout import noise_variance, read_out
 from studies.metrics.truth import light_of
 from studies.paper.claims import Claim, about, at_least, at_most, claim
-from studies.paper.figures_3_5 import BRIGHT_CD_M2, GAIN_DB, LOW_CD_M2, PITCH_UM, WHOLE, measure_bright
+from studies.paper.figures_3_5_6 import BRIGHT_CD_M2, GAIN_DB, LOW_CD_M2, PITCH_UM, WHOLE, measure_bright
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Setup, decibels, develop, exposures, sensor_of, view
 from studies.photograph.camera import colour_fit

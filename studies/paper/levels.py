@@ -11,17 +11,16 @@ import numpy as np
 
 from isp.similarity.guide import saturated_fraction
 from rodcone.colour_spaces import encode_srgb
+from sensor.capture import auto_exposure_s
 from sensor.cfa import mask
 from sensor.config import LONGEST_S
-from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.raw import RawImage
-from studies.metrics.appearance import flip
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import measure, psnr_db
+from studies.metrics.quality import flip, measure, psnr_db
 from studies.pages.plots import light_charts
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, claim, over_seeds, paper_figure
-from studies.paper.figures_3_5 import GAIN_DB
+from studies.paper.figures_3_5_6 import GAIN_DB
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,

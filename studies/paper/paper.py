@@ -16,8 +16,7 @@ from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, ran
 from studies.paper.early import section_2
 from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
-from studies.paper.figure6 import figure_6
-from studies.paper.figures_3_5 import figure_3, figure_5
+from studies.paper.figures_3_5_6 import figure_3, figure_5, figure_6
 from studies.paper.held import figure_b
 from studies.paper.levels import figure_a
 from studies.paper.numbers import number_claims

@@ -14,8 +14,8 @@ from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import NAMED
 from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL
-from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
+from render.spectrum import photons_per_joule
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_fields
 from rodcone.progress import Step, render_words
@@ -23,11 +23,10 @@ from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import camera_equation, form_image
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import held_lens, shaken
-from sensor.variations import vary
 from studies.budget.ledger import as_stated
 from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb

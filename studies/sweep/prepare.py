@@ -18,8 +18,7 @@ from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
-from sensor.presets import preset
-from sensor.variations import vary
+from sensor.presets import preset, vary
 from studies.budget.ledger import Plan
 from studies.metrics.truth import light_in_bands
 from studies.photograph.clock import Clock

@@ -28,7 +28,7 @@ class Row:
     psnr_db, ssim, delta_e_median, delta_e_p95 : float
         Of `studies.metrics.quality.Quality`.
     s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
-        Of `studies.metrics.appearance.Appearance`.
+        Of `studies.metrics.quality.Appearance`.
     mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
         Of `studies.metrics.target_figures.TargetFigures`.
     mc_share : float

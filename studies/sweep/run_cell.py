@@ -22,8 +22,7 @@ from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.response import behind_filters
 from sensor.shake import shaken
-from studies.metrics.appearance import TruePicture, appearance, true_picture
-from studies.metrics.quality import measure
+from studies.metrics.quality import TruePicture, appearance, measure, true_picture
 from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import balance_delta_e, develop_to_scale

@@ -15,9 +15,8 @@ from skimage import data
 from skimage.draw import ellipse, polygon
 
 from render.illuminants import illuminant
-from render.photometry import photons_per_joule
 from render.radiance_files.photo import srgb_basis
-from render.spectrum import Floats, band_widths
+from render.spectrum import Floats, band_widths, photons_per_joule
 from rodcone.colour_spaces import decode_srgb
 from scenes.reflectances import band, edge, grey
 from sensor.config import SensorConfig

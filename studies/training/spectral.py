@@ -14,8 +14,7 @@ from skimage import data
 from isp.design.spectral_prior import PATCH
 from isp.ple.prior import Prior
 from render.illuminants import illuminant
-from render.photometry import luminous_efficiency
-from render.spectrum import band_widths
+from render.spectrum import band_widths, luminous_efficiency
 from rodcone.colour_spaces import decode_srgb, luminance_of_srgb
 from rodcone.files import replacing
 from studies.training.pictures import (

@@ -8,9 +8,8 @@ from hard.chain import expected
 from hard.light import BANDS_NM, at_level, even_lines, in_bands, of_lines, planes_of, times, with_planes
 
 from render.illuminants import lines_nm
-from render.photometry import photons_per_joule
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM
+from render.spectrum import VISIBLE_NM, photons_per_joule
 from sensor.cfa import channel_map
 from sensor.optics import camera_equation
 

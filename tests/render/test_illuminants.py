@@ -10,9 +10,15 @@ from outside_truth import colour_science
 from refusal import refusal
 
 from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
-from render.photometry import colour_matching_functions, luminance
-from render.published_spectra import PATH, published_spectra
-from render.spectrum import Spectrum, black_body, line_bands
+from render.spectrum import (
+    PUBLISHED,
+    Spectrum,
+    black_body,
+    colour_matching_functions,
+    line_bands,
+    luminance,
+    published_spectra,
+)
 
 NM, WIDTH_NM = np.arange(360.5, 830.0), np.ones(470)
 
@@ -199,7 +205,7 @@ def write() -> None:
         f"{json.dumps(key)}: {{\n" + ",\n".join(line(name, *table) for name, table in group.items()) + "\n}"
         for key, group in of_colour_science().items()
     )
-    PATH.write_text("{\n" + ",\n".join(groups) + "\n}\n", encoding="utf-8")
+    PUBLISHED.write_text("{\n" + ",\n".join(groups) + "\n}\n", encoding="utf-8")
 
 
 if __name__ == "__main__":

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from render.illuminants import illuminant
-from render.photometry import (
+from render.spectrum import (
+    DEFAULT_WAVELENGTH_NM,
     LIGHT_M_S,
     LUMINOUS_EFFICACY_LM_W,
     PLANCK_J_S,
@@ -13,7 +14,6 @@ from render.photometry import (
     photons_per_joule,
     tristimulus,
 )
-from render.spectrum import DEFAULT_WAVELENGTH_NM
 
 ISET_NM, ISET_WIDTH_NM = np.arange(400.0, 701.0, 10.0), np.full(31, 10.0)
 WIDTH_NM = np.full(40, 10.0)

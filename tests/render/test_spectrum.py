@@ -7,9 +7,18 @@ from hypothesis import strategies as st
 from loop import loop
 from refusal import refusal
 
-from render.photometry import LIGHT_M_S, PLANCK_J_S
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, black_body, flat, line_bands, line_spectrum
+from render.spectrum import (
+    DEFAULT_WAVELENGTH_NM,
+    LIGHT_M_S,
+    PLANCK_J_S,
+    Spectrum,
+    band_widths,
+    black_body,
+    flat,
+    line_bands,
+    line_spectrum,
+)
 from sensor.optics import SpectralIrradiance
 
 BOLTZMANN_J_K = 1.380649e-23  # exact, SI 2019

@@ -13,9 +13,8 @@ from refusal import refusal
 from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
 from render.level import Irradiance, SceneMeans
-from render.photometry import luminance
 from render.scene import LightGroup
-from render.spectrum import Spectrum, flat
+from render.spectrum import Spectrum, flat, luminance
 
 NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
 SIZE = (5, 6)

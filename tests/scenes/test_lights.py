@@ -9,8 +9,7 @@ from scipy.stats import norm
 
 from render.engine import render
 from render.geometry import look_at, to_world
-from render.photometry import luminance
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, luminance
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalog import load
 

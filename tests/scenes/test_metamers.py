@@ -6,8 +6,7 @@ from loop import loop
 from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.illuminants import illuminant
-from render.photometry import colour_matching_functions, tristimulus
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Floats, Spectrum, colour_matching_functions, tristimulus
 from rodcone.colour_spaces import adapt_to_d65
 from scenes.catalog import load
 from scenes.metamers import HIGH, LOW, OTHER_LIGHT, PAIRS, TWINS_UNDER, pairs

@@ -8,8 +8,7 @@ from builders import any_order
 from loop import loop
 from refusal import refusal
 
-from sensor.config import LONGEST_S
-from sensor.exposure import (
+from sensor.capture import (
     RULES,
     auto_exposure_s,
     exposure_by_rule_s,
@@ -17,6 +16,7 @@ from sensor.exposure import (
     information_bits,
     most_informative_s,
 )
+from sensor.config import LONGEST_S
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
 from sensor.response import channel_electrons

@@ -17,8 +17,8 @@ from sensor.config_file import read_sensor
 from sensor.curves import built_in
 from sensor.device import draw_device
 from sensor.photodiodes import binned, binned_tile
+from sensor.presets import vary
 from sensor.readout import noise_sources, noise_variance
-from sensor.variations import vary
 
 QUIET = PixelConfig(1.0, 0.9, full_well_e=8000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 BOTH = loop("binning", ["charge", "digital"])

@@ -10,15 +10,13 @@ from refusal import refusal
 from isp.colour.colour_fit import fit_matrix
 from isp.colour.white_balance import neutral_response
 from render.illuminants import illuminant
-from render.photometry import photons_per_joule, tristimulus
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, photons_per_joule, tristimulus
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker
 from sensor.cfa import MOSAICS, channels
 from sensor.curves import Responses, complementary, matched_transmittance, neutral_density, read_csv, read_curve, rgbw
 from sensor.photodiodes import binned
-from sensor.presets import preset
-from sensor.variations import VARIATIONS, vary
+from sensor.presets import VARIATIONS, preset, vary
 from studies.commands import new as new_command
 
 NM = DEFAULT_WAVELENGTH_NM

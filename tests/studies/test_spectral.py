@@ -10,8 +10,7 @@ from refusal import refusal
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
 from render.illuminants import illuminant
-from render.photometry import photons_per_joule
-from render.spectrum import VISIBLE_NM, Floats
+from render.spectrum import VISIBLE_NM, Floats, photons_per_joule
 from render.transport import Transport
 from scenes.catalog import load
 from scenes.reflectances import color_checker

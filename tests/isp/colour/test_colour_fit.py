@@ -7,8 +7,7 @@ from refusal import refusal
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours, fit_matrix, relative_noise, training
 from render.illuminants import illuminant
-from render.photometry import colour_matching_functions, photons_per_joule
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, colour_matching_functions, photons_per_joule
 from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker

@@ -13,8 +13,8 @@ from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import NAMED, PROCESSORS, libraries
 from rodcone.colour_spaces import luminance_of_srgb
 from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channels, unit_channel
+from sensor.presets import VARIATIONS
 from sensor.raw import RawImage
-from sensor.variations import VARIATIONS
 
 IDENTITY = np.eye(3)
 FULL_E = 15_000.0

@@ -11,9 +11,9 @@ from refusal import refusal
 from scipy.io import savemat
 
 from render.illuminants import illuminant
-from render.photometry import luminance
 from render.radiance_files.cube import read_cube
 from render.radiance_files.radiance_source import extent_of, files_of, is_reflectance, load_picture, load_radiance
+from render.spectrum import luminance
 
 CUBE = np.random.default_rng(4).uniform(0.05, 0.95, (5, 6, NM.size))
 PLAIN = 'holds = "reflectance"\nwavelength_nm = [400, 700]\n'

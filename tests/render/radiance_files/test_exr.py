@@ -12,8 +12,7 @@ from refusal import refusal
 
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
-from render.radiance_files.exr import read_exr, write_exr
-from render.radiance_files.exr_layout import LAYOUT_UNITS, channel_name, radiance_channels, read_bands
+from render.radiance_files.exr import LAYOUT_UNITS, channel_name, radiance_channels, read_bands, read_exr, write_exr
 from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads

@@ -9,8 +9,8 @@ import scipy.io
 from loop import loop
 from refusal import refusal
 
-from render.photometry import luminance
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
+from render.spectrum import luminance
 from rodcone.errors import InputError
 
 NM = np.arange(400.0, 701.0, 10.0)

@@ -7,10 +7,9 @@ import pytest
 from PIL import Image
 from refusal import refusal
 
-from render.photometry import tristimulus
 from render.radiance_files.photo import MOST_SIDE, read_photo, srgb_basis
 from render.radiance_files.radiance_source import extent_of, is_reflectance, load_radiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM
+from render.spectrum import DEFAULT_WAVELENGTH_NM, tristimulus
 from rodcone.colour_spaces import D65_XY, decode_srgb, xyz_from_xy, xyz_to_srgb
 
 

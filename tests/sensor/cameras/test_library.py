@@ -11,7 +11,7 @@ from loop import loop
 from refusal import refusal
 
 from render.illuminants import illuminant
-from render.photometry import photons_per_joule
+from render.spectrum import photons_per_joule
 from sensor.cameras.library import VARIABLE, measured_camera, measured_cameras, read_library
 
 

@@ -10,19 +10,18 @@ from scipy import stats
 
 from render.illuminants import illuminant
 from sensor.burst import merged_raw, merged_sensor
+from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.cfa import RGBW, mask
 from sensor.chip import ChannelReading, Reading
 from sensor.config import SensorConfig, with_channel_readings, with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.photodiodes import binned
-from sensor.presets import low_noise, preset, preset_file
+from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.readings.by_channel import as_metered, of_channel, under_well
 from sensor.readout import noise_sources, noise_variance, read_out
-from sensor.variations import vary
 from studies.photograph.camera import calibrate
 from studies.photograph.snr import electrons_at_snr
 

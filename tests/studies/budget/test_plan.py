@@ -13,9 +13,8 @@ from refusal import refusal
 from render.transport import Transport
 from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import form_image
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from sensor.response import electrons_per_irradiance, expected_electrons
-from sensor.variations import vary
 from studies.budget import plan as planning
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, as_stated
 from studies.budget.plan import plan, reference_plan

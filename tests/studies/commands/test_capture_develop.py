@@ -14,10 +14,9 @@ from PIL import Image
 from scipy.io import savemat
 
 from render.illuminants import illuminant
-from render.photometry import luminance, photons_per_joule
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, luminance, photons_per_joule
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.optics import form_image, left_out

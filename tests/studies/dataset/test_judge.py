@@ -16,8 +16,7 @@ from command_line import call
 from refusal import refusal
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from sensor.presets import low_noise, preset_file
-from sensor.variations import vary
+from sensor.presets import low_noise, preset_file, vary
 from studies.dataset.judge import MEASURED, Score, expected, judge, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder

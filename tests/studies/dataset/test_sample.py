@@ -10,7 +10,7 @@ import sweep_sample as SAMPLE
 from loop import loop
 
 from render.engine import render
-from render.photometry import luminance
+from render.spectrum import luminance
 from scenes.catalog import load
 from sensor.chip import ChannelReading
 from sensor.config import SensorConfig, with_channel_readings

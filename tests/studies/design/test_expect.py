@@ -18,8 +18,7 @@ from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
 from sensor.optics import form_image
-from sensor.presets import low_noise, preset
-from sensor.variations import vary
+from sensor.presets import low_noise, preset, vary
 from studies.design.expect import MIDDLE, expect, lens_of, metric_rows, responses_e, sampling_of, view_of
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate

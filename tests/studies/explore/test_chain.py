@@ -10,7 +10,7 @@ from refusal import refusal
 
 import rodcone as public
 from isp.processors.catalogue import PROCESSORS, libraries
-from render.photometry import luminance
+from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
 from studies.explore.chain import photograph

@@ -9,7 +9,7 @@ from explore_sample import small_transport
 from matplotlib import colormaps
 from refusal import refusal
 
-from render.photometry import photons_per_joule
+from render.spectrum import photons_per_joule
 from sensor.readout import noise_variance, spread_charge
 from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls

@@ -6,8 +6,7 @@ import pytest
 from skimage.color import rgb2lab
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from studies.metrics.appearance import appearance, flip, true_picture
-from studies.metrics.pu21 import pu21_psnr_db
+from studies.metrics.quality import appearance, flip, pu21_psnr_db, true_picture
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE, s_cielab
 
 RNG = np.random.default_rng(3)

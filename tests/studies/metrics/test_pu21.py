@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from refusal import refusal
 
-from studies.metrics.pu21 import pu21_encode, pu21_psnr_db
+from studies.metrics.quality import pu21_encode, pu21_psnr_db
 
 
 def decode(value: np.ndarray) -> np.ndarray:

@@ -8,9 +8,7 @@ from refusal import refusal
 from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from studies.metrics.appearance import appearance, true_picture
-from studies.metrics.pu21 import pu21_psnr_db
-from studies.metrics.quality import measure, psnr_db
+from studies.metrics.quality import appearance, measure, psnr_db, pu21_psnr_db, true_picture
 
 
 def ssim(first: np.ndarray, second: np.ndarray) -> float:

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import report_sample as SAMPLE
 
-from studies.pages.report_markdown import code, markdown
+from studies.pages.report_compare import code, markdown
 from studies.sweep.row import Row
 
 SEEDS = (0, 1, 2)

@@ -12,9 +12,8 @@ from isp.colour.colour_fit import ColourFit, fit_matrix
 from isp.colour.white_balance import neutral_response
 from isp.processors.catalogue import NAMED
 from render.illuminants import illuminant
-from render.photometry import colour_matching_functions, tristimulus
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, flat
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, colour_matching_functions, flat, tristimulus
 from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker
 from sensor.capture import expose
@@ -22,9 +21,8 @@ from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.optics import form_image
-from sensor.presets import low_noise
+from sensor.presets import low_noise, vary
 from sensor.response import expected_electrons
-from sensor.variations import vary
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
 from studies.photograph.camera import balance_delta_e, calibrate, colour_fit, develop_to_scale, iso_speed
 

@@ -26,17 +26,15 @@ from rodcone.colour_spaces import encode_srgb
 from rodcone.digests import digest_file
 from scenes.reflectances import color_checker
 from sensor.burst import merged_raw
-from sensor.capture import expose
+from sensor.capture import auto_exposure_s, expose
 from sensor.device import draw_device
-from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
 from sensor.response import behind_filters, expected_electrons
 from sensor.shake import SHAKES, shaken
 from studies.budget.ledger import Plan
-from studies.metrics.appearance import appearance, true_picture
-from studies.metrics.quality import measure
+from studies.metrics.quality import appearance, measure, true_picture
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
 from studies.pages.report_pictures import opened
 from studies.photograph.camera import develop_to_scale

@@ -11,7 +11,7 @@ from isp.design import spectral_prior
 from isp.ple.prior import mixture, own_prior
 from isp.ple.pyramid import reconstruct
 from render.engine import render
-from render.photometry import luminous_efficiency
+from render.spectrum import luminous_efficiency
 from scenes.catalog import load
 from sensor.capture import capture
 from sensor.optics import form_image

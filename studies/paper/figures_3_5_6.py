@@ -1,16 +1,19 @@
-"""Figures 3 and 5: W in low light, where colours are noisy, and in bright light, where W is partly full.
+"""Figures 3, 5 and 6: W in low light, in bright light where it is partly full, and beside Bayer at three times.
 
 Figure 3: one exposure gives a noisy colour image and a cleaner W image, and from both a result. Figure 5: at
-200 cd/m^2, 66 ms and 3 um W is partly full, and the result is whole.
+200 cd/m^2, 66 ms and 3 um W is partly full, and the result is whole. Figure 6: Bayer and interleaved at 5, 10 and
+20 ms, Table 1 at 25 cd/m^2; W replaces the luminance at 5 ms alone.
 """
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
+from skimage.color import deltaE_ciede2000, rgb2lab
 
-from isp.colour.highlights import saturated_nearby
+from isp.colour.white_balance import saturated_nearby
 from isp.planes import bilinear
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
@@ -26,6 +29,7 @@ from studies.paper.claims import (
     at_most,
     beside,
     claim,
+    near,
     over_seeds,
     paper_figure,
 )
@@ -184,3 +188,112 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         (first, picture), *others = (shown | pictures).items()
         rows.append([(f"{reading}: {first}", picture), *others])
     return paper_figure("5", picture_rows(rows)), beside(claims_5(bright[PAPER]), claims_5(bright[DEFAULT]))
+
+
+LUMINANCE_CD_M2 = 25.0
+SUBSTITUTED = {"5ms": True, "10ms": False, "20ms": False}  # what the paper shows
+DARKEST = "5ms"
+A_LOT = 2.0  # times less noise: what "a lot" is taken for
+SLIGHT = 5.0  # CIEDE2000, what "slightly" is taken for: seen side by side, not by itself
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """A camera under one reading at one exposure.
+
+    Attributes
+    ----------
+    noise : float
+        Share of white.
+    psnr_db : (seed,) float64
+    substituted : float or None
+        Share of the exposures in which W replaced the luminance; None for Bayer.
+    """
+
+    noise: float
+    psnr_db: Image
+    substituted: float | None
+
+
+@dataclass(frozen=True)
+class Swap:
+    """What luminance substitution does: noise without it over that with it, and the median colour shift."""
+
+    noise_ratio: float
+    delta_e: float
+
+
+def claims_6(
+    bayer: Mapping[str, Outcome], interleaved: Mapping[str, Outcome], swaps: Mapping[str, Swap]
+) -> tuple[Claim, ...]:
+    """Less noise than Bayer, substitution at 5 ms alone, and what that costs.
+
+    Parameters
+    ----------
+    bayer, interleaved : mapping
+        By reading and exposure, such as ``table1_pixel, 5ms``.
+    swaps : mapping
+        By reading.
+    """
+    switch = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
+    return (
+        claim(19, (at_most(name, camera.noise / bayer[name].noise, 1.0, "×") for name, camera in interleaved.items())),
+        claim(
+            20,
+            (
+                over_seeds(name, camera.psnr_db - bayer[name].psnr_db, low=0.0, unit="dB")
+                for name, camera in interleaved.items()
+            ),
+        ),
+        claim(
+            21,
+            (
+                near(f"{name}, {'on' if switch[name] else 'off'}", camera.substituted or 0.0, float(switch[name]), 0.0)
+                for name, camera in interleaved.items()
+            ),
+        ),
+        claim(22, (at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()), exposure=DARKEST),
+        claim(23, (at_most(name, swap.delta_e, SLIGHT, "ΔE2000") for name, swap in swaps.items())),
+    )
+
+
+def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+    """Pictures of the study `paper_6.toml`, each reading with its own threshold of substitution, and what that does."""
+    subject = view(setup, "still_life", LUMINANCE_CD_M2)
+    outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}
+    table = []
+    for reading, processor in product(READINGS, outcomes):
+        pictures: list[tuple[str, Image]] = []
+        for exposure in SUBSTITUTED:
+            outcome, encoded = _photograph(setup, subject, Camera(reading, processor), exposure)
+            outcomes[processor][f"{reading}, {exposure}"] = outcome
+            words = {"bayer": "Bayer", PAPER: "interleaved", DEFAULT: "the default"}[processor]
+            words += ", W's luminance" if outcome.substituted else ""
+            pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
+        table.append(pictures)
+    paper, default = (
+        claims_6(
+            outcomes["bayer"],
+            outcomes[name],
+            {reading: swap(setup, subject, Camera(reading, name)) for reading in READINGS},
+        )
+        for name in (PAPER, DEFAULT)
+    )
+    return paper_figure("6", picture_rows(table)), beside(paper, default)
+
+
+def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
+    """Substitution at `DARKEST`, always against never."""
+    raws = exposures(camera, subject, DARKEST, setup.seeds)
+    without, with_white = ([develop(camera, raw, subject, threshold)[0] for raw in raws] for threshold in (0.0, np.inf))
+    means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
+    return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
+
+
+def _photograph(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
+    """Outcome of one condition, and its first picture, encoded."""
+    developed = [develop(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
+    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # as a screen shows them
+    decisions = [picture.substituted for _, picture in developed if picture.substituted is not None]
+    share = float(np.mean(decisions)) if decisions else None
+    return Outcome(noise(pictures), quality_db(pictures, subject.truth), share), encode_srgb(pictures[0])
