@@ -8,7 +8,7 @@ from isp.picture import Picture, finish, require_letters
 from isp.planes import bilinear, rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
 from isp.similarity.guide import saturated_fraction
-from isp.substitution import COLOUR_ERROR, OCTAVES, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
+from isp.substitution import SMOOTH_COLOUR_ERROR, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
 from isp.unseen import draw_unseen, without_unseen
 from sensor.raw import RawImage
 
@@ -20,7 +20,6 @@ def picture_interleaved(
     balance: WhiteBalance,
     settings: Settings = DEFAULTS,
     substitution_snr: float = SUBSTITUTION_SNR,
-    octaves: float = OCTAVES,
 ) -> Picture:
     """Develop an interleaved RGBW raw image: eqs. (1)-(6), Gray World, matrix, luminance substitution.
 
@@ -37,8 +36,6 @@ def picture_interleaved(
         Of `isp.interleaved.reconstruct`.
     substitution_snr : float
         W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
-    octaves : float
-        Of `isp.substitution.substitution_weight`; 0 is the paper's switch.
 
     Returns
     -------
@@ -60,9 +57,10 @@ def picture_interleaved(
     gains, sources = balance.gains(raw, result.estimate)
     noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
     snr = green_snr(raw, result.estimate)
-    weight = substitution_weight(snr, substitution_snr, octaves)
+    share = substitution_weight(snr, substitution_snr)
+    weight = share if ours else float(share > 0.5)
     alpha = saturated_fraction(raw, settings.window)
-    planes = sharpen(raw, result.estimate, gains) if ours else result.estimate
+    planes = sharpen(raw, result.estimate, gains, result.noise_gain) if ours else result.estimate
     balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
     if ours:
         draw_unseen(everything, unseen, gains, balanced)
@@ -70,8 +68,8 @@ def picture_interleaved(
     # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     mixed = alpha > 0.0
-    share, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * COLOUR_ERROR)
-    rgb[mixed] = (1.0 - share) * rows_at(rgb, mixed) + share * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
+    without, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * SMOOTH_COLOUR_ERROR)
+    rgb[mixed] = (1.0 - without) * rows_at(rgb, mixed) + without * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
@@ -89,12 +87,7 @@ def picture_interleaved_paper(
     `settings` is `isp.settings.PAPER`, one pixel, the bilateral filter; `PAPER_5X5` is its non-local means.
     """
     return picture_interleaved(
-        raw,
-        ColourFit.of(colours.matrix()),
-        balance=balance,
-        settings=settings,
-        substitution_snr=substitution_snr,
-        octaves=0.0,
+        raw, ColourFit.of(colours.matrix()), balance=balance, settings=settings, substitution_snr=substitution_snr
     )
 
 

@@ -8,7 +8,7 @@ fitted on surfaces (`isp.colour.colour_fit`), as far as the noise of the colours
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.colour_fit import ColourFit
+from isp.colour.colour_fit import MEDIAN_STEP, ColourFit
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.raw import RawImage
@@ -20,31 +20,31 @@ SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # `table1_pixel`: 0.476 and 0.951
 OCTAVES = 1.0  # on either side: narrower shows as a step over light, wider leaves W in bright pictures
 
 # How much more error the reconstructed colours hold than noise: each is sampled at one pixel in four, and what W's
-# likeness brings together need not have one colour. Factors on their noise variance, in the matrix and in the
-# luminance that is substituted (docs/decisions/0015 has the sweep).
+# likeness brings together need not have one colour. Factors on their noise variance, in the luminance that is
+# substituted and in the matrix, and there where noise is the surroundings' (docs/decisions/0015 has the sweep).
 COLOUR_ERROR = 10.0
-LUMINANCE_ERROR = 100.0
+SMOOTH_COLOUR_ERROR = 3.0
 
 
 def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
     """SNR of the frame's green: median over unsaturated pixels of reconstructed green over the noise of a sample there.
 
-    From the raw image alone, and one number a frame: a rule per pixel would flicker. The noise is that of one green
-    sample at the reconstructed level, shot noise and dark noise. NaN where all is saturated.
+    Every seventh of them counts. From the raw image alone, and one number a frame: a rule per pixel would flicker. The
+    noise is that of one green sample at the reconstructed level, shot noise and dark noise. NaN where all is saturated.
 
     Parameters
     ----------
     estimate : (h, w, channel) array
         Of `isp.interleaved.reconstruct` [e-].
     """
-    green = np.asarray(estimate[..., raw.channels.index("G")], dtype=np.float64)
+    kept = estimate[..., raw.channels.index("G")][~raw.saturated][::MEDIAN_STEP]
+    green = np.asarray(kept, dtype=np.float64)
     noise = raw.noise_of("G")
-    ratio = green / np.sqrt(noise.shot * np.maximum(green, 0.0) + noise.dark_noise_e**2)
-    ratios = ratio[~raw.saturated]
+    ratios = green / np.sqrt(noise.shot * np.maximum(green, 0.0) + noise.dark_noise_e**2)
     return float(np.median(ratios)) if ratios.size else float("nan")
 
 
-def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) -> float:
+def substitution_weight(snr: float, threshold: float) -> float:
     """Share of W in the luminance, 0 to 1: smoothstep in log2(snr / threshold); over 0.5 counts as on.
 
     Parameters
@@ -53,25 +53,19 @@ def substitution_weight(snr: float, threshold: float, octaves: float = OCTAVES) 
         Of `green_snr`; NaN (all saturated) gives 0; no signal, 0 or less, gives 1.
     threshold : float
         SNR at a weight of one half; 0 never substitutes, inf always does.
-    octaves : float
-        Of SNR on either side of the threshold over which the weight goes to 1 and to 0; 0 is the paper's switch.
 
     Raises
     ------
     InputError
-        For a threshold or a number of octaves that is negative or NaN.
+        For a threshold that is negative or NaN.
     """
-    for name, value in (("substitution_snr", threshold), ("octaves", octaves)):
-        if not value >= 0.0:  # written so that NaN fails
-            raise InputError(f"{name}: {value!r} is not allowed; give 0 or more")
+    if not threshold >= 0.0:  # written so that NaN fails
+        raise InputError(f"substitution_snr: {threshold!r} is not allowed; give 0 or more")
     if np.isnan(snr) or threshold == 0.0:
         return 0.0
     if np.isinf(threshold) or snr <= 0.0:
         return 1.0
-    above = float(np.log2(snr / threshold))
-    if abs(above) >= octaves:
-        return float(above < 0.0)
-    t = 0.5 * (1.0 - above / octaves)
+    t = float(np.clip(0.5 - 0.5 * np.log2(snr / threshold) / OCTAVES, 0.0, 1.0))
     return t * t * (3.0 - 2.0 * t)
 
 
@@ -93,6 +87,7 @@ def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float)
     (3, 4) float64
         Rows sum to 1, where those of a plain matrix do.
     """
-    colours = fit.matrix("RGBW", noise * COLOUR_ERROR)
-    white = fit.luminance(noise * [*[LUMINANCE_ERROR] * 3, 1.0])
+    colours = fit.matrix("RGBW", noise * SMOOTH_COLOUR_ERROR)
+    noisy = noise * [*[COLOUR_ERROR] * 3, 1.0]
+    white = np.eye(4)[3] if fit.plain is not None else luminance_of_srgb(fit.matrix("RGBW", noisy).T)
     return np.asarray(colours + weight * (white - luminance_of_srgb(colours.T)))

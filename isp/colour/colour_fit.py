@@ -107,12 +107,6 @@ class ColourFit:
         free = np.linalg.solve(difference @ moments @ difference.T, target)
         return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
 
-    def luminance(self, noise: ArrayLike = 0.0) -> Floats:
-        """Weights of balanced R, G, B and W in the luminance, shape (4,), as `matrix` has them at this noise."""
-        if self.plain is not None:
-            return np.array([0.0, 0.0, 0.0, 1.0])
-        return luminance_of_srgb(self.matrix("RGBW", noise).T)
-
 
 def fit_colours(
     names: Sequence[str],

@@ -5,11 +5,13 @@ others': a fringe. Yet every pixel was read in some channel, and light and shade
 (docs/decisions/0053-strong-edges.md).
 """
 
+from typing import Any
+
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from isp.kernel.edges import CORRELATION, MISSED, NEAR, REACH, SPREAD, TINY_E, UNKNOWN, channel_noise, sharpen_frame
+from isp.kernel.edges import CORRELATION, FAR, MISSED, NEAR, REACH, SPREAD, TINY, UNKNOWN, channel_noise, sharpen_frame
 from render.spectrum import Floats
 from rodcone.jit import backend
 from sensor.cfa import mask
@@ -18,7 +20,7 @@ from sensor.raw import RawImage
 STRIP_ROWS = 32  # that are computed together: 2 kB a pixel
 
 
-def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArray[np.float32]:
+def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDArray[Any]) -> NDArray[np.float32]:
     """Every channel at each pixel from the nine samples around it.
 
     With m and C the mean and the covariance of the channels' planes P over 5 x 5 pixels and N = m + s^2 a sample's
@@ -36,7 +38,11 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
     their squared distances to planes over N_y, and chi_0^2 that weighted by exp(-2 r_y^2), it counts less where
     contrast is a lamp's and the samples lie on their planes:
 
-        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P).
+        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P) - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,
+
+    the last for a colour that noise hides, which is that of the surroundings: with r_c the ratio of channel c to W in
+    the mean of 5 x 5 planes, 12 pixels apart, 1 / nu_c the frame's mean of 1 / noise gain, and <> the mean over the
+    window, D_c = P_c - r_c P_W.
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
     the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
@@ -51,24 +57,32 @@ def sharpen(raw: RawImage, planes: NDArray[np.floating], gains: Floats) -> NDArr
         R, G, B and W of `isp.interleaved.reconstruct` [e-].
     gains : (4,) float64
         White balance.
+    noise_gain : (h, w, 4) float
+        Of `isp.interleaved.reconstruct_with_noise`.
 
     Returns
     -------
     (h, w, 4) float32
     """
+    nu = 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
     if backend() != "numpy":
-        return sharpen_frame(raw, np.ascontiguousarray(planes, dtype=np.float32), gains)
-    border = (REACH, REACH), (REACH, REACH)
+        return sharpen_frame(raw, np.ascontiguousarray(planes, dtype=np.float32), np.stack([gains, nu]))
+    border = (FAR, FAR), (FAR, FAR)
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
-    strips = (slice(first, first + STRIP_ROWS + 2 * REACH) for first in range(0, raw.shape[0], STRIP_ROWS))
-    parts = [_sharpen(raw, gains, padded[rows], electrons[rows], sites[rows]) for rows in strips]
+    strips = (slice(first, first + STRIP_ROWS + 2 * FAR) for first in range(0, raw.shape[0], STRIP_ROWS))
+    parts = [_sharpen(raw, gains, nu, padded[rows], electrons[rows], sites[rows]) for rows in strips]
     return np.concatenate(parts).astype(np.float32)
 
 
-def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, sites: NDArray[np.intp]) -> Floats:
-    """In double precision; the arrays reach `REACH` pixels further. `isp.kernel.edges` is the same in single."""
+def _sharpen(raw: RawImage, gains: Floats, nu: Floats, planes: Floats, *samples: NDArray[Any]) -> Floats:
+    """In double precision; the arrays reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
+    far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., :: FAR // 2, :: FAR // 2]
+    around = np.maximum(far.sum(axis=(3, 4)), 0.0)
+    tint = around / np.maximum(around[..., 3:], TINY)
+    middle = slice(FAR - REACH, REACH - FAR)
+    planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))
     window, (shot, dark, full_e) = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1)), channel_noise(raw)
     (height, width), inner = window.shape[:2], slice(REACH - 1, 1 - REACH)
     sample = sliding_window_view(electrons[inner, inner], (3, 3)).reshape(height, width, 9)
@@ -80,9 +94,11 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     away = window - mean[..., None, None]
     covariance = np.einsum("...cij,...dij->...cd", away, away) / away[0, 0, 0].size
     light = np.maximum(mean, 0.0)
-    noise = np.maximum(shot * light + dark, TINY_E)
+    noise = np.maximum(shot * light + dark, TINY)
     variance = np.einsum("...cc->...c", covariance)
     contrast = (variance / noise).sum(axis=2, keepdims=True) / (1.0 + (light**2 / noise).sum(axis=2, keepdims=True))
+    apart = variance + tint * (tint * variance[..., 3:] - 2.0 * covariance[..., 3]) + (mean - tint * mean[..., 3:]) ** 2
+    hidden = 3.0 / np.maximum((apart / (nu * noise)).sum(axis=2, keepdims=True), 3.0)
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]
     covariance = SPREAD[0] * covariance + SPREAD[1] * shading
 
@@ -90,7 +106,7 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     value = np.take_along_axis(near, site[..., None, :], axis=2)[:, :, 0]
     to_samples = np.take_along_axis(covariance, site[..., None, :], axis=3)  # (h, w, channel, sample)
     among_samples = np.take_along_axis(to_samples, site[..., None], axis=2)  # (h, w, sample, sample)
-    sample_noise = np.maximum(shot[site] * np.maximum(value, 0.0) + dark[site], TINY_E)
+    sample_noise = np.maximum(shot[site] * np.maximum(value, 0.0) + dark[site], TINY)
     is_full = sample >= full_e[site]
     counted = np.where(is_full, UNKNOWN, sample_noise)
     residual = sample - np.take_along_axis(mean, site, axis=2)
@@ -100,6 +116,7 @@ def _sharpen(raw: RawImage, gains: Floats, planes: Floats, electrons: Floats, si
     # As far as an edge was missed.
     squares = (sample - value) ** 2 / sample_noise
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
+    sharp -= hidden * (plane - tint * plane[..., 3:])
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from isp.kernel.accumulate import larger
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
+from rodcone.types import Floats
 from sensor.raw import RawImage
 
 REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
@@ -20,8 +21,9 @@ SIDE = 2 * REACH + 1
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
 MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
+FAR = 24  # pixels to the ends of the surroundings, 5 x 5 planes; 3 x 3 lose 0.01 dB and lamps' hues
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
-TINY_E = 1e-9  # where there is neither light nor noise
+TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: standard deviation of a pixel; 0.8 loses 0.01 dB, 1.5 0.3.
 OFFSETS = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
 CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
@@ -34,30 +36,35 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
 
-def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.float64]) -> NDArray[np.float32]:
-    """As `isp.colour.edges.sharpen`, with its names."""
+def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArray[np.float32]:
+    """As `isp.colour.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
     jit, names, (height, width) = arrays(), raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
-    # Mirrored at the borders: row r stands at REACH + r.
-    rows, columns = (np.pad(np.arange(length, dtype=np.uint32), REACH, mode="reflect") for length in raw.shape)
+    # Mirrored at the borders: row r stands at FAR + r.
+    rows, columns = (np.pad(np.arange(length, dtype=np.uint32), FAR, mode="reflect") for length in raw.shape)
     frame = upload(planes)
     electrons = upload((raw.dn.astype(np.float32) - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
     cells = upload(np.array([[names.index(name) for name in line] for line in raw.cfa], np.uint32))
     row_starts, row_cells = upload(rows * np.uint32(width)), upload(rows % down * across)
     column_starts, column_cells = upload(columns), upload(columns % across)
-    shot, dark, full_e, balance = (
-        jit.Array4f([dr.opaque(jit.Float, float(value)) for value in values]) for values in (*channel_noise(raw), gains)
-    )
+    tables = (*channel_noise(raw), *scales)
+    shot, dark, full_e, balance, nu = (jit.Array4f([dr.opaque(jit.Float, float(x)) for x in row]) for row in tables)
 
     def lines(table: Any, first: Any, steps: range) -> list[Any]:
         return [dr.gather(jit.UInt, table, first + step) for step in steps]
 
     row, column = divide(dr.arange(jit.UInt, height * width), divisor(width))
-    starts = [[r + c for c in lines(column_starts, column, range(SIDE))] for r in lines(row_starts, row, range(SIDE))]
+
+    def places(steps: range) -> list[list[Any]]:
+        return [[r + c for c in lines(column_starts, column, steps)] for r in lines(row_starts, row, steps)]
+
+    starts = places(range(FAR - REACH, FAR + REACH + 1))
     window = [dr.gather(jit.Array4f, frame, start) for line in starts for start in line]
+    far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, FAR // 2)) for start in line]
     near, plane = range(REACH - 1, REACH + 2), window[len(window) // 2]
     sample = [dr.gather(jit.Float, electrons, starts[i][j]) for i in near for j in near]
-    row_cell, column_cell = lines(row_cells, row, near), lines(column_cells, column, near)
+    beside = range(FAR - 1, FAR + 2)
+    row_cell, column_cell = lines(row_cells, row, beside), lines(column_cells, column, beside)
     site = [dr.gather(jit.UInt, cells, r + c) for r in row_cell for c in column_cell]
 
     # What the window holds; moments about its middle, as squares of light have too many digits.
@@ -70,9 +77,13 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     }
     covariance = [jit.Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
     light = larger(mean, 0.0)
-    noise = larger(shot * light + dark, TINY_E)
+    noise = larger(shot * light + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
+    around = larger(sum(far[1:], far[0]), 0.0)
+    tint = around / larger(around[3], TINY)
+    apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
+    hidden = 3.0 / larger(dr.sum(apart / (nu * noise)), 3.0)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
 
     # The best linear estimate.
@@ -82,7 +93,7 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     ]
     value = [_pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
     noises = [(_pick([*shot], s), _pick([*dark], s)) for s in site]
-    sample_noise = [larger(k * larger(v, 0.0) + d, TINY_E) for v, (k, d) in zip(value, noises, strict=True)]
+    sample_noise = [larger(k * larger(v, 0.0) + d, TINY) for v, (k, d) in zip(value, noises, strict=True)]
     is_full = [e >= _pick([*full_e], s) for e, s in zip(sample, site, strict=True)]
     counted = [dr.select(f, UNKNOWN, n) for f, n in zip(is_full, sample_noise, strict=True)]
     residual = [e - _pick([*mean], s) for e, s in zip(sample, site, strict=True)]
@@ -95,6 +106,7 @@ def sharpen_frame(raw: RawImage, planes: NDArray[np.float32], gains: NDArray[np.
     chi_squared = sum(squares[1:], squares[0]) / 9.0
     chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
+    sharp -= hidden * (plane - tint * plane[3])
 
     # Light of unknown colour.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]

@@ -51,10 +51,8 @@ def interpolation_variance(mosaic: NDArray[Any], tile: Tile, patch: int) -> NDAr
 
     Notes
     -----
-    0 everywhere in `quad_rgbw`: the tent that fills a pixel reaches one block of 2x2 of each other channel, on one side
-    of the pixel, so no plane holds a value between two sides, which is what V is for. The plane is the near block's
-    value carried on by a pixel; how far that errs beside an edge, V doesn't tell. In `quad_bayer` green alone has
-    pairs, across the corners of its blocks. Quads are developed by `isp.kriging` for that (docs/decisions/0048).
+    0 everywhere in `quad_rgbw`, where no pixel lies between two samples of a channel that fill it; in `quad_bayer`
+    green alone has pairs. Quads are developed by `isp.kriging` for that (docs/decisions/0048).
     """
     total, (height, width) = np.zeros_like(mosaic), mosaic.shape
     repeats = BLOCK_ROWS // len(tile) + 2, width // len(tile[0]) + 1

@@ -6,6 +6,7 @@ import numpy as np
 from hard.case import Image, Margin, Situation, worse, worst_of
 from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
+from isp.kernel.edges import FAR
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
 from sensor.cfa import Tile, channel_map
@@ -67,7 +68,7 @@ def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None
     """Pixels of the cut frame that nothing at the border reaches; None where the frame has none."""
     develop = situation.develop
     reach = develop.get("neighbourhood", NEIGHBOURHOOD) // 2 + max(develop.get("patch", PATCH), WINDOW) // 2
-    margin = reach + 4 * len(raw.cfa)  # tents of a sample's plane and of its alpha, mended pixels
+    margin = reach + FAR + 4 * len(raw.cfa)  # surroundings; tents of a sample's plane and of its alpha, mended pixels
     if min(raw.shape) - 1 <= 2 * margin:
         return None
     return np.s_[margin:-margin, margin:-margin]

@@ -108,14 +108,13 @@ def test_under_one_wavelength_all_channels_count_alike_and_neutrals_stay_neutral
     assert alone.matrix().sum(axis=1) == pytest.approx(np.ones(3), abs=1e-12)
 
 
-def test_a_plain_matrix_stands_at_any_noise_and_takes_w_as_it_is_for_luminance() -> None:
+def test_a_plain_matrix_stands_at_any_noise() -> None:
     matrix = np.array([[1.6, -0.5, -0.1], [-0.2, 1.4, -0.2], [0.0, -0.5, 1.5]])
     plain = ColourFit.of(matrix.tolist())
     assert ColourFit.of(plain) is plain
     for noise in (0.0, 1e-3, 10.0):
         np.testing.assert_array_equal(plain.matrix(noise=noise), matrix)
         np.testing.assert_array_equal(plain.matrix("RGBW", noise), np.hstack([matrix, np.zeros((3, 1))]))
-        assert plain.luminance(noise).tolist() == [0.0, 0.0, 0.0, 1.0]
 
 
 def test_what_is_no_matrix_is_refused() -> None:

@@ -37,7 +37,7 @@ def shaded(light):
     return light[..., None] * COLOUR
 
 
-def by_hand(raw, planes, gains, row, column):
+def by_hand(raw, planes, gains, noise_gain, row, column):
     """The formula of `sharpen` at a pixel inside the frame, sample by sample."""
     names, cells = raw.channels, len(raw.cfa)
     window = planes[row - 2 : row + 3, column - 2 : column + 3].reshape(25, 4)
@@ -58,7 +58,12 @@ def by_hand(raw, planes, gains, row, column):
     squares = (samples - on_planes) ** 2 / read
     near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
+    mirrored = np.pad(np.arange(16), 24, mode="reflect")
+    around = planes[np.ix_(*(mirrored[x : x + 49 : 12] for x in (row, column)))].mean(axis=(0, 1))
+    hidden = planes[row, column] - around / around[3] * planes[row, column, 3]
+    distances = ((window - around / around[3] * window[:, 3:]) ** 2).mean(axis=0)
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
+    sharp -= min(1.0, 3.0 / (distances / noise_gain / noise).sum()) * hidden
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
     lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, squares.mean() / 30.0)
     unknown = np.where(full, 1.0, min(1.0, contrast) ** (1 if any(full[:3]) else 4) if any(full) else lamp)
@@ -75,14 +80,23 @@ def test_the_estimate_is_the_formula_s(tile):
     planes[9:12, 9:12, 3] = 15_000.0
     planes = np.minimum(planes, 15_000.0)
     raw = frame(np.minimum(shaded(rng.choice([0.1, 0.5, 1.0, 4.0], (16, 16))), 15_000.0), tile)
-    got = sharpen(raw, planes, GAINS)
+    averaged = np.array([1.0, 2.0, 3.0, 4.0])
+    got = sharpen(raw, planes, GAINS, np.broadcast_to(averaged, planes.shape))
     for row, column in product(range(2, 14), repeat=2):
-        assert got[row, column] == pytest.approx(by_hand(raw, planes, GAINS, row, column), rel=1e-3, abs=0.1)
+        assert got[row, column] == pytest.approx(by_hand(raw, planes, GAINS, averaged, row, column), rel=1e-3, abs=0.1)
 
 
-def test_planes_without_contrast_stay():
-    planes = np.broadcast_to(COLOUR, (16, 16, 4))
-    assert sharpen(frame(planes), planes, GAINS) == pytest.approx(planes, rel=1e-6)
+def test_colours_that_noise_hides_are_the_surroundings_and_others_stay():
+    """Planes of one colour and their noise lose half of its spread; a patch bluer by ten times as much keeps it."""
+    rng, light = np.random.default_rng(4), 0.1 * COLOUR
+    planes = rng.normal(light, np.sqrt(0.01 * light), (96, 96, 4))
+    planes = light + 7.0 * gaussian_filter(planes - light, (2.0, 2.0, 0.0))  # as wide as planes have it
+    patch = planes[16:24, 16:24]
+    patch[..., 2] += 10.0 * np.sqrt(0.01 * light[2])
+    got = sharpen(frame(planes), planes, np.ones(4), np.full(planes.shape, 0.01))
+    before, after = (part / part[..., 3:] for part in (planes, got))
+    assert (after[48:, 48:].std(axis=(0, 1)) < 0.5 * before[48:, 48:].std(axis=(0, 1)))[:3].all()
+    assert got[18:22, 18:22, 2].mean() == pytest.approx(patch[2:6, 2:6, 2].mean(), rel=0.1)
 
 
 def test_edges_of_light_lose_most_of_their_fringes():
@@ -96,7 +110,7 @@ def test_edges_of_light_lose_most_of_their_fringes():
         planes[:, :4], planes[:, -4:] = truth[:, :4], truth[:, -4:]
         if turned:
             truth, planes = (part.transpose(1, 0, 2) for part in (truth, planes))
-        got = sharpen(frame(truth, tile), planes, GAINS)
+        got = sharpen(frame(truth, tile), planes, GAINS, np.zeros(planes.shape))
         before, after = (np.abs((part - truth) / COLOUR)[4:-4, 4:-4].max() for part in (planes, got))
         assert after < 0.3 * before, (tile, turned)
 
@@ -106,7 +120,8 @@ def test_noise_is_not_added():
     rng = np.random.default_rng(0)
     planes = 1000.0 + rng.normal(0.0, 10.0, (64, 64, 4))
     raw = frame(1000.0 + rng.normal(0.0, np.sqrt(1000.0), (64, 64, 4)))
-    assert np.std(sharpen(raw, planes, np.ones(4)), axis=(0, 1)) == pytest.approx([6.0] * 4, abs=4.0)
+    got = sharpen(raw, planes, np.ones(4), np.zeros(planes.shape))
+    assert np.std(got, axis=(0, 1)) == pytest.approx([6.0] * 4, abs=4.0)
 
 
 def test_a_lamp_stays_where_it_is():
@@ -117,7 +132,7 @@ def test_a_lamp_stays_where_it_is():
         planes[row, column] = [3000.0, 6000.0, 2000.0, 15_000.0]
         away = np.ones((16, 16), bool)
         away[row - 1 : row + 2, column - 1 : column + 2] = False
-        got = sharpen(frame(planes), planes, np.ones(4))
+        got = sharpen(frame(planes), planes, np.ones(4), np.zeros(planes.shape))
         around = (slice(row - 2, row + 3), slice(column - 2, column + 3))
         far = away.copy()
         far[around] = False
@@ -129,7 +144,7 @@ def test_a_lamp_of_a_pixel_has_no_colour():
     """Of 25 pixels one is lit: e = 24, and channels move by 575/576 to the brightest; planes have half of it."""
     planes = np.zeros((16, 16, 4))
     planes[8, 8] = [3000.0, 6000.0, 1000.0, 10_000.0]
-    balanced = sharpen(frame(2.0 * planes), planes, GAINS)[8, 8] * GAINS
+    balanced = sharpen(frame(2.0 * planes), planes, GAINS, np.zeros(planes.shape))[8, 8] * GAINS
     assert np.ptp(balanced) < 0.003 * balanced.max()
 
 
@@ -148,13 +163,13 @@ def test_a_lamp_that_red_and_blue_miss_is_white():
 def test_what_fills_half_of_a_window_keeps_its_colour():
     planes = np.broadcast_to(COLOUR * 1e-3, (16, 16, 4)).copy()
     planes[:, 8:] = COLOUR
-    got = sharpen(frame(planes), planes, GAINS)[4:-4, 9:-4]
+    got = sharpen(frame(planes), planes, GAINS, np.zeros(planes.shape))[4:-4, 9:-4]
     assert got / COLOUR == pytest.approx(np.broadcast_to(got[..., 1:2] / 1000.0, got.shape), rel=0.1)
 
 
 def test_a_full_channel_rises_to_the_brightest():
     planes = np.broadcast_to([9000.0, 15_000.0, 4000.0, 15_000.0], (16, 16, 4))
-    got = sharpen(frame(planes), planes, GAINS)[8, 8]
+    got = sharpen(frame(planes), planes, GAINS, np.zeros(planes.shape))[8, 8]
     assert got == pytest.approx([9000.0, 18_000.0, 4000.0, 72_000.0], rel=1e-4)
 
 
@@ -174,7 +189,7 @@ def test_dark_beside_a_window_keeps_its_colour():
     """Its light, fifty times as much, fills less than half of their 5 x 5 pixels: walls were grey for two around."""
     planes = np.broadcast_to(0.02 * COLOUR * [1.0, 0.5, 0.2, 0.7], (24, 24, 4)).copy()
     planes[16:, 14:] = COLOUR
-    assert sharpen(frame(planes), planes, GAINS) == pytest.approx(planes, rel=0.02)
+    assert sharpen(frame(planes), planes, GAINS, np.zeros(planes.shape)) == pytest.approx(planes, rel=0.02)
 
 
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
@@ -188,21 +203,22 @@ def test_both_engines_agree(monkeypatch, tile, shape):
     rng = np.random.default_rng(2)
     planes = rng.uniform(0.0, 5000.0, (*shape, 4))
     planes[:, shape[1] // 2 :] += [0.0, 10_000.0, 0.0, 12_000.0]
+    averaged = 1e3 * rng.uniform(size=planes.shape)
     raw, gains = frame(rng.uniform(0.0, 16_000.0, (*shape, 4)), tile), np.array([1.5, 1.0, 2.0, 0.3])
     with monkeypatch.context() as patch:
         patch.setattr(edges, "backend", lambda: "numpy")
-        expected = sharpen(raw, planes, gains)
+        expected = sharpen(raw, planes, gains, averaged)
         patch.setattr(edges, "STRIP_ROWS", 1)
-        assert sharpen(raw, planes, gains) == pytest.approx(expected, rel=1e-6)
+        assert sharpen(raw, planes, gains, averaged) == pytest.approx(expected, rel=1e-6)
     assert (np.abs(expected / planes - 1.0) > 0.01).mean() > 0.1
-    assert sharpen(raw, planes, gains) == pytest.approx(expected, rel=1e-4, abs=0.1)
+    assert sharpen(raw, planes, gains, averaged) == pytest.approx(expected, rel=1e-4, abs=0.1)
 
 
 def test_tiny_frames_and_frames_without_light_or_noise():
     for shape, light in product(SHAPES[1:], (0.0, 5000.0)):
         rng = np.random.default_rng(2)
         planes, raw = light * rng.uniform(size=(*shape, 4)), frame(light * rng.uniform(size=(*shape, 4)))
-        assert np.isfinite(sharpen(raw, planes, np.ones(4))).all(), shape
+        assert np.isfinite(sharpen(raw, planes, np.ones(4), np.zeros(planes.shape))).all(), shape
 
 
 def test_a_small_full_patch_shows_no_tile():
