@@ -54,9 +54,9 @@ from sensor.raw_files.raw_file import write_raw as write_raw
 from studies.budget.ledger import Plan
 from studies.commands.report import write_report as report
 from studies.design.expect import ExpectedError
+from studies.explore.server import explore as explore
 from studies.explore.source import load_transport as load_transport
 from studies.explore.views import explorer_view as explorer_view
-from studies.explore.widget import explore as explore
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
 from studies.photograph.develop import develop_file as develop_file

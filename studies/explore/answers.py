@@ -16,11 +16,9 @@ from sensor.optics import form_image
 from sensor.raw_files.raw_file import write_raw
 from sensor.response import behind_filters, channel_electrons
 from studies.explore.chain import Exposed, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, Lamp, to_json
-from studies.explore.dropped import write_dropped
-from studies.explore.equipment import alone
+from studies.explore.controls import Controls, Lamp, alone, to_json
 from studies.explore.memo import Memo
-from studies.explore.messages import Header, sensor_terms
+from studies.explore.messages import Header, sensor_terms, write_dropped
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel

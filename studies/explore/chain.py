@@ -28,8 +28,7 @@ from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
-from studies.explore.controls import TIME, Controls, Lamp, options_of
-from studies.explore.equipment import alone, camera_of, lit_transport
+from studies.explore.controls import TIME, Controls, Lamp, alone, camera_of, lit_transport, options_of
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
 from studies.photograph.camera import colour_fit, develop_to_scale

@@ -1,8 +1,13 @@
-"""Messages of the page: what the program says of itself first, and what is checked of each question."""
+"""Messages of the page: what the program says of itself first, and what is checked of each question.
+
+A sensor's files that were dropped on the page are kept with the tables that it names in a folder of their own.
+"""
 
 import json
+import re
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.util import find_spec
+from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias
 
@@ -10,7 +15,8 @@ import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, libraries
 from render.illuminants import names as illuminants
-from rodcone.errors import InputError, require_keys, require_name, require_whole
+from rodcone.errors import InputError, read_errors, require_keys, require_name, require_whole
+from rodcone.toml_file import parse_toml
 from scenes.levels import DEMO_LEVELS
 from sensor.capture import RULES
 from sensor.config import SensorConfig
@@ -138,3 +144,47 @@ def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
             raise InputError(f"views: {pair!r} is not allowed; give up to four of [camera, view], cameras from 0")
         views.append((camera, view))
     return views
+
+
+MOST_FILES, MOST_DROPS = 8, 100
+_NAME = re.compile(r"\w[\w .+-]{0,99}\.(toml|csv)", re.IGNORECASE)
+
+
+def write_dropped(files: Any, drops: Path) -> tuple[Path, SensorConfig]:
+    """Write a sensor's ``.toml`` and its ``.csv`` files, by name, below `drops`; give the sensor's path and content.
+
+    Raises
+    ------
+    InputError
+        For other files, a table that was not dropped with the sensor, a file that describes no camera, or too many.
+    """
+    if not isinstance(files, dict) or not 1 <= len(files) <= MOST_FILES:
+        raise InputError(f"sensor: no files by name; allowed: a .toml and the .csv files that it names, {MOST_FILES}")
+    for name, text in files.items():
+        if not _NAME.fullmatch(name) or not isinstance(text, str):
+            raise InputError(f"sensor: {name!r} is not taken; allowed: text, .toml or .csv by a plain name; rename it")
+    sensors = [name for name in files if name.lower().endswith(".toml")]
+    if len(sensors) != 1:
+        raise InputError(f"sensor: {len(sensors)} .toml files; allowed: one, with the .csv files that it names")
+    _check_tables(sensors[0], files)
+    if (number := len(list(drops.iterdir()))) >= MOST_DROPS:
+        raise InputError(f"sensor: {number} were dropped; allowed: {MOST_DROPS}; start rodcone explore again")
+    folder = drops / str(number)
+    folder.mkdir()
+    for name, text in files.items():
+        (folder / name).write_text(text, "utf-8")
+    path = folder / sensors[0]
+    try:
+        return path, preset(path)
+    except InputError as error:
+        raise InputError(str(error).replace(str(path), sensors[0])) from None
+
+
+def _check_tables(name: str, files: Mapping[str, str]) -> None:
+    """Refuse a sensor that names files which did not come with it: a message may not make the program read others."""
+    with read_errors(f"sensor: {name!r} is no TOML", "correct it"):
+        responses = parse_toml(files[name]).get("responses", {})
+    named = responses.values() if isinstance(responses, dict) else ()
+    missing = [table for table in named if isinstance(table, str) and table not in (*files, "included", "relative")]
+    if missing:
+        raise InputError(f"sensor: {name!r} names {missing[0]!r}; allowed: files beside it; drop both together")

@@ -16,9 +16,8 @@ from rodcone.colour_spaces import decode_srgb
 from rodcone.errors import InputError, require_keys, unknown
 from scenes.catalog import load, names
 from scenes.metamers import TWINS_UNDER
-from studies.metrics.chart_colours import daylight_delta_e, pair_delta_e, true_pair_delta_e
 from studies.metrics.confidence import half_width
-from studies.metrics.target_figures import patch_masks
+from studies.metrics.target_figures import daylight_delta_e, pair_delta_e, patch_masks, true_pair_delta_e
 from studies.study.study import OWN
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from rodcone.colour_spaces import WHITE_AT, luminance_of_srgb
-from studies.metrics.chart_colours import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
+from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
 
 def chart_of(colours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

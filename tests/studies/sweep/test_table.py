@@ -12,8 +12,7 @@ from sweep_sample import row
 from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
 from scenes.catalog import load
-from studies.metrics.chart_colours import daylight_srgb
-from studies.metrics.target_figures import patch_masks
+from studies.metrics.target_figures import daylight_srgb, patch_masks
 from studies.photograph.picture_file import to_png
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
