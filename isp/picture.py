@@ -10,13 +10,11 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
 from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level
 from isp.substitution import COLOUR_ERROR
-from rodcone.brief import brief
 from rodcone.colour_spaces import white_of
+from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
 from rodcone.jit import Backend
-from rodcone.notebook import preview_png
-from rodcone.plots import Axes, draw_line
 from rodcone.types import real_array
 from sensor.raw import RawImage
 

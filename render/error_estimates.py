@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from render.scene import LightGroup
 from render.spectrum import Spectrum
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %

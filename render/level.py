@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError
 from rodcone.types import Floats
 

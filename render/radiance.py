@@ -6,12 +6,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import band_widths, luminance, tristimulus
-from rodcone.brief import brief
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
+from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
-from rodcone.notebook import preview_png
-from rodcone.plots import Axes, draw_line
 from rodcone.types import Floats, real_array
 
 

@@ -9,10 +9,9 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from render.spectrum import Spectrum, optical_constant
-from rodcone.brief import brief
+from rodcone.display import brief, draw_curves, png_of
 from rodcone.doors import method
 from rodcone.errors import InputError, one_line, require_fields, require_keys, unknown
-from rodcone.plots import draw_curves, png_of
 from rodcone.types import Floats
 
 Node: TypeAlias = dict[str, Any]

@@ -15,10 +15,9 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rodcone.brief import brief
+from rodcone.display import Axes, brief, draw_curves, png_of
 from rodcone.doors import method
 from rodcone.errors import InputError
-from rodcone.plots import Axes, draw_curves, png_of
 from rodcone.types import Floats as Floats  # noqa: PLC0414  (other packages import it from here)
 from rodcone.types import real_array
 

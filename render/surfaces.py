@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from render.loader import as_guest, load_unlit, mitsuba_module
 from render.scene import EMISSION_PARAMETER, Node, Scene
-from rodcone.brief import brief
 from rodcone.digests import digest
+from rodcone.display import brief
 from rodcone.jit import dr
 
 

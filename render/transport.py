@@ -16,7 +16,7 @@ from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum, luminance
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes
 

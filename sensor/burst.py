@@ -8,7 +8,7 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, require_range
 from sensor.cfa import mask
 from sensor.chip import Chip, PixelConfig, Reading, pixel_of_readings

@@ -8,7 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from render.spectrum import Floats
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from math import hypot
 from typing import Annotated
 
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, require_fields, require_name, require_range, require_whole
 
 CHARGE, DIGITAL = BINNINGS = ("charge", "digital")

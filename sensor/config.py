@@ -9,7 +9,7 @@ from typing import Annotated, Any
 from numpy.typing import NDArray
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_keys, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel

@@ -11,11 +11,10 @@ from numpy.typing import ArrayLike
 
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, photons_per_joule
-from rodcone.brief import brief
 from rodcone.csv_file import read_columns
+from rodcone.display import Axes, brief, draw_curves
 from rodcone.doors import method
 from rodcone.errors import InputError, require_keys, require_range
-from rodcone.plots import Axes, draw_curves
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
 # Peaks and centres are those of ISETCam's interleaved RGBW sensor; widths and powers were fitted so that electrons per

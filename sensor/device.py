@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from rodcone.brief import brief
+from rodcone.display import brief
 from sensor.cfa import block_sums
 from sensor.config import SensorConfig, check_frame
 from sensor.photodiodes import check_chip

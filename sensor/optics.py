@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance, check_values
 from render.spectrum import Floats, band_widths, luminance, photons_per_joule
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, require_whole
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf

@@ -8,11 +8,9 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from rodcone.brief import brief
+from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
-from rodcone.notebook import preview_png
-from rodcone.plots import Axes, draw_line
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
 from sensor.cfa import Tile, channels, check_covers, check_tile, mask, unit_channel
 

@@ -16,8 +16,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import rows_at
 from render.spectrum import Floats, band_widths, photons_per_joule, tristimulus
-from rodcone.brief import brief
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
+from rodcone.display import brief
 from rodcone.errors import InputError
 from sensor.raw import RawImage, channel_variance
 

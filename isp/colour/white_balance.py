@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from isp.planes import box_sums, rows_at
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths, photons_per_joule
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError
 from sensor.cfa import colour_channels, mask
 from sensor.curves import Responses, built_in

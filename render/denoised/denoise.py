@@ -14,7 +14,7 @@ from render.error_estimates import Halves
 from render.integrator.dense import Tracer
 from render.integrator.wavefront import Span, seed_of, traced
 from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.optional import optional_library
 from rodcone.types import Planes
 

@@ -12,7 +12,7 @@ from render.loader import mitsuba_words
 from render.scene import EMISSION_PARAMETER, Keys, LightGroup, Node, Scene, table_of, walk
 from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, CAMERAS, METER, SPECTRA, kind_of
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, require_name, require_whole
 from rodcone.jit import dr
 from rodcone.types import Floats

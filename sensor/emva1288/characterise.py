@@ -7,11 +7,10 @@ from math import hypot, log10, sqrt
 import numpy as np
 
 from render.spectrum import Floats
-from rodcone.brief import brief
+from rodcone.display import BLUE, ORANGE, Axes, brief, draw_curves
 from rodcone.doors import method
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
-from rodcone.plots import BLUE, ORANGE, Axes, draw_curves
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import Floats
-from rodcone.brief import brief
+from rodcone.display import brief
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device

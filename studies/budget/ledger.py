@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import even_bands
-from rodcone.brief import brief
+from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.readings.by_channel import under_well

@@ -1,18 +1,29 @@
-"""The command `rodcone demo`."""
+"""The commands `rodcone demo` and `rodcone reference`: the demo, and the light that it photographs."""
 
-from dataclasses import dataclass, replace
+import sys
+from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
+from render.engine import render
+from render.limits import MOST_SPP
+from render.reference import halves_agree, reference_folders, reference_path, save_reference
+from render.transport import Transport
+from rodcone.errors import require_range
+from rodcone.progress import duration, progress, render_words
+from sensor.presets import preset
 from studies.budget.ledger import as_stated
-from studies.commands.console import Seconds, Time
+from studies.commands.console import INTERRUPTED, Seconds, Time, say
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
+from studies.study.lit_scene import film_of, level_luminance, lux_per_cd_m2, open_choice
+from studies.study.render_noise import MARGIN, render_share
 from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
+from studies.sweep.provenance import versions
 from studies.sweep.workers import cores, run_in_processes
 
 STUDY = Path(__file__).parent.parent / "configs" / "demo.toml"
@@ -118,3 +129,108 @@ def demo(
     runner = partial(run_in_processes, workers=cores())
     _, report = make_all(study, out, lambda step: as_stated(study), runner, clock=clock)
     print(report)
+
+
+SEED = 34  # none of a demo's: its render is independent of the reference
+STEP_SPP = 512  # samples from one look, and one file, to the next
+
+
+def reference(
+    scene: str = "still_life",
+    /,
+    *,
+    size: int | None = None,
+    until: float = 0.03,
+    max_seconds: Seconds | None = None,
+    define: tuple[str, ...] = (),
+    out: Path | None = None,
+) -> int:
+    """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
+
+    It may take hours. Whatever ends it, the same command goes on; the file so far is there after every 512 samples.
+
+    Parameters
+    ----------
+    scene
+        Scene by name, or a Mitsuba scene (.xml). Light, exposure and bands are those of rodcone demo.
+    size
+        Longer side of the picture in pixels, 256 by default.
+    until
+        Stop once the render's noise variance is this share of the sensor's own, in 95 % of the pixels, at every level
+        of the demo.
+    max_seconds
+        Longest time for the render, earlier calls included.
+    define
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
+    out
+        Folder of references; by default the variable RODCONE_REFERENCES names it, or it lies in your home.
+    """
+    # What to render, as the demo would
+    require_range("until", until, 1e-4, 1e3, "give a share of the sensor's noise variance: 0.03")
+    study = read_study(STUDY)
+    choice = SceneChoice(scene, define=define)
+    study = replace(study, scenes=(choice,), render=replace(study.render, size=size or study.render.size))
+    opened, model = open_choice(choice, study), as_stated(study).renders[choice]
+    film, folder = film_of(opened, model), out or next(reference_folders())
+    assert opened.scene is not None
+    path, most_samples = reference_path(folder, opened.scene, film), STEP_SPP
+    transport: Transport | None = None
+    # Go on until the noise is low enough, and keep the file after each step
+    with progress(sys.stderr) as step:
+        while True:
+            samples = transport.spp if transport else 0.0
+            transport = render(
+                opened.scene,
+                opened.size,
+                wavelength_nm=film.wavelength_nm,
+                width_nm=film.width_nm,
+                max_spp=most_samples,
+                max_seconds=max_seconds,
+                seed=SEED,
+                cache=folder / "renders",
+                resume=transport,
+                progress=lambda share, error: step(render_words(error), share),
+            )
+            if transport.spp == samples:  # the time is up
+                break
+            shares = _shares(transport, study)
+            now = max(share for of_sensor in shares.values() for share in of_sensor.values())
+            save_reference(
+                path,
+                transport,
+                _certificate(transport, shares, now, f"rodcone reference {scene} --size {max(film.size)}"),
+            )
+            left_s = transport.seconds * (MARGIN * now / until - 1)
+            words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
+            say(f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}")
+            if now <= until or transport.stopped_by != "samples":
+                break
+            most_samples = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
+    print(path)
+    return INTERRUPTED if transport.stopped_by == "interrupt" else 0
+
+
+def _shares(transport: Transport, study: Study) -> dict[str, dict[str, float]]:
+    """Noise variance over the sensor's own in 95 % of the pixels, by sensor and level."""
+    lux = lux_per_cd_m2(transport, study.levels)
+    shares: dict[str, dict[str, float]] = {}
+    for name in study.sensors:
+        sensor = preset(name)
+        sensor = replace(sensor, lens=study.lens.on(sensor.lens))
+        shares[name] = {
+            level: render_share(transport, sensor, level_luminance(level, lux), study.longest_exposure_s)
+            for level in study.levels
+        }
+    return shares
+
+
+def _certificate(transport: Transport, shares: dict[str, Any], most: float, command: str) -> dict[str, Any]:
+    return {
+        "samples": transport.spp,
+        "share": most,
+        "shares": shares,
+        "relative_mc_error": transport.relative_mc_error,
+        "halves": asdict(halves_agree(transport)),
+        "command": command,
+        "versions": versions(),
+    }

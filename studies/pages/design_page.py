@@ -5,7 +5,7 @@ from importlib import metadata
 
 from matplotlib import rc_context
 
-from rodcone.plots import CHANNEL_COLOURS
+from rodcone.display import CHANNEL_COLOURS
 from sensor.cfa import Tile
 from sensor.config import SensorConfig
 from sensor.curves import Responses

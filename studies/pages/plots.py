@@ -15,10 +15,10 @@ from matplotlib.ticker import LogLocator
 from numpy.typing import ArrayLike, NDArray
 
 from render.spectrum import Spectrum
-from rodcone.plots import BLUE as BLUE  # noqa: PLC0414  (pages and figures import the colours from here)
-from rodcone.plots import CHANNEL_COLOURS
-from rodcone.plots import INK as INK  # noqa: PLC0414
-from rodcone.plots import ORANGE as ORANGE  # noqa: PLC0414
+from rodcone.display import BLUE as BLUE  # noqa: PLC0414  (pages and figures import the colours from here)
+from rodcone.display import CHANNEL_COLOURS
+from rodcone.display import INK as INK  # noqa: PLC0414
+from rodcone.display import ORANGE as ORANGE  # noqa: PLC0414
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.emva1288.characterise import Characterisation

@@ -14,8 +14,8 @@ from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.own import processor_of, require_consent
 from render.illuminants import illuminant
-from rodcone.brief import brief
 from rodcone.colour_spaces import white_of
+from rodcone.display import brief
 from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
 from sensor.burst import merged_raw

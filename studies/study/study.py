@@ -10,7 +10,7 @@ from isp.processors.own import processor_of, require_consent, user_file
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
-from rodcone.brief import brief
+from rodcone.display import brief
 from rodcone.errors import InputError, in_place, require_fields, require_keys, require_range, require_whole, unknown
 from sensor.capture import AUTO_INFORMATION
 from sensor.config import LONGEST_S

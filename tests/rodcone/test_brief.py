@@ -10,7 +10,7 @@ from isp.picture import Picture
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from rodcone.brief import MOST_NESTED, brief
+from rodcone.display import MOST_NESTED, brief
 from scenes.catalog import load
 from sensor.burst import merge
 from sensor.curves import rgbw

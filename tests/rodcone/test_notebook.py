@@ -9,7 +9,7 @@ from PIL import Image
 
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import WHITE_AT
-from rodcone.notebook import preview_png
+from rodcone.display import preview_png
 
 
 def pixels(png: bytes) -> np.ndarray:

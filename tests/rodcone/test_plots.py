@@ -11,7 +11,7 @@ from refusal import refusal
 from isp.picture import Picture
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
-from rodcone.plots import CHANNEL_COLOURS
+from rodcone.display import CHANNEL_COLOURS
 from sensor.curves import rgbw
 from sensor.emva1288.characterise import characterise
 from sensor.presets import low_noise
