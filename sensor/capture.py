@@ -15,7 +15,7 @@ from sensor.device import Device, draw_device
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
-from sensor.readings.by_channel import under_well
+from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance, read_out
 from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, expected_electrons
 from sensor.shake import shaken

@@ -12,7 +12,7 @@ from sensor.cfa import block_sums
 from sensor.config import SensorConfig, check_frame
 from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
-from sensor.readings.by_channel import at_sites
+from sensor.readings.merge import at_sites
 
 _MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
 

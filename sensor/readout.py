@@ -13,8 +13,7 @@ from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
-from sensor.readings.by_channel import as_metered, dimmed, of_channel, read_by_channel
-from sensor.readings.merge import merge_readings
+from sensor.readings.merge import as_metered, dimmed, merge_readings, of_channel, read_by_channel
 from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from rodcone.errors import InputError
 from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
-from sensor.raw_files.noise_profile import read_noise_profile
+from sensor.raw_files.photograph import read_noise_profile
 from sensor.raw_files.raw_file import open_raw
 
 _UNTOLD = {

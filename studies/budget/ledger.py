@@ -11,7 +11,7 @@ from render.spectrum import even_bands
 from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from sensor.readings.by_channel import under_well
+from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel

@@ -16,7 +16,7 @@ from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset
 from sensor.presets import preset as sensor_preset
-from sensor.readings.by_channel import of_channel
+from sensor.readings.merge import of_channel
 from sensor.readings.noise import of_reading
 from studies.commands.console import Time, print_json, print_table, require_new, require_place, say
 from studies.metrics.truth import GREY

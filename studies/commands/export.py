@@ -6,8 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.errors import InputError
-from studies.sweep.export import read_rows, write_csv
-from studies.sweep.table import lines, markdown
+from studies.sweep.export import lines, markdown, read_rows, write_csv
 
 
 def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:

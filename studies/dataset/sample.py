@@ -25,7 +25,7 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.raw import RawImage
-from sensor.readings.by_channel import of_channel
+from sensor.readings.merge import of_channel
 from sensor.readings.noise import dark_electrons
 from sensor.readout import as_read, noise_sources, noise_variance
 from sensor.response import channel_electrons

@@ -20,7 +20,7 @@ from sensor.chip import room_e
 from sensor.config import SensorConfig
 from sensor.diffraction import sampled_otf
 from sensor.optics import WAVELENGTH_NM, camera_equation
-from sensor.readings.by_channel import as_metered, of_channel
+from sensor.readings.merge import as_metered, of_channel
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, light_of

@@ -16,7 +16,7 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_name, require_whole
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
-from sensor.readings.by_channel import at_sites, dimmed, of_channel
+from sensor.readings.merge import at_sites, dimmed, of_channel
 from sensor.readout import as_read, noise_sources, noise_variance, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph

@@ -14,10 +14,9 @@ from studies.pages.plots import png_bytes, svg_text
 from studies.pages.report_sweep import environment
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
 from studies.paper.early import section_2
-from studies.paper.figure1 import figure_1a, figure_1b
 from studies.paper.figure2 import figure_2
+from studies.paper.figures_1_b import figure_1a, figure_1b, figure_b
 from studies.paper.figures_3_5_6 import figure_3, figure_5, figure_6
-from studies.paper.held import figure_b
 from studies.paper.levels import figure_a
 from studies.paper.numbers import number_claims
 from studies.paper.patches import figure_4, section_3_1

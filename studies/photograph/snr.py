@@ -9,7 +9,7 @@ from render.spectrum import Floats
 from rodcone.errors import require_name
 from sensor.chip import room_e
 from sensor.config import SensorConfig
-from sensor.readings.by_channel import of_channel
+from sensor.readings.merge import of_channel
 from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
 from sensor.readout import noise_variance
 from studies.metrics.truth import GREY, Light, light_of, neutral_electrons

@@ -14,7 +14,7 @@ from render.transport import Transport
 from sensor.capture import auto_exposure_s
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation, form_image
-from sensor.readings.by_channel import under_well
+from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 

@@ -1,15 +1,35 @@
-"""A sweep's rows as values, as CSV and as JSON."""
+"""What is read out of a sweep: rows, as CSV and JSON, and figures as a Markdown table: means over the seeds, a line for
+each combination of axes.
+"""
 
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields
+from html import escape
 from importlib import metadata
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from PIL import Image
+
+from render.illuminants import is_light_file
+from rodcone.colour_spaces import decode_srgb
 from rodcone.csv_file import csv_text
+from rodcone.errors import InputError, require_keys, unknown
 from rodcone.files import finite, require_ending, write_files
+from scenes.catalog import load, names
+from scenes.metamers import TWINS_UNDER
+from studies.metrics.confidence import half_width
+from studies.metrics.target_figures import daylight_delta_e, pair_delta_e, patch_masks, true_pair_delta_e
+from studies.study.study import OWN
 from studies.sweep.database import COLUMNS, last_run, read_results, rows
-from studies.sweep.row import Row
+from studies.sweep.prepare import PICTURES
+from studies.sweep.provenance import require_alike
+from studies.sweep.row import AXES, Row
+from studies.sweep.stored import read_whole
 
 _JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what spreadsheets take for the start of a formula (OWASP, CSV injection)
@@ -61,3 +81,129 @@ def results_json(folder: Path) -> bytes:
 
 def _harmless(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
+
+
+SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
+ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
+CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
+TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
+FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")
+
+
+@dataclass(frozen=True)
+class TableLine:
+    """A line of a table: its values of the axes, and each figure's mean and 95 % interval's half width over the seeds.
+
+    None stands for a figure that a cell lacks, and for the interval of one seed.
+    """
+
+    at: tuple[str, ...]
+    means: tuple[float | None, ...]
+    halves: tuple[float | None, ...]
+
+
+def lines(
+    rows: Sequence[Row], folder: Path, by: Sequence[str], show: Sequence[str], where: Mapping[str, str]
+) -> list[TableLine]:
+    """Lines of a table, in the study's order.
+
+    Parameters
+    ----------
+    rows : sequence of Row
+    folder : Path
+        Of the sweep, for figures that are measured in pictures.
+    by : sequence of str
+        Axes, some of `AXES`.
+    show : sequence of str
+        Columns of the ledger that are numbers; ``electrons_W`` and the other channels; ``pair_delta_e``, the mean
+        CIEDE2000 within the pairs of scene metamers; ``daylight_delta_e``, the mean between the ColorChecker's patches
+        and their colours under D65; both are measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE
+        observer sees of the pairs.
+    where : mapping of str to str
+        Axes and the one value that counts.
+
+    Raises
+    ------
+    InputError
+        For an unknown axis or figure, a figure that the scene doesn't have, or lines whose cells differ in more than
+        their seeds: a mean over lights, cameras or versions says nothing.
+    """
+    require_keys("axis", (*by, *where), AXES)
+    for name in show:
+        if name not in (*FIGURES, *CHARTS, TRUE_PAIRS) and not name.startswith(ELECTRONS):
+            raise unknown("show", name, (*FIGURES, *CHARTS, TRUE_PAIRS, f"{ELECTRONS}W"))
+    groups: dict[tuple[str, ...], list[Row]] = {}
+    for row in rows:
+        if all(str(getattr(row, axis)) == value for axis, value in where.items()):
+            groups.setdefault(tuple(str(getattr(row, axis)) for axis in by), []).append(row)
+    require_alike([row for group in groups.values() for row in group])
+    if not groups and not where:
+        raise InputError("table: the sweep has made no cell yet; run rodcone sweep, which goes on")
+    if not groups:
+        raise InputError(f"where: no cell has {dict(where)}; allowed: values of the study's axes; see rodcone export")
+    for at, group in groups.items():
+        for axis in AXES:
+            values = list(dict.fromkeys(str(getattr(row, axis)) for row in group))
+            if len(values) > 1:
+                raise InputError(
+                    f"by: a line of {'/'.join(at) or 'all'} would be a mean over {axis} {', '.join(values)}; allowed: "
+                    f"over seeds alone; add {axis} to --by, or give --where {axis}={values[0]}"
+                )
+    return [_line(at, group, folder, show) for at, group in groups.items()]
+
+
+def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str]) -> str:
+    """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
+    cells = [[*by, *map(_plain, show)], ["---"] * len(by) + ["---:"] * len(show)]
+    for line in table:
+        figures = [_mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
+        cells.append([*map(_plain, line.at), *figures])
+    return "\n".join(f"| {' | '.join(row)} |" for row in cells)
+
+
+def _plain(text: str) -> str:
+    """Text that Markdown shows as it is: names of files and of figures come from outside."""
+    return re.sub(r"([|\[\]`*\\])", r"\\\1", escape(" ".join(text.split()), quote=False))
+
+
+def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequence[str]) -> TableLine:
+    means: list[float | None] = []
+    halves: list[float | None] = []
+    for name in show:
+        figures = [_figure(row, name, folder) for row in group]
+        values = [value for value in figures if value is not None]
+        whole = len(values) == len(figures)  # a mean over the seeds that happen to have the figure would be biased
+        means.append(float(np.mean(values)) if whole else None)
+        halves.append(float(half_width(np.array(values))) if whole and len(values) > 1 else None)
+    return TableLine(at, tuple(means), tuple(halves))
+
+
+def _figure(row: Row, name: str, folder: Path) -> float | None:
+    if name.startswith(ELECTRONS):
+        electrons: dict[str, float] = json.loads(row.mean_electrons)
+        return electrons.get(name.removeprefix(ELECTRONS))
+    if name in FIGURES:
+        value = getattr(row, name)
+        return None if value is None else float(value)
+    scene, measure = CHARTS.get(name, ("metamers", pair_delta_e))
+    if row.scene != scene or row.scene not in names():
+        raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
+    if name == TRUE_PAIRS and is_light_file(row.spectrum):
+        raise InputError(
+            f"show: {name} under {row.spectrum}, whose file isn't in the database; allowed: lights by name; "
+            "leave it out, or give --where"
+        )
+    if name == TRUE_PAIRS:
+        return float(true_pair_delta_e(TWINS_UNDER if row.spectrum == OWN else row.spectrum).mean())
+    with Image.open(BytesIO(read_whole(folder / PICTURES, row.picture))) as file:
+        picture = decode_srgb(np.asarray(file.convert("RGB"), dtype=np.float64) / 255)
+    return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
+
+
+def _mean_text(mean: float | None, half: float | None) -> str:
+    if mean is None:
+        return "-"
+    if abs(mean) < SAME:
+        return "0"
+    places = max(0, 2 - int(np.floor(np.log10(max(abs(mean), 1e-3)))))
+    return f"{mean:.{places}f}" if half is None or half < SAME * abs(mean) else f"{mean:.{places}f} ± {half:.{places}f}"

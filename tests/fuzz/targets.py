@@ -36,8 +36,7 @@ from sensor.config_file import read_sensor
 from sensor.curves import read_csv, read_curve
 from sensor.raw import RawImage
 from sensor.raw_files.dng import read_dng
-from sensor.raw_files.noise_profile import read_noise_profile
-from sensor.raw_files.photograph import read_photograph
+from sensor.raw_files.photograph import read_noise_profile, read_photograph
 from sensor.raw_files.raw_file import write_raw
 from sensor.raw_files.raw_tiff import read_tiff
 from studies.study.study_file import read_study

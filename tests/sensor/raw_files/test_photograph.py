@@ -13,8 +13,7 @@ from file_samples import other_camera, over_black
 from loop import loop
 from refusal import refusal
 
-from sensor.raw_files.noise_profile import read_noise_profile
-from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_photograph
+from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_noise_profile, read_photograph
 from sensor.raw_files.raw_file import open_raw, read_raw
 
 rawpy = pytest.importorskip("rawpy", reason="rodcone[photographs] (LibRaw) is not installed")

@@ -20,7 +20,7 @@ from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.readings.by_channel import as_metered, of_channel, under_well
+from sensor.readings.merge import as_metered, of_channel, under_well
 from sensor.readout import noise_sources, noise_variance, read_out
 from studies.photograph.camera import calibrate
 from studies.photograph.snr import electrons_at_snr

@@ -8,10 +8,9 @@ from numpy.typing import NDArray
 
 from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near, over_seeds
 from studies.paper.early import GINDELE, claims_early
-from studies.paper.figure1 import claims_1a, claims_1b
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
+from studies.paper.figures_1_b import Best, claims_1a, claims_1b, claims_held
 from studies.paper.figures_3_5_6 import Bright, Outcome, Stages, Swap, claims_3, claims_5, claims_6
-from studies.paper.held import Best, claims_held
 from studies.paper.levels import LevelCurves, claims_levels
 from studies.paper.numbers import photon_claims, range_claim, table_claim
 from studies.paper.patches import claims_4, filter_claims

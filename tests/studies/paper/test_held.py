@@ -9,7 +9,7 @@ import pytest
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.shake import RESONANCE_HZ, SHAKES, blur_variance, held_lens, shaken
-from studies.paper.held import best_time_s, blur_px
+from studies.paper.figures_1_b import best_time_s, blur_px
 
 PATHS = 300
 

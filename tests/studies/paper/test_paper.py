@@ -14,9 +14,9 @@ from PIL import Image
 
 from sensor.curves import rgbw
 from studies.metrics.truth import light_of
-from studies.paper import held, levels
+from studies.paper import figures_1_b, levels
 from studies.paper.claims import at_least, over_seeds, value_text
-from studies.paper.figure1 import gain_db
+from studies.paper.figures_1_b import gain_db
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, make, write
 from studies.paper.patches import edge_columns
@@ -37,8 +37,8 @@ def fewer() -> Iterator[None]:
     """Six levels of light for Figures A and B in place of 40 and 4, and three times."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(levels, "LEVELS_CD_M2", np.geomspace(1e-3, 1e3, 6))
-        patch.setattr(held, "LEVELS_CD_M2", (4.0, 16.0))
-        patch.setattr(held, "TIMES_S", np.array([0.005, 0.02, 0.08]))
+        patch.setattr(figures_1_b, "LEVELS_CD_M2", (4.0, 16.0))
+        patch.setattr(figures_1_b, "TIMES_S", np.array([0.005, 0.02, 0.08]))
         yield
 
 

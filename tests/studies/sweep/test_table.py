@@ -14,10 +14,10 @@ from rodcone.colour_spaces import encode_srgb
 from scenes.catalog import load
 from studies.metrics.target_figures import daylight_srgb, patch_masks
 from studies.photograph.picture_file import to_png
+from studies.sweep.export import lines, markdown
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import keep
-from studies.sweep.table import lines, markdown
 
 HERE = Path()
 
