@@ -107,7 +107,7 @@ def _light_of_sums(prior: Prior, cells: Cells, sides: list[tuple[int, int]], str
     gains, floors = gains * share, dark**2 * share
     mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # which keeps the mosaic
     full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
-    usual = max(float(np.median(sums @ (1.0 / gains))) / len(index), 0.1 / gains.max())
+    usual = max(float(np.median(sums.sum(axis=-1))) / gains.sum(), 0.1 / gains.max())
     spread = colours(prior)[np.ix_(index, index)] * gains[:, None] * gains
     noise = usual * gains + floors
     without = np.where(np.array(LETTERS)[index] == "W", 1e9 * noise, noise)
