@@ -59,7 +59,7 @@ app.command("studies.commands.new:app", name="new", help="Write files to start f
 app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
 app.command("studies.commands.demo:reference", name="reference", help="Render the light that studies photograph.")
-app.command("studies.commands.render:render", name="render", help="Render a scene into a spectral OpenEXR file.")
+app.command("studies.commands.develop:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
 app.command("studies.commands.characterise:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
 app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")

@@ -1,19 +1,31 @@
-"""The commands `rodcone capture` and `rodcone develop`."""
+"""The commands `rodcone render`, `rodcone capture` and `rodcone develop`: light, raw files, pictures."""
 
 import sys
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
+from render.denoised.relight import relight_denoised
+from render.engine import render as render_transport
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, even_bands
+from render.transport import Transport
+from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
-from rodcone.files import check_place
-from rodcone.progress import progress
-from studies.commands.console import print_result, say
+from rodcone.files import check_place, require_ending
+from rodcone.memory import memory, require_memory
+from rodcone.progress import progress, render_words
+from studies.commands.console import INTERRUPTED, Seconds, print_result, say
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture
 from studies.photograph.shot import Order, take
+from studies.study.lit_scene import asked_spectra
+from studies.study.render_facts import render_facts
+from studies.study.scene_source import asked_level, asked_size, open_scene
 
 
 def capture(order: Annotated[Order, Parameter(name="*")], *, json: bool = False) -> None:
@@ -102,3 +114,166 @@ def develop(
     developed = develop_file((raw, *more), **choices)
     write_picture(developed.encoded, picture, bits, order.encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)
+
+
+MOST_BANDS = 1000
+READING = "reading the scene"  # 100 000 shapes take a minute
+
+
+@dataclass(frozen=True, kw_only=True)
+class RenderOrder:
+    """What to render and how.
+
+    Attributes
+    ----------
+    source : str
+        Scene by name such as color_checker, or a Mitsuba scene (.xml). Its lights are grouped by their ids up to a
+        colon; its files have to lie in its folder; lux are measured on the shape that has an irradiancemeter. Mitsuba
+        upsamples RGB colours to spectra; lights given as RGB have no unit, so give --level.
+    out : Path
+        File to write, ending in .exr.
+    height : int, optional
+        Pixels; the scene file's film by default, or 256. With one of height and width the other keeps the proportions.
+    width : int, optional
+        Pixels; as height.
+    bands : str, optional
+        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
+    light : tuple of str
+        GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
+        alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
+    chart : str, optional
+        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
+    level : str, optional
+        Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
+        by default.
+    spp : int, optional
+        Samples a pixel, at most.
+    noise : float, optional
+        Relative Monte Carlo error to reach, such as 0.02.
+    max_seconds : float, optional
+        Time for the render in seconds, at most.
+    max_depth : int, optional
+        Longest path in segments; 2 is direct light. By default what the scene's file states, 8 where it states none.
+    seed : int
+        Seed of the render.
+    cache : Path, optional
+        Folder of finished renders, to use and to add to.
+    trust_scene : bool
+        Let the scene file load plug-ins of its own, which are native code, and files from anywhere.
+    define : tuple of str
+        NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
+    extend : str, optional
+        hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
+    denoise : bool
+        Write denoised light; its error is measured against two folds of a quarter of the samples each, whose time
+        counts. Needs rodcone[denoise].
+    force : bool
+        Run even where more memory is needed than is free.
+    """
+
+    source: str = field(kw_only=False)
+    out: Path = field(default=Path("render.exr"), kw_only=False)
+    height: int | None = None
+    width: int | None = None
+    bands: str | None = None
+    light: tuple[str, ...] = ()
+    chart: str | None = None
+    level: str | None = None
+    spp: int | None = None
+    noise: float | None = None
+    max_seconds: Seconds | None = None
+    max_depth: int | None = None
+    seed: int = 0
+    cache: Path | None = None
+    trust_scene: bool = False
+    define: tuple[str, ...] = ()
+    extend: str | None = None
+    denoise: bool = False
+    force: bool = False
+
+
+def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = False) -> int:
+    """Render a scene into a spectral OpenEXR file; prints its path.
+
+    Stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples a pixel.
+    Ctrl-C keeps what is done and exits with 130.
+
+    Parameters
+    ----------
+    json
+        Print one JSON object with the path and facts of the render instead of the path.
+    """
+    # Check what can be checked before the render
+    require_ending(order.out, ".exr")
+    wavelength_nm, width_nm = _bands(order.bands)
+    with progress(sys.stderr) as step:
+        step(READING, 0.0)
+        opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart, define=order.define)
+    scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
+    spectra = asked_spectra(scene, order.light)
+    lit_at: dict[str, Any] = asked_level(scene, order.level)
+    count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
+    require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=order.denoise), order.force)
+    check_place(order.out)
+    # Render and write
+    with progress(sys.stderr) as step:
+        step(render_words(np.inf), 0.0)
+        transport = render_transport(
+            scene,
+            size,
+            wavelength_nm=wavelength_nm,
+            width_nm=width_nm,
+            spp=order.spp,
+            noise=order.noise,
+            max_seconds=order.max_seconds,
+            max_depth=order.max_depth,
+            seed=order.seed,
+            cache=order.cache,
+            progress=lambda share, error: step(render_words(error), share),
+            denoise=order.denoise,
+        )
+    radiance = (
+        relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
+    )
+    write_exr(radiance, order.out, scene=scene.name)
+    # Say what was done
+    say(*opened.notes)
+    interrupted = transport.stopped_by == "interrupt"
+    if interrupted:
+        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
+    facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
+    facts["largest_band_error"] = float(transport.band_error(spectra).max())
+    print_result(order.out, facts, json=json)
+    return INTERRUPTED if interrupted else 0
+
+
+def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
+    """Centres and widths of evenly spaced bands from ``380:780:10``; None where the engine's own are wanted."""
+    if text is None:
+        return None, None
+    try:
+        first, last, width = (float(part) for part in text.split(":"))
+        count = round((last - first) / width)
+    except (ValueError, ZeroDivisionError, OverflowError):
+        first = last = width = count = 0
+    if not (1 <= count <= MOST_BANDS and 0 < first < last and abs(first + count * width - last) < 1e-6 * width):
+        raise InputError(
+            f"bands: {text!r} is not allowed; give FIRST_EDGE:LAST_EDGE:WIDTH [nm] with 1 to {MOST_BANDS} whole bands, "
+            f"such as {VISIBLE_NM[0]:g}:{VISIBLE_NM[1]:g}:10"
+        )
+    return even_bands((first, last), count)
+
+
+def _facts(opened: SceneFile, transport: Transport, radiance: SpectralRadiance) -> dict[str, Any]:
+    groups = {
+        name: {"emitters": list(group.emitters), "power": group.power, "own_colour": group.coloured}
+        for name, group in opened.scene.groups.items()
+    }
+    return {
+        "scene": opened.scene.name,
+        "size": list(radiance.shape[:2]),
+        **vars(render_facts(transport, radiance)),
+        "mean_luminance_cd_m2": float(radiance.luminance().mean()),
+        "groups": groups,
+        "notes": list(opened.notes),
+    }
