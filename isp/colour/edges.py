@@ -41,7 +41,7 @@ def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDAr
         F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P) - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,
 
     the last for a colour that noise hides, which is that of the surroundings: with r_c the ratio of channel c to W in
-    the mean of 5 x 5 planes, 12 pixels apart, 1 / nu_c the frame's mean of 1 / noise gain, and <> the mean over the
+    the mean of 3 x 3 planes, 24 pixels apart, 1 / nu_c the frame's mean of 1 / noise gain, and <> the mean over the
     window, D_c = P_c - r_c P_W.
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
@@ -78,7 +78,7 @@ def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDAr
 
 def _sharpen(raw: RawImage, gains: Floats, nu: Floats, planes: Floats, *samples: NDArray[Any]) -> Floats:
     """In double precision; the arrays reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
-    far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., :: FAR // 2, :: FAR // 2]
+    far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
     around = np.maximum(far.sum(axis=(3, 4)), 0.0)
     tint = around / np.maximum(around[..., 3:], TINY)
     middle = slice(FAR - REACH, REACH - FAR)

@@ -21,7 +21,7 @@ SIDE = 2 * REACH + 1
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
 MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
-FAR = 24  # pixels to the ends of the surroundings, 5 x 5 planes; 3 x 3 lose 0.01 dB and lamps' hues
+FAR = 24  # pixels from plane to plane of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: standard deviation of a pixel; 0.8 loses 0.01 dB, 1.5 0.3.
@@ -60,7 +60,7 @@ def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArra
 
     starts = places(range(FAR - REACH, FAR + REACH + 1))
     window = [dr.gather(jit.Array4f, frame, start) for line in starts for start in line]
-    far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, FAR // 2)) for start in line]
+    far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, FAR)) for start in line]
     near, plane = range(REACH - 1, REACH + 2), window[len(window) // 2]
     sample = [dr.gather(jit.Float, electrons, starts[i][j]) for i in near for j in near]
     beside = range(FAR - 1, FAR + 2)

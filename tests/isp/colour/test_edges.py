@@ -59,7 +59,7 @@ def by_hand(raw, planes, gains, noise_gain, row, column):
     near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
     mirrored = np.pad(np.arange(16), 24, mode="reflect")
-    around = planes[np.ix_(*(mirrored[x : x + 49 : 12] for x in (row, column)))].mean(axis=(0, 1))
+    around = planes[np.ix_(*(mirrored[x : x + 49 : 24] for x in (row, column)))].mean(axis=(0, 1))
     hidden = planes[row, column] - around / around[3] * planes[row, column, 3]
     distances = ((window - around / around[3] * window[:, 3:]) ** 2).mean(axis=0)
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
