@@ -54,7 +54,8 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
-    question = repr((code_version(), base, reference.cfa, goal.light, goal.exposure, goal.prior, goal.levels))
+    code = code_version(names=[best_tile.__module__])
+    question = repr((code, base, reference.cfa, goal.light, goal.exposure, goal.prior, goal.levels))
     tried_gains_db = _known(tried, question, len(goal.levels))
 
     with progress(sys.stderr) as step:
@@ -69,7 +70,7 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
     # Beside the design: published mosaics of three channels or more that the sensor can have, Bayer's in one phase.
     by_camera["design"] = expected(goal, camera)
     for name in (*MOSAICS, *VARIATIONS):
-        with suppress(InputError):  # of a curve that it lacks
+        with suppress(InputError):  # of a curve that it lacks, or of a quad where it bins
             if len((other := vary(base, name)).channels) > 2 and not name.startswith("bayer_"):
                 by_camera[name] = by_camera.get(name) or expected(goal, other)
     page = design_page(goal, camera, by_camera, len(tried_gains_db))

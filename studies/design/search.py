@@ -164,7 +164,9 @@ def best_tile(goal: Goal, sensor: SensorConfig, known: Known, progress: Step) ->
         progress(f"{'/'.join(best)} {best_score:+.2f} dB", share)
         return score
 
-    for tile in [standing_for(reference), *(tuple(key.split("/")) for key in known if key.count("/") == side - 1)]:
+    letters = {*goal.letters, "/"}
+    earlier = [tuple(key.split("/")) for key in known if key.count("/") == side - 1 and set(key) <= letters]
+    for tile in [standing_for(reference), *earlier]:
         look_at(tile)
     if side == 2:
         tiles = sorted({standing_for(("".join(t[:2]), "".join(t[2:]))) for t in product(goal.letters, repeat=4)})

@@ -23,10 +23,10 @@ _CODE = (".py", ".toml", ".csv")
 _PARSING = threading.Lock()  # CPython 3.11 counts the depth of all threads' parsing as one, and fails
 
 
-def code_version(root: Path = ROOT) -> str:
-    """Version of rodcone, and the hash of the sources that decide a picture."""
+def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
+    """Version of rodcone, and the hash of the sources that decide a picture, or what modules of `studies` give."""
     files = [path for name in _WHOLE for path in (root / name).rglob("*") if path.suffix in _CODE]
-    files += deciding_modules(root)
+    files += deciding_modules(root, names)
     contents = {path.relative_to(root).as_posix(): digest_file(path) for path in files}
     return f"{metadata.version('rodcone')}+{digest(contents)[:12]}"
 

@@ -57,6 +57,9 @@ def test_letters_of_no_published_mosaic_are_searched_too(monkeypatch: pytest.Mon
     best = best_tile(replace(TWO, letters="RW", steps=20), SENSOR, known, lambda *_: None)
     assert set("".join(best)) <= set("RW")
     assert len(known) > 5
+    # what an earlier search found among more letters isn't among these
+    known["G" * 4 + "/WWWW" * 3] = [[99.0] * 2] * 3
+    assert best_tile(replace(TWO, letters="RW", steps=20), SENSOR, known, lambda *_: None) == best
 
 
 def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
