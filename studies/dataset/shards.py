@@ -23,6 +23,13 @@ MANIFEST = "manifest.jsonl"
 # Facts of a sample that stand in its manifest line.
 _LISTED = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
            "snr_db", "saturated", "render_noise")  # fmt: skip
+# What is read of a manifest's lines, by their kind.
+_READ = {
+    "set": ("name", "rodcone", "command", "identity", "samples", "planes"),
+    "scene": ("split", "licence"),
+    "shard": ("name", "split", "samples", "bytes", "digest", "made_from"),
+    "sample": _LISTED,
+}
 SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
 RENDERS = 0.9  # of a set's time, for the progress bar: 97 % of the frozen list's, less where samples are few
 Lines = list[dict[str, Any]]
@@ -152,11 +159,14 @@ def read_manifest(folder: Path) -> Lines:
         Where there is none, or it is damaged.
     """
     path = folder / MANIFEST
-    fix = "allowed: what rodcone dataset wrote; run it again"
+    fix = "allowed: what rodcone dataset wrote; move it away and run that again"
     with read_errors(f"{path}: it is no manifest of a set", fix, (OSError, ValueError, LookupError, TypeError)):
         lines = [json.loads(line) for line in path.read_text("utf-8").splitlines()]
-        if not lines or lines[0]["kind"] != "set" or not all("kind" in line for line in lines):
+        if not lines or lines[0]["kind"] != "set":
             raise ValueError("its first line is not a set's")
+        for number, line in enumerate(lines, start=1):
+            if lacking := [name for name in _READ[line["kind"]] if name not in line]:
+                raise ValueError(f"line {number} has no {lacking[0]!r}")
     return lines
 
 

@@ -329,8 +329,22 @@ def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
     assert "| 1cd/m2 | 4 |" in text
     noisy = sum(line["render_noise"]["of_95_percent"] >= 1 for line in samples)
     assert f"| 1 and more | {noisy} |" in text
-    (stored.parent / MANIFEST).write_text("{}\n")
-    refusal(read_manifest, stored.parent, match="no manifest of a set")
+
+
+def test_a_manifest_that_lacks_what_is_read_is_refused(stored: Path, tmp_path: Path) -> None:
+    lines = read_manifest(stored)
+    for kind, names in (
+        ("set", "kind name identity samples planes"),
+        ("scene", "kind split licence"),
+        ("shard", "kind name split samples bytes digest made_from"),
+        ("sample", "kind key scene level sensor luminance_cd_m2"),
+    ):
+        index, line = next((index, line) for index, line in enumerate(lines) if line["kind"] == kind)
+        for name in names.split():
+            short = {key: value for key, value in line.items() if key != name}
+            text = "".join(f"{json.dumps(x)}\n" for x in (*lines[:index], short, *lines[index + 1 :]))
+            (tmp_path / MANIFEST).write_text(text)
+            refusal(read_manifest, tmp_path, match="no manifest of a set")
 
 
 def test_drawn_scenes_are_counted_from_a_seed() -> None:
