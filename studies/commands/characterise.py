@@ -14,7 +14,6 @@ from sensor.cameras.numbers import preset_text
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
-from sensor.presets import preset
 from sensor.presets import preset as sensor_preset
 from sensor.readings.merge import of_channel
 from sensor.readings.noise import of_reading
@@ -246,5 +245,5 @@ def snr(
 
 
 def _opened(name: str, f_number: float | None) -> SensorConfig:
-    sensor = preset(name)
+    sensor = sensor_preset(name)
     return sensor if f_number is None else replace(sensor, lens=replace(sensor.lens, f_number=f_number))
