@@ -40,9 +40,10 @@ def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDAr
 
         F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P) - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,
 
-    the last for a colour that noise hides, which is that of the surroundings: with r_c the ratio of channel c to W in
-    the mean of 3 x 3 planes, 24 pixels apart, 1 / nu_c the frame's mean of 1 / noise gain, and <> the mean over the
-    window, D_c = P_c - r_c P_W.
+    the last for a colour that noise hides, which is that of the surroundings: with 1 / nu_c the frame's mean of
+    1 / noise gain, r_c the ratio of channel c to W in the sum of 3 x 3 planes, 24 pixels apart, each over b^2, b the
+    largest of its W, m_W and (nu_W N_W)^(1/2), so that a lamp has no say, and <> the mean over the window,
+    D_c = P_c - r_c P_W.
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
     the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
@@ -79,8 +80,6 @@ def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDAr
 def _sharpen(raw: RawImage, gains: Floats, nu: Floats, planes: Floats, *samples: NDArray[Any]) -> Floats:
     """In double precision; the arrays reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
-    around = np.maximum(far.sum(axis=(3, 4)), 0.0)
-    tint = around / np.maximum(around[..., 3:], TINY)
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))
     window, (shot, dark, full_e) = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1)), channel_noise(raw)
@@ -97,6 +96,9 @@ def _sharpen(raw: RawImage, gains: Floats, nu: Floats, planes: Floats, *samples:
     noise = np.maximum(shot * light + dark, TINY)
     variance = np.einsum("...cc->...c", covariance)
     contrast = (variance / noise).sum(axis=2, keepdims=True) / (1.0 + (light**2 / noise).sum(axis=2, keepdims=True))
+    faint = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
+    around = (far / np.maximum(far[..., 3:, :, :], faint[..., None, None, None]) ** 2).sum(axis=(3, 4))
+    tint = np.maximum(around, 0.0) / np.maximum(around[..., 3:], TINY)
     apart = variance + tint * (tint * variance[..., 3:] - 2.0 * covariance[..., 3]) + (mean - tint * mean[..., 3:]) ** 2
     hidden = 3.0 / np.maximum((apart / (nu * noise)).sum(axis=2, keepdims=True), 3.0)
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]

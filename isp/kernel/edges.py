@@ -80,8 +80,10 @@ def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArra
     noise = larger(shot * light + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
-    around = larger(sum(far[1:], far[0]), 0.0)
-    tint = around / larger(around[3], TINY)
+    faint = larger(light[3], dr.sqrt(nu[3] * noise[3]))
+    around = [values / dr.square(larger(values[3], faint)) for values in far]
+    around = sum(around[1:], around[0])
+    tint = larger(around, 0.0) / larger(around[3], TINY)
     apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
     hidden = 3.0 / larger(dr.sum(apart / (nu * noise)), 3.0)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]

@@ -59,7 +59,9 @@ def by_hand(raw, planes, gains, noise_gain, row, column):
     near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
     mirrored = np.pad(np.arange(16), 24, mode="reflect")
-    around = planes[np.ix_(*(mirrored[x : x + 49 : 24] for x in (row, column)))].mean(axis=(0, 1))
+    around = planes[np.ix_(*(mirrored[x : x + 49 : 24] for x in (row, column)))].reshape(9, 4)
+    brightness = np.maximum(around[:, 3:], max(mean[3], np.sqrt(noise_gain[3] * noise[3])))
+    around = (around / brightness**2).sum(axis=0)
     hidden = planes[row, column] - around / around[3] * planes[row, column, 3]
     distances = ((window - around / around[3] * window[:, 3:]) ** 2).mean(axis=0)
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
@@ -84,6 +86,13 @@ def test_the_estimate_is_the_formula_s(tile):
     got = sharpen(raw, planes, GAINS, np.broadcast_to(averaged, planes.shape))
     for row, column in product(range(2, 14), repeat=2):
         assert got[row, column] == pytest.approx(by_hand(raw, planes, GAINS, averaged, row, column), rel=1e-3, abs=0.1)
+
+
+def test_a_lamp_in_the_surroundings_gives_the_dark_no_colour():
+    planes = np.full((64, 64, 4), COLOUR / 1000.0)
+    planes[20:25, 20:25] = [5000.0, 9000.0, 300.0, 14_000.0]
+    got = sharpen(frame(planes), planes, GAINS, np.full(planes.shape, 1 / 74))
+    assert got[44:49, 44:49] == pytest.approx(planes[44:49, 44:49], abs=1e-3)  # 24 pixels away
 
 
 def test_colours_that_noise_hides_are_the_surroundings_and_others_stay():
