@@ -18,19 +18,9 @@ from rodcone.files import is_half_written, write_files
 from rodcone.progress import Step, progress_bar, render_words
 from scenes.diorama import PICTURES_LICENCE
 from studies.budget.ledger import as_stated
-from studies.dataset.order import SetOrder, bytes_needed, check_cameras, require_room
+from studies.dataset.order import RENDERS, SetOrder, bytes_needed, check_cameras, require_room
 from studies.dataset.sample import TRUTH, VERSION, Facts, Sample, frame_labels, plane_files, scene_facts
-from studies.dataset.shards import (
-    MANIFEST,
-    RENDERS,
-    SPLITS,
-    Lines,
-    Runner,
-    into_shards,
-    make_shards,
-    read_manifest,
-    split_of,
-)
+from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
 from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note

@@ -16,6 +16,7 @@ from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, read_errors
 from rodcone.files import inside, replacing, write_files
 from rodcone.progress import Step
+from studies.dataset.order import RENDERS
 from studies.dataset.sample import Arrays, Sample, code_digests, make_sample
 from studies.sweep.provenance import versions
 
@@ -31,7 +32,6 @@ _READ = {
     "sample": _LISTED,
 }
 SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
-RENDERS = 0.9  # of a set's time, for the progress bar: 97 % of the frozen list's, less where samples are few
 Lines = list[dict[str, Any]]
 Runner = Callable[..., Generator[Any, None, None]]  # of tasks, by `make`; such as `studies.sweep.workers.run`
 
