@@ -75,12 +75,6 @@ def unit_channel(tile: Tile) -> str:
     return next((name for name in "GW" if name in names), max(names, key=sites.count))
 
 
-def colour_channels(tile: Tile) -> tuple[str, ...]:
-    """Channels that saturate together with the picture: all but W beside G, which is full long before."""
-    names = channels(tile)
-    return tuple(name for name in names if name != "W") if "G" in names else names
-
-
 def is_bayer(tile: Tile) -> bool:
     """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
     return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))

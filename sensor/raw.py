@@ -137,6 +137,11 @@ class RawImage:
         return unit_channel(self.cfa)
 
     @property
+    def colour_channels(self) -> tuple[str, ...]:
+        """Channels that saturate together with the picture: all but W beside G, which is full long before."""
+        return tuple(x for x in self.channels if x != "W") if "G" in self.channels else self.channels
+
+    @property
     def shape(self) -> tuple[int, int]:
         """Height and width in pixels."""
         return self.dn.shape[0], self.dn.shape[1]

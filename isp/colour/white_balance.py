@@ -18,7 +18,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths, photons_per_joule
 from rodcone.display import brief
 from rodcone.errors import InputError
-from sensor.cfa import colour_channels, mask
+from sensor.cfa import mask
 from sensor.curves import Responses, built_in
 from sensor.raw import RawImage, channel_variance
 
@@ -37,7 +37,7 @@ def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> 
 
 def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
     """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
-    wells_e = {name: raw.noise_of(name).full_well_e for name in colour_channels(raw.cfa)}
+    wells_e = {name: raw.noise_of(name).full_well_e for name in raw.colour_channels}
     return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
 
 
@@ -49,7 +49,7 @@ def clip_highlights(
     `reach` as in `saturated_nearby`: that of the filter which made the planes. Where nothing is held the array itself
     is returned.
     """
-    clipped = saturated_nearby(raw, "".join(colour_channels(raw.cfa)), reach)
+    clipped = saturated_nearby(raw, "".join(raw.colour_channels), reach)
     if not clipped.any():
         return balanced
     limited = balanced.copy()
@@ -119,7 +119,7 @@ class WhiteBalance:
         well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
         scene.
         """
-        names, unit, colours = raw.channels, raw.unit_channel, "".join(colour_channels(raw.cfa))
+        names, unit, colours = raw.channels, raw.unit_channel, "".join(raw.colour_channels)
         if self.given is not None:
             return self.given[names.index(unit)] / self.given, dict.fromkeys(names, "given")
         neutral = self.response(raw)

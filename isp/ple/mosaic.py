@@ -18,7 +18,7 @@ from isp.ple.overlap import STRIDE, border, padded
 from isp.ple.prior import LETTERS, PATCH
 from isp.ple.tables import Sampling, Singles
 from isp.ple.units import transform
-from sensor.cfa import Tile, channel_map, channels, colour_channels, mask
+from sensor.cfa import Tile, channel_map, channels, mask
 from sensor.raw import RawImage
 
 SIDES = (1, 2, 4)  # of a tile [pixels]
@@ -145,7 +145,7 @@ def counted_electrons(raw: RawImage) -> Singles:
 
 def full_white(raw: RawImage) -> NDArray[np.bool_]:
     """Saturated samples of W beside G, which is full long after."""
-    return np.asarray(raw.saturated & (channel_map(raw.cfa, raw.shape) == "W") & ("W" not in colour_channels(raw.cfa)))
+    return np.asarray(raw.saturated & (channel_map(raw.cfa, raw.shape) == "W") & ("W" not in raw.colour_channels))
 
 
 def scale_of_cells(cells: Cells) -> Scale:
