@@ -11,6 +11,8 @@ from typing import Annotated
 import numpy as np
 from cyclopts import Parameter
 
+from render.illuminants import illuminant
+from rodcone.digests import digest_inputs
 from rodcone.errors import InputError, read_errors, require_keys
 from rodcone.files import read_bounded, write_files
 from rodcone.progress import progress
@@ -45,7 +47,8 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
     base = preset(sensor)
     tile = () if goal.tile in SIDES else vary(base, goal.tile).cfa
     reference = vary(base, goal.never_worse_than)
-    require_keys("letters", goal.letters + "".join(reference.cfa), base.responses.curves)
+    for name, letters in (("letters", goal.letters), ("never_worse_than", "".join(reference.cfa))):
+        require_keys(name, letters, base.responses.curves)
     if goal.filters and "W" not in base.responses.curves:
         raise InputError("curves: the sensor has no W, the response without a filter; add W to its responses")
     by_camera = {goal.never_worse_than: expected(goal, reference)}
@@ -55,7 +58,8 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
     code = code_version(names=[best_tile.__module__])
-    question = repr((code, base, reference.cfa, goal.light, goal.exposure, goal.prior, goal.levels))
+    lit = illuminant(goal.light), goal.exposure, goal.prior, goal.levels
+    question = digest_inputs([code, base, reference, *lit])
     tried_gains_db = _known(tried, question, len(goal.levels))
 
     with progress(sys.stderr) as step:

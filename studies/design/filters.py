@@ -17,7 +17,7 @@ from sensor.optics import camera_equation
 from sensor.presets import vary
 from sensor.response import electrons_per_irradiance
 from studies.design.expect import MIDDLE, LitPrior, drawn_pixels, exposed, metric_rows, sites_of, spread_of, view_of
-from studies.design.search import BEHIND, Goal, tile_db
+from studies.design.search import BEHIND, Goal, camera_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
 
@@ -47,7 +47,7 @@ def best_filters(goal: Goal, given: SensorConfig, tile: Tile, progress: Step) ->
     """
     # What all rounds share.
     prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
-    reference_db = tile_db(goal, given, vary(given, goal.never_worse_than).cfa)
+    reference_db = camera_db(goal, vary(given, goal.never_worse_than))
     places = sites_of(tile)
     spread = spread_of(given.pixel.crosstalk)
     rows = [[every[metric] for metric in (0, 1, 3)] for every in

@@ -106,7 +106,7 @@ class Goal:
         return np.asarray(weights / weights.sum())
 
     def beyond(self, gains_db: Floats) -> Floats:
-        """How far gains lie beyond the bound; `gains_db` of shape (3, level), as `tile_db` has them."""
+        """How far gains lie beyond the bound; `gains_db` of shape (3, level), as `camera_db` has them."""
         behind_db = np.array([self.behind, self.behind_in_luminance, self.behind])
         return np.asarray(np.maximum(0.0, -gains_db - behind_db[:, None]))
 
@@ -120,13 +120,12 @@ def expected(goal: Goal, camera: SensorConfig) -> list[ExpectedError]:
     return expect(camera, list(goal.levels.values()), goal.light, goal.time_s, goal.prior)
 
 
-def tile_db(goal: Goal, sensor: SensorConfig, tile: Tile) -> Floats:
-    """Expected error of a tile's pictures at each level, component known, shape (3, level) [dB, more is better].
+def camera_db(goal: Goal, camera: SensorConfig) -> Floats:
+    """Expected error of a camera's pictures at each level, component known, shape (3, level) [dB, more is better].
 
-    Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab. The sensor lends pixel, lens and
-    responses; its own mosaic doesn't count.
+    Of encoded sRGB, as PSNR; of encoded luminance; of a* and b*, over 1 in Lab.
     """
-    errors = expected(goal, with_tile(sensor, tile, sensor.responses))
+    errors = expected(goal, camera)
     return np.array([(x.psnr_db, x.luminance_db, -20 * np.log10(x.colour)) for x in errors]).T
 
 
@@ -145,19 +144,20 @@ def best_tile(goal: Goal, sensor: SensorConfig, known: Known, progress: Step) ->
     goal : Goal
         Its `tile` is 2x2 or 4x4.
     sensor : SensorConfig
+        Lends pixel, lens and responses; its own mosaic doesn't count.
     known : mapping
         Gains of the tiles that were tried: what is in it isn't computed again, and what is computed is put into it.
     progress : callable
         Called with the best tile and the share that is done.
     """
-    side, reference = SIDES[goal.tile], vary(sensor, goal.never_worse_than).cfa
-    reference_db = tile_db(goal, sensor, reference)
-    best, best_score = reference, -inf
+    side, reference = SIDES[goal.tile], vary(sensor, goal.never_worse_than)
+    reference_db = camera_db(goal, reference)
+    best, best_score = reference.cfa, -inf
 
     def look_at(tile: Tile, share: float = 0.0) -> float:
         nonlocal best, best_score
         if (key := "/".join(tile)) not in known:
-            known[key] = (tile_db(goal, sensor, tile) - reference_db).tolist()
+            known[key] = (camera_db(goal, with_tile(sensor, tile, sensor.responses)) - reference_db).tolist()
         score = goal.score(np.array(known[key]))
         if score > best_score:
             best, best_score = tile, score
@@ -166,7 +166,7 @@ def best_tile(goal: Goal, sensor: SensorConfig, known: Known, progress: Step) ->
 
     letters = {*goal.letters, "/"}
     earlier = [tuple(key.split("/")) for key in known if key.count("/") == side - 1 and set(key) <= letters]
-    for tile in [standing_for(reference), *earlier]:
+    for tile in [standing_for(reference.cfa), *earlier]:
         look_at(tile)
     if side == 2:
         tiles = sorted({standing_for(("".join(t[:2]), "".join(t[2:]))) for t in product(goal.letters, repeat=4)})

@@ -71,6 +71,19 @@ def test_a_camera_with_curves_of_its_own_takes_them_along(tmp_path: Path) -> Non
     assert "isn't what rodcone design wrote" in err
 
 
+def test_what_was_tried_with_other_curves_of_the_same_letters_does_not_count(tmp_path: Path) -> None:
+    table = '[responses]\ncsv = "c.csv"\nrange_nm = [380, 780]\nquantum_efficiency = "included"\n'
+    text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = ["RG", "GB"]')
+    (tmp_path / "s.toml").write_text(text.replace("\n[lens]", f"\n{table}\n[lens]"), "utf-8")
+    gains = []
+    for most in (0.4, 0.2):
+        (tmp_path / "c.csv").write_text(f"wavelength_nm,R,G,B\n380,0,0,.3\n580,.1,{most},.1\n780,.4,0,0\n")
+        few = ["--tile", "2x2", "--letters", "G", "--over", "classroom:classroom", "-o", tmp_path / "found"]
+        assert call(["design", tmp_path / "s.toml", *few])[0] == 0
+        gains.append(json.loads((tmp_path / "found" / "tried.json").read_text("utf-8"))["gains_db"]["GG/GG"])
+    assert gains[0] != gains[1]
+
+
 @pytest.mark.slow
 def test_filters_are_written_as_curves_that_read_back(tmp_path: Path) -> None:
     assert call([*FEW, "--filters", "-o", tmp_path / "found", "--behind", "9", "--behind-in-luminance", "9"])[0] == 0
@@ -99,6 +112,7 @@ def test_a_wrong_option_is_refused_and_leaves_no_folder(tmp_path: Path, monkeypa
         ("--weights 1 --weights 2 -o found", "for 7 levels"),
         ("--behind -101 -o found", "behind: -101"),
         ("--never-worse-than bayr -o found", "did you mean 'bayer'"),
+        ("--never-worse-than cmyw -o found", "never_worse_than: 'C' is unknown; allowed: B, G, R, W"),
         ("--light D66 -o found", "did you mean 'D65'"),
         ("--prior draw -o found", "did you mean 'drawn'"),
     )

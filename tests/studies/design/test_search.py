@@ -7,11 +7,11 @@ import pytest
 
 from isp.design.spectral_prior import PRIORS, load_prior
 from sensor.cfa import Tile
-from sensor.presets import preset
+from sensor.presets import preset, vary
 from studies.design import search as searching
 from studies.design.expect import drawn_pixels
 from studies.design.filters import best_filters
-from studies.design.search import Goal, best_tile, standing_for, tile_db
+from studies.design.search import Goal, best_tile, camera_db, standing_for
 
 SENSOR = preset("low_noise")
 BAYER: Tile = ("RG", "GB")
@@ -44,14 +44,14 @@ def test_all_small_tiles_are_tried_and_the_best_is_found_again_from_what_is_know
     assert scores["/".join(best)] == max(scores.values())
 
     again = []
-    monkeypatch.setattr(searching, "tile_db", lambda _goal, _sensor, tile: again.append(tile) or np.zeros((3, 2)))
+    monkeypatch.setattr(searching, "camera_db", lambda _, camera: again.append(camera.cfa) or np.zeros((3, 2)))
     assert best_tile(wanted, SENSOR, known, lambda *_: None) == best
     assert again == [BAYER]  # what gains are over
 
 
 def test_letters_of_no_published_mosaic_are_searched_too(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(
-        searching, "tile_db", lambda _goal, _sensor, tile: np.full((3, 2), float("".join(tile).count("W")))
+        searching, "camera_db", lambda _, camera: np.full((3, 2), float("".join(camera.cfa).count("W")))
     )
     known: searching.Known = {}
     best = best_tile(replace(TWO, letters="RW", steps=20), SENSOR, known, lambda *_: None)
@@ -60,6 +60,13 @@ def test_letters_of_no_published_mosaic_are_searched_too(monkeypatch: pytest.Mon
     # what an earlier search found among more letters isn't among these
     known["G" * 4 + "/WWWW" * 3] = [[99.0] * 2] * 3
     assert best_tile(replace(TWO, letters="RW", steps=20), SENSOR, known, lambda *_: None) == best
+
+
+def test_gains_are_over_the_reference_behind_its_own_filters() -> None:
+    known: searching.Known = {}
+    asked = Goal(tile="2x2", letters="W", over="classroom:classroom", never_worse_than="rgbw_nd")
+    best_tile(asked, SENSOR, known, lambda *_: None)
+    assert max(map(abs, known["BR/WG"][0])) > 0.05  # W at its full sensitivity
 
 
 def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
@@ -74,9 +81,9 @@ def test_a_design_behind_the_bound_scores_less_than_the_reference() -> None:
 @pytest.mark.thorough
 def test_filters_get_better_and_stay_filters() -> None:
     wanted = Goal(over="classroom:classroom", behind=100.0, behind_in_luminance=100.0, rounds=1)
-    before = tile_db(wanted, SENSOR, BAYER)
+    before = camera_db(wanted, vary(SENSOR, "bayer"))
     camera = best_filters(wanted, SENSOR, BAYER, lambda *_: None)
-    after = tile_db(wanted, camera, BAYER)
+    after = camera_db(wanted, camera)
     assert after[0, 0] > before[0, 0] + 0.3
     clear = SENSOR.responses.curves["W"]
     for name in "RGB":
