@@ -249,7 +249,8 @@ def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estima
     """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
     plan = reference_plan(study) if reference else plan_as_stated(study)
     rows = read_rows(out) if (out / FILE).is_file() else []
-    kept = sum(json.loads(row.versions).get("rodcone") == code_version() for row in rows)
+    code = code_version()
+    kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)
     return estimate(study, plan, open_all(study), workers, kept)
 
 

@@ -19,7 +19,7 @@ ROOT = Path(__file__).resolve().parents[2]
 _WHOLE = ("rodcone", "render", "scenes", "sensor", "isp")  # beside `studies`, all of them decide a picture
 # Of `studies` what making a frame and running a cell import; the other modules only ask, store and show.
 _DECIDING = ("studies.sweep.run_cell", "studies.sweep.frames")
-_CODE = (".py", ".toml", ".csv")
+_CODE = (".py", ".toml", ".csv", ".json", ".npz")  # code, and the tables and priors that it takes
 _PARSING = threading.Lock()  # CPython 3.11 counts the depth of all threads' parsing as one, and fails
 
 

@@ -222,6 +222,11 @@ def test_every_module_before_the_studies_decides(copy: Path, package: str) -> No
     assert [path for path in (paths[0], paths[-1]) if not changed(copy, path)] == []
 
 
+def test_tables_and_priors_that_pictures_are_made_with_decide(copy: Path) -> None:
+    for name in ("isp/ple/prior.npz", "render/data/published_spectra.json"):
+        assert changed(copy, copy / name), name
+
+
 @pytest.mark.thorough
 def test_a_byte_of_any_deciding_module_changes_the_version(copy: Path) -> None:
     deciding = deciding_modules(copy)
