@@ -99,15 +99,6 @@ def mixture(prior: Prior, size: int = PATCH) -> Mixture:
 
 
 @cache
-def colours(prior: Prior) -> NDArray[np.float64]:
-    """How far patches' mean signals of R, G, B and W, over their light, lie from grey: mean products, (4, 4)."""
-    mix, average = mixture(prior), np.tile(np.eye(4), PATCH**2) / PATCH**2
-    weights, slopes = np.exp(mix.log_weights), 2.0 * average * mix.means[:, None]
-    off = (mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)) @ average.T - 1.0
-    return (off.T * weights) @ off + np.tensordot(weights, slopes @ mix.covariances @ slopes.swapaxes(1, 2), 1)
-
-
-@cache
 def own_prior() -> Prior:
     """The prior of the project's own curves."""
     return load_prior(OWN)

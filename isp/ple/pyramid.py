@@ -22,22 +22,22 @@ from isp.ple.mosaic import (
     scale_of_pixels,
 )
 from isp.ple.overlap import STRIDE, border
-from isp.ple.prior import LETTERS, PATCH, Prior, colours
+from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import PILOT_ERROR, Sampling, Singles
 from isp.ple.units import readings
 from sensor.raw import RawImage
 
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on
+COLOUR_SPREAD = 0.2  # relative standard deviation of the light that a patch's own sums show, by its colour
 
 
 @dataclass(frozen=True)
 class PatchLight:
-    """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor + colour * light^2``."""
+    """Light of each patch, (ny, nx) [e- of white in G]; its variance is ``shot * light + floor``, and its colour's."""
 
     mean: Singles
     shot: Singles
     floor: Singles
-    colour: Singles
 
 
 def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Singles, NDArray[np.float64]]:
@@ -64,16 +64,16 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     white_e = np.asarray(white_e) / shot
     levels = pyramid(raw, white_e, electrons, full)
     coarsest = levels[-1]
-    light = _light_of_sums(prior, coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
+    light = _light_of_sums(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
     estimates = estimate(prior, scale_of_cells(coarsest), light, None)
     for coarse, cells in zip(levels[:0:-1], levels[-2::-1], strict=True):
-        sums = _light_of_sums(prior, cells, [border(length, CELLS) for length in cells.full.shape[:2]], STRIDE)
+        sums = _light_of_sums(cells, [border(length, CELLS) for length in cells.full.shape[:2]], STRIDE)
         estimates = estimate(
             prior, scale_of_cells(cells), *_from_coarser(estimates, coarse.sampling, cells.sampling, sums)
         )
 
     cells = levels[0]
-    sums = _light_of_sums(prior, cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
+    sums = _light_of_sums(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
     scale = scale_of_pixels(raw, white_e, electrons, full)
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
     planes = estimates.planes[..., cells.index]
@@ -96,25 +96,29 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
     ]
 
 
-def _light_of_sums(prior: Prior, cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
-    """Light of patches of 4x4 cells from their own sums, their best linear estimate by the prior's colours.
-
-    A red patch has less green than grey of its light, so green counts for the less, the less noise red has. Full Ws are
-    left out.
-    """
-    index, share = list(cells.index), CELLS**2 * cells.presence.mean(axis=(0, 1))  # samples of a channel, or sums
-    gains, dark = (np.array(values)[index] for values in (cells.sampling.gains, cells.sampling.dark_e))
-    gains, floors = gains * share, dark**2 * share
+def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
+    """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
+    gains, dark = (np.array(values)[list(cells.index)] for values in (cells.sampling.gains, cells.sampling.dark_e))
+    weights = gains / (np.maximum(_medians(cells), 0.1) + dark**2)
     mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # which keeps the mosaic
     full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
-    usual = max(float(np.median(sums.sum(axis=-1))) / gains.sum(), 0.1 / gains.max())
-    spread = colours(prior)[np.ix_(index, index)] * gains[:, None] * gains
-    noise = usual * gains + floors
-    without = np.where(np.array(LETTERS)[index] == "W", 1e9 * noise, noise)
-    weights, blind = (np.linalg.solve(usual**2 * spread + np.diag(values), gains) for values in (noise, without))
-    weights = np.where(full.any(axis=-1, keepdims=True), blind / (blind @ gains), weights / (weights @ gains))
-    light = (sums * weights).sum(-1), weights**2 @ gains, weights**2 @ floors, (weights @ spread * weights).sum(-1)
-    return PatchLight(*(values.astype(np.float32) for values in light))
+    weights = np.where(full > 0, 0.0, weights)
+    share = cells.presence.mean(axis=(0, 1))  # of cells that hold a channel
+    gains, floors = gains * share, dark**2 * share
+    whole = CELLS**2 * (weights @ gains)
+    mean = (sums * weights).sum(axis=-1) / whole
+    shot, floor = (CELLS**2 * (weights**2 * values).sum(axis=-1) / whole**2 for values in (gains, floors))
+    return PatchLight(*(values.astype(np.float32) for values in (mean, shot, floor)))
+
+
+def _medians(cells: Cells) -> NDArray[np.float64]:
+    """Median of each channel's electrons over the cells that hold it, shape (channel,)."""
+    down, across, _ = cells.presence.shape
+    medians = np.empty(len(cells.index))
+    for c in range(len(cells.index)):
+        parts = [cells.electrons[a::down, b::across, c].ravel() for a, b in np.argwhere(cells.presence[..., c])]
+        medians[c] = np.median(np.concatenate(parts))
+    return medians
 
 
 def _from_coarser(
@@ -133,14 +137,15 @@ def _from_coarser(
     means = _patch_means(values, sums.mean.shape, now.size)
     light, light_variance = means[..., 5], means[..., 6]
     most = np.maximum(np.maximum(sums.mean, light), 0.0)
-    sums_variance = sums.shot * most + sums.floor + sums.colour * most**2
+    sums_variance = sums.shot * most + sums.floor + (COLOUR_SPREAD * most) ** 2
     both = (light * sums_variance + sums.mean * light_variance) / (sums_variance + light_variance)
     return both.astype(np.float32), PatchPilot(np.ascontiguousarray(means[..., :4]), means[..., 4])
 
 
 def _in_finer_units(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
     """Cells of a scale in a finer one's units of noise: roots by channel, their variance, light, its variance."""
-    values = np.zeros((7, *planes.shape[:2]))
+    values = np.empty((7, *planes.shape[:2]))
+    values[4] = 0.0
     for c in range(4):
         share = now.gains[c] / before.gains[c]
         old, new = readings(before.dark_e[c]), readings(now.dark_e[c])
