@@ -84,7 +84,7 @@ class Goal:
         if self.tile not in SIDES and "/" not in self.tile:
             raise unknown("tile", self.tile, SIDES)
         count = len(self.levels)
-        if self.weights and (len(self.weights) != count or min(self.weights) < 0 or not sum(self.weights)):
+        if self.weights and (len(self.weights) != count or not 0 < sum(self.weights) < inf or min(self.weights) < 0):
             raise InputError(
                 f"weights: {list(self.weights)} for {count} levels; allowed: 0 or more; give --weights once for each"
             )

@@ -110,6 +110,7 @@ def test_a_wrong_option_is_refused_and_leaves_no_folder(tmp_path: Path, monkeypa
         ("--seed -1 -o found", "seed: -1"),
         ("--over noon:midnight -o found", "over: 'noon:midnight' is not a range of levels"),
         ("--weights 1 --weights 2 -o found", "for 7 levels"),
+        ("--tile RG/BW --over street:street --weights nan -o found", "weights: [nan] for 1 levels"),
         ("--behind -101 -o found", "behind: -101"),
         ("--never-worse-than bayr -o found", "did you mean 'bayer'"),
         ("--never-worse-than cmyw -o found", "never_worse_than: 'C' is unknown; allowed: B, G, R, W"),
