@@ -33,10 +33,11 @@ from render.engine import render
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from scenes.catalog import load
-from sensor.capture import auto_exposure_s, expose
+from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage

@@ -70,7 +70,7 @@ def _seconds(name: str, value: Any) -> Any:
 
 
 def _exposure(name: str, value: Any) -> Any:
-    return value if isinstance(value, str) and value in at("sensor.capture:RULES") else _seconds(name, value)
+    return value if isinstance(value, str) and value in at("sensor.exposure:RULES") else _seconds(name, value)
 
 
 def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
@@ -204,8 +204,8 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
 # Functions that look at the result, and warn.
 RESULTS = MappingProxyType(
     {
-        "capture": ("sensor.capture:warn_if_full", "sensor.capture:warn_if_dark"),
-        "expose": ("sensor.capture:warn_if_full",),
+        "capture": ("sensor.exposure:warn_if_full", "sensor.exposure:warn_if_dark"),
+        "expose": ("sensor.exposure:warn_if_full",),
     }
 )
 

@@ -11,8 +11,8 @@ from rodcone.csv_file import csv_text
 from rodcone.errors import InputError
 from rodcone.files import write_files
 from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
-from sensor.capture import AUTO_INFORMATION
 from sensor.cfa import OWN
+from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
 from studies.commands.console import print_json, print_table, require_place
 from studies.design.expect import ExpectedError

@@ -14,11 +14,11 @@ from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.spectrum import Floats, tristimulus
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import InputError, require_name
-from sensor.capture import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.cfa import Tile, channel_map, channels
 from sensor.chip import room_e
 from sensor.config import SensorConfig
 from sensor.diffraction import sampled_otf
+from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.optics import WAVELENGTH_NM, camera_equation
 from sensor.readings.merge import as_metered, of_channel
 from sensor.readout import spread_charge
@@ -164,7 +164,7 @@ def expect(
     light : str
         Illuminant; the camera knows it.
     exposure : str or float
-        A rule of `sensor.capture.RULES`, or a time [s].
+        A rule of `sensor.exposure.RULES`, or a time [s].
     prior : str
         One of `isp.design.spectral_prior.PRIORS`.
     blur : bool

@@ -13,9 +13,9 @@ from render.spectrum import Floats
 from rodcone.errors import InputError, require_fields, unknown
 from rodcone.progress import Step
 from scenes.levels import DEMO_LEVELS
-from sensor.capture import AUTO_INFORMATION
 from sensor.cfa import MOSAICS, Tile
 from sensor.config import SensorConfig, with_tile
+from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import vary
 from studies.design.expect import ExpectedError, expect
 from studies.study.levels import levels_between, parse_exposure

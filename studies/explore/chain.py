@@ -19,9 +19,10 @@ from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
 from sensor.burst import merged_raw
-from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W, expose, exposure_of_electrons_s, most_informative_s
+from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s, most_informative_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage

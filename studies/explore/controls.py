@@ -18,10 +18,10 @@ from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.errors import InputError, require_fields, require_keys, require_name, require_range
 from rodcone.toml_file import strict_converter, structured
-from sensor.capture import AUTO_INFORMATION, RULES
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.config import LONGEST_S, SensorConfig
+from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.presets import VARIATIONS, names
 from studies.metrics.truth import Light, light_in_bands
 from studies.study.scene_source import LIGHT, first_light, replaceable_luminance
@@ -72,7 +72,7 @@ class Controls:
     reference_light : str
         Illuminant that colours are judged under where the first light group has colours of its own, as a file has.
     exposure : str
-        A rule of `sensor.capture.RULES`, or ``time``.
+        A rule of `sensor.exposure.RULES`, or ``time``.
     exposure_s : float
         Where `exposure` is ``time``; else the longest that the rule may choose.
     sensor : str

@@ -18,8 +18,8 @@ from render.illuminants import names as illuminants
 from rodcone.errors import InputError, read_errors, require_keys, require_name, require_whole
 from rodcone.toml_file import parse_toml
 from scenes.levels import DEMO_LEVELS
-from sensor.capture import RULES
 from sensor.config import SensorConfig
+from sensor.exposure import RULES
 from sensor.presets import names as sensors
 from sensor.presets import preset
 from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json

@@ -15,8 +15,8 @@ from render.loader import variant
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from scenes.levels import DEMO_LEVELS
-from sensor.capture import AUTO_INFORMATION, RULES
 from sensor.config import LensConfig
+from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.optics import left_out
 from sensor.presets import preset
 from studies.pages.report_compare import axes_of, first_comparison

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from math import floor, isfinite, isinf, isnan, log10
 
-from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from sensor.presets import names
 from studies.metrics.metric import Metric
 from studies.pages.report_data import ReportCell

@@ -11,9 +11,9 @@ import numpy as np
 
 from isp.similarity.guide import saturated_fraction
 from rodcone.colour_spaces import encode_srgb
-from sensor.capture import auto_exposure_s
 from sensor.cfa import mask
 from sensor.config import LONGEST_S
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.raw import RawImage
 from studies.metrics.confidence import half_width

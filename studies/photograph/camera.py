@@ -19,10 +19,10 @@ from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65, xyz_to_srg
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
 from sensor.calibration import ColourCalibration
-from sensor.capture import AUTO_INFORMATION, exposure_by_rule_s
 from sensor.capture import capture as frame_of
 from sensor.config import SensorConfig
 from sensor.device import Device
+from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -228,7 +228,7 @@ def capture(
     sensor : SensorConfig, optional
         Left out, the preset ``low_noise``.
     exposure_s : float, optional
-        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.capture.exposure_by_rule_s`.
+        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposure_by_rule_s`.
     device, rng, exact, samples_per_pixel
         As `sensor.capture.capture` takes them.
     light : Spectrum, optional

@@ -19,10 +19,11 @@ from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
-from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W, capture, exposure_by_rule_s
+from sensor.capture import capture
 from sensor.cfa import is_bayer
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
 from sensor.optics import form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw

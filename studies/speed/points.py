@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from render.error_estimates import pooled
 from render.radiance import SpectralRadiance
-from sensor.capture import auto_exposure_s
 from sensor.config import SensorConfig
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons

@@ -16,9 +16,10 @@ from render.scene import Scene
 from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
-from sensor.capture import auto_exposure_s, capture
+from sensor.capture import capture
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readout import noise_variance

@@ -8,7 +8,7 @@ from render.spectrum import VISIBLE_NM
 from rodcone.errors import InputError, require_name, require_range
 from rodcone.time_text import parse_time
 from scenes.levels import DEMO_LEVELS
-from sensor.capture import RULES
+from sensor.exposure import RULES
 
 UNITS = ("cd/m2", "lux")
 NAMED = {level.name: level for level in DEMO_LEVELS}
@@ -51,7 +51,7 @@ def levels_between(over: str) -> dict[str, float]:
 
 
 def parse_exposure(text: str, name: str = "exposures", least_s: float = 1e-9) -> float | None:
-    """Exposure time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; None for a rule of `sensor.capture.RULES`.
+    """Exposure time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; None for a rule of `sensor.exposure.RULES`.
 
     Errors call the value by `name`.
 

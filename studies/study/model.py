@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from render.radiance import SpectralRadiance
-from sensor.capture import auto_exposure_s
 from sensor.config import LensConfig, SensorConfig
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.shake import held_lens
 

@@ -11,8 +11,8 @@ from render.denoised.relight import measured_error
 from render.engine import render
 from render.scene import Scene
 from render.transport import Transport
-from sensor.capture import auto_exposure_s
 from sensor.config import SensorConfig
+from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
 from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance

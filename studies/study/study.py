@@ -12,8 +12,8 @@ from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_
 from render.spectrum import VISIBLE_NM
 from rodcone.display import brief
 from rodcone.errors import InputError, in_place, require_fields, require_keys, require_range, require_whole, unknown
-from sensor.capture import AUTO_INFORMATION
 from sensor.config import LONGEST_S
+from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
@@ -127,7 +127,7 @@ class Condition:
     level : str
         ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
     exposure : str
-        A rule of `sensor.capture.RULES` such as ``auto``, or a time such as ``10ms``.
+        A rule of `sensor.exposure.RULES` such as ``auto``, or a time such as ``10ms``.
     sensor : str
         Preset by name, or a ``.toml`` file.
     white_balance : str

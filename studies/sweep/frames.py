@@ -18,8 +18,8 @@ from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.digests import digest_inputs
-from sensor.capture import AUTO, AUTO_W, most_informative_s
 from sensor.config import SensorConfig
+from sensor.exposure import AUTO, AUTO_W, most_informative_s
 from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb

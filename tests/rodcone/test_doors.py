@@ -18,7 +18,7 @@ import tifffile
 import rodcone as public
 from render.loader import mitsuba_module
 from rodcone.doors import door
-from sensor.capture import exposure_by_rule_s
+from sensor.exposure import exposure_by_rule_s
 
 NM = np.arange(385.0, 780.0, 10.0)
 RADIANCE = public.SpectralRadiance(np.full((16, 16, 40), 1e-3), NM)

@@ -8,7 +8,8 @@ from builders import any_order
 from loop import loop
 from refusal import refusal
 
-from sensor.capture import (
+from sensor.config import LONGEST_S
+from sensor.exposure import (
     RULES,
     auto_exposure_s,
     exposure_by_rule_s,
@@ -16,7 +17,6 @@ from sensor.capture import (
     information_bits,
     most_informative_s,
 )
-from sensor.config import LONGEST_S
 from sensor.optics import SpectralIrradiance
 from sensor.presets import preset
 from sensor.response import channel_electrons

@@ -10,12 +10,13 @@ from loop import loop
 from render.radiance import SpectralRadiance
 from render.spectrum import flat
 from rodcone.errors import InputError
-from sensor.capture import auto_exposure_s, capture
+from sensor.capture import capture
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise
 from sensor.response import expected_electrons, lost_shares

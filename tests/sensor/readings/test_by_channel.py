@@ -10,12 +10,12 @@ from scipy import stats
 
 from render.illuminants import illuminant
 from sensor.burst import merged_raw, merged_sensor
-from sensor.capture import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.cfa import RGBW, mask
 from sensor.chip import ChannelReading, Reading
 from sensor.config import SensorConfig, with_channel_readings, with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.raw import RawImage, noise_at_sites

@@ -5,9 +5,9 @@ import pytest
 from loop import loop
 from refusal import refusal
 
-from sensor.capture import exposure_of_electrons_s
 from sensor.chip import Reading
 from sensor.config_file import read_sensor
+from sensor.exposure import exposure_of_electrons_s
 from sensor.presets import preset, preset_file
 
 PIXEL = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nprnu = 0.01\n"

@@ -26,8 +26,9 @@ from rodcone.colour_spaces import encode_srgb
 from rodcone.digests import digest_file
 from scenes.reflectances import color_checker
 from sensor.burst import merged_raw
-from sensor.capture import auto_exposure_s, expose
+from sensor.capture import expose
 from sensor.device import draw_device
+from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
