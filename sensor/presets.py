@@ -105,9 +105,8 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         With curves of R, G, B and W.
     mosaic : str
         A name of `sensor.cfa.MOSAICS`, or rows such as ``RG/BW``; ``own``, the camera's own with its own curves; or
-        ``rgbw_nd`` (W behind a
-        neutral density that gives it G's sensitivity), ``cmyw`` (cyan, magenta, yellow and W), ``cyym`` or ``cygm``;
-        `sensor.curves` states what is assumed of these filters.
+        ``rgbw_nd`` (W behind a neutral density that gives it G's sensitivity), ``cmyw`` (cyan, magenta, yellow and W),
+        ``cyym`` or ``cygm``; `sensor.curves` states what is assumed of these filters.
 
     Raises
     ------
