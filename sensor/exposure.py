@@ -11,7 +11,7 @@ from rodcone.errors import require_name, require_range
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
-from sensor.readings.merge import under_well
+from sensor.readings.merge import of_channel, under_well
 from sensor.readout import as_read, noise_variance
 from sensor.response import behind_filters, channel_electrons
 
@@ -37,17 +37,16 @@ def auto_exposure_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    """Exposure that puts a percentile of one channel's expected electrons at a share of the well [s].
+    """Exposure in which a percentile of one channel's light and the dark current fill a share of the well [s].
 
-    Dark current and crosstalk are left out: the rule is about light. The well is
-    `SensorConfig.metered_well_e`.
+    Crosstalk and hot pixels are left out. The well is `SensorConfig.metered_well_e`.
 
     Parameters
     ----------
     irradiance : SpectralIrradiance
     sensor : SensorConfig
     longest_s : float
-        Longest exposure allowed; returned where there is no light [s].
+        Longest exposure allowed; returned where nothing fills the well [s].
     channel : str, optional
         A channel of the mosaic; left out, G, or `sensor.cfa.unit_channel` of a mosaic without G.
     percentile : float
@@ -77,8 +76,10 @@ def _share_of_well_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    bright = float(np.percentile(sensor.pixel_sums(per_second_e), percentile))
-    return min(longest_s, well_share * sensor.metered_well_e(channel) / bright) if bright > 0 else longest_s
+    alone, share = of_channel(sensor, channel)
+    dark_per_second_e = alone.pixel.dark_current_e_per_s / share  # as the light: without the density
+    filling = float(np.percentile(sensor.pixel_sums(per_second_e), percentile)) + dark_per_second_e
+    return min(longest_s, well_share * sensor.metered_well_e(channel) / filling) if filling > 0 else longest_s
 
 
 def exposure_by_rule_s(
@@ -147,7 +148,7 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     expected_e : (h, w) float64
         Photo-electrons, as `sensor.response.expected_electrons`.
     """
-    sensor = as_read(sensor, expected_e)
+    sensor = as_read(sensor, expected_e, exposure_s)
     variance = noise_variance(expected_e, sensor, exposure_s)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
     return float(np.where(under_well(expected_e, sensor, exposure_s), bits, 0.0).mean())

@@ -135,11 +135,11 @@ def read_out(
         return as_raw(dn, camera, exposure_s, engine, patterns.hot)
 
     if sensor.chip.channels:
-        return read_by_channel(expected, as_read(sensor, expected), once)
+        return read_by_channel(expected, as_read(sensor, expected, exposure_s), once)
     if not sensor.chip.readings:
         return once(expected, sensor)
     if sensor.chip.switched:
-        index = switched_to(sensor, expected)
+        index = switched_to(sensor, expected, exposure_s)
         return once(expected, of_reading(sensor, index), device.readings[index])
     readings = sensor.chip.readings
     keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in readings)}
@@ -195,7 +195,7 @@ def noise_variance(
     channel : str, optional
         Channel of all of them; left out, they are a mosaic's, (h, w). Cameras that read all channels alike don't ask.
     """
-    sensor = as_read(sensor, np.asarray(expected_e), channel)
+    sensor = as_read(sensor, np.asarray(expected_e), exposure_s, channel)
     if sensor.chip.channels:
         return _variance_by_channel(np.asarray(expected_e), sensor, exposure_s, channel)
     pixel = sensor.pixel
@@ -232,7 +232,7 @@ def noise_sources(
 
     Their squares sum to `noise_variance`, which says what each of them is.
     """
-    sensor = as_read(sensor, np.array([expected_e]), channel)
+    sensor = as_read(sensor, np.array([expected_e]), exposure_s, channel)
     if sensor.chip.channels:
         alone, share = of_channel(sensor, channel)
         return {name: noise / share for name, noise in noise_sources(expected_e * share, alone, exposure_s).items()}
@@ -259,11 +259,13 @@ def noise_sources(
     return {name: value**0.5 for name, value in variance_e2.items()}
 
 
-def as_read(sensor: SensorConfig, expected_e: NDArray[Any], channel: str | None = None) -> SensorConfig:
+def as_read(
+    sensor: SensorConfig, expected_e: NDArray[Any], exposure_s: float, channel: str | None = None
+) -> SensorConfig:
     """Camera with the gain and the channels' times that it takes for a frame; `channel` as of `noise_variance`."""
     if sensor.chip.channels:
-        return as_metered(sensor, expected_e, channel)
-    return of_reading(sensor, switched_to(sensor, expected_e)) if sensor.chip.switched else sensor
+        return as_metered(sensor, expected_e, exposure_s, channel)
+    return of_reading(sensor, switched_to(sensor, expected_e, exposure_s)) if sensor.chip.switched else sensor
 
 
 def as_raw(

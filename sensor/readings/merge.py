@@ -77,7 +77,7 @@ def dimmed(expected_e: Values, sensor: SensorConfig) -> Values:
     return np.asarray(expected_e * at_sites(sensor, expected_e.shape, 1.0, lambda x: x.light_share))
 
 
-def as_metered(sensor: SensorConfig, expected_e: Values, channel: str | None = None) -> SensorConfig:
+def as_metered(sensor: SensorConfig, expected_e: Values, exposure_s: float, channel: str | None = None) -> SensorConfig:
     """Camera whose metered channels have the times that they take for a frame.
 
     Parameters
@@ -90,8 +90,9 @@ def as_metered(sensor: SensorConfig, expected_e: Values, channel: str | None = N
         if not reading.metered or channel not in (None, reading.channel):
             return reading
         seen_e = expected_e[mask(sensor.cfa, reading.channel, expected_e.shape)] if channel is None else expected_e
-        bright_e = max(float(np.percentile(seen_e, METERED_PERCENTILE)) * reading.light_share, 1e-9)
-        share = METERED_SHARE * reading.pixel_of(sensor.pixel).full_well_e / bright_e
+        bright_e = float(np.percentile(seen_e, METERED_PERCENTILE)) * reading.light_share
+        filling_e = max(bright_e + sensor.pixel.dark_current_e_per_s * exposure_s, 1e-9)
+        share = METERED_SHARE * reading.pixel_of(sensor.pixel).full_well_e / filling_e
         steps = np.floor(_STEPS * np.log2(min(share, 1.0)) + 1e-6) / _STEPS
         return replace(reading, time_share=max(min(reading.time_share, float(2**steps)), 1e-6), metered=False)
 

@@ -65,9 +65,9 @@ def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
     return replace(sensor, pixel=pixel_of_one, chip=Chip())
 
 
-def switched_to(sensor: SensorConfig, expected_e: Floats) -> int:
+def switched_to(sensor: SensorConfig, expected_e: Floats, exposure_s: float) -> int:
     """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
-    bright_e = float(np.percentile(expected_e, METERED_PERCENTILE))
+    bright_e = float(np.percentile(expected_e, METERED_PERCENTILE)) + sensor.pixel.dark_current_e_per_s * exposure_s
     quiet_first = sorted(range(len(sensor.chip.readings)), key=lambda i: sensor.chip.readings[i].read_noise_e)
     holding = [i for i in quiet_first if bright_e <= METERED_SHARE * sensor.chip.readings[i].full_well_e]
     return holding[0] if holding else max(quiet_first, key=lambda i: sensor.chip.readings[i].full_well_e)

@@ -140,7 +140,7 @@ def weigh(
     scale = level_cd_m2 * exposure_s
     # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
     expected_e = scale * np.maximum(sensor_effects.full.mean(axis=0), 0.0)
-    sensor = as_read(sensor, expected_e)
+    sensor = as_read(sensor, expected_e, exposure_s)
     below = under_well(expected_e, sensor, exposure_s)
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
     noise_e2 = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0

@@ -101,7 +101,11 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_opened(cell.electrons)[place], dtype=np.float64) * light
     # a channel's metered time is the frame's, in its parts too
-    sensor = as_read(cell.sensor, _opened(cell.electrons) * light) if cell.sensor.chip.channels else cell.sensor
+    sensor = (
+        as_read(cell.sensor, _opened(cell.electrons) * light, cell.exposure_s)
+        if cell.sensor.chip.channels
+        else cell.sensor
+    )
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.part is not None:
         stream = stream.spawn(sample.part + 1)[-1]

@@ -234,7 +234,7 @@ def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -
     `per_second_e` are electrons behind every filter, shape (h, w, channel).
     """
     time_s = exposure_of_electrons_s(exposure, per_second_e, sensor) if isinstance(exposure, str) else exposure
-    return time_s, noise_of(as_metered(sensor, behind_filters(per_second_e * time_s, sensor)), time_s)
+    return time_s, noise_of(as_metered(sensor, behind_filters(per_second_e * time_s, sensor), time_s), time_s)
 
 
 def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:

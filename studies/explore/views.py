@@ -251,7 +251,9 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
 def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
     channel = str(channel_map(exposed.sensor.cfa, exposed.raw.shape)[row, column])
-    sensor, factor = of_channel(as_read(exposed.sensor, exposed.expected_e), channel)  # in electrons of its own
+    sensor, factor = of_channel(
+        as_read(exposed.sensor, exposed.expected_e, exposed.exposure_s), channel
+    )  # in electrons of its own
     pixel, time_s, signal_e = sensor.pixel, exposed.exposure_s, factor * float(_collected_e(exposed)[row, column])
     sources = noise_sources(signal_e, sensor, time_s)
     if not exposed.shot_noise:

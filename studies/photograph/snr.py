@@ -121,7 +121,10 @@ def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: 
     if sensor.chip.switched:
         count = len(sensor.chip.readings)
         light_e = [electrons_at_snr(snr, of_reading(sensor, number), exposure_s) for number in range(count)]
-        fits = (np.isfinite(e) and switched_to(sensor, np.array([e])) == number for number, e in enumerate(light_e))
+        fits = (
+            np.isfinite(e) and switched_to(sensor, np.array([e]), exposure_s) == number
+            for number, e in enumerate(light_e)
+        )
         return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
     levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
     ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))

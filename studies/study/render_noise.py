@@ -70,7 +70,7 @@ def _noise_and_room(
     expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
-    sensor = as_read(sensor, expected_e, channel)
+    sensor = as_read(sensor, expected_e, exposure_s, channel)
     return noise_variance(expected_e, sensor, exposure_s, channel), under_well(expected_e, sensor, exposure_s, channel)
 
 

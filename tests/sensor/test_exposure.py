@@ -8,6 +8,7 @@ from builders import any_order
 from loop import loop
 from refusal import refusal
 
+from sensor.chip import ChannelReading, Chip
 from sensor.config import LONGEST_S
 from sensor.exposure import (
     RULES,
@@ -18,6 +19,7 @@ from sensor.exposure import (
     most_informative_s,
 )
 from sensor.optics import SpectralIrradiance
+from sensor.photodiodes import binned
 from sensor.presets import preset
 from sensor.response import channel_electrons
 
@@ -65,6 +67,28 @@ def test_dim_light_gets_the_longest_time_and_no_light_too():
 )
 def test_a_rule_that_cannot_be_is_refused_in_one_line(arguments, words):
     assert words in refusal(auto_exposure_s, ramp(), preset("low_noise"), **arguments)
+
+
+@loop(("rule", "channel"), [("auto", "G"), ("auto:W", "W")])
+def test_light_and_dark_current_fill_the_well_together(rule, channel):
+    """Share of the pixel's light and of its dark current that a well holds which a rule looks at, and the well."""
+    light_e, dark_e = np.array([400.0, 1000.0, 500.0, 3000.0]), 2000.0
+    split = replace(preset("split_pixel").pixel, dark_current_e_per_s=dark_e)
+    plain = replace(preset("low_noise").pixel, dark_current_e_per_s=dark_e)
+    quad = replace(preset("low_noise", "quad_rgbw"), pixel=plain)
+    density = ChannelReading(channel, time_share=0.5, light_share=0.2)
+    cameras = (
+        (replace(preset("low_noise"), pixel=plain), 1.0, 1.0, 15_000.0),
+        (replace(preset("low_noise"), pixel=plain, chip=Chip(channels=(density,))), 0.1, 0.5, 15_000.0),
+        (replace(preset("split_pixel"), pixel=split), 1 / 1.1, 1 / 1.1, 22_000.0),
+        (binned(quad, "charge"), 4.0, 4.0, 60_000.0),
+    )
+    for sensor, of_light, of_dark, well_e in cameras:
+        frame = np.broadcast_to(light_e, (4, 4, 4))
+        exposure_s = exposure_of_electrons_s(rule, frame, sensor, 1e3)
+        filling_e = of_light * light_e["RGBW".index(channel)] + of_dark * dark_e
+        assert exposure_s * filling_e == pytest.approx(0.8 * well_e, rel=1e-12)
+        assert exposure_of_electrons_s(rule, 0 * frame, sensor, 1e3) == pytest.approx(0.8 * well_e / of_dark / dark_e)
 
 
 def test_a_mosaic_without_green_is_exposed_for_its_unit():

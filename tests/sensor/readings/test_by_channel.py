@@ -157,19 +157,21 @@ def test_a_metered_channel_takes_the_time_that_holds_its_bright_end():
     for white_e, time_share in (
         (9_000.0, 1.0),
         (12_000.0, 1.0),
+        (12_040.0, 2 ** (-1 / 16)),  # of light alone 12 000
         (24_000.0, 0.5),
         (48_000.0, 0.25),
         (30_000.0, 2 ** (-22 / 16)),
     ):
-        reading = as_metered(sensor, scene(white_e)).chip.channels[0]
+        light = scene(white_e - 2000 * TIME_S)  # the rest is dark current
+        reading = as_metered(sensor, light, TIME_S).chip.channels[0]
         assert reading.time_share == pytest.approx(time_share, rel=1e-12), white_e
         assert reading.time_share * white_e <= 0.8 * 15_000
-        raw = shot(sensor, scene(white_e), 2)
+        raw = shot(sensor, light, 2)
         assert raw.noise_of("W").shot == pytest.approx(1 / time_share)
         assert raw.exposure_s == TIME_S
         assert not raw.saturated.any()
     least = camera(ChannelReading("W", metered=True, time_share=0.125))
-    assert as_metered(least, scene(10.0)).chip.channels[0].time_share == 0.125
+    assert as_metered(least, scene(10.0), TIME_S).chip.channels[0].time_share == 0.125
 
 
 def test_rules_of_exposure_look_at_each_channel_s_own_well():

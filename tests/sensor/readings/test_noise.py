@@ -100,7 +100,9 @@ def test_at_a_seam_half_of_the_pixels_have_lost_the_reading():
 def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_end():
     sensor = switched(preset("dual_gain"))
     high, low = (of_reading(sensor, index) for index in (0, 1))
-    assert [switched_to(sensor, np.array([e])) for e in (10.0, 1746.0, 1747.0, 8e3, 1e5)] == [0, 0, 1, 1, 1]
+    assert [switched_to(sensor, np.array([e]), 0.01) for e in (10.0, 1746.0, 1747.0, 8e3, 1e5)] == [0, 0, 1, 1, 1]
+    hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1000.0))
+    assert [switched_to(hot, np.array([e]), 1.0) for e in (10.0, 746.0, 747.0)] == [0, 0, 1]
     frame = np.array([[5.0, 1000.0], [20.0, 3000.0]])
     np.testing.assert_array_equal(noise_variance(frame, sensor, 0.01), noise_variance(frame, low, 0.01))
     np.testing.assert_array_equal(noise_variance(frame / 10, sensor, 0.01), noise_variance(frame / 10, high, 0.01))
