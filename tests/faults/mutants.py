@@ -4,30 +4,27 @@ python tests/faults/mutants.py --count 300    results are kept in out/mutants.js
 
 Code and tests are the last commit's, and so is the seed, if none is given: its first eight digits. The operators are
 cosmic-ray's (``pip install cosmic-ray``). A place in a file is drawn first, then what stands there instead; arithmetic
-becomes other arithmetic, since bits of floats fail at once. Annotations are left alone, and a mutant that can't be
-imported counts for nothing: another is drawn. The file's own tests run first, then the others of its package. Prints
-the survivors and a table.
+becomes other arithmetic, since bits of floats fail at once. A mutant that can't be imported counts for nothing: another
+is drawn. The file's own tests run first, then the others of its package. Prints the survivors and a table.
 """
 
 import argparse
-import ast
-import difflib
 import json
 import random
 import re
 import subprocess
 import tempfile
 import time
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterator
-from contextlib import suppress
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from cosmic_ray.ast import Visitor, get_ast
-from cosmic_ray.mutating import mutate_code
-from cosmic_ray.operators.provider import OperatorProvider
+from cosmic_ray.commands import init
+from cosmic_ray.mutating import use_mutation
+from cosmic_ray.plugins import get_operator
+from cosmic_ray.work_db import use_db
+from cosmic_ray.work_item import MutationSpec
 from plant_faults import MAKE_TEST, ROOT, run_tests
 
 TESTS = {  # below tests/
@@ -43,82 +40,32 @@ TESTS = {  # below tests/
     "docs/make/white_pixel.py": "docs/test_white_pixel.py",
 }
 LEFT_OUT = re.compile(r".*_(RShift|LShift|BitOr|BitAnd|BitXor)_.*|.*_(RShift|LShift|BitOr|BitAnd|BitXor)")
-NEEDS_ARGUMENTS = ("VariableInserter", "VariableReplacer")
 
 
-@dataclass(frozen=True)
-class Mutant:
-    """A file with one change: its code, and the lines that changed."""
-
-    file: str
-    code: str
-    change: str
-
-
-class _Places(Visitor):
-    """Counts, for each place in a file, the operators that change it."""
-
-    def __init__(self, operators: dict[str, Any]) -> None:
-        self.operators, self.counts = operators, Counter[str]()
-        self.changes: dict[tuple[Any, Any], list[tuple[str, int]]] = {}
-
-    def visit(self, node: Any) -> Any:
-        for name, operator in self.operators.items():
-            for place in operator.mutation_positions(node):
-                self.changes.setdefault(place, []).append((name, self.counts[name]))
-                self.counts[name] += 1
-        return node
-
-
-def drawn(seed: int, copy: Path) -> Iterator[Mutant]:
+def drawn(seed: int, copy: Path) -> Iterator[MutationSpec]:
     """All mutants in an order of the seed, no place twice."""
-    provider = OperatorProvider()
-    names = [name for name in provider if name not in NEEDS_ARGUMENTS and not LEFT_OUT.fullmatch(name)]
-    operators = {name: provider[name]() for name in sorted(names)}
+    places: dict[Any, list[MutationSpec]] = defaultdict(list)
+    with use_db(copy / "mutants.sqlite") as base:
+        init([copy / file for file in TESTS], base, {})
+        for mutant in (item.mutations[0] for item in base.work_items):
+            if not LEFT_OUT.fullmatch(mutant.operator_name):
+                places[mutant.module_path, mutant.start_pos, mutant.end_pos].append(mutant)
     source = random.Random(seed)
-    places = []
-    for file in TESTS:
-        found = _Places(operators)
-        found.walk(get_ast((copy / file).read_text("utf-8")))
-        places += [(file, changes) for changes in found.changes.values()]
-    for file, changes in source.sample(places, len(places)):
-        text = (copy / file).read_text("utf-8")
-        name, number = source.choice(changes)
-        code = mutate_code(text, operators[name], number)
-        with suppress(SyntaxError):
-            if without_annotations(code) != without_annotations(text):
-                yield Mutant(file, code, difference(text, code))
+    for place in source.sample(sorted(places), len(places)):
+        yield source.choice(sorted(places[place], key=lambda mutant: (mutant.operator_name, mutant.occurrence)))
 
 
-def without_annotations(code: str) -> str:
-    """Syntax of code that has no annotations."""
-    tree = ast.parse(code)
-    for node in ast.walk(tree):
-        for name in ("annotation", "returns"):
-            if getattr(node, name, None) is not None:
-                setattr(node, name, ast.Constant(None))
-    return ast.dump(tree)
-
-
-def difference(text: str, code: str) -> str:
-    lines = list(difflib.unified_diff(text.splitlines(), code.splitlines(), n=0, lineterm=""))[2:]
-    return " ".join(re.sub(r"^@@ -(\d+).*", r"line \1:", line) for line in lines)
-
-
-def tried(mutant: Mutant, copy: Path) -> dict[str, Any]:
+def tried(mutant: MutationSpec, file: str, copy: Path) -> dict[str, Any]:
     """What its package's tests make of a mutant, those of its own file first."""
-    file, text, start = copy / mutant.file, (copy / mutant.file).read_text("utf-8"), time.perf_counter()
-    folder = copy / "tests" / TESTS[mutant.file]
-    tests = [*map(str, folder.rglob(f"test_{file.stem}.py")), str(folder)]
-    try:
-        file.write_text(mutant.code, "utf-8")
-        code, test = run_tests(copy, tests, MAKE_TEST)
-    except subprocess.TimeoutExpired:
-        code, test = 1, "::it never ends"
-    finally:
-        file.write_text(text, "utf-8")
+    folder, start = copy / "tests" / TESTS[file], time.perf_counter()
+    tests = [*map(str, folder.rglob(f"test_{mutant.module_path.stem}.py")), str(folder)]
+    with use_mutation(mutant.module_path, get_operator(mutant.operator_name)(), mutant.occurrence):
+        try:
+            code, test = run_tests(copy, tests, MAKE_TEST)
+        except subprocess.TimeoutExpired:
+            code, test = 1, "::it never ends"
     result = "survived" if code == 0 else "caught" if code == 1 and "::" in test else "not importable"
-    return {"file": mutant.file, "result": result, "by": test, "seconds": round(time.perf_counter() - start, 1)}
+    return {"file": file, "result": result, "by": test, "seconds": round(time.perf_counter() - start, 1)}
 
 
 def git(*words: str) -> bytes:
@@ -141,9 +88,12 @@ def main() -> int:
         copy = Path(folder)
         subprocess.run(["tar", "-x", "-C", folder], input=git("archive", commit), check=True)
         for mutant in drawn(options.seed, copy):
-            key = f"{mutant.file} {mutant.change}"
+            file = str(mutant.module_path.relative_to(copy))
+            key = (
+                f"{file}:{mutant.start_pos[0]} column {mutant.start_pos[1]}: {mutant.operator_name} {mutant.occurrence}"
+            )
             if key not in results:
-                results[key] = tried(mutant, copy)
+                results[key] = tried(mutant, file, copy)
                 options.results.write_text(json.dumps(known))
             if results[key]["result"] != "not importable":
                 counted.append(results[key])

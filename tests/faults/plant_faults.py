@@ -68,51 +68,18 @@ def read_faults() -> Iterator[Fault]:
 FAULTS = tuple(read_faults())
 
 
-class _Exchange(ast.NodeTransformer):
-    """Puts one piece of syntax in the place of another, and counts the places."""
-
-    def __init__(self, there: str, instead: str) -> None:
-        self.old, self.new, self.count = _syntax(there), _syntax(instead), 0
-
-    def visit(self, node: ast.AST) -> Any:
-        if isinstance(node, ast.Expr) and isinstance(self.new, ast.stmt) and _same(node.value, self.old):
-            self.count += 1  # a call alone on its line, and a statement in its place
-            return self.new
-        if not _same(node, self.old):
-            return self.generic_visit(node)
-        self.count += 1
-        return self.new
-
-
-def _same(one: Any, other: Any) -> bool:
-    """Whether two pieces of syntax are equal, wherever they stand; most differ at once."""
-    if type(one) is not type(other):
-        return False
-    if isinstance(one, ast.AST):
-        return all(_same(getattr(one, name, None), getattr(other, name, None)) for name in one._fields)
-    if isinstance(one, list):
-        return len(one) == len(other) and all(map(_same, one, other))
-    return bool(one == other)
-
-
-def _syntax(piece: str) -> ast.AST:
-    """Syntax of a statement, an expression, or an argument `name=value,`."""
-    if piece.endswith(","):
-        return ast.parse(f"_({piece})", mode="eval").body.keywords[0]
-    statement = ast.parse(piece).body[0]
-    return statement.value if isinstance(statement, ast.Expr) else statement
-
-
 def planted(fault: Fault, text: str) -> ast.Module:
     """Syntax of the file with the fault in it."""
     tree = ast.parse(text)
-    functions = [node for node in ast.walk(tree) if getattr(node, "name", None) == fault.function]
-    scope = functions[0] if functions else tree
+    scope = next((node for node in ast.walk(tree) if getattr(node, "name", None) == fault.function), tree)
+    code = ast.unparse(scope)
     for there, instead in fault.edits:
-        exchange = _Exchange(there, instead)
-        exchange.visit(scope)
-        if exchange.count != 1:
-            raise SystemExit(f"{fault.name}: {there!r} stands {exchange.count} times in {fault.file}; write it anew")
+        old = ast.unparse(ast.parse(f"_({there})"))[2:-1] if there.endswith(",") else ast.unparse(ast.parse(there))
+        if code.count(old) != 1:
+            raise SystemExit(f"{fault.name}: {there!r} stands {code.count(old)} times in {fault.file}; write it anew")
+        code = code.replace(old, instead.rstrip(","))
+    made = ast.parse(code)
+    vars(scope).update(vars(made if scope is tree else made.body[0]))
     return ast.fix_missing_locations(tree)
 
 
