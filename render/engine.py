@@ -32,7 +32,7 @@ Progress = Callable[[float, float], None]  # share of the work done (0..1), rela
 
 
 @as_guest()
-def render(
+def render(  # noqa: PLR0913  its calls in README and tutorials go on
     scene: Scene,
     size: tuple[int, int],
     *,

@@ -18,22 +18,6 @@ LONG_MODULES = {"render/integrator/dense.py"}  # one algorithm, read from top to
 MOST_FUNCTION_LINES, MOST_WITHOUT_SECTIONS = 100, 50
 MOST_MODULES_A_FOLDER = 20
 ONE_A_THING = ("scenes", "studies/commands", "studies/paper")  # a scene, a command, a figure: as many as there are
-MOST_PARAMETERS = 8
-# Names of README and tutorials, whose calls go on.
-MORE_PARAMETERS = {"render/engine.py:render", "studies/photograph/camera.py:capture"}
-
-# Who alone may import a library, and why.
-SOLE_IMPORTERS = {
-    "drjit": (
-        {"rodcone/jit.py"},
-        "rodcone.llvm has run before it, so that no import order loads an LLVM that aborts the process; "
-        "write `from rodcone.jit import dr`",
-    ),
-    "mitsuba": (
-        {"render/engine.py", "render/loader.py"},
-        "everything else works on plain arrays, and on one variant chosen in one place; call render.engine",
-    ),
-}
 
 
 def name_of(path: Path) -> str:
@@ -44,19 +28,6 @@ def name_of(path: Path) -> str:
 def nodes(path: Path) -> tuple[ast.AST, ...]:
     """Syntax of a file, node by node; the first is the module."""
     return tuple(ast.walk(ast.parse(path.read_text("utf-8"))))
-
-
-def imports(path: Path) -> Iterator[tuple[int, str]]:
-    """Line and dotted name of every absolute import, also `importlib.import_module("name")` and `__import__`."""
-    for node in nodes(path):
-        if isinstance(node, ast.Import):
-            yield from ((node.lineno, alias.name) for alias in node.names)
-        elif isinstance(node, ast.ImportFrom) and node.level == 0 and node.module:
-            yield node.lineno, node.module
-        elif isinstance(node, ast.Call) and node.args and isinstance(node.args[0], ast.Constant):
-            called = getattr(node.func, "attr", getattr(node.func, "id", ""))
-            if called in ("import_module", "__import__", "importorskip"):
-                yield node.lineno, str(node.args[0].value)
 
 
 def code_lines(function: ast.FunctionDef | ast.AsyncFunctionDef) -> int:
@@ -73,18 +44,6 @@ def test_the_walk_finds_every_package_that_is_shipped() -> None:
     shipped = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["tool"]["hatch"]["build"]["targets"]["wheel"]
     assert {Path(name_of(path)).parts[0] for path in MODULES} == set(shipped["packages"])
     assert Path(__file__).resolve() in SCRIPTS
-
-
-def test_only_one_place_imports_a_sensitive_library() -> None:
-    for library, (allowed, reason) in SOLE_IMPORTERS.items():
-        wrong = [
-            f"{name_of(path)}:{line}"
-            for path in MODULES
-            if name_of(path) not in allowed and library in path.read_text("utf-8")
-            for line, name in imports(path)
-            if name.split(".")[0] == library
-        ]
-        assert not wrong, f"{wrong} import {library}; only {sorted(allowed)} may: {reason}"
 
 
 def test_no_module_binds_a_packages_bare_name() -> None:
@@ -134,21 +93,6 @@ def test_a_folder_can_be_taken_in_at_a_glance() -> None:
     }
     wrong = {name: count for name, count in counts.items() if count > MOST_MODULES_A_FOLDER and name not in ONE_A_THING}
     assert not wrong, f"{wrong}: more than {MOST_MODULES_A_FOLDER} modules; which of them belong together?"
-
-
-def test_functions_take_few_parameters() -> None:
-    wrong = []
-    for path in MODULES:
-        for node in functions(path):
-            taken = node.args
-            count = len([*taken.posonlyargs, *taken.args, *taken.kwonlyargs])
-            if (
-                count > MOST_PARAMETERS
-                and f"{name_of(path)}:{node.name}" not in MORE_PARAMETERS
-                and path.parent.name != "commands"
-            ):
-                wrong.append(f"{name_of(path)}:{node.name} ({count})")
-    assert not wrong, f"{wrong}: more than {MOST_PARAMETERS} parameters; pass values that belong together as one"
 
 
 def test_a_public_class_has_a_name_of_its_own() -> None:

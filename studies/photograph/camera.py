@@ -208,7 +208,7 @@ def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance:
     return float(deltaE_ciede2000(lab, grey))
 
 
-def capture(
+def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     radiance: SpectralRadiance,
     sensor: SensorConfig | None = None,
     exposure_s: float | None = None,
