@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from page_parts import RESULTS, csv_text, fill
+from page_parts import RESULTS, csv_text, run, write_page
 from skimage.color import rgb2lab
 
 from isp.design.expected_error import expected_error, sampled
@@ -50,8 +50,8 @@ from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white
 from studies.photograph.camera import capture, colour_fit, develop_to_scale
 from studies.training.train import train_prior
 
-PAGE = Path(__file__).resolve().parents[1] / "design.md"
-FOLDER, TABLE = Path("out/design"), RESULTS / "design.csv"
+PAGE = RESULTS.parent / "design.md"
+FOLDER = Path("out/design")
 SCENES, SIDE, SPP = 10, 96, 256
 T = float(scipy.special.stdtrit(SCENES - 1, 0.975))  # half a 95 % interval over scenes, over the standard error
 SENSORS = ("low_noise", "table1_output")
@@ -209,7 +209,7 @@ def write(lines: Sequence[Mapping[str, Any]]) -> None:
     kinds = ("expected", "simulated", "interval")
     keys = ["sensor", "mosaic", "level", "developer", *(f"{figure}_{kind}" for figure in FIGURES for kind in kinds)]
     cells = [[x if isinstance(x := line[key], str) else f"{x:.3f}" for key in keys] for line in lines]
-    TABLE.write_text(csv_text(keys, cells))
+    figures = csv_text(keys, cells)
     agreement = [f"| RMS [dB], sign | {' | '.join(FIGURES)} |", "|---|---|---|---|"]
     for sensor in SENSORS:
         cells = []
@@ -224,7 +224,7 @@ def write(lines: Sequence[Mapping[str, Any]]) -> None:
             signs = ", ".join(f"{alike[those].sum()}/{those.sum()}" for those in (over, sure))
             cells.append(f"{rms:.2f} ({exact:.2f}) {signs}")
         agreement.append(f"| `{sensor}` | {' | '.join(cells)} |")
-    PAGE.write_text(fill(PAGE.read_text(), {"proof": "\n".join(agreement), "order": known_order()}))
+    write_page(PAGE, {"proof": "\n".join(agreement), "order": known_order()}, "", figures)
 
 
 def linear_db(prior: str, sensor: SensorConfig, time_s: float) -> float:
@@ -254,7 +254,13 @@ def known_order() -> str:
     return "\n".join(lines)
 
 
-if __name__ == "__main__":
+def main(*commit_and_network: str) -> None:
+    """Write all, with gains simulated anew where a commit and a network are given."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    lines = gains(simulated(*sys.argv[1:])) if sys.argv[1:] else list(csv.DictReader(TABLE.read_text().splitlines()))
-    write(with_expected(lines))
+    kept = list(csv.DictReader((RESULTS / "design.csv").read_text().splitlines()))
+    write(with_expected(gains(simulated(*commit_and_network)) if commit_and_network else kept))
+
+
+if __name__ == "__main__":
+    fix = "give a commit's hash and the wheel of demosaicnet, or neither"
+    run(main, sys.argv[1:], len(sys.argv) in (1, 3), fix)

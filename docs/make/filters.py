@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from design import LEVELS, PAGE, SCENES, developed, trained, transport_of, with_prior
 from numpy.typing import NDArray
-from page_parts import RESULTS, csv_text, fill
+from page_parts import RESULTS, csv_text, fill, run
 from PIL import Image
 
 from isp.processors.catalogue import NAMED, Processor
@@ -127,11 +127,16 @@ def ahead_db(rows: list[dict[str, Any]], found: str) -> NDArray[np.float64]:
     return np.mean(leads_db, axis=0)
 
 
-if __name__ == "__main__":
+def main(commit: str) -> None:
+    """Write all, and print the leads over the better of Bayer and RGBW."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    show(sys.argv[1])
-    rows = [row for number in range(SCENES) for row in rows_of(sys.argv[1], number)]
+    show(commit)
+    rows = [row for number in range(SCENES) for row in rows_of(commit, number)]
     write(leads(rows))
     for found in FOUND:
         ahead = ahead_db(rows, found)
         print(f"{found}: {ahead.mean():+.2f}±{half_width(ahead):.2f} dB over the better of Bayer and RGBW")
+
+
+if __name__ == "__main__":
+    run(main, sys.argv[1:], len(sys.argv) == 2, "give a commit's hash")

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib import rc_context
 from matplotlib.figure import Figure
-from page_parts import RESULTS, csv_text, write_page
+from page_parts import RESULTS, Parts, csv_text, run, write_page
 from real_cameras import REPORTS
 
 from rodcone.errors import InputError
@@ -65,12 +65,12 @@ class Entry:
         return np.array([getattr(row, metric.key) for row in self.pictures[processor or self.processor, level]])
 
 
-def parts(run: LastRun) -> tuple[dict[str, str], str, str]:
+def parts(swept: LastRun) -> Parts:
     """Return the page's generated parts, its figure as SVG, and every figure as CSV.
 
     Parameters
     ----------
-    run : LastRun
+    swept : LastRun
         Of a study of one scene, spectrum, exposure and white balance, with `BAYER` and `RGBW`.
 
     Raises
@@ -78,10 +78,10 @@ def parts(run: LastRun) -> tuple[dict[str, str], str, str]:
     InputError
         For another study, or one that isn't whole.
     """
-    study, seeds = run.study, {row.seed for row in run.rows}
-    require_alike(run.rows)
-    levels = list(dict.fromkeys(row.level for row in sorted(run.rows, key=lambda row: row.luminance_cd_m2)))
-    entries = [_entry(given, run.rows) for given in study["sensors"]]
+    study, seeds = swept.study, {row.seed for row in swept.rows}
+    require_alike(swept.rows)
+    levels = list(dict.fromkeys(row.level for row in sorted(swept.rows, key=lambda row: row.luminance_cd_m2)))
+    entries = [_entry(given, swept.rows) for given in study["sensors"]]
     rgbw = next((entry for entry in entries if entry.processor == RGBW), None)
     if rgbw is None or not study.get("sensor_side_um") or len(entries) > len(LINES):
         raise InputError(
@@ -104,7 +104,7 @@ def parts(run: LastRun) -> tuple[dict[str, str], str, str]:
     green, white = (rgbw.sensor.responses.curves[channel] for channel in "GW")
     at_peak = np.interp(green.wavelength_nm[green.values.argmax()], white.wavelength_nm, white.values)
     scene = study["scenes"][0]["source"]
-    worst = max(row.mc_share for row in run.rows)
+    worst = max(row.mc_share for row in swept.rows)
     set_up = (
         f"Here: scene `{scene}`, {area.side_um:g} µm, f/{rgbw.sensor.lens.f_number:g}, at most "
         f"{duration(study['longest_exposure_s'])}, compared at {area.coarsest_um:g} µm. Green's filter passes "
@@ -223,16 +223,10 @@ def _figure(entries: Sequence[Entry], levels: Sequence[str]) -> Figure:
     return figure
 
 
-def main(arguments: Sequence[str]) -> None:
+def write(folder: str) -> None:
     """Write the page of a sweep's folder, from where the sweep ran: the names of its sensors' files start there."""
-    try:
-        if len(arguments) != 1:
-            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder")
-        content, figure, cells = parts(last_run(Path(arguments[0])))
-    except InputError as error:
-        raise SystemExit(f"five_cameras: {error}") from error
-    write_page(PAGE, content, figure, cells)
+    write_page(PAGE, *parts(last_run(Path(folder))))
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(write, sys.argv[1:], len(sys.argv) == 2, "give the sweep's folder")

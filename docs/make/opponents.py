@@ -2,17 +2,17 @@
 
 import json
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
+from functools import partial
 
 import numpy as np
-from page_parts import RESULTS, csv_text, write_page
+from page_parts import RESULTS, Parts, csv_text, run, write_swept
 
 from rodcone.errors import InputError
 from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
 from studies.pages.plots import light_charts, svg_text
 from studies.pages.report_text import significant, table
 from studies.pages.verdict import OUTCOMES, leads
-from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 
 PAGE = RESULTS.parent / "opponents.md"
@@ -22,7 +22,7 @@ MARGINS = {PSNR.key: 0.1, DELTA_E.key: 0.1, FLIP.key: 0.003}  # a camera no furt
 LINES = (OURS, "ple_bayer", "bayer_residual_bm3d", "interleaved")  # of the figure
 
 
-def parts(rows: Iterable[Row], version: str) -> tuple[dict[str, str], str, str]:
+def parts(rows: Iterable[Row], version: str) -> Parts:
     """Return the page's generated parts, its figure as SVG, and every figure as CSV.
 
     Raises
@@ -109,17 +109,5 @@ def parts(rows: Iterable[Row], version: str) -> tuple[dict[str, str], str, str]:
     return content, svg_text(light_charts(light, charts)), csv_text(header, cells)
 
 
-def main(arguments: Sequence[str]) -> None:
-    """Write the page's parts, its figure and its table, all or none."""
-    try:
-        if len(arguments) != 1:
-            raise InputError(f"arguments: {list(arguments)} are not allowed; give the sweep's folder")
-        rows = read_rows(arguments[0])
-        content, figure, cells = parts(rows, json.loads(rows[0].versions)["rodcone"] if rows else "")
-    except InputError as error:
-        raise SystemExit(f"opponents: {error}") from error
-    write_page(PAGE, content, figure, cells)
-
-
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    run(partial(write_swept, PAGE, parts), sys.argv[1:], len(sys.argv) == 2, "give the sweep's folder")

@@ -6,9 +6,8 @@ from math import hypot, log10, sqrt
 from pathlib import Path
 
 import numpy as np
-from page_parts import RESULTS, csv_text, fill
+from page_parts import RESULTS, Parts, csv_text, write_page
 
-from rodcone.files import replacing
 from sensor.cameras.emva_report import EmvaReport, numbers_of, read_report
 from sensor.cameras.numbers import PixelNumbers, missing
 from sensor.chip import PixelConfig
@@ -108,8 +107,8 @@ def _snr_db(chip: Characterisation, light_e: float) -> float:
     return 20 * log10(float(np.interp(light_e, chip.transfer.light_e, chip.snr)))
 
 
-def results(reports: Mapping[str, EmvaReport]) -> tuple[dict[str, str], str]:
-    """Return the page's generated parts, and all figures as CSV.
+def results(reports: Mapping[str, EmvaReport]) -> Parts:
+    """Return the page's generated parts, no figure, and all numbers as CSV.
 
     Raises
     ------
@@ -132,7 +131,7 @@ def results(reports: Mapping[str, EmvaReport]) -> tuple[dict[str, str], str]:
         "cameras": table(("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview),
         "beyond": table(("camera", "figure", "published", "recovered", "off", "within?"), beyond),
     }
-    return parts, csv_text(("camera", *HEAD), cells)
+    return parts, "", csv_text(("camera", *HEAD), cells)
 
 
 def _cells(name: str, row: PublishedFigure) -> list[str]:
@@ -146,10 +145,7 @@ def _cells(name: str, row: PublishedFigure) -> list[str]:
 
 def main() -> None:
     """Write the page's parts and the table."""
-    parts, figures = results({path.stem: read_report(path) for path in sorted(REPORTS.glob("*.toml"))})
-    with replacing(PAGE, FIGURES) as (to_page, to_figures):
-        to_page.write_text(fill(PAGE.read_text("utf-8"), parts), "utf-8")
-        to_figures.write_text(figures, "utf-8")
+    write_page(PAGE, *results({path.stem: read_report(path) for path in sorted(REPORTS.glob("*.toml"))}))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
-from page_parts import csv_text, write_page
+from page_parts import RESULTS, Parts, csv_text, run, write_swept
 from PIL import Image
 
 from rodcone.errors import InputError
@@ -24,12 +24,10 @@ from studies.pages.headline import WHITE_PIXEL
 from studies.pages.plots import light_charts, svg_text
 from studies.pages.report_compare import DRAWN
 from studies.pages.report_text import fixed, lead_text, level_text, significant, table
-from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 
-ROOT = Path(__file__).resolve().parents[2]
-PAGE = ROOT / "docs" / "white_pixel.md"
-STUDY = ROOT / "studies" / "configs" / "white_pixel.toml"
+PAGE = RESULTS.parent / "white_pixel.md"
+STUDY = PAGE.parents[1] / "studies" / "configs" / "white_pixel.toml"
 METRICS = (PSNR, DELTA_E, FLIP)
 # No training picture is among them (studies/training/pictures.py); by the wheel and the folder in it that holds them.
 PHOTOGRAPHS = {
@@ -65,7 +63,7 @@ def write_study(folder: Path) -> None:
     (folder / "study.toml").write_text(re.sub(r"processors = .*", f"processors = {json.dumps(cameras)}", text), "utf-8")
 
 
-def parts(rows: Iterable[Row], version: str) -> tuple[dict[str, str], str, str]:
+def parts(rows: Iterable[Row], version: str) -> Parts:
     """Return the page's generated parts, its figure as SVG, and every figure as CSV."""
     places: dict[tuple[str, str, str], dict[str, Row]] = {}
     for row in rows:
@@ -178,19 +176,18 @@ def exposures(places: Places, balance: str, levels: Sequence[str]) -> str:
     return ", ".join(said)
 
 
+def write(what: str, folder: str) -> None:
+    """Write the study, or the page's parts, its figure and its table."""
+    if what == "study":
+        write_study(Path(folder))
+    else:
+        write_swept(PAGE, parts, folder)
+
+
 def main(arguments: Sequence[str]) -> None:
-    """Write the study, or the page's parts, its figure and its table, all or none."""
-    try:
-        if len(arguments) != 2 or arguments[0] not in ("study", "page"):
-            raise InputError(f"arguments: {list(arguments)} are not allowed; give study and a folder, or page and one")
-        if arguments[0] == "study":
-            write_study(Path(arguments[1]))
-            return
-        rows = read_rows(arguments[1])
-        content, figure, cells = parts(rows, json.loads(rows[0].versions)["rodcone"] if rows else "")
-    except InputError as error:
-        raise SystemExit(f"white_pixel: {error}") from error
-    write_page(PAGE, content, figure, cells)
+    """Write what is asked for."""
+    allowed = len(arguments) == 2 and arguments[0] in ("study", "page")
+    run(write, arguments, allowed, "give study and a folder, or page and one")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,11 @@
-"""The page of all cameras: counts by hand, a camera that is no worse, and sweeps that aren't whole."""
+"""The page of all cameras: counts by hand, a camera that is no worse, sweeps that aren't whole; wrong arguments."""
 
 import csv
+import runpy
+import sys
 from dataclasses import replace
 
+import pytest
 from opponents import PAGE, parts
 from refusal import refusal
 from report_sample import sample_row
@@ -60,3 +63,14 @@ def test_a_sweep_of_one_seed_or_without_a_picture_is_refused() -> None:
 def test_the_page_has_a_place_for_every_part() -> None:
     text = PAGE.read_text("utf-8")
     assert [name for name in ("set-up", "ranks") if text.count(f"<!-- {name} -->") != 1] == []
+
+
+@pytest.mark.parametrize(
+    ("program", "words"), [("design", ["2eb261e"]), ("filters", []), ("opponents", []), ("five_cameras", ["a", "b"])]
+)
+def test_a_program_with_other_arguments_ends_in_one_line(
+    program: str, words: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", [f"{program}.py", *words])
+    with pytest.raises(SystemExit, match=rf"^{program}: arguments: .* are not allowed; give .*$"):
+        runpy.run_path(str(PAGE.parent / "make" / f"{program}.py"), run_name="__main__")
