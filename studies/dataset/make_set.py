@@ -24,6 +24,7 @@ from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards,
 from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note
+from studies.study.scene_source import open_radiance_file
 from studies.study.study import Condition, Study, conditions, label, mosaics
 from studies.sweep.cells import Cell
 from studies.sweep.database import open_results
@@ -74,9 +75,9 @@ def make_set(
     """
     check_cameras(study, order)
     scenes, folder = open_all(study), out / SET
-    for opened in scenes.values():
-        if opened.scene is not None:  # a picture's size is known once it is read
-            _windows(opened.size, order.crop)
+    for opened in scenes.values() if order.crop else ():
+        file, white = opened.choice.source, opened.white
+        _windows(opened.size if opened.scene else open_radiance_file(file, white)[0].counts.shape, order.crop)
     identity = _identity(study, scenes.values(), order)
     with at_work(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)

@@ -248,6 +248,8 @@ def test_parts_that_exceed_a_scenes_frame_are_refused_before_its_render(
     monkeypatch.setattr(make_set_module, "scene_cells", lambda *_: pytest.fail("a scene is rendered"))
     drawn = {"scenes": (SceneChoice("generated-1f"),), "render": RenderLimits(size=32)}
     refusal(made, tmp_path, **drawn, order=SetOrder(crop=34), match="crop: 34 exceeds the frames' side, 32; allowed")
+    drawn["scenes"] += (SceneChoice(str(SAMPLE.picture(tmp_path / "scene.exr")), "E"),)
+    refusal(made, tmp_path, **drawn, order=SetOrder(crop=18), match="crop: 18 exceeds the frames' side, 16; allowed")
 
 
 def test_scenes_whose_samples_would_share_a_key_are_told_in_a_line(tmp_path: Path) -> None:
