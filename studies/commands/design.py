@@ -53,7 +53,7 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
         raise InputError("curves: the sensor has no W, the response without a filter; add W to its responses")
     by_camera = {goal.never_worse_than: expected(goal, reference)}
     if tile:  # one that is refused leaves no folder
-        expected(goal, with_tile(base, tile, base.responses))
+        by_camera["design"] = expected(goal, with_tile(base, tile, base.responses))
     out.mkdir(parents=True, exist_ok=True)
     # Tiles that were tried count for the same question alone.
     tried = out / "tried.json"
@@ -71,12 +71,15 @@ def design(sensor: str, /, goal: Annotated[Goal, Parameter(name="*")] = DEFAULT,
         camera = with_tile(base, tile, base.responses)
         if goal.filters:
             camera = best_filters(goal, base, tile, step)
+    if goal.filters or "design" not in by_camera:
+        by_camera["design"] = expected(goal, camera)
     # Beside the design: published mosaics of three channels or more that the sensor can have, Bayer's in one phase.
-    by_camera["design"] = expected(goal, camera)
     for name in (*MOSAICS, *VARIATIONS):
+        other = None
         with suppress(InputError):  # of a curve that it lacks, or of a quad where it bins
-            if len((other := vary(base, name)).channels) > 2 and not name.startswith("bayer_"):
-                by_camera[name] = by_camera.get(name) or expected(goal, other)
+            other = vary(base, name)
+        if other and len(other.channels) > 2 and not name.startswith("bayer_") and name not in by_camera:
+            by_camera[name] = expected(goal, other)
     page = design_page(goal, camera, by_camera, len(tried_gains_db))
     write_files({**_camera_files(out, sensor, camera, goal.filters), out / "design.html": page})
     print(f"{tile_text(tile)}\n{out}")

@@ -9,9 +9,13 @@ from command_line import call, check_refusals
 
 from rodcone import read_study
 from rodcone.digests import digest_file
+from rodcone.errors import InputError
+from sensor.config import SensorConfig
 from sensor.presets import preset, preset_file
+from studies.commands import design as design_module
 from studies.design import expect as expect_module
-from studies.design.expect import expect
+from studies.design.expect import ExpectedError, expect
+from studies.design.search import Goal
 from studies.sweep import provenance
 
 FEW = ["design", "low_noise", "--tile", "2x2", "--letters", "RGB", "--over", "classroom:classroom"]
@@ -119,3 +123,25 @@ def test_a_wrong_option_is_refused_and_leaves_no_folder(tmp_path: Path, monkeypa
     )
     check_refusals("design low_noise", rows, tmp_path)
     assert not (tmp_path / "found").exists()
+
+
+def test_a_given_tile_is_expected_once_and_a_mosaic_that_cannot_be_judged_is_told(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    judged: list[tuple[str, ...]] = []
+
+    def expected(_: Goal, camera: SensorConfig) -> list[ExpectedError]:
+        judged.append(camera.cfa)
+        if len(judged) > most:
+            raise InputError("sensor: it can't be judged; allowed: another; take one")
+        return [ExpectedError(25.0, 0.01, 30.0, 29.0, 31.0, 2.0, 3.0)]
+
+    monkeypatch.setattr(design_module, "expected", expected)
+    asked = ["design", "low_noise", "--tile", "BR/RB", *FEW[6:], "-o", tmp_path / "found"]
+    most = 99
+    assert call(asked)[0] == 0
+    assert judged.count(("BR", "RB")) == 1
+    assert len(judged) > len(set(judged)) > 8  # complementary filters share a tile
+    most = len(judged) + 2
+    code, _, err = call(asked)
+    assert (code, "can't be judged" in err) == (2, True)
