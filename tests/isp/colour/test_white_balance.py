@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.colour.white_balance import WhiteBalance, neutral_response
+from isp.colour.white_balance import WhiteBalance, gray_world, neutral_response
 from rodcone.errors import InputError
 
 
@@ -58,3 +58,31 @@ def test_a_value_is_taken_as_it_is_and_a_wrong_response_refused() -> None:
     for name, pair in (("neutral", ([1, 2, 3], None)), ("balance", (None, [1, 2, 3, -1]))):
         with pytest.raises(InputError, match=rf"^{name}: .* is not allowed; give a positive response for each of"):
             WhiteBalance.of(image, *pair)
+
+
+# Gray World in closed form: means made alike, and the calibrated neutral where a mean is uncertain.
+
+
+MEANS = np.array([3.0, 6.0, 2.0])
+ERRORS = np.array([0.1, 0.1, 0.1])
+NEUTRAL = np.array([1.0, 2.0, 0.8])
+
+
+def test_gray_world_equalises_means() -> None:
+    gains, certain = gray_world(MEANS, ERRORS, NEUTRAL, green=1)
+    assert gains == pytest.approx([2.0, 1.0, 3.0])
+    assert certain.tolist() == [True] * 3
+
+
+def test_uncertain_channel_falls_back_to_calibrated_gain_and_says_so() -> None:
+    errors = np.array([1.0, 0.1, 0.1])  # red's mean of 3 is 3 standard errors
+    gains, certain = gray_world(MEANS, errors, NEUTRAL, green=1)
+    assert certain.tolist() == [False, True, True]
+    assert gains == pytest.approx([2.0 / 1.0, 1.0, 3.0])
+
+
+def test_uncertain_green_or_no_light_makes_all_gains_calibrated() -> None:
+    for means, errors in [(MEANS, np.array([0.1, 5.0, 0.1])), (np.zeros(3), np.zeros(3))]:
+        gains, certain = gray_world(means, errors, NEUTRAL, green=1)
+        assert not certain.any(), (means, errors)
+        assert gains == pytest.approx([2.0, 1.0, 2.5]), (means, errors)

@@ -2,13 +2,17 @@
 
 from itertools import product
 
+import flip_evaluator  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from refusal import refusal
 from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
 
-from studies.metrics.quality import appearance, measure, psnr_db, pu21_psnr_db, true_picture
+from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
+from studies.metrics.quality import appearance, flip, measure, psnr_db, pu21_encode, pu21_psnr_db, true_picture
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, s_cielab
+from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
 
 def ssim(first: np.ndarray, second: np.ndarray) -> float:
@@ -58,3 +62,149 @@ def test_a_picture_that_is_not_finite_has_no_quality() -> None:
         broken[3, 4, 0] = value
         for pictures in ((broken, sound), (sound, broken)):
             refusal(metric, *pictures, match=rf"^(picture|truth|luminance_cd_m2): {value} at \(3, 4.*finite numbers")
+
+
+# What the eye sees of a difference: each figure against the module that computes it, and where one scale matters.
+
+
+RNG = np.random.default_rng(3)
+TRUTH = RNG.uniform(0.0, 1.4, (24, 32, 3))  # brighter than white here and there
+PICTURE = TRUTH + RNG.normal(0, 0.1, TRUTH.shape)
+
+
+def test_each_figure_is_its_own_module_s() -> None:
+    picture, truth = encode_srgb(PICTURE), encode_srgb(TRUTH)
+    found = appearance(PICTURE, picture, true_picture(TRUTH), 40.0)
+    seen = s_cielab(picture, truth)
+    assert found.s_cielab_median == pytest.approx(np.median(seen), rel=1e-12)
+    assert found.s_cielab_p95 == pytest.approx(np.percentile(seen, 95), rel=1e-12)
+    assert found.flip_mean == pytest.approx(flip(picture, truth).mean(), rel=1e-12)
+    luminances = 40.0 * luminance_of_srgb(PICTURE), 40.0 * luminance_of_srgb(TRUTH)
+    assert found.pu21_psnr_db == pytest.approx(pu21_psnr_db(*luminances), rel=1e-12)
+    assert 0 < found.flip_mean < 1
+    assert found.s_cielab_median < found.s_cielab_p95
+
+
+def test_absolute_luminance_counts_for_pu21_alone_and_an_error_above_white_too() -> None:
+    encoded, truth = encode_srgb(PICTURE), true_picture(TRUTH)
+    dim, bright = (appearance(PICTURE, encoded, truth, white) for white in (0.4, 4000.0))
+    assert (dim.flip_mean, dim.s_cielab_p95) == (bright.flip_mean, bright.s_cielab_p95)
+    assert dim.pu21_psnr_db > bright.pu21_psnr_db + 10  # at 0.4 cd/m^2 the eye tells few steps apart
+    glaring = np.full((24, 32, 3), 2.0)
+    above = appearance(glaring, encode_srgb(glaring), true_picture(glaring * 1.5), 40.0)
+    assert above.flip_mean == 0.0  # a display clips both
+    assert 10 < above.pu21_psnr_db < 30
+
+
+# FLIP: even colours in the paper's closed form, and what holds for any picture.
+
+DRAWS = np.random.default_rng(0)
+FIRST, SECOND = DRAWS.uniform(0, 1, (2, 32, 48, 3))
+
+
+def even_difference(first: tuple[float, ...], second: tuple[float, ...]) -> float:
+    """FLIP of two even pictures, from the paper: no blur changes them and they have no features, so colour is left.
+
+    Hunt-adjusted CIELAB, HyAB distance to the power 0.7, of which 0.4 of the largest maps to 0.95.
+    """
+
+    def hunt(colour: tuple[float, ...]) -> np.ndarray:
+        lightness, a, b = rgb2lab(np.array(colour, dtype=np.float64))
+        return np.array([lightness, 0.01 * lightness * a, 0.01 * lightness * b])
+
+    def hyab(one: tuple[float, ...], other: tuple[float, ...]) -> float:
+        difference = hunt(one) - hunt(other)
+        return float((abs(difference[0]) + np.hypot(*difference[1:])) ** 0.7)
+
+    most, found = hyab((0, 1, 0), (0, 0, 1)), hyab(first, second)
+    knee = 0.4 * most
+    return found / knee * 0.95 if found < knee else 0.95 + (found - knee) / (most - knee) * 0.05
+
+
+def test_even_colours_differ_by_the_papers_closed_form() -> None:
+    for first, second in [
+        ((0.5, 0.5, 0.5), (0.52, 0.5, 0.47)),
+        ((0.8, 0.2, 0.1), (0.2, 0.3, 0.7)),
+        ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
+    ]:
+        pictures = [np.broadcast_to(colour, (24, 24, 3)).astype(np.float64) for colour in (first, second)]
+        # scikit-image's white and matrix have other last digits, and FLIP computes in float32: 0.1 %.
+        assert flip(*pictures) == pytest.approx(np.full((24, 24), even_difference(first, second)), rel=1e-3), (
+            first,
+            second,
+        )
+
+
+def test_the_mean_is_the_programs_own_under_its_own_defaults() -> None:
+    _, mean, parameters = flip_evaluator.evaluate(SECOND.astype(np.float32), FIRST.astype(np.float32), "LDR")
+    assert flip(FIRST, SECOND).mean() == pytest.approx(mean, rel=1e-5)  # float32 sums of 1536 pixels
+    assert parameters["ppd"] == pytest.approx(PIXELS_PER_DEGREE, rel=1e-6)
+
+
+# PU21: the values at its ends and at 100 cd/m^2, its inverse worked out on paper, PSNR in closed form.
+
+
+def decode(value: np.ndarray) -> np.ndarray:
+    """The paper's inverse with its constants typed again: luminance [cd/m^2] of an encoded value."""
+    root = (value / 596.3148142 + 0.9099517204) ** (1 / 0.09150303166)
+    return ((root - 0.353487901) / (0.3734658629 - 8.277049286e-05 * root)) ** (1 / 0.9062562627)
+
+
+def test_the_ends_and_100_cd_m2_have_the_published_values() -> None:
+    # Ends as published beside the constants: 5.4705e-10 and 595.3939. At 100 cd/m^2 the fit comes near 8 bits' 256.
+    assert pu21_encode([0.005, 10_000.0]) == pytest.approx([5.4705e-10, 595.3939], rel=1e-6, abs=1e-12)
+    assert pu21_encode(100.0) == pytest.approx(256.0, abs=0.5)
+
+
+def test_a_hundredth_of_the_peak_of_256_is_40_db_at_any_luminance() -> None:
+    for level in [20.0, 256.0, 500.0]:
+        truth = decode(np.full((8, 8), level))
+        picture = decode(np.where(np.indices((8, 8)).sum(axis=0) % 2, level + 2.56, level - 2.56))
+        assert pu21_psnr_db(picture, truth) == pytest.approx(40.0, abs=1e-6), level
+
+
+def test_the_same_error_in_cd_m2_counts_for_less_in_daylight() -> None:
+    dusk, day = np.full((4, 4), 1.0), np.full((4, 4), 1000.0)
+    assert pu21_psnr_db(day + 0.5, day) > 30 + pu21_psnr_db(dusk + 0.5, dusk)
+    assert pu21_psnr_db(day, day) == np.inf
+    refusal(pu21_psnr_db, day, day[:2], match=r"^picture_cd_m2: shape \(4, 4\)")
+
+
+# Colours of a chart's patches: the transfer curve, pairs, and colours as they are in daylight.
+
+
+def chart_of(colours: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Picture of a row of two pixels a patch, and its masks."""
+    picture = np.repeat(colours[None], 2, axis=0).astype(np.float64)
+    masks = np.zeros((len(colours), 2, len(colours)), dtype=bool)
+    masks[np.arange(len(colours)), :, np.arange(len(colours))] = True
+    return picture, masks
+
+
+def test_pairs_are_neighbours_and_greys_differ_by_their_lightness() -> None:
+    # greys of L* 50 and 51: CIEDE2000 is 1 / S_L, and S_L = 1 + 0.015 x^2 / sqrt(20 + x^2) with x = 50.5 - 50
+    def luminance(lightness: float) -> float:
+        return ((lightness + 16) / 116) ** 3
+
+    picture, masks = chart_of(np.outer([luminance(50.0), luminance(51.0), 0.3, 0.3], np.ones(3)))
+    expected = 1 / (1 + 0.015 * 0.25 / np.sqrt(20.25))
+    assert pair_delta_e(picture, masks) == pytest.approx([expected, 0.0], abs=1e-4)
+
+
+def test_the_chart_in_daylight_has_no_error_and_one_colour_alone_has_a_large_one() -> None:
+    picture, masks = chart_of(daylight_srgb())
+    assert daylight_delta_e(picture, masks) == pytest.approx(np.zeros(24), abs=1e-9)
+    luminances = luminance_of_srgb(daylight_srgb())
+    assert luminances[WHITE_PATCH] == pytest.approx(WHITE_AT)
+    assert luminances.argmax() == WHITE_PATCH
+    grey, _ = chart_of(np.outer(luminances, np.ones(3)))  # the chart under a light of one wavelength, at best
+    errors = daylight_delta_e(grey, masks)
+    assert errors[18:].max() < 2.0  # its greys stay what they are
+    assert 12.0 < errors[:18].mean() < 40.0
+
+
+def test_true_pairs_are_one_under_d65_and_two_under_other_lights() -> None:
+    assert true_pair_delta_e("D65") == pytest.approx(np.zeros(12), abs=1e-6)
+    # tests/scenes/test_metamers.py holds each pair's own bounds under these lights
+    for light in ("A", "F11", "sodium_high"):
+        assert ((true_pair_delta_e(light) > 1.0) & (true_pair_delta_e(light) < 30.0)).all()

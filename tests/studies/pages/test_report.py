@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from functools import cache
 from hashlib import sha256
 from html import unescape
+from math import isnan
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ import report_sample as SAMPLE
 
 from studies.metrics import metric as figures
 from studies.pages import report_text as text
-from studies.pages.report import render_report
+from studies.pages.report import render_report, speed_rows
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.report_pictures import ReportPictures
 from studies.study.study_file import read_study
@@ -309,3 +310,82 @@ def test_numbers_in_sentences_are_recounted_from_the_rows() -> None:
     names = [level.name for level in alone.levels]
     said = f"PSNR {dark:.1f} dB at {names[0]} to {bright:.1f} dB at {names[-1]}."
     assert said in unescape(page_of(alone)).replace("\N{NO-BREAK SPACE}", " ")
+
+
+# Speed: what cameras and renders cost.
+
+
+def test_seconds_are_means_over_the_pictures_of_a_camera_and_a_sensor() -> None:
+    def slower(row: Row) -> Row | None:
+        """Seven levels of 0.11 s, of the second sensor one of 0.81 s; and Bayer's first picture isn't made yet."""
+        if (row.processor, row.level) == ("bayer", "moonlight"):
+            return None
+        long = (row.processor, row.sensor, row.level) == ("interleaved", "low_noise", "office")
+        return replace(row, develop_s=row.develop_s + 0.7 * long)
+
+    rows = speed_rows(SAMPLE.sample_report(slower, seeds=(0, 1)))
+    assert [row[:2] for row in rows] == [
+        (camera, sensor) for sensor in ("table1_output", "low_noise") for camera in ("Interleaved", "Bayer, bilinear")
+    ]
+    assert [row[3] for row in rows[::2]] == pytest.approx([0.11, 0.21])
+    assert rows[0][2] == pytest.approx(0.021)
+    assert isnan(rows[1][3])
+
+
+@pytest.mark.thorough
+def test_each_render_has_its_cost_and_the_worst_share_of_its_pictures() -> None:
+    def shared(row: Row) -> Row:
+        worst = (row.scene, row.spectrum, row.level, row.processor) == ("still_life", "own", "moonlight", "bayer")
+        return replace(row, mc_share=0.5 if worst else 0.01 if row.scene == "still_life" else 0.02)
+
+    scenes = SAMPLE.sample_views().scenes
+    report = SAMPLE.sample_report(shared, 2, scenes=scenes, spectra=("own", "A"), truths=(None,) * 4)
+    pictures = ReportPictures({cell.picture: b"RIFF" for cell in report.cells if cell.picture}, {})
+    page = unescape(render_report(report, pictures)).replace("\N{NO-BREAK SPACE}", " ")
+    table = page[page.index('id="renders-h"') : page.index('id="time-h"')]
+    found = [re.findall(r"<t[hd][^>]*>([^<]*)</t[hd]>", row) for row in re.findall(r"<tr>(.*?)</tr>", table)[1:]]
+    assert [row[0] for row in found] == ["still_life", "color_checker"]
+    for row, share in zip(found, ("50 %", "2 %"), strict=True):
+        assert row[1:] == ["path + specfilm", "256", "time", "40", "41.2 s", "3.1 %", share]
+
+
+# The report's cells: means and intervals over seeds.
+
+
+def cell_of(*rows: Row | None) -> ReportCell:
+    return ReportCell(1, "interleaved", 8.0, None, rows, None)
+
+
+def made(seed: int = 0, **values: Any) -> Row:
+    return SAMPLE.sample_row(1, 0, "interleaved", seed, **values)
+
+
+def test_two_seeds_give_mean_and_student_s_interval() -> None:
+    cell = cell_of(made(psnr_db=20.0, ssim=1.0), made(1, psnr_db=21.0, ssim=1.0))
+    # n = 2: s / sqrt(2) = 0.5, and t of one degree of freedom at 97.5 % is tan(0.475 pi) = 12.7062 (the Cauchy law).
+    assert (cell.mean("psnr_db"), cell.half("psnr_db")) == pytest.approx((20.5, 6.3531), abs=1e-4)
+    assert (cell.mean("ssim"), cell.half("ssim")) == (1.0, 0.0)
+    assert text.figure_text(cell, "psnr_db", 1, "dB").replace("\N{NO-BREAK SPACE}", " ") == "20.5 ± 6.4 dB"
+
+
+def test_a_figure_that_is_unknown_for_a_seed_is_unknown() -> None:
+    for rows in [
+        (made(psnr_db=None), made(1)),
+        (made(), made(1, psnr_db=float("inf"))),
+        (made(), None),
+        (None, made(1)),
+        (None, None),
+    ]:
+        cell = cell_of(*rows)
+        assert isnan(cell.mean("psnr_db")), rows
+        assert isnan(cell.half("psnr_db")), rows
+        assert text.figure_text(cell, "psnr_db", 1, "dB") == "—", rows
+
+
+def test_decisions_of_all_seeds_count() -> None:
+    balances = [{"R": "gray world", "G": "gray world", "B": "calibrated" if seed == 2 else "gray world"}
+                for seed in range(4)]  # fmt: skip
+    rows = [made(seed, substitution=int(seed < 3), balance=json.dumps(balances[seed])) for seed in range(4)]
+    assert cell_of(*rows).substitution == 0.75
+    assert cell_of(*rows).balance == {"R": "gray world", "G": "gray world", "B": "calibrated"}
+    assert cell_of(rows[0], None).substitution is None
