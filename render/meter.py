@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 from render.cache import load_irradiance, save_irradiance
-from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, seed_of, traced
+from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups, mitsuba_module
+from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups
 from render.runs import let_go
 from render.scene import Scene
 from rodcone.errors import InputError
@@ -77,11 +76,6 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
 
 def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
     """Irradiance of each of the film's pixels, (group, band, h, w)."""
-    parts = []
-    for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // METER_BANDS)):
-        bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-        tracer = Tracer(mitsuba_module(), loaded, bands, seed)
-        alike, span = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1)
-        image = traced(tracer.meter, alike, span, HALF_SPP * METER_PIXELS**2, seed)
-        parts.append(image["scattered"].reshape(len(loaded.groups), part.size, *film.size))
-    return np.concatenate(parts, axis=1)
+    alike, span, threads = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1), HALF_SPP * METER_PIXELS**2
+    images = [traced(x.meter, alike, span, threads, seed) for x in tracers(loaded, film, METER_BANDS, seed)]
+    return np.concatenate([x["scattered"].reshape(len(loaded.groups), -1, *film.size) for x in images], axis=1)

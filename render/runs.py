@@ -6,8 +6,7 @@ that was stopped anywhere and goes on has the bits of one go.
 """
 
 import traceback
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from itertools import product
 from typing import Any
 
@@ -17,11 +16,10 @@ from threadpoolctl import ThreadpoolController
 
 from render.error_estimates import Halves, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
-from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, seed_of, traced
+from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
-from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
+from render.loader import PART_BANDS, Film, Loaded
 from render.scene import Scene
 from render.transport import Transport
 from rodcone.types import Floats, Planes
@@ -29,8 +27,6 @@ from rodcone.types import Floats, Planes
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
 PILOT = Span(0, 8, 2)  # of each half: 32 samples a pixel, in four sets
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
-
-EvenAndOdd = tuple[Planes, Planes]
 
 
 @dataclass
@@ -65,22 +61,22 @@ class Means:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What a light group gives in some chunks, both halves of each.
+    """What one half of a light group's paths gives in some chunks.
 
     Attributes
     ----------
-    radiance : pair of (chunk, group, band, h, w) float32
-    seen : tuple of pairs of (chunk, 1 or band, h, w) float32
+    radiance : (chunk, group, band, h, w) float32
+    seen : list of (chunk, 1 or band, h, w) float32
         For each group.
-    coverage : pair of (chunk, h, w) float32
-    indirect : pair of (chunk, group, band, h, w) float32
+    coverage : (chunk, h, w) float32
+    indirect : (chunk, group, band, h, w) float32
         No groups where it isn't asked for.
     """
 
-    radiance: EvenAndOdd
-    seen: tuple[EvenAndOdd, ...]
-    coverage: EvenAndOdd
-    indirect: EvenAndOdd
+    radiance: Planes
+    seen: list[Planes]
+    coverage: Planes
+    indirect: Planes
 
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
@@ -155,17 +151,16 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
         # Each light group is found by paths of its own: together they cover the sum of what each does.
-        even, odd = (sum(of_group.coverage[half][index] for of_group in draws) for half in range(2))
-        means.coverage.add(np.asarray(even), np.asarray(odd), weight)
-        for loaded, of_group in zip(light_groups, draws, strict=True):
+        covered_even, covered_odd = (
+            sum(half.coverage[index] for half in halves) for halves in zip(*draws, strict=True)
+        )
+        means.coverage.add(np.asarray(covered_even), np.asarray(covered_odd), weight)
+        for loaded, (even, odd) in zip(light_groups, draws, strict=True):
             for slot, group in enumerate(loaded.groups):
-                even, odd = of_group.radiance
-                means.light[group].add(even[index, slot], odd[index, slot], weight)
-                even, odd = of_group.seen[slot]
-                means.seen[group].add(even[index], odd[index], weight)
+                means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight)
+                means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight)
                 if means.indirect is not None:
-                    even, odd = of_group.indirect
-                    means.indirect[group].add(even[index, slot], odd[index, slot], weight)
+                    means.indirect[group].add(even.indirect[index, slot], odd.indirect[index, slot], weight)
         means.count += chunk
 
 
@@ -182,11 +177,11 @@ def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: in
     seen = np.zeros((len(lights), *film.size), np.float32)
     uniform, threads = np.ones(film.size, np.uint32), launch_threads(light_groups, film)
     for loaded in light_groups:
-        drawn = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, PILOT.chunk))
+        halves = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, PILOT.chunk))
         for slot, group in enumerate(loaded.groups):
-            for index, (half, chunk) in enumerate(product(range(2), range(PILOT.chunks))):
-                lamps = drawn.seen[slot][half][chunk]
-                light = drawn.radiance[half][chunk, slot] - lamps
+            for index, (half, chunk) in enumerate(product(halves, range(PILOT.chunks))):
+                lamps = half.seen[slot][chunk]
+                light = half.radiance[chunk, slot] - lamps
                 scattered[group, index] = np.tensordot(energy[group], light, axes=1)
                 of_lamps = energy[group] if len(lamps) > 1 else energy[group].sum(keepdims=True)
                 seen[group] += np.tensordot(of_lamps, lamps, axes=1) / (2 * PILOT.chunks)
@@ -200,15 +195,13 @@ def launch_threads(light_groups: list[Loaded], film: Film, *, split: bool = Fals
 
 def _drawn(
     loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, split: bool = False
-) -> Drawn:
-    """Draw a span of both halves of one light group's paths."""
+) -> tuple[Drawn, Drawn]:
+    """Draw a span of both halves of one light group's paths: the even half and the odd."""
     halves, groups = [], len(loaded.groups)
     for half in range(2):
-        group_seed, parts = seed_of(seed, loaded.groups[0], half), []
-        for part in np.array_split(np.arange(film.wavelength_nm.size), -(-film.wavelength_nm.size // PART_BANDS)):
-            bands = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-            tracer = Tracer(mitsuba_module(), loaded, bands, group_seed, split=split)
-            parts.append(traced(partial(tracer.camera, film.size), rates, span, threads, group_seed))
+        group_seed = seed_of(seed, loaded.groups[0], half)
+        traces = (tracer.camera for tracer in tracers(loaded, film, PART_BANDS, group_seed, split=split))
+        parts = [traced(trace, rates, span, threads, group_seed) for trace in traces]
         scattered, indirect = (
             np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
             for name, count in (("scattered", groups), ("indirect", groups * split))
@@ -219,14 +212,8 @@ def _drawn(
             seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
         for slot, planes in enumerate(seen):
             scattered[:, slot] += planes
-        halves.append((scattered, seen, shares.sum(axis=1), indirect))
-    even, odd = halves
-    return Drawn(
-        radiance=(even[0], odd[0]),
-        seen=tuple(zip(even[1], odd[1], strict=True)),
-        coverage=(even[2], odd[2]),
-        indirect=(even[3], odd[3]),
-    )
+        halves.append(Drawn(radiance=scattered, seen=seen, coverage=shares.sum(axis=1), indirect=indirect))
+    return halves[0], halves[1]
 
 
 def _grouped(channels: Planes, groups: int, film: Film) -> Planes:

@@ -4,16 +4,14 @@ Indirect light over albedo is smooth where surfaces are, whatever their texture.
 them, made of the bands by hat functions, and the way back is the least-squares fit to the picture itself.
 """
 
-from dataclasses import dataclass, replace
-from functools import partial
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from render.error_estimates import Halves
-from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, seed_of, traced
-from render.loader import PART_BANDS, Film, Loaded, mitsuba_module
+from render.integrator.wavefront import Span, seed_of, traced, tracers
+from render.loader import PART_BANDS, Film, Loaded
 from rodcone.display import brief
 from rodcone.optional import optional_library
 from rodcone.types import Planes
@@ -65,17 +63,11 @@ def denoiser() -> Any:
 
 def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
     """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
-    bands = film.wavelength_nm.size
-    group_seed, albedo, normal = seed_of(seed, loaded.groups[0], 0), [], []
-    once = np.ones(film.size, np.uint32)
-    for part in np.array_split(np.arange(bands), -(-bands // PART_BANDS)):
-        of_part = replace(film, wavelength_nm=film.wavelength_nm[part], width_nm=film.width_nm[part])
-        tracer = Tracer(mitsuba_module(), loaded, of_part, group_seed)
-        span = Span(0, SURFACE_POINTS, 1)
-        image = traced(partial(tracer.first_surface, film.size), once, span, SURFACE_THREADS, group_seed)
-        albedo.append(image["albedo"][0])
-        normal.append(image["normal"][0])
-    return np.concatenate(albedo), normal[0]
+    once, span = np.ones(film.size, np.uint32), Span(0, SURFACE_POINTS, 1)
+    group_seed = seed_of(seed, loaded.groups[0], 0)
+    traces = (tracer.first_surface for tracer in tracers(loaded, film, PART_BANDS, group_seed))
+    images = [traced(trace, once, span, SURFACE_THREADS, group_seed) for trace in traces]
+    return np.concatenate([image["albedo"][0] for image in images]), images[0]["normal"][0]
 
 
 def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Planes) -> Planes:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from render.integrator.matte import at_all
 from render.integrator.points import APERTURE, FILM, WAVELENGTH, Points
 from render.integrator.reflectance_table import TableReader, band_offsets, reflectance_table
 from rodcone.jit import dr
@@ -35,8 +36,8 @@ class Tracer:
         sampled with `sample_lights`; with a second group the light of a constant environment, which isn't in the
         scene, is carried by the paths that escape.
     film : Film
-        Bands, the longest path and where roulette begins. The number of bands is filled up to a multiple of four by
-        repeating the last.
+        Size, bands, the longest path and where roulette begins. The number of bands is filled up to a multiple of four
+        by repeating the last.
     seed : int
         Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
     split : bool
@@ -45,11 +46,10 @@ class Tracer:
 
     def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, split: bool = False) -> None:
         self.mi, self.scene, self.split = mi, loaded.mi_scene, split
-        self.max_depth, self.rr_depth = film.max_depth, film.rr_depth
+        self.size, self.max_depth, self.rr_depth = film.size, film.max_depth, film.rr_depth
         self.coloured, self.sample_lights = loaded.coloured, loaded.sample_lights
         self.environment, self.bands = len(loaded.groups) > 1, film.wavelength_nm.size
-        filled = np.append(np.arange(film.wavelength_nm.size), [film.wavelength_nm.size - 1] * 3)
-        filled = filled[: -(-film.wavelength_nm.size // SPECTRUM_SIZE) * SPECTRUM_SIZE]
+        filled = np.minimum(np.arange(-(-self.bands // SPECTRUM_SIZE) * SPECTRUM_SIZE), self.bands - 1)
         self.centres, self.widths = film.wavelength_nm[filled], film.width_nm[filled]
         self.offsets: Any = None
         self.table: TableReader | None = None
@@ -59,7 +59,7 @@ class Tracer:
             nm = self.centres + self.widths * offsets[:, None]
             self.table = TableReader(mi, reflectance_table(loaded.curves, nm))
 
-    def camera(self, size: tuple[int, int], pixel: Any, points: Points) -> dict[str, list[Any]]:
+    def camera(self, pixel: Any, points: Points) -> dict[str, list[Any]]:
         """Trace paths from the camera, one a thread.
 
         Returns
@@ -71,7 +71,7 @@ class Tracer:
             the share of paths whose BSDF chose by wavelength.
         """
         wavelengths, step = self._wavelengths(points)
-        ray = self._camera_ray(size, pixel, points)
+        ray = self._camera_ray(pixel, points)
         dark = [self.mi.Spectrum(0.0) for _ in wavelengths]
         start = self.mi.Ray3f(ray), dr.zeros(self.mi.SurfaceInteraction3f), self.mi.Float(1.0), self.mi.Bool(True), dark
         scattered, indirect, (lamp, sky, first), chosen = self._trace(self.scene, points, start, wavelengths, step, 0)
@@ -94,7 +94,7 @@ class Tracer:
         return {"scattered": self._flat(*scattered), CHOSEN: [self.mi.Float(chosen)]}
 
     @dr.syntax
-    def first_surface(self, size: tuple[int, int], pixel: Any, points: Points) -> dict[str, list[Any]]:
+    def first_surface(self, pixel: Any, points: Points) -> dict[str, list[Any]]:
         """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
 
         Returns
@@ -104,7 +104,7 @@ class Tracer:
         """
         mi = self.mi
         wavelengths, step = self._wavelengths(points)
-        ray = mi.Ray3f(self._camera_ray(size, pixel, points))
+        ray = mi.Ray3f(self._camera_ray(pixel, points))
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         albedo, normal = [mi.Spectrum(0.0) for _ in wavelengths], mi.Vector3f(0.0)
@@ -133,9 +133,9 @@ class Tracer:
         """Bands one by one, of each spectrum in turn, without those that fill up the last four."""
         return [value for spectrum in spectra for value in _flat(spectrum)[: self.bands]]
 
-    def _camera_ray(self, size: tuple[int, int], pixel: Any, points: Points) -> Any:
+    def _camera_ray(self, pixel: Any, points: Points) -> Any:
         """Ray through a point of each thread's pixel."""
-        mi = self.mi
+        mi, size = self.mi, self.size
         row, at = pixel // size[1], points.pair(FILM)
         film = mi.Point2f((mi.Float(pixel - row * size[1]) + at.x) / size[1], (mi.Float(row) + at.y) / size[0])
         ray, _ = self.scene.sensors()[0].sample_ray(0.0, 0.5, film, points.pair(APERTURE))
@@ -311,10 +311,8 @@ class Tracer:
         if hasattr(bsdf, "scatter_bands"):
             values, pdf, sample, weights = bsdf.scatter_bands(si, towards_light, angle, wavelengths, self.table, step)
             return values, pdf, sample, weights, dr.zeros(dr.mask_t(pdf))
-        drawn = []
-        for group in wavelengths:
-            si.wavelengths = group
-            drawn.append(bsdf.eval_pdf_sample(self.mi.BSDFContext(), si, towards_light, lobe, angle))
+        context = self.mi.BSDFContext()
+        drawn = at_all(wavelengths, si, lambda: bsdf.eval_pdf_sample(context, si, towards_light, lobe, angle))
         _, pdf, sample, _ = drawn[0]
         chosen = _differs(sample, [other for _, _, other, _ in drawn[1:]])
         for _, other_pdf, _, _ in drawn[1:]:
@@ -328,10 +326,7 @@ class Tracer:
         if hasattr(bsdf, "sample_bands"):
             sample, weights = bsdf.sample_bands(si, angle, wavelengths, self.table, step)
             return sample, weights, dr.zeros(dr.mask_t(sample.pdf))
-        drawn = []
-        for group in wavelengths:
-            si.wavelengths = group
-            drawn.append(bsdf.sample(self.mi.BSDFContext(), si, lobe, angle))
+        drawn = at_all(wavelengths, si, lambda: bsdf.sample(self.mi.BSDFContext(), si, lobe, angle))
         sample = drawn[0][0]
         return sample, [weight for _, weight in drawn], _differs(sample, [other for other, _ in drawn[1:]])
 
@@ -347,19 +342,11 @@ def _differs(sample: Any, others: list[Any]) -> Any:
 
 def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[Any]:
     """Evaluate an emitter at all wavelengths within one virtual call."""
-    values = []
-    for group in wavelengths:
-        interaction.wavelengths = group
-        values.append(emitter.eval(interaction))
-    return values
+    return at_all(wavelengths, interaction, lambda: emitter.eval(interaction))
 
 
 def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelengths: list[Any]) -> list[Any]:
-    values = []
-    for group in wavelengths:
-        interaction.wavelengths = group
-        values.append(emitter.eval_direction(interaction, direction))
-    return values
+    return at_all(wavelengths, interaction, lambda: emitter.eval_direction(interaction, direction))
 
 
 def _flat(groups: list[Any]) -> list[Any]:

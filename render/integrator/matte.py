@@ -5,6 +5,7 @@ reflectance twice, once for the light's direction and once for the sampled one: 
 two do, and none where the reflectance of all bands is read from a table (`render.integrator.reflectance_table`).
 """
 
+from collections.abc import Callable
 from typing import Any
 
 from render.integrator.reflectance_table import TableReader
@@ -49,11 +50,7 @@ def matte_surface(mi: Any) -> Any:
             sample = _sampled(mi, si.wi, angle, self.twosided)
             if self.row is not None and table is not None:
                 return sample, _weights_at(self, si, table, step, sample.pdf > 0)
-            weights = []
-            for group in wavelengths:
-                si.wavelengths = group
-                weights.append(_reflectance_at(self, si) & (sample.pdf > 0))
-            return sample, weights
+            return sample, at_all(wavelengths, si, lambda: _reflectance_at(self, si) & (sample.pdf > 0))
 
         def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
             sample = _sampled(mi, si.wi, sample2, self.twosided)
@@ -66,6 +63,15 @@ def matte_surface(mi: Any) -> Any:
             return _density(si.wi, wo, self.twosided)
 
     return Matte
+
+
+def at_all(wavelengths: list[Any], interaction: Any, evaluate: Callable[[], Any]) -> list[Any]:
+    """What a call gives at all wavelengths of an interaction, four after four."""
+    values = []
+    for group in wavelengths:
+        interaction.wavelengths = group
+        values.append(evaluate())
+    return values
 
 
 def _row_at(surface: Any, si: Any) -> Any:

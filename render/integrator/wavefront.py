@@ -2,16 +2,16 @@
 
 import math
 import re
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.integrator.dense import CHOSEN
+from render.integrator.dense import CHOSEN, Tracer
 from render.integrator.points import Points, pixel_keys
-from render.loader import mitsuba_module, mitsuba_words
+from render.loader import Film, Loaded, mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
@@ -33,6 +33,13 @@ class Span:
 def seed_of(*coordinates: int) -> int:
     """Seed of 32 bits from the render's own and what it is for."""
     return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
+
+
+def tracers(loaded: Loaded, film: Film, most_bands: int, seed: int, *, split: bool = False) -> Iterator[Tracer]:
+    """Give a tracer for each part of the bands, at most so many together; all parts see the same paths."""
+    parts = -(-film.wavelength_nm.size // most_bands)
+    for nm, width_nm in zip(*(np.array_split(x, parts) for x in (film.wavelength_nm, film.width_nm)), strict=True):
+        yield Tracer(mitsuba_module(), loaded, replace(film, wavelength_nm=nm, width_nm=width_nm), seed, split=split)
 
 
 def traced(

@@ -59,9 +59,9 @@ def test_each_pixel_has_the_samples_that_its_count_tells(monkeypatch):
     scene, size = replace(load("night_street"), reference_plane=None), (12, 18)
     own, found = Tracer.camera, np.zeros(size[0] * size[1], int)
 
-    def camera(self, size, pixel, points):
+    def camera(self, pixel, points):
         found[:] += np.bincount(pixels_of_paths(pixel, points).astype(int), minlength=found.size)
-        return own(self, size, pixel, points)
+        return own(self, pixel, points)
 
     monkeypatch.setattr(Tracer, "camera", camera)
     made = render(scene, size, spp=200, **BANDS)
