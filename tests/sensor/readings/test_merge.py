@@ -9,7 +9,7 @@ from refusal import refusal
 from scipy import stats
 
 from render.illuminants import illuminant
-from sensor.burst import merged_raw, merged_sensor
+from sensor.burst import merge, merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import RGBW, mask
 from sensor.chip import ChannelReading, Reading
@@ -214,6 +214,22 @@ def test_a_chip_of_other_patterns_has_shares_of_dark_current_and_hot_pixels():
     np.testing.assert_array_equal(hot, device.hot)
     assert raw.electrons[hot].mean() / whole_share(sensor) == pytest.approx(1000.0, rel=0.01)
     assert shares(sensor).tolist() == [1.0, 0.0625]
+
+
+@loop("name", ["low_noise", *HDR, "white_apart"])
+def test_a_burst_has_the_variance_of_the_raw_image_that_is_made_of_it(name):
+    """Light from the dark to the well, over every seam; columns' gains act on dark current too."""
+    sensor = preset(name)
+    busy = replace(sensor.pixel, column_gain_spread=0.01, dark_current_e_per_s=2000.0)
+    sensor = replace(sensor, pixel=busy)
+    light = np.tile(np.geomspace(1.0, 0.8 * sensor.pixel.full_well_e, 128), (16, 1))
+    device, rng = draw_device(sensor, light.shape, np.random.default_rng(1)), np.random.default_rng(2)
+    frames = [expose(light, sensor, TIME_S, device, rng) for _ in range(4)]
+    merged, raw = merge(frames), merged_raw(frames)
+    stated = (merged.temporal_variance + merged.fixed_variance) * raw.exposure_s**2
+    at = ~raw.saturated & (raw.electrons > 0)
+    assert at.mean() > 0.9
+    np.testing.assert_allclose(stated[at], noise_at_sites(raw, raw.electrons)[at], rtol=1e-9)
 
 
 # Channels that are read apart: mean, variance, well and metering of each in closed form, and what is refused.
