@@ -4,7 +4,7 @@ A verdict follows from the numbers and is never written by hand.
 """
 
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, isfinite
@@ -23,6 +23,7 @@ VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
 # What "about" may mean: a number given to one digit stands for a fifth more or less.
 ABOUT = 0.2
+Values = Mapping[str, float | NDArray[np.float64]]  # by condition
 
 
 @dataclass(frozen=True)
@@ -101,31 +102,39 @@ def claim(number: int, checks: Iterable[ClaimCheck], **values: object) -> Claim:
     return Claim(text["where"], text["text"], tuple(checks), text.get("note", "").format(**values))
 
 
-def about(condition: str, value: float, claimed: float, unit: str = "") -> ClaimCheck:
+def within(values: Values, low: float = -inf, high: float = inf, unit: str = "") -> tuple[ClaimCheck, ...]:
+    """Check that each value lies in a range; of what exposures gave, shape (seed,), the mean with its interval."""
+    return tuple(
+        ClaimCheck(
+            condition,
+            float(np.mean(x)),
+            low,
+            high,
+            unit,
+            margin=float(half_width(x)) if isinstance(x, np.ndarray) else 0.0,
+        )
+        for condition, x in values.items()
+    )
+
+
+def about(values: Values, claimed: float, unit: str = "") -> tuple[ClaimCheck, ...]:
     """Check against a number that the paper gives as "about": a fifth more or less, `ABOUT`."""
-    return ClaimCheck(condition, value, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
+    return within(values, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
 
 
-def near(condition: str, value: float, claimed: float, margin: float, unit: str = "") -> ClaimCheck:
+def near(values: Values, claimed: float, margin: float, unit: str = "") -> tuple[ClaimCheck, ...]:
     """Check against a number within a margin on either side."""
-    return ClaimCheck(condition, value, claimed - margin, claimed + margin, unit)
+    return within(values, claimed - margin, claimed + margin, unit)
 
 
-def at_least(condition: str, value: float, low: float, unit: str = "") -> ClaimCheck:
-    """Check that a value is no less."""
-    return ClaimCheck(condition, value, low, inf, unit)
+def at_least(values: Values, low: float, unit: str = "") -> tuple[ClaimCheck, ...]:
+    """Check that values are no less."""
+    return within(values, low, unit=unit)
 
 
-def at_most(condition: str, value: float, high: float, unit: str = "") -> ClaimCheck:
-    """Check that a value is no more."""
-    return ClaimCheck(condition, value, -inf, high, unit)
-
-
-def over_seeds(
-    condition: str, values: NDArray[np.float64], low: float = -inf, high: float = inf, unit: str = ""
-) -> ClaimCheck:
-    """Check the mean of what exposures gave, shape (seed,), with its interval."""
-    return ClaimCheck(condition, float(values.mean()), low, high, unit, margin=float(half_width(values)))
+def at_most(values: Values, high: float, unit: str = "") -> tuple[ClaimCheck, ...]:
+    """Check that values are no more."""
+    return within(values, high=high, unit=unit)
 
 
 def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, ...]:

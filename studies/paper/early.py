@@ -124,29 +124,24 @@ def claims_early(
     lights : mapping
         `gathered` by the tile's name.
     """
-    fused = [(name, values) for name, values in bright.items() if name != GINDELE]
+    fused = {
+        f"{name}, {reading}": value
+        for name, values in bright.items()
+        for reading, value in values.items()
+        if name != GINDELE
+    }
+    shares = {
+        f"{channel}, {tile}, {how}": value
+        for tile, of_tile in lights.items()
+        for channel, values in of_tile.items()
+        for how, value in zip(HOW, values, strict=True)
+    }
     return (
-        claim(
-            29,
-            (
-                at_most(f"{name}, {reading}", value, WHOLE)
-                for name, values in fused
-                for reading, value in values.items()
-            ),
-            whole=WHOLE,
-        ),
-        claim(30, (at_least(reading, value, WHOLE) for reading, value in bright[GINDELE].items())),
-        claim(31, (at_least(name, value, GAIN_DB, "dB") for name, value in lost_db.items()), ms=EXPOSURE_S * 1e3),
-        claim(32, (at_least(name, value, 1.0, "×") for name, value in noise_ratios.items())),
-        claim(
-            33,
-            (
-                about(f"{channel}, {tile}, {how}", value, 1.0, "× W's light")
-                for tile, of_tile in lights.items()
-                for channel, values in of_tile.items()
-                for how, value in zip(HOW, values, strict=True)
-            ),
-        ),
+        claim(29, at_most(fused, WHOLE), whole=WHOLE),
+        claim(30, at_least(bright[GINDELE], WHOLE)),
+        claim(31, at_least(lost_db, GAIN_DB, "dB"), ms=EXPOSURE_S * 1e3),
+        claim(32, at_least(noise_ratios, 1.0, "×")),
+        claim(33, about(shares, 1.0, "× W's light")),
     )
 
 

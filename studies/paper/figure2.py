@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import chain
 from math import sqrt
 
 import numpy as np
@@ -85,11 +86,11 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
         Of `coverage`.
     """
     return (
-        claim(10, [at_least("W over the largest of the three, at its least", least, 1.0, "×")]),
+        claim(10, at_least({"W over the largest of the three, at its least": least}, 1.0, "×")),
         claim(
             11,
-            (
-                about(f"{channel}, {light}, 380-780 nm", value, CLAIMED[channel], "×")
+            chain.from_iterable(
+                about({f"{channel}, {light}, 380-780 nm": value}, CLAIMED[channel], "×")
                 for light, of_light in ratios.items()
                 for channel, value in of_light.items()
             ),
@@ -111,8 +112,8 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
     return (
         claim(
             12,
-            (
-                about(f"{channel}, {name}, {where}: {gain.dark:.0%} dark noise", gain.ratio, CLAIMED[channel], "×")
+            chain.from_iterable(
+                about({f"{channel}, {name}, {where}: {gain.dark:.0%} dark noise": gain.ratio}, CLAIMED[channel], "×")
                 for where, by_sensor in (("moonlight", moon), ("W full", bright))
                 for name, of_sensor in by_sensor.items()
                 for channel, gain in of_sensor.items()
@@ -121,8 +122,8 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
         ),
         claim(
             13,
-            (
-                about(f"{channel}, {name}: {gain.shot:.0%} shot noise", gain.ratio, roots[channel], "×")
+            chain.from_iterable(
+                about({f"{channel}, {name}: {gain.shot:.0%} shot noise": gain.ratio}, roots[channel], "×")
                 for name, of_sensor in pure.items()
                 for channel, gain in of_sensor.items()
             ),

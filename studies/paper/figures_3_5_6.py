@@ -7,7 +7,7 @@ Figure 3: one exposure gives a noisy colour image and a cleaner W image, and fro
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import product
+from itertools import chain, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,18 +21,7 @@ from sensor.cfa import mask
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.claims import (
-    Claim,
-    ClaimCheck,
-    PaperFigure,
-    at_least,
-    at_most,
-    beside,
-    claim,
-    near,
-    over_seeds,
-    paper_figure,
-)
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, near, paper_figure, within
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -84,12 +73,9 @@ def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Imag
 def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
     """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
     light = {"cd_m2": LOW_CD_M2, "ms": LOW_S * 1e3}
-    noises = (
-        at_most(f"{name}, W's noise over the colours'", step.white_noise / step.colour_noise, 0.5, "×")
-        for name, step in stages.items()
-    )
-    gains = (over_seeds(f"{name}, PSNR gained", step.gain_db, low=GAIN_DB, unit="dB") for name, step in stages.items())
-    return claim(14, noises, **light), claim(15, gains, **light)
+    noises = {f"{name}, W's noise over the colours'": x.white_noise / x.colour_noise for name, x in stages.items()}
+    gains_db = {f"{name}, PSNR gained": step.gain_db for name, step in stages.items()}
+    return claim(14, at_most(noises, 0.5, "×"), **light), claim(15, at_least(gains_db, GAIN_DB, "dB"), **light)
 
 
 def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
@@ -156,14 +142,13 @@ def measure_bright(raw: RawImage, result: Image, subject: View) -> Bright:
 
 def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
     """W partly full and the result whole, by reading."""
+    whole = {f"{name}, colours not full": shot.result_likeness for name, shot in bright.items()}
+    whole |= {f"{name}, a colour full too": shot.full_likeness for name, shot in bright.items()}
     return (
-        claim(17, (ClaimCheck(name, shot.white_full, *PARTLY, "of its pixels") for name, shot in bright.items())),
+        claim(17, within({name: shot.white_full for name, shot in bright.items()}, *PARTLY, "of its pixels")),
         claim(
             18,
-            (
-                *(at_least(f"{name}, colours not full", shot.result_likeness, WHOLE) for name, shot in bright.items()),
-                *(at_least(f"{name}, a colour full too", shot.full_likeness, WHOLE) for name, shot in bright.items()),
-            ),
+            at_least(whole, WHOLE),
             white=" and ".join(f"{shot.white_likeness:.2f} ({name})" for name, shot in bright.items()),
             full=" and ".join(f"{shot.colours_full:.0%}" for shot in bright.values()),
         ),
@@ -235,25 +220,19 @@ def claims_6(
     swaps : mapping
         By reading.
     """
-    switch = {name: SUBSTITUTED[name.rsplit(", ", 1)[1]] for name in interleaved}
+    noises = {name: camera.noise / bayer[name].noise for name, camera in interleaved.items()}
+    gains_db = {name: camera.psnr_db - bayer[name].psnr_db for name, camera in interleaved.items()}
+    switches = [
+        near({f"{name}, {'on' if on else 'off'}": camera.substituted or 0.0}, float(on), 0.0)
+        for name, camera in interleaved.items()
+        for on in [SUBSTITUTED[name.rsplit(", ", 1)[1]]]
+    ]
     return (
-        claim(19, (at_most(name, camera.noise / bayer[name].noise, 1.0, "×") for name, camera in interleaved.items())),
-        claim(
-            20,
-            (
-                over_seeds(name, camera.psnr_db - bayer[name].psnr_db, low=0.0, unit="dB")
-                for name, camera in interleaved.items()
-            ),
-        ),
-        claim(
-            21,
-            (
-                near(f"{name}, {'on' if switch[name] else 'off'}", camera.substituted or 0.0, float(switch[name]), 0.0)
-                for name, camera in interleaved.items()
-            ),
-        ),
-        claim(22, (at_least(name, swap.noise_ratio, A_LOT, "×") for name, swap in swaps.items()), exposure=DARKEST),
-        claim(23, (at_most(name, swap.delta_e, SLIGHT, "ΔE2000") for name, swap in swaps.items())),
+        claim(19, at_most(noises, 1.0, "×")),
+        claim(20, at_least(gains_db, 0.0, "dB")),
+        claim(21, chain.from_iterable(switches)),
+        claim(22, at_least({name: x.noise_ratio for name, x in swaps.items()}, A_LOT, "×"), exposure=DARKEST),
+        claim(23, at_most({name: x.delta_e for name, x in swaps.items()}, SLIGHT, "ΔE2000")),
     )
 
 

@@ -19,7 +19,7 @@ from sensor.raw import RawImage
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import flip, measure, psnr_db
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure, at_most, beside, claim, over_seeds, paper_figure
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, paper_figure, within
 from studies.paper.figures_3_5_6 import GAIN_DB
 from studies.paper.setup import (
     CAMERAS,
@@ -137,25 +137,25 @@ def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
         for side in (-0.5, 0.5)
     )
     qualities = (
-        over_seeds("PSNR, largest fall from level to level", psnr, high=GAIN_DB, unit="dB"),
-        over_seeds("CIEDE2000, largest rise", delta, high=SEEN_DELTA_E),
-        over_seeds("FLIP, largest rise", flip_rise, high=SEEN_FLIP),
-        over_seeds("PSNR, fall over the octave in which W fills", before - after, high=GAIN_DB, unit="dB"),
+        *at_most({"PSNR, largest fall from level to level": psnr}, GAIN_DB, "dB"),
+        *at_most({"CIEDE2000, largest rise": delta}, SEEN_DELTA_E),
+        *at_most({"FLIP, largest rise": flip_rise}, SEEN_FLIP),
+        *at_most({"PSNR, fall over the octave in which W fills": before - after}, GAIN_DB, "dB"),
     )
     places = {"psnr_at": psnr_at, "delta_at": delta_at, "flip_at": flip_at, "fills_at": fills_at}
     # W's part
     parts = (
-        at_most("share of similarity by W, largest step", _step(curves.similarity), SMOOTH),
-        at_most("substitution's weight, largest step", _step(curves.weight), SMOOTH),
-        ClaimCheck("share of similarity by W, in starlight", float(curves.similarity[0].mean()), 0.95, 1.0),
-        at_most("share of similarity by W, in full sun", float(curves.similarity[-1].mean()), 0.5),
+        *at_most({"share of similarity by W, largest step": _step(curves.similarity)}, SMOOTH),
+        *at_most({"substitution's weight, largest step": _step(curves.weight)}, SMOOTH),
+        *within({"share of similarity by W, in starlight": curves.similarity[0].mean()}, 0.95, 1.0),
+        *at_most({"share of similarity by W, in full sun": curves.similarity[-1].mean()}, 0.5),
     )
     # What W gains
     means, margins = curves.gain_db.mean(axis=1), half_width(curves.gain_db)
     best, least = curves.gain_db[(means - margins).argmax()], curves.gain_db[(means + margins).argmin()]
     gains = (
-        over_seeds("gain over the frame without W, largest", best, low=GAIN_DB, unit="dB"),
-        over_seeds("gain over the frame without W, least", least, low=-LEVEL_DB, unit="dB"),
+        *at_least({"gain over the frame without W, largest": best}, GAIN_DB, "dB"),
+        *at_least({"gain over the frame without W, least": least}, -LEVEL_DB, "dB"),
     )
     return (
         claim(24, qualities, how=how, gain_db=_step(curves.psnr_db), **places),

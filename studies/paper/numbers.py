@@ -12,7 +12,7 @@ from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
 from studies.metrics.truth import light_of
-from studies.paper.claims import Claim, ClaimCheck, about, claim, near
+from studies.paper.claims import Claim, about, claim, near, within
 from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
@@ -50,20 +50,16 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
     """
     # The spread of n differences has the relative error 1/sqrt(2 n): 5 of them, a false alarm in 2 million.
     margin = decibels(1 + 5 / sqrt(2 * FLAT_SIDE**2)) + 0.01
+    under_d65 = {f"D65, {name}": value for name, value in per_um2_s.items()}
+    in_pixels = {name: value * 2.0**2 * 0.025 for name, value in under_d65.items()}
+    thousand = (
+        *near({"closed form, √1000": decibels(sqrt(1000.0))}, 30.0, 0.01, "dB"),
+        *near({"1000 e⁻ read out, shot noise alone": measured_db}, 30.0, margin, "dB"),
+    )
     return (
-        claim(
-            1,
-            (about(f"D65, {name}", value, 10.0, "µm⁻² s⁻¹") for name, value in per_um2_s.items()),
-            moonlight=MOONLIGHT_CD_M2,
-        ),
-        claim(2, (about(f"D65, {name}", value * 2.0**2 * 0.025, 1.0, "photons") for name, value in per_um2_s.items())),
-        claim(
-            3,
-            (
-                near("closed form, √1000", decibels(sqrt(1000.0)), 30.0, 0.01, "dB"),
-                near("1000 e⁻ read out, shot noise alone", measured_db, 30.0, margin, "dB"),
-            ),
-        ),
+        claim(1, about(under_d65, 10.0, "µm⁻² s⁻¹"), moonlight=MOONLIGHT_CD_M2),
+        claim(2, about(in_pixels, 1.0, "photons")),
+        claim(3, thousand),
     )
 
 
@@ -81,12 +77,12 @@ def range_spans(view: View) -> dict[str, float]:
 
 def range_claim(spans: Mapping[str, float]) -> Claim:
     """Eight decades from day to night, to the order of magnitude; `spans` as of `range_spans`."""
-    return claim(4, (ClaimCheck(name, float(np.log10(span)), 7.5, 8.5, "decades") for name, span in spans.items()))
+    return claim(4, within({name: float(np.log10(span)) for name, span in spans.items()}, 7.5, 8.5, "decades"))
 
 
 def table_claim(swing_wells: Mapping[str, float]) -> Claim:
     """Whether Table 1 agrees with itself: the voltage swing [full wells] by reading."""
-    return claim(5, (about(name, wells, 1.0, "× the well") for name, wells in swing_wells.items()))
+    return claim(5, about(swing_wells, 1.0, "× the well"))
 
 
 def number_claims(view: View) -> tuple[Claim, ...]:

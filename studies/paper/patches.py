@@ -92,8 +92,7 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
 
 def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
     """The statement of Figure 4; `shares` of the pixels beside the edge by condition."""
-    checks = (at_least(name, share, SHARE, "of the x") for name, share in shares.items())
-    return (claim(16, checks, patch=PATCH, ms=EXPOSURE_S * 1e3, aside=ASIDE, away=AWAY),)
+    return (claim(16, at_least(shares, SHARE, "of the x"), patch=PATCH, ms=EXPOSURE_S * 1e3, aside=ASIDE, away=AWAY),)
 
 
 def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
@@ -175,11 +174,7 @@ def difference(reading: str, patch: int) -> float:
 def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim, ...]:
     """The two limits of eq. (1); largest differences [ppm] by patch and reading."""
     return tuple(
-        claim(
-            number,
-            (at_most(f"{name}, {patch} × {patch}", value, SAME_PPM, "ppm") for name, value in values.items()),
-            side=FRAME_SIDE,
-        )
+        claim(number, at_most({f"{x}, {patch} × {patch}": values[x] for x in values}, SAME_PPM, "ppm"), side=FRAME_SIDE)
         for number, (patch, values) in enumerate(differences.items(), 34)
     )
 

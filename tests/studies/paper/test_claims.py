@@ -6,7 +6,7 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near, over_seeds
+from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near
 from studies.paper.early import GINDELE, claims_early
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
 from studies.paper.figures_1_b import Best, claims_1a, claims_1b, claims_held
@@ -20,8 +20,9 @@ PIXEL, OUTPUT = "table1_pixel", "table1_output"
 
 
 def test_an_interval_that_leaves_the_range_does_not_hold() -> None:
-    assert over_seeds("", np.array([1.0, 1.2, 1.1, 1.1]), low=0.9).holds  # 1.1 +- 0.13
-    assert not over_seeds("", np.array([1.0, 1.2, 1.1, 1.1]), low=1.0).holds
+    values = {"": np.array([1.0, 1.2, 1.1, 1.1])}  # 1.1 +- 0.13
+    assert at_least(values, 0.9)[0].holds
+    assert not at_least(values, 1.0)[0].holds
 
 
 def claim(*values: float) -> Claim:
@@ -39,16 +40,14 @@ def test_what_is_not_finite_never_holds() -> None:
 
 
 def test_kinds_of_checks_hold_at_their_ends_and_not_beyond() -> None:
-    assert about("", 12.0, 10.0).holds
-    assert about("", 8.0, 10.0).holds
-    assert not about("", 12.01, 10.0).holds
-    assert not about("", 7.99, 10.0).holds
-    assert near("", 9.5, 9.0, 0.5).holds
-    assert not near("", 9.51, 9.0, 0.5).holds
-    assert at_least("", 1.0, 1.0).holds
-    assert not at_least("", 0.99, 1.0).holds
-    assert at_most("", 1.0, 1.0).holds
-    assert not at_most("", 1.01, 1.0).holds
+    by_kind = (
+        (about({"8": 8.0, "12": 12.0, "12.01": 12.01, "7.99": 7.99}, 10.0), {"8", "12"}),
+        (near({"9.5": 9.5, "9.51": 9.51}, 9.0, 0.5), {"9.5"}),
+        (at_least({"1": 1.0, "0.99": 0.99}, 1.0), {"1"}),
+        (at_most({"1": 1.0, "1.01": 1.01}, 1.0), {"1"}),
+    )
+    for checks, within in by_kind:
+        assert {check.condition for check in checks if check.holds} == within
 
 
 def both(value: object, other: object | None = None) -> dict[str, object]:

@@ -15,7 +15,7 @@ from PIL import Image
 from sensor.curves import rgbw
 from studies.metrics.truth import light_of
 from studies.paper import figures_1_b, levels
-from studies.paper.claims import at_least, over_seeds, value_text
+from studies.paper.claims import at_least, value_text, within
 from studies.paper.figures_1_b import gain_db
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, make, write
@@ -228,8 +228,8 @@ def test_edge_is_found_at_the_first_bright_column() -> None:
 
 def test_a_number_that_reads_as_its_bound_has_another_digit() -> None:
     # 0.9496 would read 0.95 beside "at least 0.95", and fail: another digit tells why
-    assert value_text(at_least("", 0.94996, 0.95)) == "0.94996"
-    assert value_text(over_seeds("", np.array([1.0, 3.0]), unit="dB")) == "2 ± 13\N{NO-BREAK SPACE}dB"
+    assert value_text(*at_least({"": 0.94996}, 0.95)) == "0.94996"
+    assert value_text(*within({"": np.array([1.0, 3.0])}, unit="dB")) == "2 ± 13\N{NO-BREAK SPACE}dB"
 
 
 @pytest.mark.slow
