@@ -105,9 +105,10 @@ def dng_tags(raw: RawImage) -> Tags:
     """Tags of the first directory, without those that describe the TIFF itself.
 
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels unless some are read
-    apart: S is the shot noise, 1 / full scale in electrons, O the dark noise; PRNU grows with x^2 and doesn't fit the
-    form. LinearResponseLimit is where the well begins to clip (`RawImage.saturation_e`). WhiteLevel is one for all
-    channels: converters clip what one that is read apart holds beyond it.
+    apart: S is the shot noise, 1 / full scale in electrons, with what columns' gains make of light beside dark current;
+    O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is where the well begins to clip
+    (`RawImage.saturation_e`). WhiteLevel is one for all channels: converters clip what one that is read apart holds
+    beyond it.
 
     Raises
     ------
@@ -161,8 +162,9 @@ def dng_tags(raw: RawImage) -> Tags:
 def _noise_profile(raw: RawImage) -> tuple[float, ...]:
     """S and O of `dng_tags`, of all channels together or of each plane where some are read apart."""
     noise = [raw.noise_of(name) for name in raw.channels[: None if raw.channel_noise else 1]]
-    full_e = raw.full_well_e
-    return tuple(part for x in noise for part in (x.shot / full_e, (x.dark_noise_e / full_e) ** 2))
+    full_e, both = raw.full_well_e, 2 * raw.column_gain_spread**2  # as in `noise_at_sites`
+    pairs = [((x.shot + both * x.dark_current_e) / full_e, (x.dark_noise_e / full_e) ** 2) for x in noise]
+    return tuple(part for pair in pairs for part in pair)
 
 
 def exif_tags(raw: RawImage) -> Tags:

@@ -125,6 +125,8 @@ def test_noise_profile_is_shot_noise_and_dark_noise_over_full_scale() -> None:
     assert kind == "d"
     assert slope == pytest.approx(1 / 2000, rel=1e-12)  # N(1)^2 = 2000 e-^2 / (2000 e-)^2
     assert offset == pytest.approx((9 + 16 + 2.0**2 / 12) / 2000**2, rel=1e-12)
+    columns = replace(raw, column_gain_spread=0.01, dark_current_e=500.0)  # 2 x 0.01^2 x 500 e- of light beside dark
+    assert dng_tags(columns)[51041][1] == pytest.approx((1.1 / 2000, offset), rel=1e-12)
 
 
 def test_the_response_counts_as_linear_up_to_where_pixels_count_as_saturated() -> None:
