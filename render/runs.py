@@ -1,8 +1,8 @@
 """Runs of two sequences of points over a scene, and their means: the picture, and half the difference as its error.
 
-Each pixel has two sequences of its own, independent of each other: the even and the odd half. A run draws the next
-points of both. They are added in chunks, whose limits follow from their place in the sequence alone, so that a render
-that was stopped anywhere and goes on has the bits of one go.
+Each pixel has two sequences of its own, independent of each other: the even and the odd half. A point is one Sobol
+point: one path. A run draws the next points of both halves. They are added in chunks, whose limits depend only on the
+position in the sequence: a resumed render has the same bits as one that was never stopped.
 """
 
 import traceback
@@ -26,6 +26,7 @@ from rodcone.types import Floats, Planes
 
 MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
 PILOT = Span(0, 8, 2)  # of each half: 32 samples a pixel, in four sets
+_PILOT_STREAM = 8
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
 
@@ -38,14 +39,14 @@ class Means:
     count : int
         Points of each half in a pixel of rate 1.
     rates : (h, w) uint32
-        By how many times more points a pixel has: powers of two.
+        How many times as many points a pixel gets as one of rate 1: powers of two.
     light : Halves of (group, band, h, w)
     seen : list of Halves of (1 or band, h, w)
-        Light that is seen directly, of each group.
+        Light that is seen directly, of each group: one plane where emission doesn't depend on wavelength.
     coverage : Halves of (h, w)
         Share of the paths that meet a light first.
     shared : (int, int) or None
-        Groups that are rendered along the same paths.
+        A light group and the constant environment, which share paths: their indices.
     indirect : Halves of (group, band, h, w) or None
         Indirect light in `light`, where it is kept by itself.
     """
@@ -61,13 +62,13 @@ class Means:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one half of a light group's paths gives in some chunks.
+    """What one half of the paths of a loaded scene gives in some chunks.
 
     Attributes
     ----------
     radiance : (chunk, group, band, h, w) float32
     seen : list of (chunk, 1 or band, h, w) float32
-        For each group.
+        For each group, as `Means.seen`.
     coverage : (chunk, h, w) float32
     indirect : (chunk, group, band, h, w) float32
         No groups where it isn't asked for.
@@ -116,7 +117,10 @@ def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def scene_means_of(means: Means) -> SceneMeans:
-    """Means over the picture of what is no light; pixels are independent of each other."""
+    """Means over the picture of light that isn't emitted straight at the camera, and the share of it without a lamp.
+
+    Pixels are independent of each other.
+    """
     groups, bands, *size = means.light.mean.shape
     scattered, errors = np.empty((groups, bands)), []
     for group in range(groups):
@@ -133,29 +137,29 @@ def scene_means_of(means: Means) -> SceneMeans:
     return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
 
 
-def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
+def add_run(scenes: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
     """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
     start, chunk, split = means.count, chunk_from(means.count), means.indirect is not None
-    # Chunks of one length (it grows along the sequence), as many as the threads of a launch hold
-    threads = launch_threads(light_groups, film, split=split)
+    # Chunks until their length changes (it grows along the sequence), as many as the threads of a launch hold
+    threads = launch_threads(scenes, film, split=split)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(equal_chunks, -(-(stop - start) // chunk))
     span = Span(start, chunk, chunks)
-    draws = [_drawn(loaded, film, means.rates, span, threads, seed, split=split) for loaded in light_groups]
-    if len(light_groups[0].groups) == 2:
-        means.shared = light_groups[0].groups[0], light_groups[0].groups[1]
+    draws = [_drawn(loaded, film, means.rates, span, threads, seed, split=split) for loaded in scenes]
+    if len(scenes[0].groups) == 2:
+        means.shared = scenes[0].groups[0], scenes[0].groups[1]
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
-        # Each light group is found by paths of its own: together they cover the sum of what each does.
+        # A camera path meets one lamp first, of one group: coverage is the sum over the groups' paths.
         covered_even, covered_odd = (
             sum(half.coverage[index] for half in halves) for halves in zip(*draws, strict=True)
         )
         means.coverage.add(np.asarray(covered_even), np.asarray(covered_odd), weight)
-        for loaded, (even, odd) in zip(light_groups, draws, strict=True):
+        for loaded, (even, odd) in zip(scenes, draws, strict=True):
             for slot, group in enumerate(loaded.groups):
                 means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight)
                 means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight)
@@ -164,7 +168,7 @@ def add_run(light_groups: list[Loaded], means: Means, film: Film, stop: int, see
         means.count += chunk
 
 
-def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
+def pilot_rates(scenes: list[Loaded], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
     """Rates of the pixels (h, w), from samples that are drawn for them alone.
 
     Parameters
@@ -175,44 +179,44 @@ def pilot_rates(light_groups: list[Loaded], film: Film, lights: Floats, seed: in
     energy = (lights * film.width_nm).astype(np.float32)
     scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
     seen = np.zeros((len(lights), *film.size), np.float32)
-    uniform, threads = np.ones(film.size, np.uint32), launch_threads(light_groups, film)
-    for loaded in light_groups:
-        halves = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, PILOT.chunk))
+    uniform, threads = np.ones(film.size, np.uint32), launch_threads(scenes, film)
+    for loaded in scenes:
+        halves = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, _PILOT_STREAM))
         for slot, group in enumerate(loaded.groups):
             for index, (half, chunk) in enumerate(product(halves, range(PILOT.chunks))):
-                lamps = half.seen[slot][chunk]
-                light = half.radiance[chunk, slot] - lamps
+                direct = half.seen[slot][chunk]
+                light = half.radiance[chunk, slot] - direct
                 scattered[group, index] = np.tensordot(energy[group], light, axes=1)
-                of_lamps = energy[group] if len(lamps) > 1 else energy[group].sum(keepdims=True)
-                seen[group] += np.tensordot(of_lamps, lamps, axes=1) / (2 * PILOT.chunks)
+                emission = energy[group] if len(direct) > 1 else energy[group].sum(keepdims=True)
+                seen[group] += np.tensordot(emission, direct, axes=1) / (2 * PILOT.chunks)
     return rates_of(scattered, seen)
 
 
-def launch_threads(light_groups: list[Loaded], film: Film, *, split: bool = False) -> int:
+def launch_threads(scenes: list[Loaded], film: Film, *, split: bool = False) -> int:
     """Threads of a launch, by the memory that their channels need."""
-    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in light_groups)
+    return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in scenes)
 
 
 def _drawn(
     loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, split: bool = False
 ) -> tuple[Drawn, Drawn]:
-    """Draw a span of both halves of one light group's paths: the even half and the odd."""
+    """Draw a span of both halves of the paths of one loaded scene: the even half and the odd."""
     halves, groups = [], len(loaded.groups)
     for half in range(2):
         group_seed = seed_of(seed, loaded.groups[0], half)
         traces = (tracer.camera for tracer in tracers(loaded, film, PART_BANDS, group_seed, split=split))
         parts = [traced(trace, rates, span, threads, group_seed) for trace in traces]
-        scattered, indirect = (
+        total, indirect = (
             np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
             for name, count in (("scattered", groups), ("indirect", groups * split))
         )
-        shares = parts[0]["shares"]  # of all parts of the bands: they see the same paths
-        seen = [shares[:, slot, None] for slot in range(groups)]
+        coverage = parts[0]["shares"]  # of all parts of the bands: they see the same paths
+        seen = [coverage[:, slot, None] for slot in range(groups)]
         if loaded.coloured:
             seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
         for slot, planes in enumerate(seen):
-            scattered[:, slot] += planes
-        halves.append(Drawn(radiance=scattered, seen=seen, coverage=shares.sum(axis=1), indirect=indirect))
+            total[:, slot] += planes
+        halves.append(Drawn(radiance=total, seen=seen, coverage=coverage.sum(axis=1), indirect=indirect))
     return halves[0], halves[1]
 
 

@@ -6,11 +6,11 @@ the estimate of the least squared error is linear, and its error has the covaria
 
     P_k = C_k - C_k H' (H C_k H' + N_k)^-1 H C_k                                                    (textbook LMMSE)
 
-so that the expected error is sum_k pi_k tr(W_k P_k), W_k the metric about the component's mean. No estimator knows the
-component, so a real one does worse. One that uses mean and covariance of all patches together, and so is linear in the
-samples, does better than nothing: its error, by the same formula for one Gaussian, is the other end. Both are
-expectations over the prior: an easy scene lies under them. A lens L makes them those of the estimate of L x, a picture
-whose blur nobody undoes, beside x: with V_k = C_k - P_k, what the samples tell,
+so that the expected error is sum_k pi_k tr(W_k P_k), e' W_k e the squared error of a colour that is e off the
+component's mean. No estimator knows the component, so a real one does worse. One that uses mean and covariance of all
+patches together, and so is linear in the samples, can be built: its error, by the same formula for one Gaussian, is an
+upper bound. Both are expectations over the prior: an easy scene has less error. With a lens L the estimate is that of
+L x, a picture whose blur nobody undoes, and is compared with x: with V_k = C_k - P_k, what the samples tell,
 
     C_k + L V_k L' - V_k L' - L V_k + (L mu_k - mu_k)(L mu_k - mu_k)'
 """
@@ -82,6 +82,7 @@ class Noise:
 def pooled(prior: Gaussians) -> Gaussians:
     """One Gaussian with the mean and covariance of the whole mixture."""
     mean, root = np.tensordot(prior.weights, prior.means, 1), np.sqrt(prior.weights)[:, None, None]
+    # b^2 mu mu' of the components is b^2 of the pooled mean's square, and b^2 of the deviations' squares: hence 1 + b^2
     spread = np.hypot(1.0, prior.brightness) * root * (prior.means - mean)
     wide = np.concatenate([*(root[..., None] * prior.factors), np.moveaxis(spread, 0, -1)], axis=-1)
     left, sizes, _ = np.linalg.svd(wide.reshape(mean.size, -1), full_matrices=False)
@@ -92,8 +93,9 @@ def pooled(prior: Gaussians) -> Gaussians:
 def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
     """Share o of a sample's variance that reading it explains, by how far its mean is from the well; and its slope.
 
-    In standard deviations a of the whole: o = Phi(a) + phi(a) (hazard(a) - a), the open samples' part and that of the
-    bound; its slope is phi(a) (hazard(a) - a)^2.
+    That is the Fisher information of a Gaussian censored at the well, over that of one that isn't. With
+    a = (well - mean) / sigma, o = Phi(a) + phi(a) (hazard(a) - a): first the open samples' part, then the full ones',
+    each of which is a lower bound. Its slope is phi(a) (hazard(a) - a)^2.
     """
     a = np.minimum(distance, FAR)
     density, over = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi), np.sqrt(2 / np.pi) / erfcx(a / np.sqrt(2)) - a
@@ -132,13 +134,13 @@ class Samples:
     signal : (component, sample, sample) float64
         H C_k H'.
     spread : (component, sample) float64
-        Variance of a sample at a brightness that its neighbours know.
+        Variance of a sample, the brightness given.
     cross : (component, sample, pixel, coefficient) float64
         H C_k L' at the middle pixels.
-    beside : (component, sample, pixel, coefficient) float64
-        H C_k (2 - L)' there: `cross` without a lens.
+    error_cross : (component, sample, pixel, coefficient) float64
+        H C_k (2 I - L)' there: with the estimate's gain it gives C_k less the error's covariance.
     within : (component, pixel, coefficient, coefficient) float64
-        C_k of each middle pixel's coefficients, and the square of what the lens does to its mean.
+        C_k of each middle pixel's coefficients, and (L mu_k - mu_k)(L mu_k - mu_k)' there.
     """
 
     weights: Doubles
@@ -146,7 +148,7 @@ class Samples:
     signal: Doubles
     spread: Doubles
     cross: Doubles
-    beside: Doubles
+    error_cross: Doubles
     within: Doubles
 
 
@@ -176,13 +178,15 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
         signal=signal,
         spread=np.diagonal(signal, axis1=1, axis2=2) - (prior.brightness * means) ** 2,
         cross=cross,
-        beside=2 * by_pixel[:, :, middle] - cross,
+        error_cross=2 * by_pixel[:, :, middle] - cross,
         within=inside @ inside.swapaxes(-1, -2) + prior.rest[:, None, None, None] * np.eye(coefficients),
     )
 
 
 def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Doubles, Doubles]:
-    """G of the best linear estimate, (component, sample, pixel, coefficient), and what it leaves unknown, as `within`.
+    """G of the best linear estimate, (component, sample, pixel, coefficient), and its error's matrix, as `within`.
+
+    With a lens that matrix isn't symmetric; a quadratic form takes its symmetric part.
 
     Parameters
     ----------
@@ -194,7 +198,7 @@ def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Doubles
     variance = sample_variance(scale * samples.means, scale**2 * samples.spread, noise)
     total, cross = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1]), scale * samples.cross
     gain = np.asarray(np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1))).reshape(*cross.shape)
-    return gain, samples.within - np.einsum("kspc,kspe->kpce", scale * samples.beside, gain, optimize=True)
+    return gain, samples.within - np.einsum("kspc,kspe->kpce", scale * samples.error_cross, gain, optimize=True)
 
 
 def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles) -> Doubles:
@@ -205,7 +209,7 @@ def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles)
     samples, scale, noise
         As `best_estimate` has them.
     forms : (metric, component, pixel, coefficient, coefficient) float64
-        W: the squared error of a pixel is e' W e, e that of its coefficients; only its even part counts.
+        W: the squared error of a pixel is e' W e, e that of its coefficients.
     """
     left = best_estimate(samples, scale, noise)[1]
     return np.asarray(np.einsum("k,mkpce,kpce->m", samples.weights, forms, left, optimize=True) / left.shape[1])

@@ -1,7 +1,7 @@
 """Indirect light denoised by Intel's Open Image Denoise, six spectra of it, guided by the surfaces that are seen.
 
 Indirect light over albedo is smooth where surfaces are, whatever their texture. Its spectra are few: six planes hold
-them, made of the bands by hat functions, and the way back is the least-squares fit to the picture itself.
+them, made of the bands by hat functions. A least-squares matrix, fitted to the picture itself, leads back to the bands.
 """
 
 from dataclasses import dataclass
@@ -21,8 +21,8 @@ SPECTRA = 6  # two calls of three planes
 LEAST_ALBEDO = 0.02  # darker surfaces are taken as this: their light over albedo would be noise alone
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
-MIXING_PIXELS = 2.0  # standard deviation of the window in which errors are compared
-ROUNDING = 1e-10  # of squares of single-precision numbers: spectra that differ by less are one
+MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
+ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values: squares of single-precision numbers
 _PLANES = 3  # of a call
 
 
@@ -37,7 +37,7 @@ class Denoised:
     indirect : Halves of (group, band, h, w)
         That part of the unbiased light, with its noise.
     folds : Halves of (group, band, h, w)
-        Two renders with paths of their own, no part of which is in `radiance`.
+        Two independent renders that measure the error of `radiance`; no part of them is in it.
     fold_points : int
         Samples of each fold in a pixel of rate 1.
     """
@@ -62,7 +62,10 @@ def denoiser() -> Any:
 
 
 def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
-    """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels."""
+    """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels.
+
+    Pass another seed than the light's paths have: with that one the two would share their noise.
+    """
     once, span = np.ones(film.size, np.uint32), Span(0, SURFACE_POINTS, 1)
     group_seed = seed_of(seed, loaded.groups[0], 0)
     traces = (tracer.first_surface for tracer in tracers(loaded, film, PART_BANDS, group_seed))
@@ -98,19 +101,19 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
     hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
     reduced, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
     # Denoise the whole and each half
-    guide = _last(normal)
+    guide = _channels_last(normal)  # the light is divided by albedo already; without any the library takes no normals
     options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True}
     options["device"] = library.Device(library.DeviceType.CPU)  # the same light on every machine
 
     def filtered(planes: Planes) -> Planes:
         indices = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
-        images = [library.denoise(_last(planes[triple]), **options) for triple in indices.reshape(-1, _PLANES)]
+        images = [library.denoise(_channels_last(planes[triple]), **options) for triple in indices.reshape(-1, _PLANES)]
         return np.concatenate([np.moveaxis(image, -1, 0) for image in images])[: len(planes)]
 
     even, odd = np.maximum(reduced + error, 0), np.maximum(reduced - error, 0)
     share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
     mixture = reduced + share * (filtered(reduced) - reduced)
-    return np.asarray(np.maximum(np.tensordot(_way_back(light, reduced), mixture, 1), 0) * unit)
+    return np.asarray(np.maximum(np.tensordot(_spectra_to_bands(light, reduced), mixture, 1), 0) * unit)
 
 
 def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
@@ -128,7 +131,8 @@ def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
     from scipy.ndimage import gaussian_filter  # late: a render that isn't denoised does without
 
     variance, even, odd = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *residuals))
-    # A half has twice the variance of the mean. What is left must be more than that estimate's own standard error.
+    # A half has twice the variance of the mean, so E is that of a half, an upper bound. The window averages 4 pi s^2
+    # independent pixels, and a variance of that many draws has the relative error sqrt(2 / pixels): E counts beyond it.
     of_half, pixels = 2 * variance, 4 * np.pi * MIXING_PIXELS**2
     squared = np.maximum((even + odd) / 2 - of_half - of_half * (2 / pixels) ** 0.5, 0)
     total = variance + squared
@@ -143,12 +147,12 @@ def _hats(bands: int) -> Planes:
     return np.asarray(hats / hats.sum(axis=1, keepdims=True), np.float32)
 
 
-def _way_back(bands: Planes, reduced: Planes) -> Planes:
+def _spectra_to_bands(bands: Planes, reduced: Planes) -> Planes:
     """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
     source, target = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (reduced, bands))
     return np.asarray(target @ source.T @ np.linalg.pinv(source @ source.T, rcond=ROUNDING), np.float32)
 
 
-def _last(planes: Planes) -> Planes:
+def _channels_last(planes: Planes) -> Planes:
     """Planes with their axis last, as the denoiser takes them."""
     return np.ascontiguousarray(np.moveaxis(planes, 0, -1), np.float32)

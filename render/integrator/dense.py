@@ -18,7 +18,8 @@ from rodcone.jit import dr
 
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands. Under the horizon `measured` gives densities below 0.
+# lobes by wavelength and one path can't serve all bands. Densities count by their size: below the horizon `measured`
+# gives negative ones.
 PDF_TOLERANCE = 1e-3
 CHOSEN = "chosen"  # the channel that counts such paths
 
@@ -66,9 +67,9 @@ class Tracer:
         -------
         dict of lists of Float
             ``scattered``: bands without the light that is seen directly, then the environment's; with ``split``
-            ``indirect``: as many of indirect light; ``shares`` of paths that meet a light first, which is that light
-            at unit emission, and that meet the environment; with ``coloured`` ``lamps``: the light's bands; ``chosen``:
-            the share of paths whose BSDF chose by wavelength.
+            ``indirect``: as many of indirect light; ``shares`` of paths that meet a lamp first, at unit emission also
+            the lamp's radiance, and that meet the environment; with ``coloured`` ``lamps``: the light's bands;
+            ``chosen``: the share of paths whose BSDF chose by wavelength.
         """
         wavelengths, step = self._wavelengths(points)
         ray = self._camera_ray(pixel, points)
@@ -120,7 +121,7 @@ class Tracer:
             throughput = _times(throughput, weights)
             delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
             scatters = go_on & ~delta
-            albedo = _either(scatters, throughput, albedo)
+            albedo = _select(scatters, throughput, albedo)
             normal = dr.select(scatters, mi.Vector3f(si.sh_frame.n), normal)
             ray = si.spawn_ray(si.to_world(sample.wo))
             ray.wavelengths = wavelengths[0]
@@ -142,7 +143,7 @@ class Tracer:
         return ray
 
     def _wavelengths(self, points: Points) -> tuple[list[Any], Any]:
-        """Wavelengths of a path, and the table's step that they belong to.
+        """Wavelengths of a path, and the index of their offset, for which reflectances are tabulated.
 
         The offset from the bands' centres is one of those that the table is made for, if there is one. Centres and
         widths reach the kernel as data: other bands don't compile it anew.
@@ -208,7 +209,10 @@ class Tracer:
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.split else []
-        direct, unscattered = mi.Bool(True), mi.Bool(True)  # the light met next; the path so far
+        direct, unscattered = (
+            mi.Bool(True),
+            mi.Bool(True),
+        )  # of the light met next; of the path so far, one vertex ahead
         lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
         first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
         eta, depth = mi.Float(1.0), mi.UInt32(0)
@@ -216,25 +220,25 @@ class Tracer:
         while dr.hint(active, label="dense path"):
             # Light that the path meets
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
-            share = self._share(scene, si, previous, previous_pdf, previous_delta)
+            mis_weight = self._mis_weight(scene, si, previous, previous_pdf, previous_delta)
             emitted = self._emitted(scene, si, wavelengths)
-            unseen = (depth > 0) | (bounced > 0)
+            beyond_first = (depth > 0) | (bounced > 0)
             for value in _flat(emitted) if self.coloured else emitted[:1]:
-                lamp_first |= ~unseen & (value != 0)
-            sky_first |= ~unseen & ~si.is_valid()
-            first = _either(unseen, first, emitted) if self.coloured else first
-            result = _plus(result, throughput, emitted, dr.select(unseen, share, 0.0))
-            indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, share))
+                lamp_first |= ~beyond_first & (value != 0)
+            sky_first |= ~beyond_first & ~si.is_valid()
+            first = _select(beyond_first, first, emitted) if self.coloured else first
+            result = _plus(result, throughput, emitted, dr.select(beyond_first, mis_weight, 0.0))
+            indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, mis_weight))
 
             # Light that is sampled from here, and the direction to go on in
-            go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), unseen & ~si.is_valid()
+            go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), beyond_first & ~si.is_valid()
             received, sample, weights, by_wavelength = self._bounce(
                 scene, points.bounce(depth + bounced), ray, si, go_on, wavelengths, step
             )
             result = _plus(result, throughput, received, 1.0)
             indirect = self._indirect(indirect, throughput, received, dr.select(unscattered, 0.0, 1.0))
             chosen |= go_on & by_wavelength
-            scattered = _times(throughput, weights)
+            onward = _times(throughput, weights)
 
             ray = si.spawn_ray(si.to_world(sample.wo))
             ray.wavelengths = wavelengths[0]
@@ -244,12 +248,12 @@ class Tracer:
             direct = dr.select(si.is_valid(), unscattered, direct)
             unscattered &= previous_delta
             depth[si.is_valid()] += 1
-            scattered, survives = _roulette(scattered, eta, depth >= self.rr_depth, points.roulette(depth))
-            throughput = _either(escaped & self.environment, throughput, scattered)
+            onward, survives = _roulette(onward, eta, depth >= self.rr_depth, points.roulette(depth))
+            throughput = _select(escaped & self.environment, throughput, onward)
             active = go_on & survives
         # Environment of the paths that escaped
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
-        sky, indirect_sky = _either(escaped, throughput, dark), _either(escaped & ~direct, throughput, dark)
+        sky, indirect_sky = _select(escaped, throughput, dark), _select(escaped & ~direct, throughput, dark)
         scattered = [result, sky] if self.environment else [result]
         indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.split else []
         return scattered, indirects, (lamp_first, sky_first, first), chosen
@@ -258,8 +262,8 @@ class Tracer:
         """Add indirect light where it is asked for by itself."""
         return _plus(indirect, throughput, light, factor) if self.split else indirect
 
-    def _share(self, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any) -> Any:
-        """Weight of the light that a path meets, beside the chance that it had been sampled from the point before."""
+    def _mis_weight(self, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any) -> Any:
+        """Weight of the light that a path meets, against sampling that light from the point before."""
         if not self.sample_lights:
             return self.mi.Float(1.0)
         direction = self.mi.DirectionSample3f(scene, si, previous)
@@ -294,7 +298,7 @@ class Tracer:
         ds, light = scene.sample_emitter_direction(si, towards_light, True, lit)
         lit &= ds.pdf != 0  # 0 also in shadow; a light may be dark at the first wavelengths and shine at others
         values, pdf, sample, weights, by_wavelength = dr.dispatch(
-            bsdf, self._scattered, si, si.to_local(ds.d), lobe, angle, wavelengths, step
+            bsdf, self._eval_and_sample, si, si.to_local(ds.d), lobe, angle, wavelengths, step
         )
         factor = dr.select(lit, dr.select(ds.delta, 1.0, _power_heuristic(ds.pdf, pdf)), 0.0)
         arriving = self._arriving(ds, light, si, wavelengths)
@@ -304,7 +308,7 @@ class Tracer:
     # A surface at all wavelengths, within one virtual call: what no wavelength changes is then computed once.
     # `render.integrator.matte` brings `scatter_bands` and `sample_bands`: its sampling knows no wavelength.
 
-    def _scattered(
+    def _eval_and_sample(
         self, bsdf: Any, si: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, Any, list[Any], Any]:
         """Values towards a light, density, sampled direction, its weights, and whether wavelength chose it."""
@@ -364,8 +368,8 @@ def _times(first: list[Any], second: list[Any]) -> list[Any]:  # Dr.Jit's syntax
     return [a * b for a, b in zip(first, second, strict=True)]
 
 
-def _either(first: Any, where: list[Any], elsewhere: list[Any]) -> list[Any]:
-    return [dr.select(first, a, b) for a, b in zip(where, elsewhere, strict=True)]
+def _select(mask: Any, if_true: list[Any], if_false: list[Any]) -> list[Any]:
+    return [dr.select(mask, a, b) for a, b in zip(if_true, if_false, strict=True)]
 
 
 def _plus(result: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:

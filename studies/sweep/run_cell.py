@@ -1,4 +1,4 @@
-"""One cell: exposed, developed, measured; its picture on disk before its row is given back."""
+"""Expose, develop and measure one cell; save its picture, then return the row."""
 
 import json
 import platform
@@ -50,7 +50,7 @@ def run_cell(cell: Cell) -> Row:
     OSError
         Where the picture can't be written.
     """
-    processor = processor_of(cell.processor, json.loads(cell.made_by.versions))  # a user's own: the same bytes, or none
+    processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
     _check_provenance(cell, processor)
     sensor, engine = cell.sensor, cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
@@ -58,14 +58,15 @@ def run_cell(cell: Cell) -> Row:
     light = cell.luminance_cd_m2 * cell.exposure_s
     unmoved_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
-    # In a study with `sensor_side_um` the truth was already averaged to the coarsest sensor's pixels.
-    truth, truth_png = _truth(cell.truth, sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape)
+    # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
+    bins_truth = sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape
+    truth, truth_png = _truth(cell.truth, bins_truth)
     pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(cell.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
 
-    def burst() -> RawImage:
+    def burst() -> RawImage:  # `timed` may call it twice: with the same noise
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
         hand, raws = shake_stream(cell.seed), []
         for _ in range(frames):
@@ -78,13 +79,13 @@ def run_cell(cell: Cell) -> Row:
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
-    # the neutral of the scene's light, as a raw file would note it; else Gray World's, from the picture
+    # The neutral of the scene's light, as a raw file would note it, sets the scale; as shot, the balance too.
     as_shot = names["white_balance"] == AS_SHOT
     neutral = neutral_electrons(sensor, cell.light, raw.exposure_s)
     options = {"balance": neutral} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.colours, sensor, neutral, cell.white_cd_m2, **options),
-        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),
+        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # each has other kernels
     )
     if linear.shape != truth.linear.shape:  # of sensors of one size: compared at the coarsest's pixels
         linear = area_average(linear, truth.linear.shape[:2])
@@ -154,12 +155,12 @@ def _check_provenance(cell: Cell, processor: Processor) -> None:
 
 def _truth(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
     """The truth, of 2x2 pixels each where the camera bins, and its PNG."""
-    _array(path)  # tells what can't be read
-    return _worked_out(path, binned)
+    _array(path)  # refuses what can't be read, in the cache or not
+    return _true_picture(path, binned)
 
 
 @lru_cache(maxsize=2)  # cells of one scene under one spectrum come one after the other
-def _worked_out(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
+def _true_picture(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
     linear = np.array(_array(path))
     if binned:
         linear = np.moveaxis(block_sums(np.moveaxis(linear, -1, 0)) / 4, 0, -1)
