@@ -29,7 +29,7 @@ from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_inputs
 from rodcone.errors import InputError
-from rodcone.types import Floats, Planes
+from rodcone.types import Planes
 
 SHIPPED = Path(__file__).parent / "data" / "references"
 FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
@@ -85,9 +85,7 @@ def find_reference(scene: Scene, film: Film) -> Reference | None:
     for folder in reference_folders():
         path = reference_path(folder, scene, film)
         if (arrays := read_arrays(path)) is not None:
-            certificate = json.loads(str(arrays["certificate"]))
-            groups, bands = dict(scene.groups), (film.wavelength_nm, film.width_nm)
-            return Reference(path, _unpacked(arrays, certificate, groups, *bands), certificate)
+            return _unpacked(path, arrays, scene.groups)
     return None
 
 
@@ -104,13 +102,10 @@ def open_reference(path: str | Path) -> Reference:
     if arrays is None or "groups" not in (certificate := json.loads(str(arrays.get("certificate", "{}")))):
         raise InputError(f"{path}: there is no intact reference light; allowed: a file of rodcone reference; make it")
     groups = {
-        name: LightGroup(
-            tuple(group["emitters"]), Spectrum(*map(np.array, group["spectrum"])), group["power"], group["coloured"]
-        )
+        name: LightGroup(**group | {"emitters": tuple(group["emitters"]), "spectrum": Spectrum(*group["spectrum"])})
         for name, group in certificate["groups"].items()
     }
-    bands = np.array(certificate["wavelength_nm"]), np.array(certificate["width_nm"])
-    return Reference(file, _unpacked(arrays, certificate, groups, *bands), certificate)
+    return _unpacked(file, arrays, groups)
 
 
 def _unpacks(file: Path) -> bool:
@@ -136,12 +131,7 @@ def save_reference(path: Path, transport: Transport, certificate: Mapping[str, A
     }
     made_by = {name: getattr(transport, name) for name in ("seconds", "integrator", "variant")}
     groups = {
-        name: {
-            "emitters": group.emitters,
-            "spectrum": [group.spectrum.wavelength_nm.tolist(), group.spectrum.values.tolist()],
-            "power": group.power,
-            "coloured": group.coloured,
-        }
+        name: vars(group) | {"spectrum": [group.spectrum.wavelength_nm.tolist(), group.spectrum.values.tolist()]}
         for name, group in transport.groups.items()
     }
     bands = {"wavelength_nm": transport.wavelength_nm.tolist(), "width_nm": transport.width_nm.tolist()}
@@ -168,16 +158,11 @@ def _error_plane(light: Halves, error: Planes) -> Planes:
     return np.asarray(plane * np.sqrt(np.maximum(lost, 1.0))[:, None, None], np.float32)
 
 
-def _unpacked(
-    arrays: Mapping[str, Any],
-    certificate: Mapping[str, Any],
-    groups: Mapping[str, LightGroup],
-    wavelength_nm: Floats,
-    width_nm: Floats,
-) -> Transport:
-    """Transport of a file; variances are pooled from the error plane as a render's from its difference."""
-    light = arrays["light"] * arrays["scale"]
-    rates = arrays["rates"]
+def _unpacked(path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightGroup]) -> Reference:
+    """Light of a file; variances are pooled from the error plane as a render's from its difference."""
+    certificate = json.loads(str(arrays["certificate"]))
+    wavelength_nm, width_nm = (np.array(certificate[name]) for name in ("wavelength_nm", "width_nm"))
+    light, rates = arrays["light"] * arrays["scale"], arrays["rates"]
     means = Means(
         count=int(arrays["points"]),
         rates=rates,
@@ -186,13 +171,13 @@ def _unpacked(
         coverage=Halves(*arrays["coverage"]),
         shared=tuple(arrays["shared"].tolist()) or None,
     )
-    return Transport(
+    transport = Transport(
         light=means.light,
         coverage=means.coverage,
         seen=tuple(means.seen),
         **errors_of(emission(groups, wavelength_nm, width_nm), means),
         scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _LEVELS}),
-        groups=groups,
+        groups=dict(groups),
         wavelength_nm=wavelength_nm,
         width_nm=width_nm,
         counts=2 * means.count * rates,
@@ -201,6 +186,7 @@ def _unpacked(
         integrator=f"reference light: {certificate['integrator']}",
         variant=certificate["variant"],
     )
+    return Reference(path, transport, certificate)
 
 
 def agreement(live: Transport, reference: Transport) -> Agreement:
