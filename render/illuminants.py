@@ -19,15 +19,6 @@ from rodcone.csv_file import read_columns
 from rodcone.errors import InputError, one_line, require_range, unknown
 from rodcone.optional import quietly_imported
 
-# CIE 015:2018 tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps,
-# HP1 is standard high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
-_TABULATED = {
-    **{name: name for name in ("A", "D50", "D55", "D65", "D75")},
-    "F2": "FL2",
-    "F11": "FL11",
-    "sodium_high": "HP1",
-    **{f"LED-{kind}": f"LED-{kind}" for kind in ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")},
-}
 # Sodium D2 and D1 in air, NIST Atomic Spectra Database; D2 is twice as strong where the vapour is thin. In a
 # low-pressure lamp the two are nearer to equal: 0.6 nm apart, no band and no eye can tell.
 _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
@@ -39,8 +30,12 @@ _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
 def names() -> tuple[str, ...]:
-    """Names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``."""
-    return (*sorted((*_TABULATED, "E")), "moonlight", *_LINES, "sunlight")
+    """Names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``.
+
+    CIE 015:2018 has tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps, its HP1 is standard
+    high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
+    """
+    return (*sorted((*published_spectra("illuminants"), "E")), "moonlight", *_LINES, "sunlight")
 
 
 def lines_nm(name: str) -> tuple[float, ...]:
@@ -131,12 +126,11 @@ def _unit_lines(at_nm: tuple[float, ...], powers: tuple[float, ...]) -> Spectrum
 def _smooth(name: str) -> Spectrum:
     if name == "E":
         return flat()
-    if name == "moonlight":
-        sun = _direct_sun()
-        return Spectrum(sun.wavelength_nm, sun.values * (1 + MOON_SLOPE_PER_NM * (sun.wavelength_nm - 550.0)))
-    if name == "sunlight":
-        return _direct_sun()
-    return Spectrum(*published_spectra("illuminants")[_TABULATED[name]])
+    if name in ("moonlight", "sunlight"):
+        # the sun's own beam at the ground, 1 nm means: ASTM G173-03, direct and circumsolar, sun 42 degrees high
+        nm, sun = published_spectra("sun")["direct"]
+        return Spectrum(nm, sun if name == "sunlight" else sun * (1 + MOON_SLOPE_PER_NM * (nm - 550.0)))
+    return Spectrum(*published_spectra("illuminants")[name])
 
 
 @cache
@@ -165,11 +159,6 @@ def daylight(cct_k: float) -> Spectrum:
     m2 = (0.0300 - 31.4424 * x + 30.0717 * y) / m
     (nm, s0), (_, s1), (_, s2) = published_spectra("daylight").values()
     return unit_luminance(Spectrum(nm, s0 + m1 * s1 + m2 * s2))
-
-
-def _direct_sun() -> Spectrum:
-    """Sun's own beam at the ground, in 1 nm means: ASTM G173-03, direct and circumsolar, sun 42 degrees high."""
-    return Spectrum(*published_spectra("sun")["direct"])
 
 
 def unit_luminance(spectrum: Spectrum) -> Spectrum:

@@ -145,8 +145,10 @@ def test_a_file_that_is_no_lamp_is_refused_by_name_in_one_line(tmp_path, text, w
 
 # Published tables: those of colour-science, whose digits they are. Run as a script, it writes them anew.
 
-LIGHTS = ("A", "D50", "D55", "D65", "D75", "FL2", "FL11", "HP1")
-LEDS = ("B1", "B2", "B3", "B4", "B5", "BH1", "RGB1", "V1", "V2")
+LIGHTS = {name: name for name in ("A", "D50", "D55", "D65", "D75")}  # our name: theirs
+LIGHTS |= {"F2": "FL2", "F11": "FL11", "sodium_high": "HP1"}
+LIGHTS |= {name: name for name in ("LED-B1", "LED-B2", "LED-B3", "LED-B4", "LED-B5", "LED-BH1")}
+LIGHTS |= {name: name for name in ("LED-RGB1", "LED-V1", "LED-V2")}
 SUN_NM = np.arange(300.0, 1101.0)
 
 
@@ -157,9 +159,8 @@ def of_colour_science() -> dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]:
     sun = colour.plotting.datasets.SD_ASTMG173_DIRECT_CIRCUMSOLAR
     means = Spectrum(sun.wavelengths, sun.values).band_average(SUN_NM, np.ones_like(SUN_NM))
     camera = colour.MSDS_CAMERA_SENSITIVITIES["Nikon 5100 (NPL)"]
-    names = [*LIGHTS, *(f"LED-{kind}" for kind in LEDS)]
     tables = {
-        "illuminants": {name: colour.SDS_ILLUMINANTS[name] for name in names},
+        "illuminants": {name: colour.SDS_ILLUMINANTS[theirs] for name, theirs in LIGHTS.items()},
         "daylight": colour.colorimetry.SDS_BASIS_FUNCTIONS_CIE_ILLUMINANT_D_SERIES,
         "color_checker": colour.SDS_COLOURCHECKERS["cc_ohta"],
     }
