@@ -1,4 +1,4 @@
-"""Placing things: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
+"""Placing things and the camera: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
 
 from collections.abc import Sequence
 from typing import Any
@@ -57,3 +57,15 @@ def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float
 def to_world(*transforms: Floats) -> Any:
     """Product of transforms, the last applied first, as `mitsuba.load_dict` takes it in every variant."""
     return Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())
+
+
+def camera(
+    fov_deg: float,
+    origin: tuple[float, float, float],
+    target: tuple[float, float, float],
+    size: tuple[int, int] | None = None,
+) -> dict[str, Any]:
+    """Perspective camera of `fov_deg` over the picture's shorter side; `size` is the picture's own height and width."""
+    pose = to_world(look_at(origin, target))
+    view = {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}
+    return view | ({"film": {"type": "hdrfilm", "height": size[0], "width": size[1]}} if size else {})

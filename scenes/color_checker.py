@@ -6,12 +6,11 @@ from pathlib import Path
 
 import numpy as np
 
-from render.geometry import look_at, translate
+from render.geometry import camera, look_at, translate
 from render.scene import Node, Scene
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError, require_range
-from scenes.camera_and_sky import camera, under_sky
-from scenes.materials import matte, panel
+from scenes.materials import matte, panel, under_sky
 from scenes.reflectances import color_checker as patches
 from scenes.reflectances import grey, held, read_reflectances
 

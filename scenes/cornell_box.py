@@ -6,11 +6,10 @@ Source of geometry and spectra: Cornell University Program of Computer Graphics,
 
 import numpy as np
 
-from render.geometry import look_at, rotate, translate
+from render.geometry import camera, look_at, rotate, translate
 from render.illuminants import illuminant, unit_luminance
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
-from scenes.camera_and_sky import camera
 from scenes.materials import block, floor, matte, panel
 from scenes.reflectances import resampled
 

@@ -5,12 +5,11 @@ from math import cos, pi, radians, sin
 
 import numpy as np
 
-from render.geometry import rotate, translate
+from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import require_whole
-from scenes.camera_and_sky import camera
 from scenes.generated import LARGEST_SEED
 from scenes.materials import ball, block, checks, disk, far_disk, floor, glossy, matte, metal, panel, printed, rod
 from scenes.reflectances import color_checker, grey

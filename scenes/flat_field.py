@@ -3,8 +3,7 @@
 from render.geometry import look_at, to_world
 from render.scene import Scene
 from rodcone.errors import require_range
-from scenes.camera_and_sky import under_sky
-from scenes.materials import matte, panel
+from scenes.materials import matte, panel, under_sky
 from scenes.reflectances import grey
 
 

@@ -4,12 +4,11 @@ from math import cos, radians, sin
 
 import numpy as np
 
-from render.geometry import look_at, rotate, translate
+from render.geometry import camera, look_at, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
 from rodcone.errors import require_whole
-from scenes.camera_and_sky import camera
 from scenes.materials import ball, block, checks, disk, floor, glass, glossy, matte, metal, panel, rod, star
 from scenes.reflectances import band, edge, grey
 

@@ -1,12 +1,16 @@
-"""Mitsuba nodes for surfaces and shapes, so that each scene reads as a list of things."""
+"""Mitsuba nodes for surfaces and shapes, so that each scene reads as a list of things; the sky of charts."""
 
+from collections.abc import Mapping
 from math import radians, tan
 
 from render.geometry import look_at, rotate, scale, to_world, translate
-from render.scene import Node, spectrum_node
+from render.illuminants import illuminant
+from render.scene import LightGroup, Node, Scene, spectrum_node
 from render.spectrum import Floats, Spectrum, optical_constant
 from rodcone.errors import InputError
 from scenes.reflectances import grey, resampled
+
+SKY_LUMINANCE_CD_M2 = 100.0
 
 
 def matte(reflectance: Spectrum) -> Node:
@@ -118,3 +122,10 @@ def glass() -> Node:
     1.5187 is Schott N-BK7's at 546 nm; leaving out its dispersion shifts the refracted picture by 1 % at most.
     """
     return {"type": "dielectric", "int_ior": 1.5187, "ext_ior": 1.000277}
+
+
+def under_sky(name: str, view: Node, shapes: Mapping[str, Node], light: str, reference_plane: str) -> Scene:
+    """Scene of some shapes in a constant environment of 100 cd/m^2, the light group ``sky``."""
+    geometry = {"type": "scene", "sensor": view, **shapes, "sky": {"type": "constant"}}
+    groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
+    return Scene(name, geometry, groups, reference_plane=reference_plane)

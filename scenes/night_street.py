@@ -2,11 +2,10 @@
 
 from math import cos, pi, radians, sin
 
-from render.geometry import rotate, translate
+from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Floats, Spectrum
-from scenes.camera_and_sky import camera
 from scenes.materials import block, disk, far_disk, floor, glossy, matte, panel, rod
 from scenes.reflectances import band, edge, grey
 

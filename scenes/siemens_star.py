@@ -1,10 +1,9 @@
 """Siemens star: spokes that narrow towards the middle, every spatial frequency in every direction."""
 
-from render.geometry import look_at, translate
+from render.geometry import camera, look_at, translate
 from render.scene import Scene
 from rodcone.errors import require_whole
-from scenes.camera_and_sky import camera, under_sky
-from scenes.materials import matte, panel, star
+from scenes.materials import matte, panel, star, under_sky
 from scenes.reflectances import grey
 
 RADIUS_M = 0.2

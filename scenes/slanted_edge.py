@@ -1,10 +1,9 @@
 """Slanted edge: the target from which ISO 12233 measures how sharp a camera is."""
 
-from render.geometry import look_at, rotate, translate
+from render.geometry import camera, look_at, rotate, translate
 from render.scene import Scene
 from rodcone.errors import require_range
-from scenes.camera_and_sky import camera, under_sky
-from scenes.materials import matte, panel
+from scenes.materials import matte, panel, under_sky
 from scenes.reflectances import grey
 
 BRIGHT = 0.6

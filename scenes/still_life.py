@@ -2,11 +2,10 @@
 
 from math import cos, pi, sin
 
-from render.geometry import look_at, rotate, scale, to_world, translate
+from render.geometry import camera, look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
-from scenes.camera_and_sky import camera
 from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, checks, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey

@@ -2,10 +2,9 @@
 
 from math import cos, pi, radians, sin, sqrt
 
-from render.geometry import rotate, translate
+from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from scenes.camera_and_sky import camera
 from scenes.materials import ball, block, checks, disk, far_disk, floor, glass, glossy, matte, metal, panel, rod
 from scenes.reflectances import band, edge, grey
 

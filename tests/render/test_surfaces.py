@@ -2,11 +2,10 @@
 
 import numpy as np
 
-from render.geometry import look_at, to_world, translate
+from render.geometry import camera, look_at, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Scene
 from render.surfaces import see_surfaces
-from scenes.camera_and_sky import camera
 from scenes.materials import ball, matte, panel
 from scenes.reflectances import grey
 
