@@ -6,6 +6,7 @@ Both are estimated from pixels spread evenly over the picture, and cost little b
 import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -175,8 +176,7 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
     shared : SharedPaths, optional
         Groups whose errors are correlated.
     """
-    rows, columns = _spread(radiance.shape[2:])
-    chosen = np.s_[..., rows[:, None], columns]
+    chosen = _spread(radiance.shape[2:])
     total = (emitted[:, :, None, None] ** 2 * variance[chosen]).sum(axis=0)
     if shared:
         total += replace(shared, correlation=shared.correlation[chosen]).term(emitted, variance[chosen])
@@ -201,11 +201,10 @@ def within_band_error(
     radiance : (group, band, h, w) float32
         At unit spectral emission.
     """
-    rows, columns = _spread(radiance.shape[2:])
-    missed = np.zeros((radiance.shape[1], rows.size, columns.size))
-    total = np.zeros_like(missed)
+    chosen = _spread(radiance.shape[2:])
+    missed, total = np.zeros((2, *radiance[0][chosen].shape))
     for light, planes in zip(lights.values(), radiance, strict=True):
-        transport = planes[:, rows[:, None], columns].astype(np.float64)
+        transport = planes[chosen].astype(np.float64)
         slope, curvature = _derivatives(transport, wavelength_nm)
         mean, first, second = (
             moment[:, None, None] * light.power for moment in _moments(light.spectrum, wavelength_nm, width_nm)
@@ -241,12 +240,11 @@ def warn_of_wide_bands(error: Floats, values: Planes, wavelength_nm: Floats, wid
         )
 
 
-def _spread(shape: tuple[int, ...]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
-    """Rows and columns of at most about `SAMPLE_PIXELS` pixels, evenly spread over a picture."""
+def _spread(shape: tuple[int, ...]) -> tuple[Any, ...]:
+    """Index (..., row, column) of at most about `SAMPLE_PIXELS` pixels, evenly spread over a picture."""
     step = max(1, round(np.sqrt(shape[0] * shape[1] / SAMPLE_PIXELS)))
-    return np.arange(min(step // 2, shape[0] - 1), shape[0], step), np.arange(
-        min(step // 2, shape[1] - 1), shape[1], step
-    )
+    rows, columns = (np.arange(min(step // 2, length - 1), length, step) for length in shape)
+    return ..., rows[:, None], columns
 
 
 def _derivatives(values: Floats, wavelength_nm: Floats) -> tuple[Floats, Floats]:

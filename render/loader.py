@@ -8,8 +8,7 @@ from functools import cache
 from typing import Any
 
 from render.integrator.dense import SPECTRUM_SIZE
-from render.integrator.matte import matte_surface, with_matte_surfaces
-from render.integrator.reflectance_table import with_rows
+from render.integrator.matte import matte_surface, with_matte_surfaces, with_rows
 from render.scene import Node, Scene, emitter_paths, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from render.integrator.matte import at_all
+from render.integrator.matte import TableReader, at_all, band_offsets, reflectance_table
 from render.integrator.points import APERTURE, FILM, WAVELENGTH, Points
-from render.integrator.reflectance_table import TableReader, band_offsets, reflectance_table
 from rodcone.jit import dr
 
 SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`

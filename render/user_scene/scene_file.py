@@ -163,8 +163,7 @@ def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: l
             result[key] = str(file)
         elif kind != "ResolvedReference":
             signed = key in _SIGNED or (properties.plugin_name(), key) in _SIGNED_OF
-            _check_numbers(key, kind, value, signed=signed)
-            result[key] = _xml_value(kind, value)
+            result[key] = _xml_value(key, kind, value, signed=signed)
     return result
 
 
@@ -178,35 +177,35 @@ def _key(part: Node, ids: Mapping[str, int], numbers: Counter[str], label: str, 
     return name
 
 
-def _check_numbers(key: str, kind: str, value: Any, *, signed: bool) -> None:
-    """Raise `InputError` for numbers that Mitsuba would take, and render as black, NaN or nonsense."""
+def _xml_value(key: str, kind: str, value: Any, *, signed: bool) -> Any:
+    """Value of a property as `mitsuba.load_dict` takes it in every variant.
+
+    Raises
+    ------
+    InputError
+        For numbers that Mitsuba would take, and render as black, NaN or nonsense.
+    """
+    numbers: list[Any] = []
     if kind in ("Float", "Integer"):
         numbers = [value]
     elif kind == "Spectrum":
         numbers = [*value.wavelengths, *value.values]
     elif kind in ("Color", "Vector"):
-        numbers = list(value)
+        numbers = value = [float(x) for x in value]
     elif kind == "Transform":
-        numbers = np.ravel(value.matrix).tolist()
+        value = np.array(value.matrix, dtype=np.float64)
+        numbers = value.ravel().tolist()
     elif kind == "String" and key in _LISTS:
         numbers = _NUMBER.findall(value)  # Mitsuba refuses what is none
-    else:
-        return
     signed = signed or kind in ("Vector", "Transform")
     wrong = [x for x in map(float, numbers) if not isfinite(x) or (x < 0 and not signed)]
     if wrong:
         allowed = "finite numbers" if signed else "finite numbers of 0 or more"
         raise InputError(f"{key}: {wrong[0]:g} is not allowed; allowed: {allowed}; correct it")
-
-
-def _xml_value(kind: str, value: Any) -> Any:
-    """Value of a property as `mitsuba.load_dict` takes it in every variant."""
     if kind == "Transform":
-        return to_world(np.array(value.matrix, dtype=np.float64))
+        return to_world(value)
     if kind == "Color":
-        return {"type": "rgb", "value": [float(x) for x in value]}
-    if kind == "Vector":
-        return [float(x) for x in value]
+        return {"type": "rgb", "value": value}
     if kind == "Spectrum":
         if len(value.values) == 1 and not len(value.wavelengths):
             return uniform_node(float(value.values[0]))

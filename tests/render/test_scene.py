@@ -12,7 +12,7 @@ from refusal import refusal
 
 from render.engine import render
 from render.geometry import look_at, rotate, scale, to_world, translate
-from render.integrator.reflectance_table import STEPS, TableReader
+from render.integrator.matte import STEPS, TableReader
 from render.loader import Film, load_groups, mitsuba_module, variant
 from render.scene import LightGroup, Scene, spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from loop import loop
 
-from render.integrator.matte import with_matte_surfaces
-from render.integrator.reflectance_table import TableReader, reflectance_table, with_rows
+from render.integrator.matte import TableReader, reflectance_table, with_matte_surfaces, with_rows
 from render.loader import as_guest, mitsuba_module
 from rodcone.jit import dr
 from scenes.materials import checks, printed

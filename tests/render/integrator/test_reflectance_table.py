@@ -8,7 +8,7 @@ from loop import loop
 from scipy.stats import norm
 
 from render.engine import render
-from render.integrator.reflectance_table import STEPS, band_offsets, reflectance_table, with_rows
+from render.integrator.matte import STEPS, band_offsets, reflectance_table, with_rows
 from render.scene import spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat, line_spectrum
 from scenes.catalog import load
