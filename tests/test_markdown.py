@@ -43,6 +43,15 @@ def test_every_link_and_picture_of_a_page_leads_somewhere() -> None:
             assert not anchor or anchor in anchors(place.read_text("utf-8")), f"{page.name}: {target}#{anchor}"
 
 
+def test_a_test_that_a_page_names_is_there() -> None:
+    named = re.compile(r"\btests/([\w/]+\.py)(?:::(\w+))?")
+    for page in PAGES:
+        for file, test in named.findall(page.read_text("utf-8")):
+            path = ROOT / "tests" / file
+            assert path.is_file(), f"{page.name}: {file}"
+            assert f"def {test}" in path.read_text("utf-8"), f"{page.name}: {file}::{test}"
+
+
 def test_the_first_screen_of_the_readme_answers_a_stranger_in_this_order() -> None:
     marks = ("rodcone is for people who", "**What does a white pixel bring?**", "images/light_rising.webp", "make demo",
              "import rodcone\n", "images/chain.svg", "## Without make")  # fmt: skip

@@ -33,7 +33,7 @@ from studies.photograph.develop import develop, develop_file, mosaic_processor
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
 LIGHT = light_in_bands(illuminant("D65"), NM, WIDTH)
-# Mosaics without R, G and B tell other colours, or none: tests/isp/processors/test_any_mosaic.py
+# Mosaics without R, G and B tell other colours, or none: tests/isp/processors/test_catalogue.py
 QUICK = [name for name, processor in NAMED.items() if processor.extra != "bm3d" and processor.colours]
 SIDE = 16  # pixels of a patch
 
