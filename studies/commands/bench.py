@@ -17,7 +17,6 @@ from studies.commands.console import print_table
 from studies.pages.report_sweep import environment
 from studies.pages.speed_page import bench_page
 from studies.photograph.clock import processor_facts
-from studies.speed.points import stage_json
 from studies.speed.stages import STAGES, Bench, stages
 from studies.study.levels import parse_level
 
@@ -51,7 +50,7 @@ def bench(
     if not json:
         print("\n".join(f"{name}: {fact}" for name, fact in (results["machine"] | results["environment"]).items()))
     with progress(sys.stderr) as step:
-        for stage in map(stage_json, work):
+        for stage in work:
             results["stages"].append(stage)
             step(stage["name"], len(results["stages"]) / STAGES)
             if not json:

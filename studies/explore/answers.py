@@ -84,7 +84,7 @@ def _shot(controls: Controls, exposed: Exposed, memo: Memo) -> Shot | None:
     if stand_in(controls, exposed.raw.dn.size) == controls:
         development = development_of(exposed, controls, memo)
         memo.check()
-        developed = development.develop()
+        developed = development()
     else:
         developed = memo.kept("slow", repr(controls))
         if developed is None:

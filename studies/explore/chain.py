@@ -4,6 +4,7 @@ Light adds up: every light group goes through lens and filters by itself, at pow
 level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
 """
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -11,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.colour_fit import ColourFit
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
 from render.radiance import SpectralRadiance
@@ -36,6 +36,7 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.study import AS_SHOT
 
 Image = NDArray[np.float64]
+Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, the processor's own result
 _CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
 _LONGEST_S = 1e7
 
@@ -100,26 +101,6 @@ class Exposed:
 
 
 @dataclass(frozen=True)
-class Development:
-    """What a processor is given: enough to develop in another process."""
-
-    processor: str
-    raw: RawImage
-    colours: ColourFit
-    sensor: SensorConfig
-    neutral: NDArray[np.float64]
-    white_cd_m2: float
-    options: dict[str, Any]
-
-    def develop(self) -> tuple[Image, Picture]:
-        """Linear sRGB at the scale of the truth, and the processor's own result."""
-        processor = PROCESSORS[self.processor]
-        return develop_to_scale(
-            self.raw, processor, self.colours, self.sensor, self.neutral, self.white_cd_m2, **self.options
-        )
-
-
-@dataclass(frozen=True)
 class Shot:
     """A photograph beside its truth.
 
@@ -162,7 +143,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     """
     memo = memo or Memo()
     exposed = expose_scene(transport, controls, memo)
-    linear, picture = development_of(exposed, controls, memo).develop()
+    linear, picture = development_of(exposed, controls, memo)()
     return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
@@ -225,14 +206,15 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
 
 
 def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
-    """What the processor is to do with an exposure."""
+    """What the processor is to do with an exposure, in this process or, pickled, in another."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
-    colours = memo.of("colours", fitted, colour_fit, sensor, PROCESSORS[controls.processor], light)
+    processor = PROCESSORS[controls.processor]
+    colours = memo.of("colours", fitted, colour_fit, sensor, processor, light)
     neutral, options = neutral_electrons(sensor, light, raw.exposure_s), options_of(controls)
     if controls.white_balance == AS_SHOT:
         options["balance"] = neutral
-    return Development(controls.processor, raw, colours, sensor, neutral, exposed.white_cd_m2, options)
+    return partial(develop_to_scale, raw, processor, colours, sensor, neutral, exposed.white_cd_m2, **options)
 
 
 def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:

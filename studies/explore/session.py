@@ -281,7 +281,7 @@ class Session:
                 except Overtaken:
                     self._slow_wanted = True
                     raise
-                end = begin(development, done)
+                end = begin(controls.processor, development, done)
                 with self._changed:
                     self._slow[key] = end
 

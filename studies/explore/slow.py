@@ -39,12 +39,17 @@ def stand_in(controls: Controls, pixels: int) -> Controls:
     return controls
 
 
-def begin(development: Development, report: Callable[[tuple[Image, Picture] | InputError], None]) -> Callable[[], None]:
+def begin(
+    name: str, development: Development, report: Callable[[tuple[Image, Picture] | InputError], None]
+) -> Callable[[], None]:
     """Develop in a process of its own; returns what ends it.
 
     Parameters
     ----------
-    development : Development
+    name : str
+        Of the processor.
+    development : callable
+        As `studies.explore.chain.development_of` gives it.
     report : callable
         Called in a thread of its own with what came of it; not where it was ended.
     """
@@ -58,11 +63,7 @@ def begin(development: Development, report: Callable[[tuple[Image, Picture] | In
         if ended.is_set():
             return
         if process.returncode:
-            report(
-                InputError(
-                    f"processor: {development.processor} ended with code {process.returncode}; see the messages above"
-                )
-            )
+            report(InputError(f"processor: {name} ended with code {process.returncode}; see the messages above"))
         else:
             report(pickle.loads(output))
 
@@ -78,7 +79,7 @@ def work() -> None:
     """Develop what standard input holds; what comes of it goes to standard output."""
     development: Development = pickle.load(sys.stdin.buffer)
     try:
-        result: tuple[Image, Picture] | InputError = development.develop()
+        result: tuple[Image, Picture] | InputError = development()
     except InputError as error:
         result = error
     sys.stdout.buffer.write(pickle.dumps(result))

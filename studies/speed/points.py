@@ -60,29 +60,6 @@ class Measured:
     share: float | None = None
 
 
-@dataclass(frozen=True)
-class Stage:
-    """One stage of the chain, and its choices.
-
-    Attributes
-    ----------
-    name, question : str
-    reference : str
-        What errors are differences from, and what the times are divided by.
-    noise_e : float
-        Root mean square of the sensor's own noise, to compare the errors with.
-    points : tuple of Measured
-    reference_times : Times
-    """
-
-    name: str
-    question: str
-    reference: str
-    noise_e: float
-    points: tuple[Measured, ...]
-    reference_times: Times
-
-
 def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
     """Which of some (time, error) are on the Pareto front: no other is as fast and as accurate, and better in one.
 
@@ -118,33 +95,41 @@ def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple
     return points
 
 
-def share_of_noise_variance(point: Measured, stage: Stage) -> float:
-    """Squared error of a choice over the sensor's own noise variance."""
-    return (point.error_e / stage.noise_e) ** 2 if point.share is None else point.share
+def stage_json(
+    name: str, question: str, reference: str, noise_e: float, points: Sequence[Measured], reference_times: Times
+) -> dict[str, Any]:
+    """Return a stage of the chain as JSON holds it: its choices' times and errors with their ratios.
 
-
-def stage_json(stage: Stage) -> dict[str, Any]:
-    """Return a stage as JSON holds it: times and errors with their ratios."""
-    shares = [share_of_noise_variance(point, stage) for point in stage.points]
-    on_front = front([(point.times.seconds, share) for point, share in zip(stage.points, shares, strict=True)])
+    Parameters
+    ----------
+    name, question : str
+    reference : str
+        What errors are differences from, and what the times are divided by.
+    noise_e : float
+        Root mean square of the sensor's own noise, to compare the errors with.
+    points : sequence of Measured
+    reference_times : Times
+    """
+    shares = [(point.error_e / noise_e) ** 2 if point.share is None else point.share for point in points]
+    on_front = front([(point.times.seconds, share) for point, share in zip(points, shares, strict=True)])
     return {
-        "name": stage.name,
-        "question": stage.question,
-        "reference": stage.reference,
-        "reference_s": stage.reference_times.seconds,
-        "reference_processor_s": stage.reference_times.processor_s,
-        "noise_e": stage.noise_e,
+        "name": name,
+        "question": question,
+        "reference": reference,
+        "reference_s": reference_times.seconds,
+        "reference_processor_s": reference_times.processor_s,
+        "noise_e": noise_e,
         "points": [
             {
                 "choice": point.choice,
                 **vars(point.times),
-                "time_over_reference": point.times.seconds / stage.reference_times.seconds,
-                "processor_over_reference": point.times.processor_s / stage.reference_times.processor_s,
+                "time_over_reference": point.times.seconds / reference_times.seconds,
+                "processor_over_reference": point.times.processor_s / reference_times.processor_s,
                 "error_e": point.error_e,
                 "share_of_noise_variance": share,
                 "on_front": best,
             }
-            for point, share, best in zip(stage.points, shares, on_front, strict=True)
+            for point, share, best in zip(points, shares, on_front, strict=True)
         ],
     }
 

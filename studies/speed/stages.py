@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import partial
-from typing import Annotated, TypeVar
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,12 +26,13 @@ from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import fine_bands, groups_of, wide_bands
 from studies.budget.terms import horizontal_view_deg
-from studies.speed.points import Measured, Stage, Times, electrons, mean_error, timed, yardstick
+from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, timed, yardstick
 from studies.study.levels import parse_level
 
 MOST_BANDS = 40
 STAGES = 5
 Image = NDArray[np.float64]
+Stage = dict[str, Any]  # of `studies.speed.points.stage_json`
 T = TypeVar("T")
 
 
@@ -128,7 +129,7 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
     reference = f"two renders of {most} samples and other seeds, whose own noise falls out of the mean"
     noise_e = float(np.sqrt(yard.noise_e2[yard.inside].mean()))
-    return Stage("samples", question, reference, noise_e, tuple(points), reference_times)
+    return stage_json("samples", question, reference, noise_e, points, reference_times)
 
 
 def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float, view_deg: float) -> Stage:
@@ -193,8 +194,8 @@ def _stage(
     error_e: Callable[[T], float],
 ) -> Stage:
     """Measure each choice's error; the last choice's times are the reference's."""
-    points = tuple(Measured(choice, times, error_e(result)) for choice, (result, times) in timings.items())
-    return Stage(name, question, reference, noise_e, points, points[-1].times)
+    points = [Measured(choice, times, error_e(result)) for choice, (result, times) in timings.items()]
+    return stage_json(name, question, reference, noise_e, points, points[-1].times)
 
 
 def _render(bench: Bench, scene: Scene, nm: Floats, width_nm: Floats, spp: int, seed: int) -> Callable[[], Transport]:

@@ -4,6 +4,7 @@ import json
 import re
 from html import unescape
 from pathlib import Path
+from typing import Any
 
 import pytest
 from command_line import call, check_refusals
@@ -14,7 +15,7 @@ from scenes.catalog import load
 from sensor.presets import preset
 from studies.commands.bench import _print_stage
 from studies.pages.speed_page import LEAST_SHARE, bench_page
-from studies.speed.points import Measured, Stage, Times, front, stage_json, timed
+from studies.speed.points import Measured, Times, front, stage_json, timed
 from studies.speed.stages import STAGES, Bench, stages
 
 TINY = Bench(
@@ -26,8 +27,8 @@ def point(seconds: float, error_e: float, name: str = "x") -> Measured:
     return Measured(name, Times(seconds, seconds, 2 * seconds), error_e)
 
 
-def stage(*points: Measured) -> Stage:
-    return Stage("bands", "How many?", "the last", 10.0, points, points[-1].times)
+def stage(*points: Measured) -> dict[str, Any]:
+    return stage_json("bands", "How many?", "the last", 10.0, points, points[-1].times)
 
 
 @given(st.lists(st.tuples(st.integers(1, 6), st.integers(0, 6)), min_size=1, max_size=12))
@@ -56,7 +57,7 @@ def test_calls_take_turns_the_first_does_not_count_and_the_median_does(monkeypat
 
 
 def test_ratios_stand_beside_seconds() -> None:
-    made = stage_json(stage(point(1.0, 5.0), point(4.0, 0.0)))
+    made = stage(point(1.0, 5.0), point(4.0, 0.0))
     assert [each["time_over_reference"] for each in made["points"]] == [0.25, 1.0]
     assert [each["share_of_noise_variance"] for each in made["points"]] == [0.25, 0.0]
     assert all(each["on_front"] for each in made["points"])
@@ -73,7 +74,7 @@ def test_bad_input_is_refused_before_anything_is_measured(tmp_path: Path) -> Non
 
 
 @pytest.fixture(scope="module")
-def measured() -> list[Stage]:
+def measured() -> list[dict[str, Any]]:
     return list(stages(TINY, load(TINY.scene), preset(TINY.sensor)))
 
 

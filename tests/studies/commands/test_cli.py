@@ -114,14 +114,13 @@ SCRIPT = """
 import sys
 from functools import partial
 from threading import Event
-from types import SimpleNamespace
 
 from studies.commands.cli import main
 from studies.explore.slow import begin
 
 if __name__ == "__main__":
     developed, results = Event(), []
-    begin(SimpleNamespace(develop=partial(len, "abc"), processor="ple"), lambda x: (results.append(x), developed.set()))
+    begin("ple", partial(len, "abc"), lambda x: (results.append(x), developed.set()))
     assert developed.wait(60) and results == [3], results
     main(["sweep", *sys.argv[1:]])
 """
