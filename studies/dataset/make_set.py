@@ -137,7 +137,7 @@ def _earlier(folder: Path, identity: str) -> Lines:
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
     """Samples of a scene; cells that differ in what is done with a frame alone are one."""
     frames = {_name(x.condition, processor_of(x.processor).mosaic, x.seed): x for x in reversed(cells)}
-    windows = _windows(np.load(cells[0].electrons, mmap_mode="r").shape[:2], order.crop)
+    windows = _windows(np.load(cells[0].frame.electrons, mmap_mode="r").shape[:2], order.crop)
     return [
         Sample(
             key=f"{name}_{window[0]}-{window[1]}" if order.crop else name,

@@ -95,17 +95,14 @@ class Sample:
 
 def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     """Arrays of a sample by name, the raw frame first, and its facts as JSON holds them."""
-    cell = sample.cell
+    cell, frame = sample.cell, sample.cell.frame
     row, column, height, width = sample.window
     place = np.s_[row : row + height, column : column + width]
     light = cell.luminance_cd_m2 * cell.exposure_s
-    expected_e = np.asarray(_opened(cell.electrons)[place], dtype=np.float64) * light
+    expected_e = np.asarray(_opened(frame.electrons)[place], dtype=np.float64) * light
     # a channel's metered time is the frame's, in its parts too
-    sensor = (
-        as_read(cell.sensor, _opened(cell.electrons) * light, cell.exposure_s)
-        if cell.sensor.chip.channels
-        else cell.sensor
-    )
+    metered = frame.sensor.chip.channels
+    sensor = as_read(frame.sensor, _opened(frame.electrons) * light, cell.exposure_s) if metered else frame.sensor
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.part is not None:
         stream = stream.spawn(sample.part + 1)[-1]
@@ -116,7 +113,7 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     for name, path in sample.files.items():
         plane = _opened(path)[place] * scales.get(name, 1)
         arrays[name] = np.ascontiguousarray(plane, dtype=np.uint16 if name == "ids" else np.float32)
-    return arrays, _facts(sample, sensor, raw, expected_e, _opened(cell.errors)[:, *place] * light)
+    return arrays, _facts(sample, sensor, raw, expected_e, _opened(frame.errors)[:, *place] * light)
 
 
 def _facts(
@@ -219,8 +216,8 @@ def code_digests() -> list[str]:
 def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
     """Files that planes of a cell's frame are cut from; a picture file has none of surfaces."""
     folder = (job.out / PLANES).resolve()
-    names = facts["files"][_frame_key(cell)]
-    paths = {"mosaic_e": cell.electrons, "rgb": cell.truth, **{plane: folder / name for plane, name in names.items()}}
+    paths = {"mosaic_e": cell.frame.electrons, "rgb": cell.frame.truth}
+    paths |= {plane: folder / name for plane, name in facts["files"][_frame_key(cell)].items()}
     return {plane: paths[plane] for plane in planes if plane in paths}
 
 
@@ -232,7 +229,7 @@ def scene_hash(opened: OpenedScene) -> str:
 
 
 def _frame_key(cell: Cell) -> str:
-    return f"{cell.condition.spectrum} {cell.electrons.stem} {'/'.join(cell.sensor.cfa)}"
+    return f"{cell.condition.spectrum} {cell.frame.electrons.stem} {'/'.join(cell.frame.sensor.cfa)}"
 
 
 def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], transport: Transport) -> dict[str, Any]:
@@ -254,7 +251,7 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
         facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():
             if cell.condition.spectrum == spectrum:
-                electrons = channel_electrons(form_image(view, cell.sensor), cell.sensor, 1.0)
+                electrons = channel_electrons(form_image(view, cell.frame.sensor), cell.frame.sensor, 1.0)
                 facts["files"][name] = surfaces | of_light | kept(channels_e=electrons.astype(np.float32))
     return facts
 

@@ -9,11 +9,10 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from rodcone.digests import digest, digest_inputs
-from sensor.config import SensorConfig
-from studies.metrics.truth import Light
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.render_facts import RenderFacts
 from studies.study.study import Condition, label
+from studies.sweep.frames import UnitFrame
 from studies.sweep.provenance import Provenance
 
 
@@ -62,17 +61,14 @@ class Cell:
     illuminance_lux : float or None
         On the reference plane; None without one.
     exposure_s : float
-    sensor : SensorConfig
-        With the processor's mosaic and the lens that is modelled.
+    frame : UnitFrame
+        Its sensor has the processor's mosaic and the lens that is modelled.
     made_by : Provenance
         Of the process that asks; a worker with other versions or engines refuses the cell.
     colours : ColourFit
         Of the processor's balanced planes, under the scene's light.
-    light : Light
     white_cd_m2 : float
         Luminance shown as white.
-    electrons, errors, truth : Path
-        As `studies.sweep.frames.UnitFrame` holds them.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
     render : RenderRecord
@@ -88,14 +84,10 @@ class Cell:
     luminance_cd_m2: float
     illuminance_lux: float | None
     exposure_s: float
-    sensor: SensorConfig
+    frame: UnitFrame
     made_by: Provenance
     colours: ColourFit
-    light: Light
     white_cd_m2: float
-    electrons: Path
-    errors: Path
-    truth: Path
     pictures: Path
     render: RenderRecord
     budget_share: float | None = None

@@ -90,7 +90,7 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None
     facts = read_facts(folder, key)
     if facts is None:
         return None
-    files = {name: folder / facts.pop(name) for name in ("truth", "electrons", "errors")}
+    files = {name: (folder / facts.pop(name)).resolve() for name in ("truth", "electrons", "errors")}
     if not all(is_whole(path) for path in files.values()):
         return None
     light = Light(**{name: np.array(values, float) for name, values in facts.pop("light").items()})

@@ -52,16 +52,16 @@ def run_cell(cell: Cell) -> Row:
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
     _check_provenance(cell, processor)
-    sensor, engine = cell.sensor, cell.made_by.readout_engine
+    frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
-    unmoved_e = np.asarray(_array(cell.electrons), dtype=np.float64) * light
+    unmoved_e = np.asarray(_array(frame.electrons), dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
     # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
-    bins_truth = sensor.chip.sites > 1 and _array(cell.truth).shape[:2] == expected_e.shape
-    truth, truth_png = _truth(cell.truth, bins_truth)
-    pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(cell.errors)) * light
+    bins_truth = sensor.chip.sites > 1 and _array(frame.truth).shape[:2] == expected_e.shape
+    truth, truth_png = _truth(frame.truth, bins_truth)
+    pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(frame.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -81,7 +81,7 @@ def run_cell(cell: Cell) -> Row:
     saturated = raw.saturated
     # The neutral of the scene's light, as a raw file would note it, sets the scale; as shot, the balance too.
     as_shot = names["white_balance"] == AS_SHOT
-    neutral = neutral_electrons(sensor, cell.light, raw.exposure_s)
+    neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
     options = {"balance": neutral} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.colours, sensor, neutral, cell.white_cd_m2, **options),
@@ -109,7 +109,7 @@ def run_cell(cell: Cell) -> Row:
         spp=cell.render.facts.spp,
         bands=cell.render.facts.bands,
         render=render_text(cell.render),
-        lens=json.dumps(vars(cell.sensor.lens)),
+        lens=json.dumps(vars(sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
         mc_share=charged_share(

@@ -51,8 +51,9 @@ def sample_of(folder: Path, sensor: SensorConfig, level_cd_m2: float) -> Sample:
     files = {"electrons": ramp, "errors": np.zeros((1, *SIZE)), "truth": np.zeros((*SIZE, 3))}
     for name, array in files.items():
         np.save(folder / f"{name}.npy", array)
-    cell = replace(cell, sensor=sensor, luminance_cd_m2=level_cd_m2, **{x: folder / f"{x}.npy" for x in files})
-    files = {"mosaic_e": cell.electrons}
+    frame = replace(cell.frame, sensor=sensor, **{x: folder / f"{x}.npy" for x in files})
+    cell = replace(cell, frame=frame, luminance_cd_m2=level_cd_m2)
+    files = {"mosaic_e": frame.electrons}
     return Sample("key", cell, "bayer", "0" * 32, "train", files, LIGHT, None, (0, 0, *SIZE))
 
 

@@ -199,7 +199,7 @@ def cells(tmp_path: Path) -> list[Cell]:
 
 
 def test_what_was_ready_comes_before_the_error(cells: list[Cell], tmp_path: Path) -> None:
-    bad = replace(cells[2], truth=tmp_path / "absent.npy")
+    bad = replace(cells[2], frame=replace(cells[2].frame, truth=tmp_path / "absent.npy"))
     running = run([cells[0], bad, cells[1]], InThisProcess(), at_once=2)
     assert next(running).key == cells[0].key
     refusal(list, running, match="can't be read")

@@ -136,17 +136,17 @@ def with_light(cell: Cell, expected_e: np.ndarray, error_e: np.ndarray, folder: 
         file = BytesIO()
         np.save(file, array / 0.01)  # at 1 cd/m^2 and 1 s
         given[name] = folder / keep(folder, file.getvalue(), ".npy")
-    return replace(cell, **given)
+    return replace(cell, frame=replace(cell.frame, **given))
 
 
 def test_the_monte_carlo_share_is_of_the_pixels_below_saturation(tmp_path: Path) -> None:
     """Half of the pixels at 400 e- with an error of 3 e- each, half beyond the well with 5000 e-, in numbers."""
     cell = made(tmp_path, levels=("1cd/m2",), exposures=("10ms",), seeds=(0,))[0]
     saturated = np.arange(SAMPLE.SIZE[1]) >= SAMPLE.SIZE[1] // 2
-    expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
+    expected_e = np.broadcast_to(np.where(saturated, 2.0 * cell.frame.sensor.pixel.full_well_e, 400.0), SAMPLE.SIZE)
     error_e = np.broadcast_to(np.where(saturated, 5000.0, 3.0), SAMPLE.SIZE)
     row = run_cell(with_light(cell, expected_e, error_e, tmp_path))
-    pixel, sensor = cell.sensor.pixel, cell.sensor
+    pixel, sensor = cell.frame.sensor.pixel, cell.frame.sensor
     dark_e = pixel.dark_current_e_per_s * 0.01
     dark = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
     own = 400.0 + dark_e + (pixel.prnu * 400.0) ** 2 + dark
@@ -159,9 +159,9 @@ def test_the_monte_carlo_share_of_a_burst_is_over_the_noise_that_merged_frames_s
     lit = with_light(cell, np.full(SAMPLE.SIZE, 20.0), np.full(SAMPLE.SIZE, 0.5), tmp_path)
     merged = []
     for chip in range(60):
-        device = draw_device(cell.sensor, SAMPLE.SIZE, np.random.default_rng([chip, 0]))
+        device = draw_device(cell.frame.sensor, SAMPLE.SIZE, np.random.default_rng([chip, 0]))
         stream = np.random.default_rng([chip, 1])
-        light = np.full(SAMPLE.SIZE, 20.0), cell.sensor, 0.01, device, stream
+        light = np.full(SAMPLE.SIZE, 20.0), cell.frame.sensor, 0.01, device, stream
         merged.append(merged_raw([expose(*light, exact=True) for _ in range(4)]).electrons)
     # the merged frames' electrons of the light that one frame's 20 e- are, and its error with them; 19 200 pixels
     # know a variance to 1 %, and columns share offsets
@@ -177,7 +177,7 @@ def test_a_cell_weighs_the_same_whatever_the_pictures_size_and_travels_as_it_is(
     weights = [pickle.dumps(made(folder)[0]) for folder in (small, large)]
     assert abs(len(weights[0]) - len(weights[1])) < 500  # 3776 pixels more would be 30 kB
     assert pickle.loads(weights[0]).key == made(small)[0].key
-    assert np.load(pickle.loads(weights[1]).electrons).shape == (64, 64)
+    assert np.load(pickle.loads(weights[1]).frame.electrons).shape == (64, 64)
 
 
 def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path) -> None:
@@ -187,8 +187,9 @@ def test_other_code_and_arrays_out_of_reach_are_told_in_one_line(tmp_path: Path)
         replace(cell, made_by=replace(cell.made_by, versions='{"rodcone": "0.0.0+other"}')),
         match="install the same rodcone",
     )
-    refusal(run_cell, replace(cell, electrons=tmp_path / "absent.npy"), match="a folder that all workers see")
-    cell.truth.write_bytes(b"no array")
+    absent = replace(cell.frame, electrons=tmp_path / "absent.npy")
+    refusal(run_cell, replace(cell, frame=absent), match="a folder that all workers see")
+    cell.frame.truth.write_bytes(b"no array")
     refusal(run_cell, cell, match="can't be read")
 
 
@@ -240,16 +241,16 @@ def test_a_burst_is_merged_and_shows_less_noise_and_its_first_frame_is_the_singl
 def test_cells_of_a_hand_held_study_are_moved_alike_and_a_dark_frame_is_the_still_one(tmp_path: Path) -> None:
     by_hand = {"lens": LensTerms(shake="hand"), "seeds": (0,), "levels": ("1cd/m2",)}
     cells = made(tmp_path, **by_hand, exposures=("66ms",))
-    sensor = cells[0].sensor
+    sensor = cells[0].frame.sensor
     assert sensor.lens.shake_um == SHAKES["hand"]
-    unmoved = np.load(cells[0].electrons)
+    unmoved = np.load(cells[0].frame.electrons)
     assert unmoved.ndim == 3
     frame = behind_filters(shaken(unmoved * 0.066, sensor, 0.066, shake_stream(0)), sensor)
     device = draw_device(sensor, frame.shape, device_stream(cells[0].condition.sensor, "bayer", 0))
     raw = read_out(frame, sensor, device, 0.066, exposure_stream(cells[0].condition, "bayer", 0))
     row = run_cell(cells[0])
     assert row.saturated == raw.saturated.mean()
-    neutral = neutral_electrons(sensor, cells[0].light, 0.066)
+    neutral = neutral_electrons(sensor, cells[0].frame.light, 0.066)
     linear, _ = develop_to_scale(
         raw, PROCESSORS["bayer"], cells[0].colours, sensor, neutral, cells[0].white_cd_m2, balance=neutral
     )
@@ -277,7 +278,7 @@ def quad_file(folder: Path, binning: str) -> str:
 def test_a_binned_cell_is_measured_at_its_own_size(binning: str, tmp_path: Path) -> None:
     study = SAMPLE.small_study(tmp_path, sensors=(quad_file(tmp_path, binning),), processors=("bayer",))
     cell = SAMPLE.made_cells(tmp_path, study)[0]
-    whole, row = np.load(cell.truth), run_cell(cell)
+    whole, row = np.load(cell.frame.truth), run_cell(cell)
     sizes = [opened((cell.pictures / name).read_bytes()).shape[:2] for name in (row.picture, row.truth)]
     assert sizes == [(whole.shape[0] // 2, whole.shape[1] // 2)] * 2
     assert row.psnr_db > 15.0  # one at a wrong scale, a factor of four, has under 10
