@@ -8,7 +8,7 @@ from operator import getitem
 import numpy as np
 
 from render.scene import Node, Scene, emitter_paths, table_of, walk
-from render.spectrum import Spectrum, optical_constant
+from render.spectrum import VISIBLE_NM, Spectrum, optical_constant
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
@@ -29,8 +29,8 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
     low, high = SUNSKY_NM
     if "sunsky" in paths.values() and (shortest_nm < low or longest_nm > high):
         raise InputError(
-            f"{prefix} a sunsky is known over {low:g}-{high:g} nm alone; give wavelength_nm within, or light by area, "
-            "constant and directional"
+            f"{prefix} a sunsky is known over {low:g}-{high:g} nm alone; give bands within, such as --bands "
+            f"{VISIBLE_NM[0]:g}:{high:g}:10 of rodcone render, or light by area, constant and directional"
         )
     for path, (low, high), extends in _surfaces(scene.geometry, paths):
         if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:

@@ -1,12 +1,12 @@
 """Spectra as piecewise linear functions and their averages over bands; published tables; photons, luminance and colour.
 
 The published tables are colour-science's, to the last digit, in a file of this package: importing that library takes
-1 to 2 s. ``python tests/render/test_illuminants.py`` writes the file. Tables of refractive indices are Mitsuba's own,
-SI constants are exact and defined once.
+1 to 2 s. ``python tests/render/test_illuminants.py`` writes the file. Tables of refractive indices are Mitsuba's own.
 """
 
 import json
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from importlib import metadata
@@ -144,6 +144,24 @@ def line_bands(
     within = np.searchsorted(cuts, even) % 2 == 1
     edges = np.unique([low, high, *cuts, *even[~near & ~within]])
     return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+
+
+def emission_lines_nm(spectrum: Spectrum) -> Floats:
+    """Wavelengths of a spectrum's emission lines (`line_spectrum`): peaks under 0.2 nm wide."""
+    nm, values = spectrum.wavelength_nm, spectrum.values
+    narrow = np.diff(nm) <= LINE_BASE_NM
+    peak = narrow[:-1] & narrow[1:] & (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
+    return nm[1:-1][peak]
+
+
+def fine_bands(
+    spectra: Iterable[Spectrum], range_nm: tuple[float, float] = VISIBLE_NM, width_nm: float = 10.0
+) -> tuple[Floats, Floats]:
+    """Band centres and widths that follow lights: even bands, and a narrow one for each emission line of any."""
+    lines = np.unique(np.concatenate([np.zeros(0), *map(emission_lines_nm, spectra)]))
+    within = lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)]
+    count = max(1, round((range_nm[1] - range_nm[0]) / width_nm))
+    return line_bands(within, range_nm, width_nm) if within.size else even_bands(range_nm, count)
 
 
 def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:

@@ -9,7 +9,14 @@ from numpy.typing import NDArray
 
 from render.combine import combine, emission
 from render.denoised.denoise import Denoised
-from render.error_estimates import Halves, SharedPaths, relative_error, warn_of_wide_bands, within_band_error
+from render.error_estimates import (
+    Halves,
+    SharedPaths,
+    luminance_error,
+    relative_error,
+    warn_of_wide_bands,
+    within_band_error,
+)
 from render.illuminants import illuminant
 from render.level import Irradiance, Level, SceneMeans
 from render.radiance import SpectralRadiance
@@ -132,7 +139,8 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: outside it is dark.
         WideBandsWarning
-            Where `band_error` is over 1 % in a band that holds 1 % of the light or more, with the width that would do.
+            Where `band_error` is over 1 % in a band that holds 1 % of the light or more, with the width that would do;
+            where a light's lines put its luminance off by over 4 %.
         """
         if isinstance(spectra, float | int):
             powers = dict.fromkeys(self.groups, spectra)
@@ -142,7 +150,8 @@ class Transport:
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         planes = combine(coefficients, self.radiance)
         error = within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
-        warn_of_wide_bands(error, planes, self.wavelength_nm, self.width_nm)
+        seen = luminance_error(lights, self.wavelength_nm, self.width_nm)
+        warn_of_wide_bands(error, seen, planes, self.wavelength_nm, self.width_nm)
         return SpectralRadiance(
             values=np.moveaxis(planes, 0, -1),
             wavelength_nm=self.wavelength_nm,

@@ -1,6 +1,6 @@
 """Fewer, wider bands out of a render's fine ones: what a render of those would give, without rendering again."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -9,27 +9,13 @@ from scipy.linalg import block_diag
 
 from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
-from render.spectrum import LINE_BASE_NM, VISIBLE_NM, Floats, Spectrum, line_bands
+from render.spectrum import Floats
 from render.transport import Transport
 
 FINE_NM = 10.0  # of the reference's bands (design: 380-780 nm in 10 nm bands)
 # Bands that a plan may choose, where no line asks for one of its own: the renderer works on four at a time, so that
 # numbers between cost as much as the next multiple.
 COUNTS = (4, 8, 12, 16, 20, 28, 40)
-
-
-def emission_lines_nm(spectrum: Spectrum) -> Floats:
-    """Wavelengths of a spectrum's emission lines (`render.spectrum.line_spectrum`): peaks under 0.2 nm wide."""
-    nm, values = spectrum.wavelength_nm, spectrum.values
-    narrow = np.diff(nm) <= LINE_BASE_NM
-    peak = narrow[:-1] & narrow[1:] & (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
-    return nm[1:-1][peak]
-
-
-def fine_bands(spectra: Iterable[Spectrum], range_nm: tuple[float, float] = VISIBLE_NM) -> tuple[Floats, Floats]:
-    """Band centres and widths of the reference: 10 nm, and a narrow one for each emission line of any spectrum."""
-    lines = np.unique(np.concatenate([np.zeros(0), *(emission_lines_nm(spectrum) for spectrum in spectra)]))
-    return line_bands(lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)], range_nm, FINE_NM)
 
 
 def counts(width_nm: Floats) -> tuple[int, ...]:

@@ -7,7 +7,8 @@ from html import escape
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import even_bands
+from render.illuminants import illuminant
+from render.spectrum import fine_bands
 from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
@@ -15,7 +16,7 @@ from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel
-from studies.study.study import Condition, SceneChoice, Study, conditions, label, most_spp
+from studies.study.study import OWN, Condition, SceneChoice, Study, conditions, label, most_spp
 
 # Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
 # predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations (Cantelli).
@@ -266,8 +267,8 @@ class Plan:
 
 def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
-    low, high = study.render.range_nm
-    centres, widths = even_bands((low, high), max(1, round((high - low) / study.render.band_nm)))
+    lights = (illuminant(name) for name in study.spectra if name != OWN)
+    centres, widths = fine_bands(lights, study.render.range_nm, study.render.band_nm)
     bands = tuple(centres.tolist()), tuple(widths.tolist())
     renders = {scene: RenderModel(*bands, most_spp(study, scene), study.render.denoise) for scene in study.scenes}
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}

@@ -8,14 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.engine import render
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, fine_bands
 from render.transport import Transport
 from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
 from sensor.presets import preset, vary
-from studies.budget.bands import counts, fine_bands, groups_of, wide_bands
+from studies.budget.bands import counts, groups_of, wide_bands
 from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, weigh
 from studies.budget.terms import LENS_TERMS, SHAKE, effects, horizontal_view_deg, shake_effect

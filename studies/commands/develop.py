@@ -12,7 +12,7 @@ from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, even_bands
+from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
@@ -137,7 +137,7 @@ class RenderOrder:
     width : int, optional
         Pixels; as height.
     bands : str, optional
-        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default.
+        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default, and a lamp's lines apart.
     light : tuple of str
         GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
         alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
@@ -205,15 +205,17 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     """
     # Check what can be checked before the render
     require_ending(order.out, ".exr")
-    wavelength_nm, width_nm = _bands(order.bands)
+    bands = _bands(order.bands)
     with progress(sys.stderr) as step:
         step(READING, 0.0)
         opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart, define=order.define)
     scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
     spectra = asked_spectra(scene, order.light)
     lit_at: dict[str, Any] = asked_level(scene, order.level)
-    count = DEFAULT_WAVELENGTH_NM.size if wavelength_nm is None else wavelength_nm.size
-    require_memory(memory(size[0] * size[1], count, len(scene.groups), denoised=order.denoise), order.force)
+    wavelength_nm, width_nm = bands or fine_bands(spectra.get(x, own.spectrum) for x, own in scene.groups.items())
+    require_memory(
+        memory(size[0] * size[1], wavelength_nm.size, len(scene.groups), denoised=order.denoise), order.force
+    )
     check_place(order.out)
     # Render and write
     with progress(sys.stderr) as step:
@@ -247,10 +249,10 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     return INTERRUPTED if interrupted else 0
 
 
-def _bands(text: str | None) -> tuple[Floats | None, Floats | None]:
-    """Centres and widths of evenly spaced bands from ``380:780:10``; None where the engine's own are wanted."""
+def _bands(text: str | None) -> tuple[Floats, Floats] | None:
+    """Centres and widths of evenly spaced bands from ``380:780:10``; None where the lights choose."""
     if text is None:
-        return None, None
+        return None
     try:
         first, last, width = (float(part) for part in text.split(":"))
         count = round((last - first) / width)

@@ -14,7 +14,7 @@ from isp.planes import bilinear
 from isp.processors.catalogue import Processor
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, photons_per_joule, tristimulus
+from render.spectrum import Floats, Spectrum, fine_bands, photons_per_joule, tristimulus
 from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
@@ -30,6 +30,8 @@ from sensor.response import electrons_per_irradiance
 from sensor.shake import held_lens
 from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
 
+LEAST_COLOUR = 1e-5  # of the signals, in the weaker of two directions: less is the rounding of a light of a line or two
+GREY_COLOUR = 0.01  # of the channels' own differences, under a light that shows no colours
 ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
 
@@ -78,7 +80,7 @@ def iso_speed(sensor: SensorConfig) -> float | None:
 
 
 def _in_bands(spectrum: Spectrum) -> Light:
-    return light_in_bands(spectrum, DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
+    return light_in_bands(spectrum, *fine_bands([spectrum]))
 
 
 def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Floats, Floats]:
@@ -93,15 +95,19 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     if not np.all(collected > 0):
         raise InputError(
             f"responses: {names[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
-            "allowed: a channel that sees light; give another curve"
+            "allowed: a channel that sees light; give another curve, or colours under a broad light, such as D65"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    signals, colours = training(response[three], nm, light.spectrum, surfaces)
+    signals, colours = training(response[three], nm, light.spectrum, surfaces, width)
     to_srgb = fit_through_neutral(signals, colours if len(three) == 3 else grey_of(colours))
-    if len(three) == 3 and np.linalg.cond(to_srgb) > 1e6:
-        raise InputError(
-            f"responses: {', '.join(names[:3])} can't tell colours apart; allowed: three different curves; correct one"
-        )
+    if len(three) == 3 and not _tells_colours(signals):
+        if _tells_colours(training(response[three], nm, np.ones_like(nm), surfaces, width)[0]):
+            to_srgb = _nearly_grey(collected[three])  # it is the light that shows no colours, as sodium's lines
+        else:
+            three_names = ", ".join(names[:3])
+            raise InputError(
+                f"responses: {three_names} can't tell colours apart; allowed: three different curves; correct one"
+            )
     white = tristimulus(light.spectrum, nm, width)  # Y = 1
     from_xyz = _srgb_of_xyz(white)
     target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width), white))
@@ -115,6 +121,17 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
         np.linalg.inv(_srgb_of_xyz(D50_XYZ)) @ to_srgb
     )  # D50: the connection space of DNG's ForwardMatrix
     return neutral, to_srgb, neutral[:, None] * from_srgb @ from_xyz, to_xyz
+
+
+def _tells_colours(signals: Floats) -> bool:
+    """Whether balanced signals (patch, 3) differ from one another in two directions by more than rounding."""
+    differences = signals[:, :2] - signals[:, 2:]
+    return bool(np.linalg.svd(differences, compute_uv=False)[-1] > LEAST_COLOUR * np.linalg.norm(signals))
+
+
+def _nearly_grey(collected: Floats) -> Floats:
+    """Matrix from balanced R, G and B to their mean by electrons, with as little colour as leaves it an inverse."""
+    return (1 - GREY_COLOUR) * np.tile(collected / collected.sum(), (3, 1)) + GREY_COLOUR * np.eye(3)
 
 
 def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:

@@ -13,7 +13,7 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import film_size
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, fine_bands
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
@@ -183,9 +183,12 @@ def take(order: Order, step: Step | None = None) -> Taken:
     if opened is not None:
         if step:
             step(render_words(np.inf), 0.0)
+        bands = fine_bands(spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items())
         transport = render(
             opened.scene,
             _size(order, opened),
+            wavelength_nm=bands[0],
+            width_nm=bands[1],
             spp=order.spp or _SPP,
             seed=order.seed,
             progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
@@ -208,8 +211,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
     rng = np.random.default_rng([order.seed, _FRAME])
     taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     name = Path(order.sensor).stem.encode("ascii", "replace").decode()
-    lens, iso = sensor.lens, iso_speed(sensor)
-    raws = [replace(frame, camera=name, f_number=lens.f_number, iso=iso, colour=colour) for frame in taken]
+    about: dict[str, Any] = {"f_number": sensor.lens.f_number, "iso": iso_speed(sensor), "colour": colour}
+    raws = [replace(frame, camera=name, **about) for frame in taken]
     raw = raws[0]
     if opened is not None:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
@@ -218,10 +221,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
-        notes += [
-            f"{saturated:.0%} of the pixels are saturated at {exposure_s:g} s; give a shorter --exposure, "
-            "or leave it out"
-        ]
+        notes += [f"{saturated:.0%} of the pixels are saturated at {exposure_s:g} s; shorten or omit --exposure"]
 
     # The files.
     places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]

@@ -13,7 +13,7 @@ from isp.settings import Settings
 from render.engine import render
 from render.radiance import SpectralRadiance
 from render.scene import Scene
-from render.spectrum import VISIBLE_NM, Floats, even_bands
+from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
 from sensor.capture import capture
@@ -24,7 +24,7 @@ from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.budget.bands import fine_bands, groups_of, wide_bands
+from studies.budget.bands import groups_of, wide_bands
 from studies.budget.terms import horizontal_view_deg
 from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, timed, yardstick
 from studies.study.levels import parse_level

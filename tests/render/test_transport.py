@@ -10,11 +10,11 @@ from builders import transport_of
 from loop import loop
 from refusal import refusal
 
-from render.error_estimates import Halves, SharedPaths
+from render.error_estimates import Halves, SharedPaths, WideBandsWarning
 from render.illuminants import illuminant
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
-from render.spectrum import Spectrum, flat, luminance
+from render.spectrum import Spectrum, flat, line_spectrum, luminance
 
 NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
 SIZE = (5, 6)
@@ -237,6 +237,7 @@ def test_a_light_that_varies_with_the_surfaces_within_a_band_is_warned_of_with_a
     only_blue = Spectrum(np.array([375.0, 376.0, 424.0, 425.0]), np.array([0.0, 1.0, 1.0, 0.0]))
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
+        warnings.filterwarnings("ignore", "bands: luminance is off")
         made.relight({"lamp": line}, powers={"sky": 0.0})
         made.relight({"lamp": line, "sky": only_blue}, powers={"lamp": 1e-9})  # light is elsewhere
     if off is None:
@@ -245,3 +246,12 @@ def test_a_light_that_varies_with_the_surfaces_within_a_band_is_warned_of_with_a
         (warning,) = caught
         assert re.match(f"bands: the one at 550 nm is off by about {off}", str(warning.message))
         assert warning.filename == __file__
+
+
+def test_a_line_whose_luminance_the_bands_miss_is_warned_of():
+    """The eye at 508 nm is 1.2 times as sensitive as over 500-510 nm, by the tables, and as sensitive at 505 nm."""
+    made = replace(transport(np.ones((2, 40, *SIZE)), seen=None), wavelength_nm=np.arange(385.0, 780.0, 10.0))
+    made = replace(made, width_nm=np.full(40, 10.0))
+    with pytest.warns(WideBandsWarning, match=r"bands: luminance is off by about 1\d\.\d%.*bands of up to 10 nm"):
+        made.relight({"lamp": line_spectrum([508.0], [1.0])}, powers={"sky": 0.0})
+    made.relight({"lamp": line_spectrum([505.0], [1.0])}, powers={"sky": 0.0})  # warnings are errors

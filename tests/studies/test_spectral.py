@@ -10,7 +10,7 @@ from refusal import refusal
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
 from render.illuminants import illuminant
-from render.spectrum import VISIBLE_NM, Floats, photons_per_joule
+from render.spectrum import VISIBLE_NM, Floats, fine_bands, photons_per_joule
 from render.transport import Transport
 from scenes.catalog import load
 from scenes.reflectances import color_checker
@@ -19,7 +19,7 @@ from sensor.config import SensorConfig
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
-from studies.budget.bands import counts, fine_bands, groups_of
+from studies.budget.bands import counts, groups_of
 from studies.budget.ledger import as_stated
 from studies.commands import new as new_command
 from studies.metrics.target_figures import patch_masks
@@ -80,6 +80,11 @@ def test_ws_electrons_per_lux_are_the_integral(wall: Transport) -> None:
         found = expected_e[mask(sensor.cfa, "W", expected_e.shape)].mean()
         # bands of 10 nm: the luminance of a light with edges (sodium, LED) is off by up to 0.6 % in them
         assert found == pytest.approx(integral_e(sensor, name, LUX, 0.01), rel=8e-3), name
+
+
+def test_a_study_without_a_plan_gives_a_lamps_lines_a_band_of_their_own() -> None:
+    (model,) = as_stated(Study((SceneChoice("flat_field"),), ("1lux",), spectra=("own", "sodium_low"))).renders.values()
+    assert min(model.width_nm) == pytest.approx(1.6, abs=0.01)
 
 
 def test_a_study_renders_the_range_that_it_asks_for() -> None:

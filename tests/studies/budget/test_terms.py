@@ -13,7 +13,7 @@ from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.loader import mitsuba_module
 from render.scene import LightGroup
-from render.spectrum import Spectrum, flat
+from render.spectrum import Spectrum, emission_lines_nm, fine_bands, flat
 from render.transport import Transport
 from rodcone.jit import backend
 from sensor.kernel.kernel import expected_electrons_single
@@ -22,7 +22,7 @@ from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.shake import held_lens
-from studies.budget.bands import COUNTS, emission_lines_nm, fine_bands, groups_of, merge_radiance, merge_transport
+from studies.budget.bands import COUNTS, groups_of, merge_radiance, merge_transport
 from studies.budget.choice import choose, image_ns, render_ns
 from studies.budget.ledger import (
     EFFECT_MARGIN,

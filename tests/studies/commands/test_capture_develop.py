@@ -132,10 +132,7 @@ def test_a_frame_more_than_half_saturated_is_told(tmp_path: Path) -> None:
         write_exr(SpectralRadiance(values, NM, 0.0, WIDTH), lit)
         # its lens draws a sharp edge
         code, _, err = call(["capture", lit, "-o", shot, "--exposure", "10ms", "--sensor", "table1_output"])
-        words = (
-            f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; give a shorter --exposure, or "
-            "leave it out\n"
-        )
+        words = f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; shorten or omit --exposure\n"
         assert (code, words in err, "saturated" in err) == (0, told, told)
 
 
@@ -297,6 +294,16 @@ def test_another_lamp_gives_its_own_colours_and_white_balance_another_neutral(tm
         expected = calibrate(sensor, illuminant(lit)).neutral
         # 256 pixels of R and of B with over 500 e- each: 5 standard errors of the ratio to G
         assert np.array(signal) / signal[1] == pytest.approx(expected, rel=5 * np.sqrt(2 / (256 * 500)) + 1e-3)
+
+
+def test_a_lamps_lines_reach_the_sensor_as_lines(tmp_path: Path) -> None:
+    arguments = ["capture", "flat_field", "--spp", "4", "--size", "64", "--level", "10lux", "--light", "sodium_low"]
+    assert call([*arguments, "--exposure", "200ms", "-o", tmp_path / "a.tif"])[0] == 0
+    raw, curves = read_raw(tmp_path / "a.tif"), preset("low_noise").responses.curves
+    signal = {channel: raw.electrons[mask(raw.cfa, channel, raw.shape)].mean() for channel in "RGW"}
+    at = {channel: np.interp(589.2, curve.wavelength_nm, curve.values) for channel, curve in curves.items()}
+    for channel in "RG":  # 1024 pixels of over 180 e-
+        assert signal[channel] / signal["W"] == pytest.approx(at[channel] / at["W"], rel=0.02)
 
 
 def negative(path: Path, cfa: str = "bayer", share: float = 0.25, light: str = "D65") -> RawImage:

@@ -14,7 +14,15 @@ from isp.colour.white_balance import neutral_response
 from isp.processors.catalogue import NAMED
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, colour_matching_functions, flat, tristimulus
+from render.spectrum import (
+    DEFAULT_WAVELENGTH_NM,
+    Spectrum,
+    band_widths,
+    colour_matching_functions,
+    flat,
+    line_spectrum,
+    tristimulus,
+)
 from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker
 from sensor.capture import capture, expose
@@ -219,6 +227,15 @@ def test_speed_is_78_over_the_exposure_that_fills_the_well() -> None:
     assert iso_speed(sensor) == pytest.approx(78 * 1.114e4 * area_um2 / 15_000, rel=3e-3)
     dull = replace(sensor, lens=replace(sensor.lens, transmittance=0.5, f_number=8.0))
     assert iso_speed(dull) == pytest.approx(iso_speed(sensor), rel=1e-12)  # it is counted at the sensor
+
+
+@pytest.mark.parametrize("lines_nm", [(589.3,), (499.9, 510.1), (656.3,)])
+def test_under_a_line_or_two_all_is_nearly_grey(lines_nm: tuple[float, ...]) -> None:
+    calibration = calibrate(low_noise(), line_spectrum(lines_nm, np.ones(len(lines_nm))))
+    share = calibration.neutral[:3] / calibration.neutral[:3].sum()  # a channel counts by its electrons
+    assert np.abs(calibration.to_srgb - share).max() < 0.011
+    assert np.linalg.cond(calibration.to_srgb) < 1000
+    calibrate(low_noise(), illuminant("sodium_high"))
 
 
 def test_what_cannot_be_calibrated_is_refused() -> None:
