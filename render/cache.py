@@ -129,13 +129,9 @@ def write_arrays(path: Path, arrays: Mapping[str, Any], *, packed: bool = False)
 
 
 def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render") -> Path:
-    key = digest_inputs(
-        [
-            *(ENGINE_VERSION, kind, INTEGRATOR, variant(), compiler_version()),
-            *map(metadata.version, ("mitsuba", "drjit")),
-            *(*scene_terms(scene, film), seed),
-        ]
-    )
+    libraries = map(metadata.version, ("mitsuba", "drjit"))
+    engine = [ENGINE_VERSION, kind, INTEGRATOR, variant(), compiler_version(), *libraries]
+    key = digest_inputs([*engine, *scene_terms(scene, film), seed])
     return folder / f"{_NOT_IN_NAMES.sub('_', scene.name)}-{key}.npz"
 
 

@@ -144,11 +144,8 @@ def _checked_film(
 ) -> Film:
     if not scene.groups:
         raise InputError(f"scene {scene.name}: it has no light; allowed: one light group or more; add one")
-    if (
-        not isinstance(size, tuple | list)
-        or len(size) != 2
-        or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in size)
-    ):
+    sides = list(size) if isinstance(size, tuple | list) else []
+    if len(sides) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in sides):
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)

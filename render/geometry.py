@@ -1,13 +1,15 @@
 """Placing things and the camera: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
 
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from rodcone.errors import InputError
 from rodcone.jit import Matrix4
 from rodcone.types import Floats
+
+Point: TypeAlias = tuple[float, float, float]  # [m]
 
 
 def translate(x: float, y: float, z: float) -> Floats:
@@ -59,12 +61,7 @@ def to_world(*transforms: Floats) -> Any:
     return Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())
 
 
-def camera(
-    fov_deg: float,
-    origin: tuple[float, float, float],
-    target: tuple[float, float, float],
-    size: tuple[int, int] | None = None,
-) -> dict[str, Any]:
+def camera(fov_deg: float, origin: Point, target: Point, size: tuple[int, int] | None = None) -> dict[str, Any]:
     """Perspective camera of `fov_deg` over the picture's shorter side; `size` is the picture's own height and width."""
     pose = to_world(look_at(origin, target))
     view = {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}

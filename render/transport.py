@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,6 +28,8 @@ from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
+Spectra: TypeAlias = Mapping[str, Spectrum | str]  # or names of illuminants, by light group
+Powers: TypeAlias = Mapping[str, float]  # by light group
 
 
 @dataclass(frozen=True)
@@ -103,9 +105,9 @@ class Transport:
 
     def relight(
         self,
-        spectra: Mapping[str, Spectrum | str] | float | None = None,
+        spectra: Spectra | float | None = None,
         *,
-        powers: Mapping[str, float] | None = None,
+        powers: Powers | None = None,
         luminance_cd_m2: float | None = None,
         illuminance_lux: float | None = None,
     ) -> SpectralRadiance:
@@ -162,9 +164,9 @@ class Transport:
 
     def relight_halves(
         self,
-        spectra: Mapping[str, Spectrum | str] | None = None,
+        spectra: Spectra | None = None,
         *,
-        powers: Mapping[str, float] | None = None,
+        powers: Powers | None = None,
         luminance_cd_m2: float | None = None,
         illuminance_lux: float | None = None,
     ) -> tuple[SpectralRadiance, SpectralRadiance]:
@@ -191,9 +193,7 @@ class Transport:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
 
-    def band_error(
-        self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
-    ) -> Floats:
+    def band_error(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Floats:
         """Error of `relight` where light and transport both vary within a band, shape (band,).
 
         Relative, RMS over pixels: the product of band averages misses their covariance
@@ -202,9 +202,7 @@ class Transport:
         lights = self._lights(spectra, powers)
         return within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
 
-    def level(
-        self, spectra: Mapping[str, Spectrum | str] | None = None, *, powers: Mapping[str, float] | None = None
-    ) -> Level:
+    def level(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Level:
         """Mean luminance [cd m^-2] of what is no light, under given lights: what a level in cd/m^2 sets.
 
         The light that is seen directly is left out of the sum, and what it covers out of the area.
@@ -244,9 +242,7 @@ class Transport:
     def _repr_png_(self) -> bytes:
         return self.relight()._repr_png_()
 
-    def _lights(
-        self, spectra: Mapping[str, Spectrum | str] | None, powers: Mapping[str, float] | None
-    ) -> dict[str, LightGroup]:
+    def _lights(self, spectra: Spectra | None, powers: Powers | None) -> dict[str, LightGroup]:
         """Light groups as asked for."""
         for what, given in (("spectra", spectra), ("powers", powers)):
             if given is not None:
@@ -264,9 +260,7 @@ class Transport:
             lights[name] = replace(group, spectrum=spectrum, power=float(power))
         return lights
 
-    def _emission(
-        self, spectra: Mapping[str, Spectrum | str] | None = None, powers: Mapping[str, float] | None = None
-    ) -> Floats:
+    def _emission(self, spectra: Spectra | None = None, powers: Powers | None = None) -> Floats:
         """Spectral emission of the lights asked for, shape (group, band)."""
         return emission(self._lights(spectra, powers), self.wavelength_nm, self.width_nm)
 

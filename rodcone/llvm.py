@@ -10,17 +10,12 @@ import re
 import sys
 import warnings
 from collections.abc import Iterable
+from glob import glob
 from importlib import metadata
 from pathlib import Path
 
 OLDEST_LLVM = 17  # 15 and 16 abort with "Cannot select: fmaximum" at the first kernel (measured with Dr.Jit 1.5)
-_SYSTEM_DIRECTORIES = (
-    "/usr/lib",
-    "/usr/lib64",
-    "/usr/local/lib",
-    "/usr/lib/x86_64-linux-gnu",
-    "/usr/lib/aarch64-linux-gnu",
-)
+_SYSTEM_DIRECTORIES = ("/usr/lib", "/usr/lib64", "/usr/local/lib", "/usr/lib/*64-linux-gnu", "/usr/lib/llvm-*/lib")
 _LIBRARY_NAME = re.compile(r"libLLVM(?:-(\d+)\.so(?:\.\d+)*|\.so\.(\d+)(?:\.\d+)*)$")
 
 
@@ -44,8 +39,8 @@ def _wheel_library() -> Path | None:
 
 
 def _system_library() -> Path | None:
-    folders = [Path(name) for name in _SYSTEM_DIRECTORIES] + sorted(Path("/usr/lib").glob("llvm-*/lib"))
-    return _newest(path for folder in folders for path in folder.glob("libLLVM*.so*") if path.is_file())
+    files = (Path(file) for folder in _SYSTEM_DIRECTORIES for file in sorted(glob(f"{folder}/libLLVM*.so*")))
+    return _newest(file for file in files if file.is_file())
 
 
 def find_llvm() -> Path | None:

@@ -10,7 +10,7 @@ from time import monotonic
 from typing import Any, TextIO, TypeAlias
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, SpinnerColumn, Task, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import Progress, SpinnerColumn, Task, TimeElapsedColumn
 
 Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 LINE_EVERY_S = 5.0
@@ -28,14 +28,8 @@ def progress(file: TextIO) -> Iterator[Step]:
     and fro.
     """
     console = Console(file=file)
-    columns = (
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TextColumn("{task.percentage:3.0f} %"),
-        TimeElapsedColumn(),
-        TimeRemainingColumn(),
-    )
+    *columns, time_left = Progress.get_default_columns()
+    columns = [SpinnerColumn(), *columns, TimeElapsedColumn(), time_left]
     bar = Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=math.inf
     )

@@ -1,6 +1,5 @@
 """Denoised light under given lights, and what its error is measured by."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,17 +9,16 @@ from numpy.typing import NDArray
 
 from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
-from render.spectrum import Spectrum
-from render.transport import Transport
+from render.transport import Powers, Spectra, Transport
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
 
 def relight_denoised(
     transport: Transport,
-    spectra: Mapping[str, Spectrum | str] | None = None,
+    spectra: Spectra | None = None,
     *,
-    powers: Mapping[str, float] | None = None,
+    powers: Powers | None = None,
     luminance_cd_m2: float | None = None,
     illuminance_lux: float | None = None,
 ) -> tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance]:

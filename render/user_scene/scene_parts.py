@@ -100,12 +100,11 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     groups = light_groups(mi, name, geometry, _check_references(name, geometry))
     if not groups:
         raise InputError(f"scene {name}: it has no light; allowed: one emitter or more; add one")
-    plane = planes[0] if planes else None
     scene = Scene(
         name=name,
         geometry=geometry,
         groups=groups,
-        reference_plane=plane,
+        reference_plane=planes[0] if planes else None,
         extend=extend,
         max_depth=depth,
         rr_depth=rr_depth,
