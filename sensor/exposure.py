@@ -76,10 +76,24 @@ def _share_of_well_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    alone, share = of_channel(sensor, channel)
-    dark_per_second_e = alone.pixel.dark_current_e_per_s / share  # as the light: without the density
-    filling = float(np.percentile(sensor.pixel_sums(per_second_e), percentile)) + dark_per_second_e
+    filling = float(np.percentile(sensor.pixel_sums(per_second_e), percentile)) + _dark_per_second_e(sensor, channel)
     return min(longest_s, well_share * sensor.metered_well_e(channel) / filling) if filling > 0 else longest_s
+
+
+def _dark_per_second_e(sensor: SensorConfig, channel: str) -> float:
+    """Dark current that a channel's sites would have in the whole time without a density, as their light is given."""
+    alone, share = of_channel(sensor, channel)
+    return alone.pixel.dark_current_e_per_s / share
+
+
+def at_level_s(unit_s: float, level: float, rule: str, sensor: SensorConfig) -> float:
+    """Exposure by ``auto`` or ``auto:W`` of `level` times the light whose exposure without a longest one is `unit_s`.
+
+    Dark current, a share f of what fills the well there, doesn't grow with the light: unit_s / (level + (1 - level) f).
+    """
+    channel = "W" if rule == AUTO_W and "W" in sensor.channels else sensor.unit_channel
+    fill_e = METERED_SHARE * sensor.metered_well_e(channel)
+    return unit_s / (level + (1 - level) * _dark_per_second_e(sensor, channel) * unit_s / fill_e)
 
 
 def exposure_by_rule_s(

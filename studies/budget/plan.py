@@ -14,6 +14,7 @@ from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
+from sensor.exposure import AUTO, at_level_s
 from sensor.presets import preset, vary
 from studies.budget.bands import counts, groups_of, wide_bands
 from studies.budget.choice import choose
@@ -175,7 +176,7 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
                         level = level_luminance(condition.level, lux)
                         exposure_s = parse_exposure(condition.exposure)
                         if exposure_s is None:
-                            exposure_s = min(study.longest_exposure_s, auto_s / level)
+                            exposure_s = min(study.longest_exposure_s, at_level_s(auto_s, level, AUTO, sensor))
                         sensor_effects = of_any_time
                         if lens.shake_um:
                             shake = shake_effect(lit, sensor, lens, exposure_s, rng)

@@ -22,7 +22,7 @@ from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s, most_informative_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, at_level_s, exposure_of_electrons_s, most_informative_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage
@@ -182,9 +182,9 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
         rules = (AUTO, AUTO_W) if controls.exposure == AUTO_INFORMATION else (controls.exposure,)
         times_s = []
         for rule in rules:  # both look at a percentile, which goes with the level
-            metered = (lit_so, rule, sensor.pixel.full_well_e)
+            metered = (lit_so, rule, sensor.pixel.full_well_e, sensor.pixel.dark_current_e_per_s)
             unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
-            times_s.append(min(exposure_s, unit_s / scale))
+            times_s.append(min(exposure_s, at_level_s(unit_s, scale, rule, sensor)))
         exposure_s = most_informative_s(mosaicked_e * scale, sensor, times_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])

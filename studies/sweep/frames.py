@@ -19,7 +19,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum,
 from render.transport import Transport
 from rodcone.digests import digest_inputs
 from sensor.config import SensorConfig
-from sensor.exposure import AUTO, AUTO_W, most_informative_s
+from sensor.exposure import AUTO, AUTO_W, at_level_s, most_informative_s
 from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
@@ -150,7 +150,10 @@ def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longe
     asked_s = parse_exposure(exposure)
     if asked_s is not None:
         return asked_s
-    for_green_s, for_white_s = (min(longest_s, unit_s / luminance_cd_m2) for unit_s in (frame.auto_s, frame.auto_w_s))
+    for_green_s, for_white_s = (
+        min(longest_s, at_level_s(unit_s, luminance_cd_m2, rule, frame.sensor))
+        for unit_s, rule in ((frame.auto_s, AUTO), (frame.auto_w_s, AUTO_W))
+    )
     if exposure == AUTO:
         return for_green_s
     if exposure == AUTO_W or for_green_s == for_white_s:

@@ -12,6 +12,7 @@ from sensor.chip import ChannelReading, Chip
 from sensor.config import LONGEST_S
 from sensor.exposure import (
     RULES,
+    at_level_s,
     auto_exposure_s,
     exposure_by_rule_s,
     exposure_of_electrons_s,
@@ -88,6 +89,8 @@ def test_light_and_dark_current_fill_the_well_together(rule, channel):
         exposure_s = exposure_of_electrons_s(rule, frame, sensor, 1e3)
         filling_e = of_light * light_e["RGBW".index(channel)] + of_dark * dark_e
         assert exposure_s * filling_e == pytest.approx(0.8 * well_e, rel=1e-12)
+        brighter_s = exposure_of_electrons_s(rule, 7 * frame, sensor, 1e3)
+        assert at_level_s(exposure_s, 7.0, rule, sensor) == pytest.approx(brighter_s, rel=1e-12)
         assert exposure_of_electrons_s(rule, 0 * frame, sensor, 1e3) == pytest.approx(0.8 * well_e / of_dark / dark_e)
 
 

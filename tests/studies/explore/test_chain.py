@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from explore_sample import GAUSSIAN, RENDER, ran, random_controls, small_transport
+from loop import loop
 from refusal import refusal
 
 import rodcone as public
@@ -68,13 +69,16 @@ def test_the_memory_is_bounded():
     assert max(len(kept) for kept in memo.stages.values()) <= 8
 
 
-def test_the_stages_are_the_public_chain():
+@loop(("level_cd_m2", "dark_e_per_s"), [(3.0, 0.0), (300.0, 3e5)])
+def test_the_stages_are_the_public_chain(level_cd_m2, dark_e_per_s):
     """Light, exposure and truth of the scene's own lamps, against the functions that a script would call."""
-    transport, controls = small_transport(), Controls(level_cd_m2=3.0, lens={"diffraction": 1.0})
+    terms = {"lens": {"diffraction": 1.0}, "pixel": {"dark_current_e_per_s": dark_e_per_s}}
+    transport, controls = small_transport(), Controls(level_cd_m2=level_cd_m2, exposure="auto", **terms)
     exposed = photograph(transport, controls).exposed
-    radiance = transport.relight(luminance_cd_m2=3.0)
+    radiance = transport.relight(luminance_cd_m2=level_cd_m2)
     sensor = public.low_noise()
-    sensor = replace(sensor, lens=replace(sensor.lens, diffraction=1.0))
+    pixel = replace(sensor.pixel, dark_current_e_per_s=dark_e_per_s)
+    sensor = replace(sensor, pixel=pixel, lens=replace(sensor.lens, diffraction=1.0))
     exposure_s = public.auto_exposure_s(form_image(radiance, sensor), sensor)
     # The undershoot of a group alone is not that of the sum: a hundredth of the brightest pixels' light at most.
     assert exposed.exposure_s == pytest.approx(exposure_s, rel=1e-3)
@@ -85,7 +89,7 @@ def test_the_stages_are_the_public_chain():
     assert np.sum(exposed.expected_e) == pytest.approx(expected.sum(), rel=1e-5)
     first = next(iter(transport.groups.values()))
     light = light_in_bands(first.spectrum, transport.wavelength_nm, transport.width_nm)
-    truth = true_srgb(radiance, light, shown_white_cd_m2(transport, 3.0))
+    truth = true_srgb(radiance, light, shown_white_cd_m2(transport, level_cd_m2))
     assert np.allclose(photograph(transport, controls).true, truth, rtol=1e-4, atol=1e-6)
 
 

@@ -96,10 +96,15 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
 
 
 def test_rules_of_exposure_are_each_cameras_own_and_leave_its_noise(tmp_path: Path) -> None:
+    """Of a camera whose dark current fills a well as quickly as white's light does: it doesn't go with the level."""
     rules = ("auto", "auto:W", "auto:information")
-    cells = made(tmp_path, levels=("1000cd/m2",), exposures=rules, seeds=(0,), processors=("bayer", "interleaved"))
+    text = preset_file("low_noise").read_text("utf-8")
+    hot = tmp_path / "hot.toml"
+    hot.write_text(text.replace("dark_current_e_per_s = 0.0", "dark_current_e_per_s = 1e7"), "utf-8")
+    changes = {"levels": ("1000cd/m2",), "exposures": rules, "processors": ("bayer", "interleaved")}
+    cells = made(tmp_path, sensors=(str(hot),), seeds=(0,), **changes)
     times = {(cell.processor, cell.condition.exposure): cell.exposure_s for cell in cells}
-    sensor = preset("low_noise")
+    sensor = preset(hot)
     sharp = replace(sensor, lens=replace(sensor.lens, diffraction=0.0))  # one time for all models of the lens
     radiance = as_transport(load_radiance(tmp_path / "scene.exr")).relight(luminance_cd_m2=1000.0)
     for_white = auto_exposure_s(form_image(radiance, sharp), sensor, channel="W")
@@ -107,6 +112,8 @@ def test_rules_of_exposure_are_each_cameras_own_and_leave_its_noise(tmp_path: Pa
     assert {times["bayer", rule] for rule in rules} == {times["bayer", "auto"]}
     assert times["bayer", "auto"] == pytest.approx(times["interleaved", "auto"], rel=any_order(10))
     assert times["interleaved", "auto:W"] == pytest.approx(for_white, rel=1e-6)
+    plain_s = auto_exposure_s(form_image(radiance, sharp), preset("low_noise"), channel="W")
+    assert 0.2 < for_white / plain_s < 0.8
     assert times["interleaved", "auto:information"] in (times["interleaved", "auto"], times["interleaved", "auto:W"])
     bayer = {run_cell(cell).picture for cell in cells if cell.processor == "bayer"}
     assert len(bayer) == 1  # the same time, the same picture
