@@ -114,8 +114,8 @@ def test_the_signal_is_that_of_the_level_and_exposure_asked_for(exr: Path, tmp_p
 
 
 def test_a_level_without_the_lamps_in_view_is_said_beside_the_mean_of_the_picture(tmp_path: Path) -> None:
-    for scene, lamps_in_view in (("night_street", True), ("still_life", False)):
-        arguments = ["capture", scene, "--size", "48", "--spp", "16", "--level", "100cd/m2", "--json"]
+    for scene, lamps_in_view in (("cornell_box", True), ("flat_field", False)):
+        arguments = ["capture", scene, "--size", "24", "--spp", "4", "--level", "100cd/m2", "--json"]
         code, printed, err = call([*arguments, "-o", str(tmp_path / "shot.dng")])
         mean_cd_m2 = json.loads(printed)["luminance_cd_m2"]
         words = (

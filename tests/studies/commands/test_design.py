@@ -20,6 +20,7 @@ from studies.design.search import Goal
 from studies.sweep import provenance
 
 FEW = ["design", "low_noise", "--tile", "2x2", "--letters", "RGB", "--over", "classroom:classroom"]
+FIGURES = [ExpectedError(25.0, 0.01, 30.0, 29.0, 31.0, 2.0, 3.0)]
 
 
 @pytest.mark.thorough
@@ -76,7 +77,9 @@ def test_a_camera_with_curves_of_its_own_takes_them_along(tmp_path: Path) -> Non
     assert "isn't what rodcone design wrote" in err
 
 
-def test_what_was_tried_with_other_curves_of_the_same_letters_does_not_count(tmp_path: Path) -> None:
+def test_what_was_tried_with_other_curves_of_the_same_letters_does_not_count(tmp_path, monkeypatch):
+    monkeypatch.setattr(design_module, "expected", lambda *_: FIGURES)  # of the cameras beside the tiles
+    monkeypatch.setattr(design_module, "design_page", lambda *_, **__: "")
     table = '[responses]\ncsv = "c.csv"\nrange_nm = [380, 780]\nquantum_efficiency = "included"\n'
     text = preset_file("low_noise").read_text("utf-8").replace('cfa = "rgbw"', 'cfa = ["RG", "GB"]')
     (tmp_path / "s.toml").write_text(text.replace("\n[lens]", f"\n{table}\n[lens]"), "utf-8")
@@ -135,7 +138,7 @@ def test_a_given_tile_is_expected_once_and_a_mosaic_that_cannot_be_judged_is_tol
         judged.append(camera.cfa)
         if len(judged) > most:
             raise InputError("sensor: it can't be judged; allowed: another; take one")
-        return [ExpectedError(25.0, 0.01, 30.0, 29.0, 31.0, 2.0, 3.0)]
+        return FIGURES
 
     monkeypatch.setattr(design_module, "expected", expected)
     asked = ["design", "low_noise", "--tile", "BR/RB", *FEW[6:], "-o", tmp_path / "found"]
