@@ -118,6 +118,21 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
     return groups
 
 
+def worded(report: ReportData, axis: int, a: int, b: int) -> list[tuple[Group, tuple[str, str, str, str, str]]]:
+    """Groups as of `groups_of`, and what is said of each.
+
+    That is who is better, what it is worth in light, whether a white balance misses by more, what the two have in
+    common, and RGBW beside the best Bayer; empty where there is nothing to say.
+    """
+    groups = groups_of(report, axis, a, b)
+    places = report.by_group if axis == CAMERA else [()] * len(groups)
+    said = []
+    for x, place in zip(groups, places, strict=True):
+        balance = balance_words(x) if axis != BALANCE else ""
+        said.append((x, (answer(x.pair), in_light(x.pair), balance, pair_words(x), best_words(x, place))))
+    return said
+
+
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
     """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
     drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
@@ -172,17 +187,11 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
                 metric.key: _flat(leads(metric, sides[i][metric.key], sides[j][metric.key])) for metric in metrics
             }
         for a, b in permutations(range(length), 2) if axis in RIVALS else ():
-            groups = groups_of(report, axis, a, b)
-            places = report.by_group if axis == CAMERA else [()] * len(groups)
-            key = f"{a} {b}"
+            compared, key = worded(report, axis, a, b), f"{a} {b}"
+            groups = [group for group, _ in compared]
             across["answers"][key] = [
-                {
-                    "said": answer(x.pair),
-                    "light": in_light(x.pair),
-                    "balance": balance_words(x) if axis != BALANCE else "",
-                    "times": " ".join(filter(None, (pair_words(x), best_words(x, place)))),
-                }
-                for x, place in zip(groups, places, strict=True)
+                {"said": said, "light": light, "balance": balance, "times": " ".join(filter(None, further))}
+                for _, (said, light, balance, *further) in compared
             ]
             across["over"][key] = over_groups(groups)
             if a < b:
@@ -226,23 +235,9 @@ def markdown(report: ReportData, command: str, a: int) -> str:
     of = first_comparison(report)
     axis = axes_of(report)[of.compared]
     b = of.b if a == of.a else next(value for value in range(len(axis.values)) if value != a)
-    groups = groups_of(report, of.compared, a, b)
-    places = report.by_group if of.compared == CAMERA else [()] * len(groups)
     words = [
-        " ".join(
-            filter(
-                None,
-                (
-                    "-",
-                    code(group.title) if group.title else "",
-                    answer(group.pair),
-                    in_light(group.pair),
-                    balance_words(group) if of.compared != BALANCE else "",
-                    best_words(group, place),
-                ),
-            )
-        )
-        for group, place in zip(groups, places, strict=True)
+        " ".join(filter(None, ("-", code(x.title) if x.title else "", said, light, balance, best)))
+        for x, (said, light, balance, _, best) in worded(report, of.compared, a, b)
     ]
     parts = [
         f"# {code(report.title)}",

@@ -1,6 +1,7 @@
 """A camera's colours, calibrated on the ColorChecker; its notes beside a frame; development to the truth's scale."""
 
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -276,4 +277,10 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         colour = calibrate(sensor, light or illuminant("D65"))
     except InputError:
         colour = None
-    return replace(raw, colour=colour, f_number=sensor.lens.f_number, iso=iso_speed(sensor))
+    return noted(raw, sensor, colour)
+
+
+def noted(raw: RawImage, sensor: SensorConfig, colour: ColourCalibration | None, source: str | Path = "") -> RawImage:
+    """Raw image with what a camera notes beside a frame: its name, by the sensor's preset or file, lens and colours."""
+    name = Path(source).stem.encode("ascii", "replace").decode() or raw.camera
+    return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)
