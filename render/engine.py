@@ -20,7 +20,7 @@ from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import INTEGRATOR, Film, as_guest, load_groups, variant
 from render.meter import Meter
-from render.runs import add_run, errors_of, let_go, means_of, no_means, pilot_rates, scene_means_of
+from render.runs import add_run, fields_of, let_go, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
@@ -165,9 +165,8 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denois
     if earlier is None:
         return None
     shape = (len(scene.groups), film.wavelength_nm.size, *film.size)
-    same_bands = np.array_equal(earlier.wavelength_nm, film.wavelength_nm) and np.array_equal(
-        earlier.width_nm, film.width_nm
-    )
+    same_centres = np.array_equal(earlier.wavelength_nm, film.wavelength_nm)
+    same_bands = same_centres and np.array_equal(earlier.width_nm, film.width_nm)
     if earlier.radiance.shape != shape or not same_bands or list(earlier.groups) != list(scene.groups):
         raise InputError(
             f"resume: (group, band, h, w) {earlier.radiance.shape} of lights {list(earlier.groups)} don't fit the "
@@ -195,15 +194,15 @@ def _render(
         means, earlier = no_means(scene, film, rates, split=denoise), None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
     # Draw runs until a limit is reached
-    errors: dict[str, Any] = {"relative_mc_error": np.inf}
+    fields: dict[str, Any] = {"relative_mc_error": np.inf}
     look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
             add_run(loaded, means, film, look, limits.seed)
             if means.count >= LEAST_POINTS:
-                errors = errors_of(lights, means)
-            now, error = time.perf_counter(), errors["relative_mc_error"]
+                fields = fields_of(lights, means)
+            now, error = time.perf_counter(), fields["relative_mc_error"]
             progress(own_share * limits.share(means.count, error, now - start), error)
             # The error is told after every run, and stops the render at a look alone.
             looked_at = error if means.count >= look else np.inf
@@ -214,13 +213,10 @@ def _render(
         if denoise:
             denoised = denoise_means(scene, loaded, film, means, limits.seed, earlier.denoised if earlier else None)
     # Tell what was drawn
-    if "variance" not in errors:  # fewer points than an error is told of
-        errors = errors_of(lights, means)
+    if "variance" not in fields:  # fewer points than an error is told of
+        fields = fields_of(lights, means)
     return Transport(
-        light=means.light,
-        coverage=means.coverage,
-        seen=tuple(means.seen),
-        **errors,
+        **fields,
         scene_means=scene_means_of(means),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,

@@ -207,9 +207,8 @@ def within_band_error(
     for light, planes in zip(lights.values(), radiance, strict=True):
         transport = planes[chosen].astype(np.float64)
         slope, curvature = _derivatives(transport, wavelength_nm)
-        mean, first, second = (
-            moment[:, None, None] * light.power for moment in _moments(light.spectrum, wavelength_nm, width_nm)
-        )
+        moments = _moments(light.spectrum, wavelength_nm, width_nm)
+        mean, first, second = (moment[:, None, None] * light.power for moment in moments)
         missed += np.abs(slope * first) + np.abs(curvature * second) / 2
         total += transport * mean
     # a lamp in view doesn't hide the rest

@@ -23,7 +23,7 @@ from render.denoised.relight import sums_over_blocks
 from render.error_estimates import Halves
 from render.level import SceneMeans
 from render.loader import Film
-from render.runs import Means, errors_of
+from render.runs import Means, fields_of
 from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
@@ -172,10 +172,7 @@ def _unpacked(path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightG
         shared=tuple(arrays["shared"].tolist()) or None,
     )
     transport = Transport(
-        light=means.light,
-        coverage=means.coverage,
-        seen=tuple(means.seen),
-        **errors_of(emission(groups, wavelength_nm, width_nm), means),
+        **fields_of(emission(groups, wavelength_nm, width_nm), means),
         scene_means=SceneMeans(**{name: arrays[f"mean_{name}"] for name in _LEVELS}),
         groups=dict(groups),
         wavelength_nm=wavelength_nm,

@@ -107,13 +107,14 @@ def means_of(transport: Transport, *, split: bool = False) -> Means:
     )
 
 
-def errors_of(lights: Floats, means: Means) -> dict[str, Any]:
-    """What a `Transport` tells of its Monte Carlo error under lights (group, band), from the means: fields by name."""
+def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
+    """Fields of a `Transport` that hold the means and their Monte Carlo error under lights (group, band)."""
     errors = group_errors(means.light, means.seen, means.coverage.mean, means.rates)
     variance = np.stack([group.covariance(group, means.rates) for group in errors])
     shared = shared_paths(means.shared, errors, variance, means.rates) if means.shared else None
     error = relative_error(lights, means.light.mean, variance, shared)
-    return {"variance": variance, "shared": shared, "relative_mc_error": error}
+    light = {"light": means.light, "coverage": means.coverage, "seen": tuple(means.seen)}
+    return light | {"variance": variance, "shared": shared, "relative_mc_error": error}
 
 
 def scene_means_of(means: Means) -> SceneMeans:
@@ -155,10 +156,8 @@ def add_run(scenes: list[Loaded], means: Means, film: Film, stop: int, seed: int
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
         # A camera path meets one lamp first, of one group: coverage is the sum over the groups' paths.
-        covered_even, covered_odd = (
-            sum(half.coverage[index] for half in halves) for halves in zip(*draws, strict=True)
-        )
-        means.coverage.add(np.asarray(covered_even), np.asarray(covered_odd), weight)
+        covered = [np.asarray(sum(half.coverage[index] for half in halves)) for halves in zip(*draws, strict=True)]
+        means.coverage.add(covered[0], covered[1], weight)
         for loaded, (even, odd) in zip(scenes, draws, strict=True):
             for slot, group in enumerate(loaded.groups):
                 means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight)

@@ -224,13 +224,11 @@ def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
         nested = isinstance(value, dict) and path not in emitters
         result[key] = _hold(value, emitters, f"{path}/") if nested else value
     material = result.get("material")
-    if (
-        isinstance(material, str)
-        and (eta := optical_constant(material, "eta"))
-        and (k := optical_constant(material, "k"))
-    ):
+    index = {part: optical_constant(material, part) for part in ("eta", "k")} if isinstance(material, str) else {}
+    held = {part: spectrum_node(_held(table)) for part, table in index.items() if table}
+    if len(held) == 2:
         del result["material"]
-        result |= {"eta": spectrum_node(_held(eta)), "k": spectrum_node(_held(k))}
+        result |= held
     return result
 
 

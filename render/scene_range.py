@@ -65,7 +65,6 @@ def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, wid
         warnings.warn(
             f"{light} is known over {low:g}-{high:g} nm, and bands reach {shortest:g}-{longest:g} nm: "
             "outside its table it is taken as dark",
-            UserWarning,
             stacklevel=4,
         )
 

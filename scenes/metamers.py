@@ -57,13 +57,8 @@ def _black(nm: Floats) -> Floats:
     # Colours of every bump at fine resolution and in the renderer's bands: a black of both, so that pairs are as equal
     # in a picture as they are on paper.
     fine_nm, one_nm = np.arange(380.5, 780.0), np.ones(400)
-    rendered_nm = band_widths(DEFAULT_WAVELENGTH_NM)
-    twin = np.vstack(
-        [
-            _colours(nm, bumps, TWINS_UNDER, fine_nm, one_nm),
-            _colours(nm, bumps, TWINS_UNDER, DEFAULT_WAVELENGTH_NM, rendered_nm),
-        ]
-    )
+    bands = (fine_nm, one_nm), (DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
+    twin = np.vstack([_colours(nm, bumps, TWINS_UNDER, *at_nm) for at_nm in bands])
     other = _colours(nm, bumps, OTHER_LIGHT, fine_nm, one_nm)
     free = np.linalg.svd(twin)[2][np.linalg.matrix_rank(twin) :].T  # weights of the bumps that leave no colour
     strongest = np.linalg.svd(other @ free)[2][0]

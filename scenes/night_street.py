@@ -85,13 +85,12 @@ def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str,
 def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
     """Street lamp 6 m high on the pavement, its arm over the street (`towards` = 1: to the right)."""
     steel, head = matte(grey(0.12)), x + 1.1 * towards
+    down = translate(head, 6.025, z) @ rotate((1, 0, 0), 90)
     return {
         f"{name}_pole": rod((x, 0.0, z), (x, 6.1, z), 0.06, steel),
         f"{name}_arm": rod((x, 6.1, z), (head, 6.1, z), 0.04, steel),
         f"{name}_head": block(translate(head, 6.03, z), 0.60, 0.12, 0.28, steel),
-        f"{name}_opening": panel(
-            translate(head, 6.025, z) @ rotate((1, 0, 0), 90), *OPENING_M, matte(DARK), emitter={"type": "area"}
-        ),
+        f"{name}_opening": panel(down, *OPENING_M, matte(DARK), emitter={"type": "area"}),
     }
 
 

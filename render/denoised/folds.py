@@ -23,9 +23,8 @@ def denoise_means(
         Where the denoiser isn't installed.
     """
     assert means.indirect is not None
-    folds = no_means(
-        scene, film, means.rates, split=True
-    )  # by the kernel of the render's own light: no other is compiled
+    # split, as the render's own light: no other kernel is compiled
+    folds = no_means(scene, film, means.rates, split=True)
     if earlier is not None:
         folds.count, folds.light = earlier.fold_points, earlier.folds.copy()
     stop = max(1, round(2 * means.count * FOLD_SHARE))

@@ -208,10 +208,8 @@ class Tracer:
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.split else []
-        direct, unscattered = (
-            mi.Bool(True),
-            mi.Bool(True),
-        )  # of the light met next; of the path so far, one vertex ahead
+        # of the light met next; of the path so far, one vertex ahead
+        direct, unscattered = mi.Bool(True), mi.Bool(True)
         lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
         first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
         eta, depth = mi.Float(1.0), mi.UInt32(0)

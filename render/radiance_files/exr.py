@@ -101,7 +101,7 @@ def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tupl
         bands = _parsed(str(stated))
         if bands is not None and [channel_name(centre) for centre in bands[0]] == list(channels):
             return bands
-        warnings.warn(f"the attribute {BANDS} doesn't fit the channels and is left aside", UserWarning, stacklevel=3)
+        warnings.warn(f"the attribute {BANDS} doesn't fit the channels and is left aside", stacklevel=3)
     nm = np.array(list(channels.values()))
     if nm.size == 1:
         raise InputError(
@@ -125,12 +125,12 @@ def check_units(header: Mapping[str, Any], channels: Iterable[str]) -> None:
     """Raise `InputError` for units that aren't spectral radiance; a `UserWarning` names what is assumed."""
     stated = header.get(OWN_UNITS, header.get(UNITS))
     if stated is None:
-        warnings.warn(f"it states no {UNITS}: {TRUE_UNITS} is assumed", UserWarning, stacklevel=3)
+        warnings.warn(f"it states no {UNITS}: {TRUE_UNITS} is assumed", stacklevel=3)
     elif stated not in (LAYOUT_UNITS, TRUE_UNITS):
         raise InputError(f"its units are {stated!r}; allowed: {LAYOUT_UNITS} or {TRUE_UNITS}; convert it")
     present = [name for name in (*_MEASUREMENT, *channels) if name in header]
     if present:
-        warnings.warn(f"the camera described by {', '.join(present)} is not undone", UserWarning, stacklevel=3)
+        warnings.warn(f"the camera described by {', '.join(present)} is not undone", stacklevel=3)
 
 
 ERROR, SCENE, PREVIEW = "rodconeRelativeMcError", "rodconeScene", "rodconePreview"
@@ -172,9 +172,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     if len(set(names)) < len(names):
         raise InputError(f"{path}: band centres less than 1e-6 nm apart have no names of their own; merge those bands")
     preview, white_cd_m2 = _preview(radiance)
-    channels = {
-        name: np.ascontiguousarray(radiance.values[:, :, band], dtype=np.float32) for band, name in enumerate(names)
-    }
+    channels = {name: np.ascontiguousarray(radiance.values[:, :, k], np.float32) for k, name in enumerate(names)}
     channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
     header = {
         "compression": OpenEXR.PIZ_COMPRESSION,

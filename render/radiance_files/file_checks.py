@@ -70,7 +70,6 @@ def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
         return nm, band_widths(nm)
     warnings.warn(
         "its wavelengths are not evenly spaced and no widths are stated: edges half-way between them are taken",
-        UserWarning,
         stacklevel=2,
     )
     edges = np.concatenate([[nm[0] - steps[0] / 2], (nm[1:] + nm[:-1]) / 2, [nm[-1] + steps[-1] / 2]])

@@ -135,9 +135,7 @@ def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
     share = sum(int(np.count_nonzero(plane < 0)) for plane in planes) / planes.size
     if 0 < share <= most and np.isfinite(planes.min()):
         np.maximum(planes, 0.0, out=planes)
-        warnings.warn(
-            f"{100 * share:.3g}% of its photons were negative and became 0, as in ISETCam", UserWarning, stacklevel=3
-        )
+        warnings.warn(f"{100 * share:.3g}% of its photons were negative and became 0, as in ISETCam", stacklevel=3)
 
 
 def _numbers(numbers: Numbers, name: str) -> NDArray[Any]:
