@@ -182,6 +182,7 @@ def test_a_render_of_other_paths_agrees_and_a_scaled_one_is_refused_in_one_line(
     assert np.mean(np.minimum(ratios, 9)) == pytest.approx(np.mean(np.minimum(stated / stated.mean(), 9)), rel=0.5)
 
 
+@pytest.mark.filterwarnings("ignore:bands. luminance")  # three bands of 100 nm
 def test_a_file_gives_its_light_without_the_scene_and_its_lamps_can_be_replaced(small, tmp_path, monkeypatch):
     scene, film, made = small
     path = reference_path(tmp_path, scene, film)
