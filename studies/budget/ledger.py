@@ -15,7 +15,7 @@ from sensor.presets import preset
 from sensor.readings.merge import under_well
 from sensor.readout import as_read, noise_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
-from studies.study.model import ImageModel, RenderModel
+from studies.study.model import ImageModel, RenderModel, in_bands
 from studies.study.study import OWN, Condition, SceneChoice, Study, conditions, label, most_spp
 
 # Standard errors added to a mean over the pilot's pixels. Of noise a few pixels may hold most, here and in what is
@@ -268,9 +268,8 @@ class Plan:
 def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
     lights = (illuminant(name) for name in study.spectra if name != OWN)
-    centres, widths = fine_bands(lights, study.render.range_nm, study.render.band_nm)
-    bands = tuple(centres.tolist()), tuple(widths.tolist())
-    renders = {scene: RenderModel(*bands, most_spp(study, scene), study.render.denoise) for scene in study.scenes}
+    bands = fine_bands(lights, study.render.range_nm, study.render.band_nm)
+    renders = {scene: in_bands(bands, most_spp(study, scene), study.render.denoise) for scene in study.scenes}
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
     return Plan(renders=renders, images=images)

@@ -22,7 +22,7 @@ from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, wei
 from studies.budget.terms import LENS_TERMS, SHAKE, effects, horizontal_view_deg, shake_effect
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
-from studies.study.model import ImageModel, RenderModel, unit_exposure_s
+from studies.study.model import ImageModel, in_bands, unit_exposure_s
 from studies.study.scene_source import open_radiance_file
 from studies.study.study import OWN, Study, conditions, mosaics, most_spp
 
@@ -86,12 +86,9 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
         sizes = {count: len(groups) for count, groups in pilot.groups.items()}
         choice = choose(rows, sizes, study.budget, most_spp(study, opened.choice) if pilot.rendered else 0)
         if pilot.rendered:
-            nm, width_nm = wide_bands(
-                pilot.transport.wavelength_nm, pilot.transport.width_nm, pilot.groups[choice.count]
-            )
-            renders[opened.choice] = RenderModel(
-                tuple(nm.tolist()), tuple(width_nm.tolist()), choice.spp, study.render.denoise
-            )
+            fine = pilot.transport.wavelength_nm, pilot.transport.width_nm
+            wide = wide_bands(*fine, pilot.groups[choice.count])
+            renders[opened.choice] = in_bands(wide, choice.spp, study.render.denoise)
         for row in rows:
             left_out = choice.left_out[row.condition]
             lens = full_lens(study, preset(row.condition.sensor).lens, opened)
@@ -107,9 +104,9 @@ def reference_plan(study: Study) -> Plan:
     renders, images = {}, {}
     for opened in open_all(study).values():
         if opened.scene is not None:
-            nm, width_nm = fine_bands(_spectra(opened, study), study.render.range_nm)
+            fine = fine_bands(_spectra(opened, study), study.render.range_nm)
             spp = min(REFERENCE_SAMPLES * most_spp(study, opened.choice), 1 << 16)
-            renders[opened.choice] = RenderModel(tuple(nm.tolist()), tuple(width_nm.tolist()), spp)
+            renders[opened.choice] = in_bands(fine, spp)
         for condition in conditions(study, opened.choice):
             images[condition] = ImageModel(full_lens(study, preset(condition.sensor).lens, opened))
     return Plan(renders=renders, images=images)

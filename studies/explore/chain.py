@@ -189,13 +189,13 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
-    device = memo.of("device", chip, draw_device, sensor, shape, _rng(controls.seed, _CHIP))
+    device = memo.of("device", chip, draw_device, sensor, shape, np.random.default_rng([controls.seed, _CHIP]))
     numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
     take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
     exposures = []
     for number in numbers:
         memo.check()
-        rng, frame_e = _rng(controls.seed, _FRAME, number), expected_e
+        rng, frame_e = np.random.default_rng([controls.seed, _FRAME, number]), expected_e
         if sensor.lens.shake_um:
             frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
         exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
@@ -258,10 +258,6 @@ def _weighted(weights: Any, planes: list[Image]) -> Image:
     for weight, plane in zip(weights[1:], planes[1:], strict=True):
         total += weight * plane
     return np.asarray(total)
-
-
-def _rng(*seed: int) -> np.random.Generator:
-    return np.random.default_rng(list(seed))
 
 
 def _items(terms: Any) -> tuple[tuple[str, float], ...]:

@@ -4,12 +4,12 @@ A verdict follows from the numbers and is never written by hand.
 """
 
 import tomllib
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,7 +17,9 @@ from numpy.typing import NDArray
 
 from studies.metrics.confidence import half_width
 from studies.pages import report_text as text
+from studies.paper.setup import CAMERAS
 
+T = TypeVar("T")
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
@@ -104,17 +106,11 @@ def claim(number: int, checks: Iterable[ClaimCheck], **values: object) -> Claim:
 
 def within(values: Values, low: float = -inf, high: float = inf, unit: str = "") -> tuple[ClaimCheck, ...]:
     """Check that each value lies in a range; of what exposures gave, shape (seed,), the mean with its interval."""
-    return tuple(
-        ClaimCheck(
-            condition,
-            float(np.mean(x)),
-            low,
-            high,
-            unit,
-            margin=float(half_width(x)) if isinstance(x, np.ndarray) else 0.0,
-        )
-        for condition, x in values.items()
-    )
+    return tuple(ClaimCheck(name, float(np.mean(x)), low, high, unit, margin=_margin(x)) for name, x in values.items())
+
+
+def _margin(value: float | NDArray[np.float64]) -> float:
+    return float(half_width(value)) if isinstance(value, np.ndarray) else 0.0
 
 
 def about(values: Values, claimed: float, unit: str = "") -> tuple[ClaimCheck, ...]:
@@ -137,8 +133,8 @@ def at_most(values: Values, high: float, unit: str = "") -> tuple[ClaimCheck, ..
     return within(values, high=high, unit=unit)
 
 
-def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, ...]:
-    """Claims computed by the paper's own method, with the values of the same claims computed by the default."""
+def beside(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
+    """Claims of what the paper's own method gave, with the values of the same claims of what the default gave."""
     return tuple(
         replace(
             claim,
@@ -147,7 +143,7 @@ def beside(claims: Sequence[Claim], defaults: Sequence[Claim]) -> tuple[Claim, .
                 for check, default_check in zip(claim.checks, default.checks, strict=True)
             ),
         )
-        for claim, default in zip(claims, defaults, strict=True)
+        for claim, default in zip(*(claims_of(by_camera[name]) for name in CAMERAS), strict=True)
     )
 
 

@@ -242,7 +242,7 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     light = light_of("D65")
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
     more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice
-    paper, default = (claims_held(best[BAYER], best[name], more_light) for name in (PAPER, DEFAULT))
+    claims = beside(lambda of: claims_held(best[BAYER], of, more_light), best)
     names = {"Bayer": best[BAYER], "interleaved": best[PAPER], "the default": best[DEFAULT]}
     charts = {
         "Best time by hand, ms": {
@@ -252,4 +252,4 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             name: [one.psnr_db.mean() for one in of_level.values()] for name, of_level in names.items()
         },
     }
-    return paper_figure("B", light_charts(LEVELS_CD_M2, charts), reading=READING), beside(paper, default)
+    return paper_figure("B", light_charts(LEVELS_CD_M2, charts), reading=READING), claims

@@ -93,9 +93,7 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             )
             pictures[RESULT[name]] = result[0]
         rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
-    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), beside(
-        claims_3(stages[PAPER]), claims_3(stages[DEFAULT])
-    )
+    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), beside(claims_3, stages)
 
 
 @dataclass(frozen=True)
@@ -172,7 +170,7 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         shown = {f"{name}, white is full": encode_srgb(grey(plane, full_e)) for name, plane in recorded.items()}
         (first, picture), *others = (shown | pictures).items()
         rows.append([(f"{reading}: {first}", picture), *others])
-    return paper_figure("5", picture_rows(rows)), beside(claims_5(bright[PAPER]), claims_5(bright[DEFAULT]))
+    return paper_figure("5", picture_rows(rows)), beside(claims_5, bright)
 
 
 LUMINANCE_CD_M2 = 25.0
@@ -250,15 +248,9 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             words += ", W's luminance" if outcome.substituted else ""
             pictures.append((f"{words}, {exposure}" if pictures else f"{reading}: {words}, {exposure}", encoded))
         table.append(pictures)
-    paper, default = (
-        claims_6(
-            outcomes["bayer"],
-            outcomes[name],
-            {reading: swap(setup, subject, Camera(reading, name)) for reading in READINGS},
-        )
-        for name in (PAPER, DEFAULT)
-    )
-    return paper_figure("6", picture_rows(table)), beside(paper, default)
+    swaps = {name: {reading: swap(setup, subject, Camera(reading, name)) for reading in READINGS} for name in CAMERAS}
+    judged = {name: (outcomes[name], swaps[name]) for name in CAMERAS}
+    return paper_figure("6", picture_rows(table)), beside(lambda of: claims_6(outcomes["bayer"], *of), judged)
 
 
 def swap(setup: Setup, subject: View, camera: Camera) -> Swap:

@@ -183,5 +183,5 @@ def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         "FLIP": {"interleaved": paper.flip, "the default": default.flip},
     }
     means = {title: {name: x.mean(axis=1) for name, x in lines.items()} for title, lines in charts.items()}
-    claims = beside(claims_levels(paper), claims_levels(default))
+    claims = beside(claims_levels, by_camera)
     return paper_figure("A", light_charts(LEVELS_CD_M2, means), count=len(LEVELS_CD_M2), reading=READING), claims

@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from render.radiance import SpectralRadiance
+from render.spectrum import Floats
 from sensor.config import LensConfig, SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
@@ -20,6 +21,12 @@ class RenderModel:
     width_nm: tuple[float, ...]
     spp: int
     denoise: bool = False
+
+
+def in_bands(bands: tuple[Floats, Floats], spp: int, denoise: bool = False) -> RenderModel:
+    """Render in bands, by their centres and widths [nm]."""
+    nm, width_nm = (tuple(x.tolist()) for x in bands)
+    return RenderModel(nm, width_nm, spp, denoise)
 
 
 @dataclass(frozen=True)
