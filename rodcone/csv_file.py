@@ -36,7 +36,9 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
     fix = "give a CSV of numbers, with commas between them, and a header"
     with read_errors(f"{what}: {str(path)!r} can't be read", fix, (OSError, ValueError, csv.Error)):
         content = read_bounded(Path(path), MOST_BYTES)
-        header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row]
+        header, *rows = [row for row in csv.reader(StringIO(content.decode("utf-8-sig"), newline="")) if row] or [[]]
+        if not header:
+            raise ValueError("it is empty")
         table = np.array([[float(cell) for cell in row] for row in rows], dtype=np.float64)
     names = [name.strip() for name in header]
     if _NOT_LETTERS.sub("", names[0].lower()) in _WAVELENGTH:

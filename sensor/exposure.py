@@ -168,9 +168,20 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     return float(np.where(under_well(expected_e, sensor, exposure_s), bits, 0.0).mean())
 
 
+def _dark_full(raw: RawImage) -> bool:
+    """Whether dark current leaves light less than a tenth of what it takes itself."""
+    return raw.full_well_e < 0.1 * raw.dark_current_e
+
+
 def warn_if_full(raw: RawImage) -> None:
     """Warn of a frame most of whose pixels are saturated, as one of 10 s is that was meant as 10 ms."""
-    if (full := float(raw.saturated.mean())) > MOST_FULL:
+    if _dark_full(raw):
+        warnings.warn(
+            f"exposure_s: dark current fills the well in {raw.exposure_s:g} s; give less, or a smaller "
+            "dark_current_e_per_s",
+            stacklevel=4,
+        )
+    elif (full := float(raw.saturated.mean())) > MOST_FULL:
         warnings.warn(
             f"exposure_s: {full:.0%} of the pixels are saturated at {raw.exposure_s:g} s; give less (a number "
             "is seconds: 10 ms is 0.01 or '10ms'), or leave it out",
@@ -181,7 +192,9 @@ def warn_if_full(raw: RawImage) -> None:
 def warn_if_dark(raw: RawImage) -> None:
     """Warn of a frame that shows nothing but its dark noise; one of no time at all is meant so."""
     lit = float(np.mean(raw.electrons > DARK_SIGMAS * raw.dark_noise_e))
-    if raw.exposure_s > 0 and lit < max(LEAST_LIT, 1.5 / (raw.dn.size + 1)):  # of few pixels one may be so by chance
+    if (
+        raw.exposure_s > 0 and not _dark_full(raw) and lit < max(LEAST_LIT, 1.5 / (raw.dn.size + 1))
+    ):  # of few pixels one may be so by chance
         warnings.warn(
             f"exposure_s: {1 - lit:.1%} of the pixels read no more than dark noise ({raw.dark_noise_e:.2g} e-) at "
             f"{raw.exposure_s:g} s; give a longer time, or more light",

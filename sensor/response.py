@@ -12,6 +12,7 @@ from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 
 MOST_LOST = 0.5  # of a channel's response: with less than half of it a picture doesn't show that channel
+NARROW_NM = 20.0  # no filter of a camera is narrower
 LEAST_WARNED = 5e-3  # of a channel's response: no warning under it
 _STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 
@@ -32,10 +33,18 @@ def electrons_per_irradiance(
     Warns
     -----
     UserWarning
-        Where the bands don't fill the camera's window: what each channel loses.
+        Where the bands don't fill the camera's window: what each channel loses; where all responses end within
+        `NARROW_NM` of one another, as of an EMVA report's one wavelength.
     """
     check_window(sensor.window_nm, wavelength_nm, width_nm)
     _check_covered(sensor, wavelength_nm, width_nm)
+    ends = [nm for channel in sensor.channels for nm in sensor.responses.curves[channel].wavelength_nm[[0, -1]]]
+    if max(ends) - min(ends) < NARROW_NM:
+        warnings.warn(
+            f"responses: they are known over {min(ends):g}-{max(ends):g} nm, and count as 0 elsewhere; give whole "
+            "curves, or a preset that lends them",
+            stacklevel=3,
+        )
     seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)
     response = sensor.responses.band_average(sensor.channels, wavelength_nm, width_nm)
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor

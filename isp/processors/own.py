@@ -137,8 +137,6 @@ def _module(path: Path, content: bytes) -> ModuleType:
 def _run(path: Path, function: Any, raw: RawImage, colours: Any, **options: Any) -> Any:
     try:
         return function(raw, colours, **options)
-    except InputError:
-        raise
     except (Exception, SystemExit) as error:
         failure = f"{_failure(path, error)}; it was given a mosaic of {'/'.join(raw.cfa)}"
         raise InputError(f"processors: {failure}") from error

@@ -242,8 +242,8 @@ def markdown(report: ReportData, command: str, a: int) -> str:
     parts = [
         f"# {code(report.title)}",
         f"    {command}",
-        f"rodcone {report.rodcone}, study {code(report.name)}, {len(report.seeds)} seeds. {code(axis.values[a])} "
-        f"beside {code(axis.values[b])}:",
+        f"rodcone {report.rodcone}, study {code(report.name)}, {len(report.seeds)} seed{'s'[: len(report.seeds) - 1]}. "
+        f"{code(axis.values[a])} beside {code(axis.values[b])}:",
         "\n".join(words),
         f"Lead of {code(axis.values[a])}, half the 95 % interval over seeds after ±. **Bold**: behind by what a person "
         "sees. In brackets: less than that, or undecided. Last: light levels ahead, level, behind; equal light once.",

@@ -283,21 +283,22 @@ def test_a_linear_picture_encodes_itself(tmp_path: Path) -> None:
 
 
 def test_a_frame_that_is_all_full_or_all_dark_is_told() -> None:
-    """Of 256 pixels in the dark one may lie above its noise by chance."""
+    """Of 256 pixels in the dark one may lie above its noise by chance; 20 s of 750 e-/s are the well's 15 000 e-."""
     for side, luminance_cd_m2, exposure, words in (
         (64, 25.0, 10, "saturated at 10 s; give less (a number is seconds"),
         (64, 1e-4, "1us", "no more than dark noise"),
         (16, 1e-4, "1us", "no more than dark noise"),
         (64, 25.0, "10ms", ""),
         (1, 25.0, "10ms", ""),
+        (1, 1e-9, "20s", "dark current fills the well in 20 s"),
         (64, 0.0, 0, ""),
     ):
         values = np.full((side, side, 40), 1e-3 * luminance_cd_m2 / RADIANCE.luminance().mean())
         with warnings.catch_warnings(record=True) as caught:
             warnings.simplefilter("always")
-            public.capture(
-                public.SpectralRadiance(values, NM), public.low_noise("rgbw" if side > 1 else "mono"), exposure
-            )
+            sensor = public.low_noise("rgbw" if side > 1 else "mono")
+            dark = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=0.0 if side > 1 else 750.0))
+            public.capture(public.SpectralRadiance(values, NM), dark, exposure)
         assert [words in str(one.message) for one in caught] == [True] * bool(words)
 
 

@@ -73,7 +73,7 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
         ("wavelength,R\n0.4,0.1\n0.5,0.2\n", ("wavelengths up to 0.5", "convert them")),
         ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
         ("wavelength_nm,R\n", ("wavelength_nm", "header")),
-        ("", ("can't be read", "CSV of numbers, with commas between them, and a header")),
+        ("", ("can't be read (it is empty)", "CSV of numbers, with commas between them, and a header")),
         ("nm;R\n400;0.1\n500;0.2\n", ("can't be read", "with commas between them")),
         ("wavelength_nm,R\n400,0.1\n500,high\n", ("can't be read", "'high'", "CSV of numbers")),
         ("wavelength_nm,R\n400,0.1\n500\n", ("can't be read", "CSV of numbers")),

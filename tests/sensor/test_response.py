@@ -8,7 +8,7 @@ import pytest
 from loop import loop
 
 from render.radiance import SpectralRadiance
-from render.spectrum import flat
+from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
 from sensor.capture import capture
 from sensor.cfa import BAYER, RGBW, mask
@@ -179,3 +179,10 @@ def test_a_picture_that_fills_the_window_but_for_half_a_per_cent_is_taken_silent
 def test_a_window_as_wide_as_the_picture_is_taken_silently():
     narrow, radiance = replace(SENSOR, window_nm=(545.0, 555.0)), equal_energy(545, 555)
     assert expected_electrons(form_image(radiance, narrow), narrow, 0.01).min() > 0
+
+
+def test_responses_known_at_one_wavelength_are_told():
+    """As `rodcone new preset --noise` writes them: 0.64 electrons a photon at 525 nm, and nothing elsewhere."""
+    peak = Spectrum(np.array([524.0, 526.0]), np.array([0.64, 0.64]))
+    with pytest.warns(UserWarning, match=r"responses: they are known over 524-526 nm, and count as 0 elsewhere"):
+        expected(equal_energy(380.0, 780.0), camera(cfa=("W",), responses=Responses({"W": peak})), 0.01)

@@ -79,6 +79,11 @@ def test_a_file_that_fails_says_where_in_one_line(tmp_path: Path) -> None:
         ("def develop(raw, matrix, **options):\n    return {}['x']", "fails at line 2 (KeyError: 'x')"),
         ("def develop(raw, matrix, **options): raise SystemExit", "fails at line 1 (SystemExit"),
         ("def develop(raw, matrix, **options): raise SystemExit", "it was given a mosaic of RG/"),
+        (
+            "import rodcone\ndef develop(raw, matrix, **options):\n"
+            "    return rodcone.finish(raw, raw.electrons[..., None], matrix, **options)",
+            "mine.py fails at line 3 (InputError: planes: shape (8, 10, 1) is not allowed",
+        ),
         ("def develop(raw, matrix, **options): pass", "gave NoneType of shape ()"),
         ("def develop(raw, matrix, **options): return 'x'", "gave str of shape (0,)"),
         ("def develop(raw, matrix, **options): return raw.electrons", "gave ndarray of shape (8, 10)"),

@@ -256,6 +256,8 @@ def test_the_table_has_leads_with_their_sign_interval_mark_and_count() -> None:
     assert row == ["`Interleaved`", "+2.0 ± 0.2", "**−1.0 ± 0.2**", "(+0.1 ± 0.2)", "(+9.0 ± 14.9)", "1 / 1 / 1"]
     _, row = table_of(page, "FLIP")
     assert row[1:] == ["+0.050 ± 0.000", "**−0.030 ± 0.000**", "(−0.001 ± 0.000)", "(0.000 ± 0.000)", "1 / 2 / 1"]
+    alone = SAMPLE.sample_report(compared, 4, sensors=SAMPLE.SENSORS[:1], seeds=SEEDS[:1])
+    assert "study `sample`, 1 seed." in markdown(alone, "", 1)
     other = table_of(markdown(report, "", 0), "PSNR [dB]")[1]
     assert other[1:] == ["**−2.0 ± 0.2**", "+1.0 ± 0.2", "(−0.1 ± 0.2)", "(−9.0 ± 14.9)", "1 / 1 / 1"]
 
