@@ -249,9 +249,7 @@ def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
         raise InputError("it has subsampled channels; allowed: a value for every pixel; save it at full resolution")
     (left, top), (right, bottom) = ([int(n) for n in corner] for corner in header["dataWindow"])
     height, width = bottom - top + 1, right - left + 1
-    needed = require_extent(height, width, len(channels))
-    if needed > MOST_EXPANSION * file_bytes:
-        raise InputError(f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it declares; save it again")
+    require_extent(height, width, len(channels), file_bytes)
     if kind == OpenEXR.tiledimage:  # the library takes a whole tile's memory, however small the picture
         across, down = int(header["tiles"].xSize), int(header["tiles"].ySize)
         if across * down * len(channels) * _FLOAT.dtype.itemsize > max(MOST_TILE_BYTES, MOST_EXPANSION * file_bytes):

@@ -1,6 +1,7 @@
 """Limits on the size that a picture file declares, checked before memory is allocated; bands from its wavelengths."""
 
 import warnings
+from math import inf
 from pathlib import Path
 
 import numpy as np
@@ -30,13 +31,11 @@ def require_file(path: Path) -> int:
     return path.stat().st_size
 
 
-def require_extent(height: int, width: int, channels: int) -> int:
-    """Bytes that float32 pixels take.
+def require_extent(height: int, width: int, channels: int, file_bytes: float = inf, small_bytes: int = 0) -> None:
+    """Raise `InputError` for float32 pixels that a file shouldn't or can't hold.
 
-    Raises
-    ------
-    InputError
-        Where a side is not 1 to 32768 pixels, there are over 4096 channels, or all pixels take over 8 GiB.
+    A side is 1 to 32768 pixels, there are at most 4096 channels, and all pixels take at most 8 GiB, and at most
+    `MOST_EXPANSION` times the file or `small_bytes`.
     """
     if not (0 < height <= MOST_SIDE and 0 < width <= MOST_SIDE):
         raise InputError(f"{height} x {width} pixels are not allowed; each side is 1 to {MOST_SIDE}; crop or scale it")
@@ -48,7 +47,8 @@ def require_extent(height: int, width: int, channels: int) -> int:
             f"{height} x {width} pixels with {channels} channels are {needed} bytes; allowed: {MOST_BYTES}; "
             "crop it, or keep fewer bands"
         )
-    return needed
+    if needed > max(small_bytes, MOST_EXPANSION * file_bytes):
+        raise InputError(f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it declares; save it again")
 
 
 def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:

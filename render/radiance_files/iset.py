@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from render.illuminants import unit_luminance
 from render.radiance import SpectralRadiance
-from render.radiance_files.file_checks import MOST_EXPANSION, SMALL_BYTES, bands_between, require_extent, require_file
+from render.radiance_files.file_checks import SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
 from render.spectrum import Spectrum, photons_per_joule
 from rodcone.errors import InputError, in_place
@@ -60,11 +60,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
         nm, shape, photons = _from_basis(numbers) if from_basis else _stored(numbers)
         centres, widths = bands_between(nm)
-        needed, file_bytes = require_extent(*shape, nm.size), require_file(path)
-        if needed > max(SMALL_BYTES, MOST_EXPANSION * file_bytes):
-            raise InputError(
-                f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it stands for; save it again"
-            )
+        require_extent(*shape, nm.size, require_file(path), SMALL_BYTES)
         planes = np.empty((nm.size, *shape), dtype=np.float32)
         with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):

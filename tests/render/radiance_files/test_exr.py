@@ -13,7 +13,7 @@ from refusal import refusal
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import LAYOUT_UNITS, channel_name, radiance_channels, read_bands, read_exr, write_exr
-from render.radiance_files.file_checks import MOST_BYTES, MOST_SIDE, bands_between, require_extent
+from render.radiance_files.file_checks import MOST_BYTES, MOST_EXPANSION, MOST_SIDE, bands_between, require_extent
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads
 
@@ -333,7 +333,9 @@ def test_widths_of_wavelengths_that_do_not_increase_are_refused() -> None:
 
 
 def test_extent_is_allowed_up_to_its_limits() -> None:
-    assert require_extent(MOST_SIDE, MOST_SIDE, 2) == MOST_BYTES
+    least_bytes = MOST_BYTES / MOST_EXPANSION
+    require_extent(MOST_SIDE, MOST_SIDE, 2, least_bytes)
+    refusal(require_extent, MOST_SIDE, MOST_SIDE, 2, least_bytes - 1, match="bytes can't hold")
     for height, width, channels in ((MOST_SIDE, MOST_SIDE, 3), (MOST_SIDE + 1, 1, 1), (0, 1, 1), (1, -1, 1)):
         refusal(require_extent, height, width, channels, match=f"{height} x {width} pixels")
 
