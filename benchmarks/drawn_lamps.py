@@ -1,4 +1,4 @@
-"""Lamps in the dark by `interleaved`: `python benchmarks/drawn_lamps.py SEED`.
+"""Lamps in the dark: `python benchmarks/drawn_lamps.py SEED [PROCESSOR]`, `interleaved` if none is named.
 
 Four colours, seven sizes, on each site of the tile, of 300 to 300 000 e- in G, sharp and with a halo. *Hue*: pixels of
 a chroma over 20 in CIELAB, 40 degrees off the truth's and the lamp's own. *Large*: over a fifth of the lamp on more
@@ -15,7 +15,7 @@ from skimage.color import rgb2lab
 
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from sensor.cfa import RGBW, mask
+from sensor.cfa import BAYER, RGBW, mask
 from sensor.raw import RawImage
 
 NEUTRAL = np.array([0.5, 1.0, 0.5, 4.8])
@@ -28,7 +28,7 @@ CALIBRATION = {"black_dn": 100.0, "white_dn": 15_100.0, "gain_e_per_dn": 1.0, "r
 
 
 def faults(
-    colour: NDArray[np.float64], size: tuple[int, int], level: tuple[float, ...], halo: bool, seed: int
+    colour: NDArray[np.float64], size: tuple[int, int], level: tuple[float, ...], halo: bool, seed: int, name: str
 ) -> NDArray[np.int_]:
     """Of a lamp on each of four sites: lamps, pixels of another hue, large lamps, and lamps with a hole."""
     (lamp_e, field_e, white), rng = level, np.random.default_rng(seed)
@@ -37,11 +37,12 @@ def faults(
     for place in places:
         lamp[place] = 1.0
     lamp = 0.997 * gaussian_filter(lamp, 0.7) + 0.003 * gaussian_filter(lamp, 3.0) if halo else lamp
-    sites = np.argmax([mask(RGBW, name, lamp.shape) for name in "RGBW"], axis=0)
+    cfa = BAYER if PROCESSORS[name].mosaic == "bayer" else RGBW
+    sites = np.argmax([mask(cfa, channel, lamp.shape) for channel in "RGBW"], axis=0)
     read = rng.poisson(field_e * NEUTRAL[sites] + lamp_e * lamp * colour[sites]) + rng.normal(0.0, 1.5, lamp.shape)
-    dn = (np.minimum(read, 15_000.0) + 100.0).astype(np.uint16)
-    raw, own = RawImage(dn=dn, cfa=RGBW, prnu=0.0, exposure_s=0.01, **CALIBRATION), MATRIX @ (colour / NEUTRAL)[:3]
-    shown = PROCESSORS["interleaved"].develop(raw, MATRIX, balance=NEUTRAL).rgb
+    dn = np.rint(np.minimum(read, 15_000.0) + 100.0).astype(np.uint16)
+    raw, own = RawImage(dn=dn, cfa=cfa, prnu=0.0, exposure_s=0.01, **CALIBRATION), MATRIX @ (colour / NEUTRAL)[:3]
+    shown = PROCESSORS[name].develop(raw, MATRIX, balance=NEUTRAL[: len(raw.channels)]).rgb
     got, true = (np.clip(x / (white * field_e), 0.0, 1.0) for x in (shown, field_e + lamp_e * lamp[..., None] * own))
     lab, *others = (rgb2lab(encode_srgb(np.clip(rgb, 0.0, 1.0))) for rgb in (got, true, own[None, None] / own.max()))
     light, truth, hue = luminance_of_srgb(got), luminance_of_srgb(true), lab @ [0, 1, 1j]
@@ -61,6 +62,7 @@ def faults(
 
 
 if __name__ == "__main__":
+    named = sys.argv[2] if len(sys.argv) > 2 else "interleaved"
     for halo in (False, True):
-        total = sum(faults(*case, halo, int(sys.argv[1])) for case in product(COLOURS, SIZES, LEVELS))
+        total = sum(faults(*case, halo, int(sys.argv[1]), named) for case in product(COLOURS, SIZES, LEVELS))
         print("halo" if halo else "sharp", "lamps, hue, large, holes:", *total)

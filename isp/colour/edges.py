@@ -46,11 +46,12 @@ def sharpen(raw: RawImage, planes: NDArray[Any], gains: Floats, noise_gain: NDAr
     D_c = P_c - r_c P_W.
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
-    the samples; nor the light of a channel of which one of the nine samples is full, q_c = 1; nor, as far as there is
-    contrast, any hue where a colour is, q = min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels
-    rise to the brightest:
+    the samples or it lies between those of a channel, l = (n - 1.5 s) / m_W with n the mean of P_W over the nine pixels
+    and s the least of its means over the four lattices of every second pixel in the window; nor the light of a channel
+    of which one of the nine samples is full, q_c = 1; nor, as far as there is contrast, any hue where a colour is, q =
+    min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels rise to the brightest:
 
-        F'_c = F_c + max((1 - 1 / e^2) min(1, chi^2 / 30), q, q_c) (max_d g_d F_d / g_c - F_c).
+        F'_c = F_c + max((1 - 1 / e^2) min(1, max(chi^2 / 30, l)), q, q_c) (max_d g_d F_d / g_c - F_c).
 
     Parameters
     ----------
@@ -122,7 +123,10 @@ def _sharpen(raw: RawImage, gains: Floats, nu: Floats, planes: Floats, *samples:
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
-    missed = np.minimum(squares.mean(axis=2, keepdims=True) / MISSED, 1.0)
+    white = np.maximum(window[..., 3, :, :], 0.0)
+    least = np.min([white[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
+    dark = (white[..., 1:-1, 1:-1].mean(axis=(2, 3)) - 1.5 * least) / np.maximum(light[..., 3], TINY)
+    missed = np.minimum(np.maximum(squares.mean(axis=2) / MISSED, dark), 1.0)[..., None]
     lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
     black = np.minimum(contrast, 1.0)
     hue = np.where(full[..., :3].any(axis=2, keepdims=True), black, np.where(full[..., 3:], black**4, lamp))
