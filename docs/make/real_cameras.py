@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import hypot, log10, sqrt
-from pathlib import Path
 
 import numpy as np
 from page_parts import RESULTS, Parts, csv_text, write_page
@@ -12,21 +11,18 @@ from sensor.cameras.emva_report import EmvaReport, numbers_of, read_report
 from sensor.cameras.numbers import PixelNumbers, missing
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.emva1288.characterise import Characterisation, characterise
+from sensor.emva1288.characterise import characterise
 from studies.pages.report_text import MISSING, table
 
-PAGE = Path(__file__).resolve().parents[1] / "real_cameras.md"
-FIGURES = RESULTS / "real_cameras.csv"
-REPORTS = Path(__file__).parent.parent.parent / "sensor" / "cameras" / "reports"
+PAGE = RESULTS.parent / "real_cameras.md"
+REPORTS = PAGE.parents[1] / "sensor" / "cameras" / "reports"
 SHAPE, EXPOSURE_S = (256, 320), 0.01
 MOST_OFF = 0.035  # of a figure, 0.3 dB: what Basler states of its own calibration, as the guide quotes it
 HEAD = ("figure", "unit", "published", "configured", "recovered", "off", "is it within 3.5 % or 0.3 dB?")
 REASONS = {  # of what lies beyond, by file and symbol
     ("basler_aca1920_155um", "K"): "no: the black level isn't told, so that K follows from the saturation here",
-    (
-        "basler_aca1920_155um",
-        "DR_dB",
-    ): "no: 12.2 bit is 32 k over 6.8 e⁻; the threshold also holds quantisation, 2.3 e⁻, and half an electron",
+    ("basler_aca1920_155um", "DR_dB"): "no: 12.2 bit is 32 k over 6.8 e⁻; the threshold also holds quantisation, "
+    "2.3 e⁻, and half an electron",
     ("flir_bfs_u3_50s5m", "DR_dB"): "no: it is 10824 over 2.27 + 0.5 e⁻, without the quantisation that 12 bit add "
     "(0.8 e⁻); K isn't told",
     ("alvium_1800_c_507", "DR_dB"): "no, but it is printed to 1 dB",
@@ -97,14 +93,8 @@ def rows_of(report: EmvaReport, seed: int = 0) -> list[PublishedFigure]:
         for figure in [chip.figure(name)]
         if symbol in figures or symbol not in ("DSNU1288", "PRNU1288", "mu_I")
     ]
-    return [
-        *rows,
-        PublishedFigure("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, _snr_db(chip, half), False),
-    ]
-
-
-def _snr_db(chip: Characterisation, light_e: float) -> float:
-    return 20 * log10(float(np.interp(light_e, chip.transfer.light_e, chip.snr)))
+    snr_db = 20 * log10(float(np.interp(half, chip.transfer.light_e, chip.snr)))
+    return [*rows, PublishedFigure("SNR_50_dB", "dB", figures.get("SNR_50_dB"), in_closed_form, snr_db, False)]
 
 
 def results(reports: Mapping[str, EmvaReport]) -> Parts:
