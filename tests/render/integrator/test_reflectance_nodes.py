@@ -6,7 +6,6 @@ with probability `FALSE_ALARM` at most (Bonferroni); seeds are fixed. A bias of 
 of ten.
 """
 
-import struct
 from pathlib import Path
 
 import numpy as np
@@ -213,15 +212,8 @@ def write_measured(path: Path) -> None:
     fields |= {"theta_i": np.linspace(0, 1.5, 4, dtype=np.float32), "phi_i": np.zeros(1, np.float32)}
     fields |= {"wavelengths": np.linspace(360, 830, 6, dtype=np.float32)}
     fields |= {"spectra": np.random.default_rng(7).uniform(0.1, 0.5, (1, 4, 6, 8, 8)).astype(np.float32)}
-    fields |= {"jacobian": np.ones(1, np.uint8), "description": np.frombuffer(b"made up", np.uint8)}
-    head, body = b"tensor_file\0\1\0" + struct.pack("<I", len(fields)), b""
-    first = len(head) + sum(13 + len(name) + 8 * values.ndim for name, values in fields.items())
-    for name, values in fields.items():
-        kind = {"u": 1, "f": 10}[values.dtype.kind]
-        head += struct.pack("<H", len(name)) + name.encode()
-        head += struct.pack(f"<HBQ{values.ndim}Q", values.ndim, kind, first + len(body), *values.shape)
-        body += values.tobytes()
-    path.write_bytes(head + body)
+    fields |= {"jacobian": np.ones(1, np.uint8), "description": "made up"}
+    mitsuba_module().tensor_io.write(str(path), **fields)
 
 
 def stock(path: Path) -> np.ndarray:

@@ -203,21 +203,18 @@ VARIABLES: dict[str, Any] = {
 NUMBERS = [name for name, value in VARIABLES.items() if isinstance(value, np.ndarray) and value.dtype.kind in "iuf"]
 
 
-def element(kind: int, content: bytes, order: str = "<") -> bytes:
-    return struct.pack(f"{order}II", kind, len(content)) + content + bytes(-len(content) % 8)
+def element(kind: int, content: bytes) -> bytes:
+    return struct.pack("<II", kind, len(content)) + content + bytes(-len(content) % 8)
 
 
-def matrix(kind: int, dimensions: tuple[int, ...], stored: int, content: bytes, order: str = "<") -> bytes:
+def matrix(kind: int, dimensions: tuple[int, ...], stored: int, content: bytes) -> bytes:
     """Variable x by the format's description: flags, dimensions, name, numbers."""
-    parts = element(6, struct.pack(f"{order}II", kind, 0), order)
-    parts += element(5, struct.pack(f"{order}{len(dimensions)}i", *dimensions), order)
-    parts += element(1, b"x", order) + element(stored, content, order)
-    return element(14, parts, order)
+    parts = element(6, struct.pack("<II", kind, 0)) + element(5, struct.pack(f"<{len(dimensions)}i", *dimensions))
+    return element(14, parts + element(1, b"x") + element(stored, content))
 
 
-def file_of(path: Path, *elements: bytes, order: str = "<") -> Path:
-    mark = b"IM" if order == "<" else b"MI"
-    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack(f"{order}H", 0x0100) + mark + b"".join(elements))
+def file_of(path: Path, *elements: bytes) -> Path:
+    path.write_bytes(b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H", 0x0100) + b"IM" + b"".join(elements))
     return path
 
 
