@@ -7,6 +7,7 @@ from itertools import product
 from typing import Any
 
 import numpy as np
+from skimage import data
 from sweep_sample import row
 
 from sensor.presets import preset
@@ -172,17 +173,9 @@ def _encode(linear: np.ndarray) -> bytes:
 
 
 def sample_pictures(report: ReportData) -> ReportPictures:
-    """Return a coloured test scene under noise that falls with the light."""
+    """Return a photograph under noise that falls with the light."""
     height, width = report.scenes[0].height, report.scenes[0].width
-    y, x = np.mgrid[0:height, 0:width] / height
-    scene = np.stack([0.15 + 0.3 * y, 0.2 + 0.2 * x, 0.35 - 0.2 * y], axis=-1)
-    for column, line, radius, colour in (
-        (0.3, 0.6, 0.2, (0.7, 0.15, 0.1)), (0.62, 0.5, 0.16, (0.1, 0.5, 0.2)), (0.75, 0.78, 0.13, (0.9, 0.8, 0.2)),
-    ):  # fmt: skip
-        distance = np.hypot(x - column, y - line) / radius
-        shade = (1.1 - 0.8 * distance)[..., None] * np.array(colour)
-        scene = np.where((distance < 1)[..., None], shade, scene)
-    scene = np.where(((x * 32).astype(int) + (y * 32).astype(int) & 1)[..., None] * (y < 0.2)[..., None], 0.8, scene)
+    scene = (data.coffee()[60 : 60 + height, 160 : 160 + width] / 255) ** 2.2
     rng = np.random.default_rng(7)
     # A truth of its own for each place has a shade of its own.
     pictures = {name: _encode(scene * (1 - 0.1 * place)) for place, name in enumerate(report.truths) if name}
