@@ -137,7 +137,6 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "transport": _value("render.transport:Transport", "give rodcone.render(...)"),
         "resume": _value("render.transport:Transport", "give what render gave before"),
         "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalog:load"),
-        "write_exr.scene": _TEXT,
         "sensor": _value("sensor.config:SensorConfig", "give a preset's name or file", "sensor.presets:preset"),
         "with_channel_readings.readings": _each(
             _value("sensor.chip:ChannelReading", "give rodcone.ChannelReading(...)")
@@ -146,8 +145,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
-        **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light"), _TEXT),
-        **dict.fromkeys(("expect.light", "prior", "view"), _TEXT),
+        **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light", "expect.light"), _TEXT),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
         "raw": _RAW,
@@ -178,11 +176,8 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("width", "workers", "pictures"), _WHOLE),
         **dict.fromkeys(("size", "shape"), _size),
         **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
-        **dict.fromkeys(
-            ("name", "encoding", "channel", "isp", "readout", "way", "white_balance", "extend", "engine", "processor"),
-            _TEXT,
-        ),
-        "shake": _TEXT,
+        **dict.fromkeys(("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view"), _TEXT),
+        **dict.fromkeys(("white_balance", "extend", "engine", "processor", "write_exr.scene"), _TEXT),
         **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything", "blur"), _FLAG),
         **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
         **dict.fromkeys(("progress", "step", "runner", "make"), _CALL),
