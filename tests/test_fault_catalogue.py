@@ -7,7 +7,6 @@ import ast
 import subprocess
 import sys
 from collections import Counter
-from datetime import date
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +47,6 @@ def test_a_fault_whose_text_is_gone_is_told() -> None:
     gone = Fault("gone", "sensor/readout.py", "", (("not + there", "at + all"),), ())
     with pytest.raises(SystemExit, match="stands 0 times"):
         faults.planted(gone, "x = 1\n")
-
-
-def test_the_draw_is_the_same_all_day_and_another_the_next() -> None:
-    assert faults.drawn(5, date(2026, 1, 1)) == faults.drawn(5, date(2026, 1, 1))
-    assert faults.drawn(5, date(2026, 1, 1)) != faults.drawn(5, date(2026, 1, 2))
 
 
 def _project(folder: Path, test: str) -> Fault:

@@ -91,18 +91,6 @@ def correlated(values: np.ndarray, filters: np.ndarray, bias: np.ndarray, step: 
     return np.einsum("ihwrc,oirc->ohw", windows, filters, optimize=True) + bias[:, None, None]
 
 
-def test_a_layer_is_its_sum() -> None:
-    rng = np.random.default_rng(2)
-    values, filters, bias = rng.normal(size=(3, 7, 6)), rng.normal(size=(4, 3, 2, 2)), rng.normal(size=4)
-    found = correlated(values, filters, bias, step=2)
-    assert found.shape == (4, 3, 3)
-    for o, y, x in np.ndindex(found.shape):
-        sums = (
-            filters[o, i, r, c] * values[i, 2 * y + r, 2 * x + c] for i, r, c in product(range(3), range(2), range(2))
-        )
-        assert found[o, y, x] == pytest.approx(bias[o] + sum(sums))
-
-
 @pytest.mark.parametrize("cfa", BAYER_PHASES)
 def test_the_network_is_its_layers_in_torchs_order(cfa: tuple[str, ...]) -> None:
     weights = random_weights()
