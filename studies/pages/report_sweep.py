@@ -49,8 +49,9 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         made by different versions, variants or engines, or a picture is gone.
     """
     run = last_run(folder)
-    study, rows = run.study, run.rows
+    rows, brightness = run.rows, {row.level: row.luminance_cd_m2 for row in reversed(run.rows)}
     require_alike(rows)
+    study = {**run.study, "levels": sorted(run.study["levels"], key=lambda level: brightness.get(level, np.inf))}
 
     names = [label(choice["source"]) for choice in study["scenes"]]
     of_views = {(row.scene, row.spectrum): row.truth for row in rows}
@@ -79,7 +80,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         renders=tuple(render_of(rows, name) for name in names),
         stages=run.stages,
         environment=environment_of(rows),
-        configuration=configuration(study),
+        configuration=configuration(run.study),
         exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(rows, study["sensors"]),
         notes=(*dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())), *unmade),

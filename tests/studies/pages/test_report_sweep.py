@@ -116,6 +116,16 @@ def test_pictures_fill_the_page_up_to_its_size(out: Path, monkeypatch: pytest.Mo
     assert len(sweep_report(out)[1].flip_maps) == 2, "those that are compared at first are in any page"
 
 
+def test_levels_rise_in_the_report_in_whatever_order_the_study_has_them(tmp_path: Path) -> None:
+    """Charts draw a line from one to the next, and the page's head gives the first and the last as their range."""
+    SAMPLE.swept(SAMPLE.small_study(tmp_path, levels=("25cd/m2", "1cd/m2", "5cd/m2"), seeds=(0,)), tmp_path / "out")
+    report, _ = sweep_report(tmp_path / "out")
+    assert [level.name for level in report.levels] == [
+        f"{value}\N{NO-BREAK SPACE}cd/m\N{SUPERSCRIPT TWO}" for value in (1, 5, 25)
+    ]
+    assert [(cell.level, cell.luminance_cd_m2) for cell in report.cells] == [(0, 1.0), (1, 5.0), (2, 25.0)]
+
+
 @pytest.mark.thorough
 def test_the_mean_of_a_map_is_the_figure_of_its_picture(out: Path) -> None:
     """Figures are of pictures before 8 bits, whose steps move FLIP by some thousandths."""
