@@ -54,16 +54,13 @@ class Merged:
 class _Group:
     """All frames of one exposure time: the first, their number, their mean rate, a sample's noise and clear level."""
 
+    exposure_s: float
     first: RawImage
     count: int
     rate: NDArray[np.float64]
     temporal_e2: _Sites
     shot: _Sites
     clear_e: _Sites
-
-    @property
-    def exposure_s(self) -> float:
-        return self.first.exposure_s
 
 
 def merge(frames: Sequence[RawImage]) -> Merged:
@@ -224,7 +221,7 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
         # Half, lest a well of a few electrons never count.
         clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
         temporal_e2, _, shot, *_ = _at_sites(same[0], 0.0)
-        groups.append(_Group(same[0], len(same), rate, temporal_e2, shot, clear_e))
+        groups.append(_Group(exposure_s, same[0], len(same), rate, temporal_e2, shot, clear_e))
     return groups
 
 
