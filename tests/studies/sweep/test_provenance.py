@@ -128,7 +128,7 @@ def test_rows_of_two_processes_tell_their_own_threads_not_the_parents(tmp_path: 
 
 
 def test_a_rows_variant_is_the_one_that_mitsuba_has_set(tmp_path: Path) -> None:
-    limits = RenderLimits(size=16, spp=16, band_nm=100.0)
+    limits = RenderLimits(size=16, spp=16, band_nm=50.0)
     study = Study((SceneChoice("flat_field"),), ("1cd/m2",), processors=("bayer",), render=limits)
     SAMPLE.swept(study, tmp_path)
     (row,) = read_rows(tmp_path)

@@ -64,7 +64,7 @@ def test_a_flipped_bit_in_what_cells_share_is_told_and_made_again(name: str, tmp
     SAMPLE.swept(study, out)
     before = SAMPLE.content(out)
     cell = SAMPLE.made_cells(out, study)[0]
-    path: Path = getattr(cell, name)
+    path: Path = getattr(cell.frame, name)
     right = np.load(path).copy()
     flip(path, -1)
     assert not np.array_equal(np.load(path), right)
