@@ -18,6 +18,7 @@ from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_cs
 from sensor.photodiodes import binned
 
 _SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm")
+MOST_PRNU = 0.1  # of a signal: sensors have 0.003 to 0.02
 MOST_OUTSIDE = 0.01  # share of a response outside the window
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
 
@@ -47,7 +48,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     RelativeResponsesWarning
         Where the responses are relative.
     UserWarning
-        Where a window that the file doesn't state takes over 1 % from one.
+        Where a window that the file doesn't state takes over 1 % from one; where PRNU seems to be in per cent.
     """
     tile = None if cfa is None else tile_of(cfa)  # a wrong one isn't the file's fault
     with read_errors(f"sensor file: {str(path)!r} can't be read", "copy a preset: rodcone new preset NAME -o FILE"):
@@ -63,6 +64,12 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         )
     if "responses" in content and "window_nm" not in content:
         _warn_of_window(sensor, content["responses"]["range_nm"], path)
+    if (prnu := sensor.pixel.prnu) > MOST_PRNU:
+        warnings.warn(
+            f"sensor file {str(path)!r}: prnu = {prnu:g} is {prnu:.0%} of the signal; if per cent were meant, as EMVA "
+            f"1288 states it, give {prnu / 100:g}",
+            stacklevel=2,
+        )
     return sensor
 
 

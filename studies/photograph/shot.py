@@ -23,7 +23,7 @@ from sensor.capture import capture
 from sensor.cfa import is_bayer
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s, warn_if_dark
 from sensor.optics import form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
@@ -212,6 +212,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     raws = [noted(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
+    warn_if_dark(raw)
     if opened is not None:
         even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).

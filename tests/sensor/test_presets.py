@@ -170,6 +170,11 @@ def test_a_window_that_is_not_stated_is_told_where_it_takes_some_of_a_response(t
         read_sensor(write(tmp_path, whole.replace("350,", "375,")))
 
 
+def test_a_prnu_in_per_cent_is_told(tmp_path):
+    with pytest.warns(UserWarning, match=r"prnu = 0\.7 is 70% of the signal; if per cent were meant, .* give 0\.007$"):
+        read_sensor(write(tmp_path, LEAST.replace("prnu = 0.01", "prnu = 0.7") + LENS))
+
+
 def test_without_responses_the_project_s_own_are_used_and_c_is_w_s_curve():
     assert low_noise().responses is rgbw()
     clear = preset("low_noise", "rccc").responses

@@ -134,6 +134,13 @@ def test_a_frame_more_than_half_saturated_is_told(tmp_path: Path) -> None:
         code, _, err = call(["capture", lit, "-o", shot, "--exposure", "10ms", "--sensor", "table1_output"])
         words = f"rodcone: {columns / 64:.0%} of the pixels are saturated at 0.01 s; shorten or omit --exposure\n"
         assert (code, words in err, "saturated" in err) == (0, told, told)
+        assert "dark noise" not in err
+
+
+@pytest.mark.filterwarnings("default:exposure_s")
+def test_a_frame_that_shows_dark_noise_alone_is_told(exr: Path, tmp_path: Path) -> None:
+    code, _, err = call(["capture", exr, "-o", tmp_path / "shot.dng", "--exposure", "1us"])
+    assert (code, err.count("of the pixels read no more than dark noise (1.8 e-) at 1e-06 s; give a longer")) == (0, 1)
 
 
 def cut(path: Path, first_nm: float, last_nm: float) -> Path:
