@@ -108,7 +108,7 @@ def test_planes_are_what_the_light_says(tmp_path: Path) -> None:
 
 @pytest.mark.thorough
 def test_a_rendered_scene_has_its_surfaces_versions_and_the_licences_of_its_pictures(tmp_path: Path) -> None:
-    limits = RenderLimits(size=16, spp=4, band_nm=100.0)
+    limits = RenderLimits(size=16, spp=4, band_nm=50.0)
     folder = made(tmp_path, order=SetOrder(shards=1), scenes=(SceneChoice("diorama-5"),), render=limits)
     seen = see_surfaces(load("diorama-5"), (16, 16))
     head, scene = read_manifest(folder)[:2]

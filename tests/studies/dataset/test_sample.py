@@ -138,6 +138,7 @@ def test_parts_of_a_frame_have_noise_of_their_own_and_one_chip(tmp_path: Path) -
 
 
 @pytest.mark.thorough
+@pytest.mark.filterwarnings("ignore:bands. luminance")  # three bands of 100 nm
 def test_shares_of_lights_sum_to_the_picture_and_each_is_what_it_gives_alone() -> None:
     scene = load("night_street")
     transport = render(scene, (16, 24), wavelength_nm=[450, 550, 650], width_nm=[100] * 3, spp=8)
