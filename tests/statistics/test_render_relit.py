@@ -114,6 +114,7 @@ def test_on_10_nm_relit_is_directly_rendered_within_the_error_reported(name, ran
         assert reported[1] < 3 * found[1]
 
 
+@pytest.mark.filterwarnings("ignore:bands")
 def test_a_line_in_a_coarse_grid_is_off_by_what_is_reported_against_1_nm_bands():
     options = {"spp": 64, "seed": 3}  # the same paths: their noise is in both
     lights = {"lamp": "sodium_low"}
