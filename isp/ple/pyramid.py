@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import PatchPilot, ScaleEstimate, estimate
+from isp.ple.guide import follow
 from isp.ple.mosaic import (
     CELLS,
     Cells,
@@ -77,6 +78,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     scale = scale_of_pixels(raw, white_e, electrons, full)
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
     planes = estimates.planes[..., cells.index]
+    follow(planes, raw.cfa, estimates.noise[list(cells.index)])
     apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
     for first in range(0, len(planes), TOGETHER):
         rows = planes[first : first + TOGETHER]

@@ -1,0 +1,138 @@
+"""Colours between their samples: each follows the mosaic's sharpest channel as linearly as its samples do around it.
+
+After residual interpolation (D. Kiku, Y. Monno, M. Tanaka, M. Okutomi, IEEE Trans. Image Process. 25(3), 2016): over
+3x3 samples of a colour c a line explains it by the guide g, and what is interpolated is what the line leaves,
+
+    c = b + a g,   a = cov(c, g) / var(g),   b and a between samples the means of the nearest two or four.
+
+The prior takes strong colours for greyer than they are, and doesn't know where. So its estimate p is held against c by
+what each misses: (p - c)^2, and e, what b misses between samples, more where g is farther from its mean than at the
+samples; both averaged over 3x3 samples. A pixel gets c + (p - c) e / (e + (p - c)^2).
+
+Where the guide is every other pixel, as Bayer's G, half of its value at a colour's sample is p's; the other half is the
+sample and the difference between both, carried along rows and columns from the side that changes the least.
+"""
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.ple.tables import Singles
+from sensor.cfa import Tile, channel_map, channels
+
+GUIDES = ("W", "G")  # the first that a mosaic has
+FLAT = 1e-4  # of the guide's squared mean: of variances under this, a is the ratio of the means
+MISSES = 0.25  # of the squared difference of b from its four neighbours' mean: what b misses between samples
+LEAST_MISS = 0.05  # of b between samples, where these say as much as noise [units of noise^2]
+NEAR = 0.62  # weight of a sample's own difference, beside that of the next pixel
+REACH = 18  # pixels that a value depends on
+TOGETHER = 128  # rows, even: they stay in a core's cache
+_LEAST = np.float32(1e-12)  # units of noise^2, to divide by
+Phase = tuple[int, int]  # row and column within 2x2 pixels
+
+
+def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64]) -> None:
+    """Bring the channels that a mosaic samples once in 2x2 pixels to their guide's lines.
+
+    Parameters
+    ----------
+    planes : (h, w, channel) float32
+        In units of noise, channels in the order of `sensor.cfa.channels`; it is overwritten but for the samples.
+    tile : tuple of str
+        Of 1, 2 or 4 pixels a side. Channels on other sites are left as they are.
+    noise : (channel,) float64
+        Posterior variance of a pixel over a sample's noise: where it is small, samples say little of lines.
+    """
+    names, letters = channels(tile), channel_map(tile, (4, 4))
+    sites = {name: [(i, j) for i, j in np.ndindex(2, 2) if np.all(letters[i::2, j::2] == name)] for name in names}
+    guide = next((name for name in GUIDES if sites.get(name)), None)
+    colours = [c for c, name in enumerate(names) if name != guide and len(sites[name]) == 1]
+    if guide is None or not colours:
+        return
+    height, width = planes.shape[:2]
+    rows = np.pad(np.arange(height), (REACH, REACH + height % 2), mode="reflect")
+    sides = ((0, 0), (REACH, REACH + width % 2), (0, 0))
+    edge, before = REACH // 2, list[tuple[slice, Singles]]()
+    for first in range(0, height, TOGETHER):
+        strip = np.pad(planes[rows[first : first + TOGETHER + 2 * REACH]], sides, mode="reflect")
+        # By row and column within 2x2 pixels: (2, 2, channel, row, column).
+        parts = strip.reshape(len(strip) // 2, 2, -1, 2, len(names)).transpose(1, 3, 4, 0, 2).copy()
+        lines = parts[:, :, names.index(guide)].copy()
+        for c in colours if sites[guide] in ([(0, 0), (1, 1)], [(0, 1), (1, 0)]) else ():
+            (site,) = sites[names[c]]
+            lines[site] = 0.5 * (lines[site] + _carried(parts[*site, c], site, lines, sites[guide]))
+        for c in colours:
+            _follow(parts[:, :, c], lines, sites[names[c]][0], LEAST_MISS / float(noise[c]) ** 2)
+        inside = parts[..., edge:-edge, edge:-edge].transpose(3, 0, 4, 1, 2)
+        # A strip is written when the next one has been read.
+        for place, values in before:
+            planes[place] = values
+        place = slice(first, min(first + TOGETHER, height))
+        before = [(place, inside.reshape(2 * len(inside), -1, len(names))[: place.stop - first, :width])]
+    planes[before[0][0]] = before[0][1]
+
+
+def _follow(plane: Singles, guide: Singles, site: Phase, least: float) -> None:
+    """Overwrite a colour (2, 2, row, column) but for its samples, those of `site`."""
+    others = [phase for phase in np.ndindex(2, 2) if phase != site]
+    b, a, middle, variance = _line(plane[site], guide[site])
+    around = sum(np.roll(b, step, axis) for step in (1, -1) for axis in (0, 1))
+    missed = MISSES * _means((b - 0.25 * around) ** 2) + least
+    missed *= np.maximum(1.0, _means(np.mean([(guide[phase] - middle) ** 2 for phase in others], axis=0)) / variance)
+    lines = [_between(b, site, phase) + _between(a, site, phase) * guide[phase] for phase in others]
+    differences = [plane[phase] - line for phase, line in zip(others, lines, strict=True)]
+    share = missed / (missed + _means(np.mean(np.square(differences), axis=0)))
+    for phase, line, difference in zip(others, lines, differences, strict=True):
+        plane[phase] = line + share * difference
+
+
+def _carried(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:
+    """Guide at a colour's samples c, from its samples beside them in a row and in a column."""
+    total, weights = np.zeros_like(c), np.zeros_like(c)
+    for beside in besides:
+        axis = int(beside[0] == site[0])
+        step = site[axis] - beside[axis]
+        # Guide less colour: at the colour's samples, and at the guide's on either side.
+        here = _forecast(c, site, guide[beside], beside) - c
+        there = guide[beside] - _forecast(guide[beside], beside, c, site)
+        sides = there, np.roll(there, -step, axis)
+        across = np.abs(sides[0] - sides[1])
+        for side, towards in zip(sides, (-step, step), strict=True):
+            rough = across + np.abs(np.roll(here, -towards, axis) - here)
+            weight = 1.0 / (rough**2 + _LEAST)
+            total += weight * (NEAR * here + (1.0 - NEAR) * side)
+            weights += weight
+    return c + total / weights
+
+
+def _forecast(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles:
+    """Another channel at the samples c, from its samples `beside` them."""
+    b, a, _, _ = _line(other, _between(c, site, beside))
+    return _between(b, beside, site) + _between(a, beside, site) * c
+
+
+def _line(c: Singles, g: Singles) -> tuple[Singles, Singles, Singles, Singles]:
+    """Offset b and slope a of c over g around each sample; mean and variance of g."""
+    mean, middle, share = _means(c), _means(g), np.float32(1.0 - FLAT)
+    variance = _means(g * g) - share * middle * middle + _LEAST
+    a = _means((_means(c * g) - share * mean * middle) / variance)
+    return c - a * g, a, middle, variance
+
+
+def _means(values: NDArray[Any]) -> Singles:
+    """Over 3x3, 0 in the outermost lines."""
+    means = np.zeros_like(values)
+    rows = values[:-2] + values[1:-1] + values[2:]
+    inside = np.add(rows[:, :-2], rows[:, 1:-1], out=means[1:-1, 1:-1])
+    inside += rows[:, 2:]
+    inside *= np.float32(1 / 9)
+    return means
+
+
+def _between(values: Singles, site: Phase, phase: Phase) -> Singles:
+    """Means of the nearest samples, those of `site`, at the pixels of `phase`; wrong in the outermost lines."""
+    for axis in (0, 1):
+        if step := phase[axis] - site[axis]:
+            values = 0.5 * (values + np.roll(values, -step, axis))
+    return values
