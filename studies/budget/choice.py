@@ -1,7 +1,7 @@
 """The cheapest model within the stated share of the sensor's noise variance."""
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 from math import ceil
 from operator import itemgetter
@@ -32,8 +32,9 @@ class Choice:
 def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares, most_spp: int) -> Choice:
     """Choose one render and a lens for each condition of one scene.
 
-    Monte Carlo noise has a share of its own; the rest is for all other terms together. A condition's choice holds for
-    all of its mosaics. The finest bands with everything modelled are within any share.
+    Monte Carlo noise has a share of its own; the rest is for all other terms together. Sensors and mosaics that see the
+    same light for the same time are compared: what one needs, all have. The finest bands with everything modelled are
+    within any share.
 
     Parameters
     ----------
@@ -44,19 +45,16 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
     most_spp : int
         What the study allows; 0 for a picture file.
     """
-    by_condition: dict[Condition, list[Weighed]] = {}
+    compared: dict[Condition, list[Weighed]] = {}
     for row in rows:
-        by_condition.setdefault(row.condition, []).append(row)
+        compared.setdefault(replace(row.condition, sensor=""), []).append(row)
     choices: list[tuple[float, Choice]] = []
     for count, bands in sizes.items():
-        lenses = {
-            condition: _cheapest_lens(mosaic_rows, count, bands, shares)
-            for condition, mosaic_rows in by_condition.items()
-        }
-        lens_choices = {condition: lens for condition, lens in lenses.items() if lens is not None}
-        if len(lens_choices) < len(by_condition):
+        lenses = [(alike, _cheapest_lens(alike, count, bands, shares)) for alike in compared.values()]
+        by_condition = {row.condition: lens for alike, lens in lenses if lens for row in alike}
+        if not all(lens for _, lens in lenses):
             continue
-        left_out = {condition: out for condition, (_, out) in lens_choices.items()}
+        left_out = {condition: out for condition, (_, out) in by_condition.items()}
         # Samples a pixel that bring Monte Carlo noise under its share in every condition.
         wanted = ceil(
             max(
@@ -65,7 +63,7 @@ def choose(rows: Sequence[Weighed], sizes: dict[int, int], shares: BudgetShares,
             )
         )
         spp = min(max(wanted, FIRST_SPP), most_spp)
-        cost = sum(lens_ns for lens_ns, _ in lens_choices.values()) + render_ns(bands, spp)
+        cost = sum(lens_ns for lens_ns, _ in by_condition.values()) + render_ns(bands, spp)
         choices.append((cost, Choice(count=count, spp=spp, left_out=left_out)))
     return min(choices, key=itemgetter(0))[1]
 
@@ -86,10 +84,10 @@ def _cheapest_lens(
     """Cost, and the terms of lens and kernel left out; None where the bands alone are too much."""
 
     def fits(row: Weighed, left_out: Iterable[str]) -> bool:
-        total_e = sum(row.bands[count]) + sum({**row.lens, KERNEL: row.kernel}[name] for name in left_out)
+        total_e = sum(row.bands[count]) + sum({**row.lens, KERNEL: row.kernel}.get(name, 0.0) for name in left_out)
         return total_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance
 
-    names = [*rows[0].lens, KERNEL]
+    names = [*dict.fromkeys(name for row in rows for name in row.lens), KERNEL]
     fitting = [
         (image_ns(bands, set(names) - set(out)), frozenset(out))
         for count_left_out in range(len(names) + 1)

@@ -345,6 +345,20 @@ def test_choice_is_the_cheapest_of_all_that_fit() -> None:
     assert "diffraction" not in choice.left_out[CONDITION]
 
 
+def test_sensors_that_are_compared_have_one_lens() -> None:
+    """The noisy one by itself needs no lens at all."""
+    noisy = replace(CONDITION, sensor="table1_output")
+    rows = [weighed(), weighed(noisy, noise_variance=1e6)]
+    alone = choose(rows[1:], SIZES, BudgetShares(), 512)
+    assert "diffraction" in alone.left_out[noisy]
+    together = choose(rows, SIZES, BudgetShares(), 512)
+    assert (
+        together.left_out[noisy]
+        == together.left_out[CONDITION]
+        == choose(rows[:1], SIZES, BudgetShares(), 512).left_out[CONDITION]
+    )
+
+
 def test_samples_are_those_that_monte_carlos_share_asks_for_up_to_the_studys() -> None:
     rows = [weighed(paths=600.0)]  # blurred 1200 e-^2 a sample against 3 e-^2
     assert choose(rows, SIZES, BudgetShares(), 512).spp == 400
