@@ -1,8 +1,8 @@
 """Light that W doesn't see: a lamp of one pixel, or of one row of pixels, on sites of the colours alone.
 
-W guides the similarity. Light that reaches no W site has dark W all around, and what is as dark gets a share of it: a
-block, in the colours that saw it. Yet a clear pixel collects whatever a colour does. So a sample far over all W around
-it tells of its own pixel alone, and of no colour (docs/decisions/0051-unseen-light.md).
+W guides the similarity. Light that reaches no W site has dark W all around, which looks like dark W elsewhere: it would
+spread over a block, in the colours that saw it. Yet a clear pixel collects whatever a colour does. So a sample far over
+all W around it tells of its own pixel alone, and of no colour (docs/decisions/0051-unseen-light.md).
 """
 
 from dataclasses import replace
@@ -26,13 +26,13 @@ TIMES_LEAST = 2.0  # of its channel around, over which a sample is alone
 def without_unseen(raw: RawImage, neutral: Floats) -> tuple[RawImage, NDArray[np.bool_]]:
     """Take out samples that no W around can explain.
 
-    With n the channels' response to a neutral, s the dark noise, W the largest of W's samples as far as its tent
+    With n the channels' response to a neutral, k S + s^2 a sample's noise, M the largest sample of W as far as its tent
     reaches, and L the least of the eight of its own channel a tile away, a sample S is taken out where
 
-        S > max(W, 5 W n / n_W, 2 L) + 4 sqrt(S + s^2),
+        S > max(M, 5 M n / n_W, 2 L) + 4 sqrt(k S + s^2),
 
-    and W n / n_W stands in its place. L, for light that no W sees is one pixel wide: where it isn't, W tells too
-    little, as where most charge leaves its pixel.
+    and M n / n_W stands in its place. The bound 2 L keeps this to isolated samples: wider light reaches some W, but
+    where crosstalk is strong, and W proves nothing.
 
     Parameters
     ----------
@@ -96,15 +96,17 @@ def _brightest_white(padded: NDArray[Any], raw: RawImage, phase: tuple[int, ...]
 def _least_around(samples: NDArray[Any], places: tuple[NDArray[np.intp], ...]) -> NDArray[Any]:
     """Least of the eight samples around each place among those of a phase, mirrored at the border."""
     rows, columns = (np.pad(np.arange(length), 1, mode="reflect") for length in samples.shape)
-    steps = [step for step in product(range(3), repeat=2) if step != (1, 1)]  # from the one before on
+    steps = [
+        step for step in product(range(3), repeat=2) if step != (1, 1)
+    ]  # of the padded rows: -1, 0 and 1 from the place
     return np.asarray(np.minimum.reduce([samples[rows[places[0] + i], columns[places[1] + j]] for i, j in steps]))
 
 
 def draw_unseen(raw: RawImage, unseen: NDArray[np.bool_], gains: Floats, balanced: NDArray[np.float64]) -> None:
     """Draw, in place, what `without_unseen` took out of `raw`: at its own pixels, neutral, up to the full well.
 
-    The level is the mean of the balanced samples there and beside by a tent, for each colour saw a part. A line goes on
-    through a colour that has little of its light, between two pixels that were taken out.
+    The level is the mean, weighted by a tent, of the balanced samples that were taken out there and beside: each colour
+    saw a part. A pixel between two that were taken out is drawn too: a line goes on through a colour that sees little.
 
     Parameters
     ----------

@@ -16,22 +16,23 @@ from sensor.raw import RawImage
 
 REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
 SIDE = 2 * REACH + 1
-# Of the covariance of planes, which are means, and of light of the mean colour: 2.5 and 0 lose 0.6 dB, 0 and 2.5 lose
-# 0.1; less of both, 0.3 and 0.7, loses 0.2, twice as much gains 0.1 and makes flats noisier.
+# a and b of C' = a C + b e m m^T. 2.5 and 0 lose 0.6 dB, 0 and 2.5 lose 0.1; 0.3 and 0.7 lose 0.2, twice both gains 0.1
+# and makes flats noisier.
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
 MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
-FAR = 24  # pixels from plane to plane of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
+FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
-# Of the nine samples around a pixel, row by row: standard deviation of a pixel; 0.8 loses 0.01 dB, 1.5 0.3.
+# Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
+# of 1.5 0.3.
 OFFSETS = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
 CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
 NEAR = CORRELATION[4] ** 4 / (CORRELATION[4] ** 4).sum()
 
 
 def channel_noise(raw: RawImage) -> NDArray[np.float64]:
-    """Electrons of variance an electron, dark variance [e-^2], and from where full [e-]: (3, channel)."""
+    """Shot noise's variance an electron (k), dark variance [e-^2], and from where full [e-]: (3, channel)."""
     noises = [raw.noise_of(name) for name in raw.channels]
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
@@ -67,7 +68,8 @@ def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArra
     row_cell, column_cell = lines(row_cells, row, beside), lines(column_cells, column, beside)
     site = [dr.gather(jit.UInt, cells, r + c) for r in row_cell for c in column_cell]
 
-    # What the window holds; moments about its middle, as squares of light have too many digits.
+    # What the window holds: m, C, N, e (contrast), b (faint is its least), r (tint), <D^2> (apart), and the share that
+    # noise hides. Moments are about the middle pixel, as squares of light have too many digits.
     away = [value - plane for value in window]
     offset = sum(away[1:], away[0]) / SIDE**2
     mean = plane + offset
@@ -110,7 +112,7 @@ def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArra
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
     sharp -= hidden * (plane - tint * plane[3])
 
-    # Light of unknown colour.
+    # Light of unknown colour: q (hue) and q_c. W is channel 3.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
     full = reduce(or_, channels_full)  # a bit a channel
     white = [[larger(values[3], 0.0) for values in window[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]

@@ -1,15 +1,17 @@
 """One scale: each patch picks a component and takes its estimate, and overlapping patches are averaged.
 
-A patch's pixels x, of posterior variance v, count by how sure they are: over the patches p that cover a pixel
+A patch counts by how sure it is, v its posterior variance, the mean over pixels and channels: over the patches p that
+cover a pixel
 
     X = sum_p w_p h x_p / sum_p w_p h,   w = 1 / (max(1, misfit)^DOUBT (v + LEAST_VARIANCE)),
 
-h the window that falls towards a patch's edges (`isp.ple.tables.window`), misfit as `isp.ple.pick.pick` gives it.
+h the window that falls towards a patch's edges (`isp.ple.tables.window`), misfit the mean squared residual in standard
+deviations, 1 for a patch that its component explains (`isp.ple.pick.pick`).
 
 Words: a *sampling* says which channels a patch's samples are of, and their gains and noise; patches whose place within
 the tile is the same share it. The *pilot* is the coarser scale's word on a patch: its four channels' means. *Light* is
-a patch's mean brightness, in electrons of white in G; a *table* holds the prior's components at one light. *Full* is a
-saturated W: a lower bound.
+a patch's mean brightness: electrons of a G sample under a white of that brightness. A *table* holds the prior's
+components at one light. *Full* is a saturated W: a lower bound.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -32,7 +34,7 @@ from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table
 
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
-COARSE_STEPS = 2  # of light from table to table where a scale only tells the finer one
+COARSE_STEPS = 2  # of light from table to table at coarse scales, which need no finer ones
 DOUBT = 2.0  # power by which a patch that its component explains badly counts less
 INFLATE = 2.0  # of the pilot's variance: it has seen the same samples
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
@@ -87,9 +89,9 @@ class ScaleEstimate:
     planes : (h, w, 4) float32
         In units of noise.
     variance : (h/2, w/2, 4) float32
-        Posterior variance of the mean of a patch's middle.
+        Posterior variance of the mean over the middle half of a patch, mean over the patches.
     noise : (4,) float64
-        Posterior variance of a pixel, median over the patches.
+        Posterior variance of a pixel over the noise of a sample, median over the patches.
     """
 
     planes: Singles
@@ -128,7 +130,7 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
         patches = _solve(prior, groups, y, hit, steps[first:last].ravel(), part_pilot)
         return *overlapped(patches, (last - first, nx), size), patches.noise
 
-    # Sums run strip by strip, whatever the threads.
+    # Sums run in the order of the strips: the result doesn't depend on threads.
     total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
     weight = np.zeros(total.shape[:2], np.float32)
     variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
@@ -189,8 +191,8 @@ def _solve(
 ) -> Patches:
     """Estimate the patches of each sampling, by light.
 
-    A patch with full Ws is estimated twice: from R, G and B alone, and then with each full W at what this says, or at
-    its reading if that is more.
+    A patch with saturated Ws is estimated twice: from R, G and B alone, and then with each of these Ws at the larger of
+    that estimate and its reading.
     """
     count, values = len(y), 4 * groups[0][0].size ** 2
     patches = Patches(*(np.empty((count, *shape), np.float32) for shape in ((values,), (), (4,), (4,))))
@@ -222,7 +224,7 @@ def _solve_by_light(
     among: NDArray[np.intp],
     patches: Patches,
 ) -> None:
-    order = among[np.argsort(steps[among], kind="stable")]  # of 16 bits: the fast sort
+    order = among[np.argsort(steps[among], kind="stable")]  # of int16: a radix sort
     bounds = np.flatnonzero(np.diff(steps[order], prepend=-(1 << 15), append=-(1 << 15)))
     for first, last in pairwise(bounds.tolist()):
         index = order[first:last]
@@ -234,7 +236,8 @@ def _solve_one_light(
     at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
-    noise, below = None, [np.empty(0, np.intp)]  # patches whose straight line falls under black
+    # Patches whose linear estimate falls under black: `on_the_curve` redoes them
+    noise, below = None, [np.empty(0, np.intp)]
     parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
     if pilot is not None:
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
@@ -252,24 +255,24 @@ def _solve_one_light(
             variance, inner = by.variance, by.inner
             rows = np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
             if noise is not None:
-                sure = 1.0 / (noise[group, None] + at.spread[k])
-                variance, inner = by.variance - sure @ by.pilot_variance, by.inner - sure @ by.pilot_inner
-                # The pilot's innovation over its variance stands for its means.
-                rows[:, -4:] = rows @ at.reads[k][:, -4:] * sure
-            # A patch that no component explains knows its pixels by as much less.
+                precision = 1.0 / (noise[group, None] + at.spread[k])
+                variance, inner = by.variance - precision @ by.pilot_variance, by.inner - precision @ by.pilot_inner
+                # The pilot's means give way to their innovation times its precision.
+                rows[:, -4:] = rows @ at.reads[k][:, -4:] * precision
+            # A patch that no component explains has a larger posterior variance, by `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT
             place, weight = (
                 index[group],
                 (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32),
             )
             rows *= weight[:, None]
-            over = np.matmul(rows, linear, out=values[: group.size])
+            weighted = np.matmul(rows, linear, out=values[: group.size])
             if noise is not None and at.mix.size == PATCH:
-                below.append(group[(over < 0.0).any(axis=1)])
+                below.append(group[(weighted < 0.0).any(axis=1)])  # the finest scale: its output is seen
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
             patches.noise[place] = variance * (by.noise / by.variance)
-            patches.values[place] = over
+            patches.values[place] = weighted  # times the window, which `linear` holds
     if noise is not None:
         for group in blocks(np.concatenate(below), TOGETHER):
             place = index[group]

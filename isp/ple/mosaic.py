@@ -1,4 +1,4 @@
-"""What of a mosaic lies where: sums of samples over cells, the samples of a patch, and the mosaic beyond its frame.
+"""A mosaic for piecewise linear estimation: sums of samples over cells, channels of a patch, reflection at the frame.
 
 Patches lie two pixels apart. In a tile of four pixels they begin at its first or third pixel, which are the tile's
 *phases*; the channels of a patch's samples, its sampling, depend on the phase. Cells of 2x2 pixels may lack channels
@@ -22,7 +22,7 @@ from sensor.cfa import Tile, channel_map, channels, mask
 from sensor.raw import RawImage
 
 SIDES = (1, 2, 4)  # of a tile [pixels]
-SCALES = 4  # coarser ones
+SCALES = 4  # levels of the pyramid above single pixels
 CELLS = 4  # a side of a coarse patch
 LEAST_CELLS = 5  # a side of the coarsest scale
 
@@ -36,9 +36,9 @@ class Cells:
     electrons : (h, w, channel) float32
         Of the mosaic's channels [e-]; 0 where a cell has no sample of a channel.
     full : (h, w, channel) bool
-        Where a saturated W is in the sum.
+        Where a saturated W is in the sum: of W beside G, which is full long after.
     presence : (row, column, channel) bool
-        Which channels the first cells hold; the others repeat them.
+        Which channels the first cells hold; periodic.
     sampling : Sampling
         Of patches of 4x4 cells.
     index : tuple of int
@@ -61,7 +61,7 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     white_e : (4,) array_like
         Electrons of R, G, B and W from white, relative to G.
     electrons : (h, w) float32
-        `counted_electrons` of the raw image, and so is ``white_e``.
+        `counted_electrons` of the raw image; ``white_e`` is divided by the same factor.
     full : (h, w) bool
         `full_white` of it.
     """
@@ -70,11 +70,11 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     down, across = (lcm(side, 2) // 2 for side in (len(raw.cfa), len(raw.cfa[0])))
     letters = channel_map(raw.cfa, (2 * down, 2 * across)).reshape(down, 2, across, 2)
     tally = np.stack([(letters == name).sum(axis=(1, 3)) for name in names], axis=-1)
-    # The finest cells are to be alike: each sums as many samples of a channel as the cell with the fewest (`least`, of
-    # the cells that have any). The samples beyond are kept apart, in sums[1], for the larger cells.
-    least = np.where(tally > 0, tally, 4).min(axis=(0, 1))
+    # One `Sampling` serves all patches only if every cell sums as many samples of a channel: as many as the cell with
+    # the fewest of those that have any. sums[1] holds the surplus, for the larger cells.
+    fewest = np.where(tally > 0, tally, 4).min(axis=(0, 1))
     height, width = (length // 2 for length in raw.shape)
-    shape = (1 + int(np.any(tally > least)), height, width, len(names))
+    shape = (1 + int(np.any(tally > fewest)), height, width, len(names))
     sums: Singles = np.zeros(shape, np.float32)
     fulls: NDArray[np.bool_] = np.zeros(shape, bool)
     for (a, b), (c, name) in product(np.ndindex(down, across), enumerate(names)):
@@ -84,13 +84,13 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
             if letters[a, i, b, j] == name
         ]
         for number, site in enumerate(sites):
-            cells = (int(number >= least[c]), slice(a, None, down), slice(b, None, across), c)
+            cells = (int(number >= fewest[c]), slice(a, None, down), slice(b, None, across), c)
             sums[cells] += electrons[site]
             fulls[cells] |= full[site]
-    counts, whole = np.ones(4), np.ones(4)
-    counts[list(index)], whole[list(index)] = least, 4 * tally.mean(axis=(0, 1))
-    # `counts` are the samples of a channel in a cell of 2x2 pixels, `whole` those in a cell of 4x4.
-    finest = _cell_sampling(raw, white_e, counts, tally > 0, index)
+    # Samples of R, G, B and W that a cell of 2x2 pixels sums, and one of 4x4
+    in_2x2, in_larger = np.ones(4), np.ones(4)
+    in_2x2[list(index)], in_larger[list(index)] = fewest, 4 * tally.mean(axis=(0, 1))
+    finest = _cell_sampling(raw, white_e, in_2x2, tally > 0, index)
     levels = [Cells(sums[0], fulls[0], tally > 0, finest, index)]
     sums, fulls = (sums[0], fulls[0]) if len(sums) == 1 else (sums.sum(axis=0), np.asarray(fulls.any(axis=0)))
     # Larger cells hold every channel, and all of its samples.
@@ -100,8 +100,8 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
         fours = (height, 2, width, 2, len(names))
         sums = sums[: 2 * height, : 2 * width].reshape(fours).sum(axis=(1, 3))
         fulls = np.asarray(fulls[: 2 * height, : 2 * width].reshape(fours).any(axis=(1, 3)))
-        levels.append(Cells(sums, fulls, every, _cell_sampling(raw, white_e, whole, every, index), index))
-        whole = np.where(np.isin(np.arange(4), index), 4 * whole, whole)
+        levels.append(Cells(sums, fulls, every, _cell_sampling(raw, white_e, in_larger, every, index), index))
+        in_larger = np.where(np.isin(np.arange(4), index), 4 * in_larger, in_larger)
     return levels
 
 
@@ -121,7 +121,8 @@ def _first_patch(presence: NDArray[np.bool_]) -> NDArray[np.bool_]:
 def _sampling(
     raw: RawImage, white_e: ArrayLike, counts: NDArray[np.float64], size: int, rows: tuple[int, ...]
 ) -> Sampling:
-    # In six digits: exposures of other times differ in the last bits, and would each have tables of their own.
+    # Tables are kept by these numbers: in six digits, exposures of different times share them. PRNU stays that of one
+    # sample, though independent gains even out in a sum: coarse cells are read as a little noisier than they are.
     gains, dark_e = (
         tuple(float(f"{value:.6g}") for value in values)
         for values in (np.asarray(white_e) * counts, counted_noise(raw)[1] * np.sqrt(counts))
@@ -130,13 +131,13 @@ def _sampling(
 
 
 def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Factor of shot noise of R, G, B and W, by which a site counts fewer electrons, and their dark noise in these."""
+    """Factor k by which electrons of R, G, B and W, read apart, are scaled up; dark noise in counted electrons."""
     noise = [raw.noise_of(name) for name in LETTERS]
     return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
 
 
 def counted_electrons(raw: RawImage) -> Singles:
-    """What the sites of a mosaic count, (h, w) float32: of a channel that is read apart less than it stands for."""
+    """Electrons that the sites of a mosaic count, (h, w) float32: over k, so that their shot noise is Poisson's."""
     electrons = raw.electrons.astype(np.float32)
     for noise in raw.channel_noise:
         electrons[mask(raw.cfa, noise.channel, raw.shape)] /= np.float32(noise.shot)
@@ -193,12 +194,12 @@ def _sites(tile: Tile, top: int, left: int) -> tuple[int, ...]:
 
 
 def continued(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Samples (h, w) of a mosaic, continued beyond the frame by reflection, and the mosaic with them.
+    """Samples (h, w) of a mosaic, continued beyond the frame by reflection; the tile goes on too.
 
     Where the reflected pixel is of another channel, the nearest pixel beside it of the right one stands for it.
     """
     wide = tuple(padded(plane, PATCH) for plane in samples)
-    if max(len(tile), len(tile[0])) <= 2:  # which reflection keeps
+    if max(len(tile), len(tile[0])) <= 2:  # reflection keeps a tile of two
         return wide
     shape = samples[0].shape
     sides = [border(length, PATCH) for length in shape]
