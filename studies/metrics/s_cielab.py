@@ -7,7 +7,7 @@ three opponent planes, each blurred by the eye's own spread, back to XYZ, then C
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dctn, idctn
-from skimage.color import rgb2xyz, xyz2lab
+from skimage.color import deltaE_cie76, rgb2xyz, xyz2lab
 
 from render.spectrum import Floats
 
@@ -52,3 +52,18 @@ def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGR
 def eye_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
     return np.asarray(xyz2lab(eye_xyz(rgb2xyz(encoded), pixels_per_degree)))
+
+
+def s_cielab(
+    picture: NDArray[np.float64], truth: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE
+) -> NDArray[np.float64]:
+    """S-CIELAB difference of each pixel, shape (h, w); 1 is about what can just be seen.
+
+    Parameters
+    ----------
+    picture, truth : (h, w, 3) float64
+        Encoded sRGB in [0, 1]; D65 is the white.
+    pixels_per_degree : float
+        Of the eye's view. With fewer the picture is nearer, and finer detail is seen.
+    """
+    return np.asarray(deltaE_cie76(eye_lab(picture, pixels_per_degree), eye_lab(truth, pixels_per_degree)))

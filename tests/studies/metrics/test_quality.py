@@ -8,12 +8,12 @@ import pytest
 from outside_truth import colour_science
 from refusal import refusal
 from scipy.ndimage import correlate
-from skimage.color import deltaE_cie76, deltaE_ciede2000, rgb2lab
+from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
 from studies.metrics.confidence import half_width
 from studies.metrics.quality import appearance, flip, measure, psnr_db, pu21_encode, pu21_psnr_db, true_picture
-from studies.metrics.s_cielab import PIXELS_PER_DEGREE, SPREADS, XYZ_TO_OPPONENT, eye_lab, eye_xyz
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
 from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
 
@@ -77,7 +77,7 @@ PICTURE = TRUTH + RNG.normal(0, 0.1, TRUTH.shape)
 def test_each_figure_is_its_own_module_s() -> None:
     picture, truth = encode_srgb(PICTURE), encode_srgb(TRUTH)
     found = appearance(PICTURE, picture, true_picture(TRUTH), 40.0)
-    seen = deltaE_cie76(eye_lab(picture), eye_lab(truth))
+    seen = s_cielab(picture, truth)
     assert found.s_cielab_median == pytest.approx(np.median(seen), rel=1e-12)
     assert found.s_cielab_p95 == pytest.approx(np.percentile(seen, 95), rel=1e-12)
     assert found.flip_mean == pytest.approx(flip(picture, truth).mean(), rel=1e-12)
@@ -261,8 +261,7 @@ def test_all_of_it_agrees_with_colour_sciences_colours() -> None:
     white = np.array([0.3127, 0.3290])
     labs = [colour.XYZ_to_Lab(eye_xyz(colour.sRGB_to_XYZ(picture), ppd), white) for picture in (first, second)]
     # Its sRGB matrix and white have other last digits: 2e-3, as for CIEDE2000.
-    seen = deltaE_cie76(eye_lab(first, ppd), eye_lab(second, ppd))
-    assert seen == pytest.approx(colour.delta_E(*labs, method="CIE 1976"), rel=2e-3)
+    assert s_cielab(first, second, ppd) == pytest.approx(colour.delta_E(*labs, method="CIE 1976"), rel=2e-3)
 
 
 # Student's interval: a table's value.
