@@ -29,8 +29,8 @@ class PixelConfig:
         Standard deviation over pixels of the relative photo-response.
     dark_current_e_per_s : float
         Of every pixel, collected with the light and Poisson like it.
-    conversion_gain_uv_per_e, voltage_swing_v : float
-        What `swing_e` is made of; the well alone decides where pixels clip.
+    conversion_gain_uv_per_e, voltage_swing_v, analog_gain : float
+        As Table 1 and data sheets state them: reported, not applied. The well alone decides where pixels clip.
     column_gain_spread : float
         Standard deviation over columns of their amplifiers' relative gain; it acts on what the well gave, so behind the
         Poisson draw and the clip.
@@ -54,6 +54,7 @@ class PixelConfig:
     dark_current_e_per_s: Annotated[float, (0.0, 1e12, "give electrons per second, 0 for none")] = 0.0
     conversion_gain_uv_per_e: Annotated[float, (1e-6, 1e9, "give microvolts per electron")] = 30.0
     voltage_swing_v: Annotated[float, (1e-6, 1e6, "give volts")] = 1.08
+    analog_gain: Annotated[float, (1e-6, 1e6, "give a factor")] = 1.0
     column_gain_spread: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
     column_offset_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")] = 0.0
     hot_pixel_share: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0

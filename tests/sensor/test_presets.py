@@ -55,7 +55,7 @@ def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(
 )
 @loop("cfa", ["rgbw", "bayer"])
 def test_the_files_hold_the_last_bit_of_table_1_s_quotients(camera, read_noise_e, dsnu_e, prnu, diffraction, cfa):
-    pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu)
+    pixel = PixelConfig(2.2, 0.9, 15_000.0, read_noise_e, dsnu_e, prnu, analog_gain=7.98)
     expected = SensorConfig(pixel, LensConfig(2.8, diffraction=diffraction), cfa=MOSAICS[cfa])
     assert camera(cfa) == expected
     assert camera(cfa).gain_e_per_dn == expected.gain_e_per_dn
