@@ -13,6 +13,7 @@ Where the guide is every other pixel, as Bayer's G, half of its value at a colou
 sample and the difference between both, carried along rows and columns from the side that changes the least.
 """
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -32,7 +33,7 @@ _LEAST = np.float32(1e-12)  # units of noise^2, to divide by
 Phase = tuple[int, int]  # row and column within 2x2 pixels
 
 
-def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64]) -> None:
+def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64], black: Sequence[float]) -> None:
     """Bring the channels that a mosaic samples once in 2x2 pixels to their guide's lines.
 
     Parameters
@@ -43,6 +44,8 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64]) -> None:
         Of 1, 2 or 4 pixels a side. Channels on other sites are left as they are.
     noise : (channel,) float64
         Posterior variance of a pixel over a sample's noise: where it is small, samples say little of lines.
+    black : (channel,) sequence of float
+        Reading of no light, under which no line goes.
     """
     names, letters = channels(tile), channel_map(tile, (4, 4))
     sites = {name: [(i, j) for i, j in np.ndindex(2, 2) if np.all(letters[i::2, j::2] == name)] for name in names}
@@ -63,7 +66,7 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64]) -> None:
             (site,) = sites[names[c]]
             lines[site] = 0.5 * (lines[site] + _carried(parts[*site, c], site, lines, sites[guide]))
         for c in colours:
-            _follow(parts[:, :, c], lines, sites[names[c]][0], LEAST_MISS / float(noise[c]) ** 2)
+            _follow(parts[:, :, c], lines, sites[names[c]][0], LEAST_MISS / float(noise[c]) ** 2, black[c])
         inside = parts[..., edge:-edge, edge:-edge].transpose(3, 0, 4, 1, 2)
         # A strip is written when the next one has been read.
         for place, values in before:
@@ -73,7 +76,7 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64]) -> None:
     planes[before[0][0]] = before[0][1]
 
 
-def _follow(plane: Singles, guide: Singles, site: Phase, least: float) -> None:
+def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: float) -> None:
     """Overwrite a colour (2, 2, row, column) but for its samples, those of `site`."""
     others = [phase for phase in np.ndindex(2, 2) if phase != site]
     b, a, middle, variance = _line(plane[site], guide[site])
@@ -81,6 +84,7 @@ def _follow(plane: Singles, guide: Singles, site: Phase, least: float) -> None:
     missed = MISSES * _means((b - 0.25 * around) ** 2) + least
     missed *= np.maximum(1.0, _means(np.mean([(guide[phase] - middle) ** 2 for phase in others], axis=0)) / variance)
     lines = [_between(b, site, phase) + _between(a, site, phase) * guide[phase] for phase in others]
+    lines = [np.maximum(line, np.float32(black)) for line in lines]
     differences = [plane[phase] - line for phase, line in zip(others, lines, strict=True)]
     share = missed / (missed + _means(np.mean(np.square(differences), axis=0)))
     for phase, line, difference in zip(others, lines, differences, strict=True):

@@ -78,7 +78,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     scale = scale_of_pixels(raw, white_e, electrons, full)
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
     planes = estimates.planes[..., cells.index]
-    follow(planes, raw.cfa, estimates.noise[list(cells.index)])
+    black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in cells.index]
+    follow(planes, raw.cfa, estimates.noise[list(cells.index)], black)
     apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
     for first in range(0, len(planes), TOGETHER):
         rows = planes[first : first + TOGETHER]
