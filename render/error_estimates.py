@@ -217,29 +217,36 @@ def within_band_error(
     return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
 
 
-def luminance_error(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: Floats) -> float:
-    """Relative error of the luminance of lights that are known by their band averages alone.
+def luminance_error(
+    lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
+) -> float:
+    """Relative error of a picture's luminance whose lights are known by their band averages alone, RMS over pixels.
 
     A sensor's channels, as steep as the eye's sensitivity, see an error of this order or some times it. As
     `within_band_error`, with the eye's sensitivity in place of the transport, and signs.
     """
     eye = colour_matching_functions()[1].band_average(wavelength_nm, width_nm)
     slope, curvature = (values[:, 0, 0] for values in _derivatives(eye[:, None, None], wavelength_nm))
+    transport = radiance[_spread(radiance.shape[2:])].astype(np.float64)
     moments = [light.power * np.array(_moments(light.spectrum, wavelength_nm, width_nm)) for light in lights.values()]
-    mean, first, second = np.sum(moments, axis=0)
-    total = float((eye * mean) @ width_nm)
-    return abs(float((slope * first + curvature * second / 2) @ width_nm)) / total if total > 0 else 0.0
+    mean, first, second = np.swapaxes(moments, 0, 1)  # (group, band)
+    weights = slope * first + curvature * second / 2, eye * mean
+    missed, total = (np.tensordot(weight * width_nm, transport, 2) for weight in weights)
+    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
+    return float(np.sqrt(np.square(relative).sum() / max(1, np.count_nonzero(total > 0))))
 
 
 class WideBandsWarning(UserWarning):
     """Bands within which light and surfaces, or light and eye, vary together by more than band averages tell."""
 
 
-def warn_of_wide_bands(error: Floats, seen: float, values: Planes, wavelength_nm: Floats, width_nm: Floats) -> None:
+def warn_of_wide_bands(
+    error: Floats, photometric: float, values: Planes, wavelength_nm: Floats, width_nm: Floats
+) -> None:
     """Warn (`WideBandsWarning`) where `within_band_error` is large in a band of a picture, with what would do.
 
-    For smooth light the error falls with the square of the width. `values` has the shape (band, h, w), `seen` is the
-    `luminance_error`.
+    For smooth light the error falls with the square of the width. `values` has the shape (band, h, w), `photometric` is
+    the `luminance_error`.
     """
     light = values.mean(axis=(1, 2), dtype=np.float64) * width_nm
     error = np.where(light >= LEAST_LIGHT * light.sum(), error, 0.0)
@@ -253,11 +260,11 @@ def warn_of_wide_bands(error: Floats, seen: float, values: Planes, wavelength_nm
             WideBandsWarning,
             stacklevel=3,
         )
-    if seen > MOST_LUMINANCE_ERROR and light.any():
+    if photometric > MOST_LUMINANCE_ERROR and light.any():
         warnings.warn(
-            f"bands: luminance is off by about {seen:.1%} and a sensor's channels by more, for a light varies within "
-            f"bands of up to {width_nm.max():g} nm; give narrower ones, as --bands of rodcone render, or for a lamp's "
-            "lines rodcone.line_bands",
+            f"bands: luminance is off by about {photometric:.1%} and a sensor's channels by more, for a light varies "
+            f"within bands of up to {width_nm.max():g} nm; give narrower ones, as --bands of rodcone render, or for a "
+            "lamp's lines rodcone.line_bands",
             WideBandsWarning,
             stacklevel=3,
         )

@@ -152,8 +152,8 @@ class Transport:
         coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
         planes = combine(coefficients, self.radiance)
         error = within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
-        seen = luminance_error(lights, self.wavelength_nm, self.width_nm)
-        warn_of_wide_bands(error, seen, planes, self.wavelength_nm, self.width_nm)
+        photometric = luminance_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
+        warn_of_wide_bands(error, photometric, planes, self.wavelength_nm, self.width_nm)
         return SpectralRadiance(
             values=np.moveaxis(planes, 0, -1),
             wavelength_nm=self.wavelength_nm,

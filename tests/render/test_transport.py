@@ -255,3 +255,11 @@ def test_a_line_whose_luminance_the_bands_miss_is_warned_of():
     with pytest.warns(WideBandsWarning, match=r"bands: luminance is off by about 1\d\.\d%.*bands of up to 10 nm"):
         made.relight({"lamp": line_spectrum([508.0], [1.0])}, powers={"sky": 0.0})
     made.relight({"lamp": line_spectrum([505.0], [1.0])}, powers={"sky": 0.0})  # warnings are errors
+    # What counts is what a light gives to the picture, however bright it is by itself.
+    reach = np.array([1e4, 1e-4]).reshape(2, 1, 1, 1)
+    for_lamp, for_sky = (
+        replace(made, light=Halves(light, 0 * light)) for light in (made.radiance / reach, made.radiance * reach)
+    )
+    with pytest.warns(WideBandsWarning, match="bands: luminance is off by about 1"):
+        for_lamp.relight({"lamp": line_spectrum([508.0], [1.0])}, powers={"lamp": 1e-3})
+    for_sky.relight({"lamp": line_spectrum([508.0], [1.0])}, powers={"lamp": 1e3})
