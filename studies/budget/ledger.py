@@ -267,9 +267,11 @@ class Plan:
 
 def as_stated(study: Study) -> Plan:
     """Plan without a budget: bands and samples as the study states, lenses as the study and its sensors state."""
-    lights = (illuminant(name) for name in study.spectra if name != OWN)
-    bands = fine_bands(lights, study.render.range_nm, study.render.band_nm)
-    renders = {scene: in_bands(bands, most_spp(study, scene), study.render.denoise) for scene in study.scenes}
+    renders = {}
+    for scene in study.scenes:
+        lights = (illuminant(name) for name in (*study.spectra, scene.light) if name not in (OWN, None))
+        bands = fine_bands(lights, study.render.range_nm, study.render.band_nm)
+        renders[scene] = in_bands(bands, most_spp(study, scene), study.render.denoise)
     lenses = {name: study.lens.on(preset(name).lens) for name in study.sensors}
     images = {condition: ImageModel(lenses[condition.sensor]) for condition in conditions(study)}
     return Plan(renders=renders, images=images)

@@ -85,6 +85,10 @@ def test_ws_electrons_per_lux_are_the_integral(wall: Transport) -> None:
 def test_a_study_without_a_plan_gives_a_lamps_lines_a_band_of_their_own() -> None:
     (model,) = as_stated(Study((SceneChoice("flat_field"),), ("1lux",), spectra=("own", "sodium_low"))).renders.values()
     assert min(model.width_nm) == pytest.approx(1.6, abs=0.01)
+    scenes = SceneChoice("flat_field", light="sodium_low"), SceneChoice("color_checker")
+    assert [min(x.width_nm) for x in as_stated(Study(scenes, ("1lux",))).renders.values()] == pytest.approx(
+        [1.6, 20.0], abs=0.01
+    )
 
 
 def test_a_study_renders_the_range_that_it_asks_for() -> None:
