@@ -11,9 +11,12 @@ samples; both averaged over 3x3 samples. A pixel gets c + (p - c) e / (e + (p - 
 
 Where the guide is every other pixel, as Bayer's G, half of its value at a colour's sample is p's; the other half is the
 sample and the difference between both, carried along rows and columns from the side that changes the least.
+
+Grey is what the prior knows best, and fine grey stripes are what lines know least: all of this counts by how far the
+light around is from grey.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -27,13 +30,20 @@ FLAT = 1e-4  # of the guide's squared mean: of variances under this, a is the ra
 MISSES = 0.25  # of the squared difference of b from its four neighbours' mean: what b misses between samples
 LEAST_MISS = 0.05  # of b between samples, where these say as much as noise [units of noise^2]
 NEAR = 0.62  # weight of a sample's own difference, beside that of the next pixel
+GREY, COLOURED = 0.04, 0.14  # of R, G or B over their mean: where lines begin to count, and where they count in full
 REACH = 18  # pixels that a value depends on
 TOGETHER = 128  # rows, even: they stay in a core's cache
 _LEAST = np.float32(1e-12)  # units of noise^2, to divide by
 Phase = tuple[int, int]  # row and column within 2x2 pixels
 
 
-def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64], black: Sequence[float]) -> None:
+def follow(
+    planes: Singles,
+    tile: Tile,
+    noise: NDArray[np.float64],
+    black: Sequence[float],
+    balanced: Callable[[Singles], NDArray[np.float64]],
+) -> None:
     """Bring the channels that a mosaic samples once in 2x2 pixels to their guide's lines.
 
     Parameters
@@ -46,6 +56,8 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64], black: Seque
         Posterior variance of a pixel over a sample's noise: where it is small, samples say little of lines.
     black : (channel,) sequence of float
         Reading of no light, under which no line goes.
+    balanced : callable
+        Gives the light of values (..., channel) of `planes`, equal in all channels for a grey.
     """
     names, letters = channels(tile), channel_map(tile, (4, 4))
     sites = {name: [(i, j) for i, j in np.ndindex(2, 2) if np.all(letters[i::2, j::2] == name)] for name in names}
@@ -61,12 +73,13 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64], black: Seque
         strip = np.pad(planes[rows[first : first + TOGETHER + 2 * REACH]], sides, mode="reflect")
         # By row and column within 2x2 pixels: (2, 2, channel, row, column).
         parts = strip.reshape(len(strip) // 2, 2, -1, 2, len(names)).transpose(1, 3, 4, 0, 2).copy()
-        lines = parts[:, :, names.index(guide)].copy()
+        lines, share = parts[:, :, names.index(guide)].copy(), _colourfulness(parts, names, balanced)
         for c in colours if sites[guide] in ([(0, 0), (1, 1)], [(0, 1), (1, 0)]) else ():
             (site,) = sites[names[c]]
             lines[site] = 0.5 * (lines[site] + _carried(parts[*site, c], site, lines, sites[guide]))
         for c in colours:
-            _follow(parts[:, :, c], lines, sites[names[c]][0], LEAST_MISS / float(noise[c]) ** 2, black[c])
+            least = LEAST_MISS / float(noise[c]) ** 2
+            _follow(parts[:, :, c], lines, sites[names[c]][0], least, black[c], share)
         inside = parts[..., edge:-edge, edge:-edge].transpose(3, 0, 4, 1, 2)
         # A strip is written when the next one has been read.
         for place, values in before:
@@ -76,8 +89,19 @@ def follow(planes: Singles, tile: Tile, noise: NDArray[np.float64], black: Seque
     planes[before[0][0]] = before[0][1]
 
 
-def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: float) -> None:
-    """Overwrite a colour (2, 2, row, column) but for its samples, those of `site`."""
+def _colourfulness(
+    parts: Singles, names: tuple[str, ...], balanced: Callable[[Singles], NDArray[np.float64]]
+) -> Singles:
+    """0 where the light around is grey, 1 where it is coloured, for cells of 2x2 pixels."""
+    around = np.stack([_means(_means(plane)) for plane in parts.mean(axis=(0, 1))], axis=-1)
+    light = balanced(around)[..., [c for c, name in enumerate(names) if name != "W"]]
+    mean = np.maximum(light.mean(axis=-1), _LEAST)
+    most = np.abs(light - mean[..., None]).max(axis=-1) / mean
+    return np.asarray(np.clip((most - GREY) / (COLOURED - GREY), 0.0, 1.0), np.float32)
+
+
+def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: float, most: Singles) -> None:
+    """Overwrite a colour (2, 2, row, column) by the share `most` at most, but for its samples, those of `site`."""
     others = [phase for phase in np.ndindex(2, 2) if phase != site]
     b, a, middle, variance = _line(plane[site], guide[site])
     around = sum(np.roll(b, step, axis) for step in (1, -1) for axis in (0, 1))
@@ -86,9 +110,9 @@ def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: fl
     lines = [_between(b, site, phase) + _between(a, site, phase) * guide[phase] for phase in others]
     lines = [np.maximum(line, np.float32(black)) for line in lines]
     differences = [plane[phase] - line for phase, line in zip(others, lines, strict=True)]
-    share = missed / (missed + _means(np.mean(np.square(differences), axis=0)))
-    for phase, line, difference in zip(others, lines, differences, strict=True):
-        plane[phase] = line + share * difference
+    squares = _means(np.mean(np.square(differences), axis=0))
+    for phase, difference in zip(others, differences, strict=True):
+        plane[phase] -= most * (squares / (missed + squares)) * difference
 
 
 def _carried(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:

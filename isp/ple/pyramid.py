@@ -62,7 +62,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     """
     electrons, full = counted_electrons(raw), full_white(raw)
     shot, dark_e = counted_noise(raw)
-    white_e = np.asarray(white_e) / shot
+    white_e = np.asarray(white_e) / shot  # as counted
     levels = pyramid(raw, white_e, electrons, full)
     coarsest = levels[-1]
     light = _light_of_sums(coarsest, [border(length, CELLS) for length in coarsest.full.shape[:2]], STRIDE).mean
@@ -77,17 +77,21 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     sums = _light_of_sums(cells, _sides(raw.shape, cells.full.shape, PATCH), 1)
     scale = scale_of_pixels(raw, white_e, electrons, full)
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
-    planes = estimates.planes[..., cells.index]
-    black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in cells.index]
-    follow(planes, raw.cfa, estimates.noise[list(cells.index)], black)
-    apart = [(c, i) for c, i in enumerate(cells.index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
+    index = list(cells.index)
+    planes, noise = estimates.planes[..., index], estimates.noise[index]
+    apart = [(c, i) for c, i in enumerate(index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
+
+    def in_electrons(values: Singles) -> NDArray[np.float64]:
+        result = readings(raw.dark_noise_e).electrons(values)
+        for c, i in apart:
+            result[..., c] = readings(float(dark_e[i])).electrons(values[..., c]) * shot[i]
+        return result
+
+    black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in index]
+    follow(planes, raw.cfa, noise, black, lambda values: in_electrons(values) / (white_e * shot)[index])
     for first in range(0, len(planes), TOGETHER):
-        rows = planes[first : first + TOGETHER]
-        counted = [readings(float(dark_e[i])).electrons(rows[..., c]) * shot[i] for c, i in apart]
-        rows[...] = readings(raw.dark_noise_e).electrons(rows)
-        for (c, _), plane in zip(apart, counted, strict=True):
-            rows[..., c] = plane
-    return planes, estimates.noise[list(cells.index)]
+        planes[first : first + TOGETHER] = in_electrons(planes[first : first + TOGETHER])
+    return planes, noise
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
