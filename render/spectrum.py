@@ -26,6 +26,7 @@ SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in n
 MOST_OVERLAP = 0.01  # of the narrower of two bands: rounding of stated edges, not light that counts twice
 LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
 LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
+LEAST_LINE = 1e-3  # of a light's power: less is noise of a curve that is measured finely
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
 
 
@@ -147,11 +148,11 @@ def line_bands(
 
 
 def emission_lines_nm(spectrum: Spectrum) -> Floats:
-    """Wavelengths of a spectrum's emission lines (`line_spectrum`): peaks under 0.2 nm wide."""
+    """Wavelengths of a spectrum's emission lines (`line_spectrum`): peaks under 0.2 nm wide, twice their sides."""
     nm, values = spectrum.wavelength_nm, spectrum.values
-    narrow = np.diff(nm) <= LINE_BASE_NM
-    peak = narrow[:-1] & narrow[1:] & (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
-    return nm[1:-1][peak]
+    beside, power = np.maximum(values[:-2], values[2:]), values[1:-1] * (nm[2:] - nm[:-2]) / 2
+    narrow = np.maximum(nm[2:] - nm[1:-1], nm[1:-1] - nm[:-2]) <= LINE_BASE_NM
+    return nm[1:-1][narrow & (values[1:-1] > 2 * beside) & (power > LEAST_LINE * np.trapezoid(values, nm))]
 
 
 def fine_bands(
@@ -160,8 +161,8 @@ def fine_bands(
     """Band centres and widths that follow lights: even bands, and a narrow one for each emission line of any."""
     lines = np.unique(np.concatenate([np.zeros(0), *map(emission_lines_nm, spectra)]))
     within = lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)]
-    count = max(1, round((range_nm[1] - range_nm[0]) / width_nm))
-    return line_bands(within, range_nm, width_nm) if within.size else even_bands(range_nm, count)
+    even = even_bands(range_nm, max(1, round((range_nm[1] - range_nm[0]) / width_nm)))
+    return line_bands(within, range_nm, width_nm) if within.size else even
 
 
 def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:
@@ -221,8 +222,7 @@ def black_body(temperature_k: float) -> Spectrum:
     second_radiation_constant_nm_k = 1.438776877e7  # CODATA 2018, exact SI: h c / k
     nm = np.arange(300.0, 1101.0, 5.0)
     exponent = second_radiation_constant_nm_k / temperature_k
-    relative = (560.0 / nm) ** 5 * np.expm1(exponent / 560.0) / np.expm1(exponent / nm)
-    return Spectrum(nm, relative)
+    return Spectrum(nm, (560.0 / nm) ** 5 * np.expm1(exponent / 560.0) / np.expm1(exponent / nm))
 
 
 PUBLISHED = Path(__file__).parent / "data" / "published_spectra.json"

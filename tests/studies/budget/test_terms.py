@@ -90,6 +90,14 @@ def test_smooth_lights_are_referred_to_bands_of_10_nm() -> None:
     assert np.allclose(width_nm, 10.0)
 
 
+def test_noise_of_a_finely_measured_lamp_is_no_line() -> None:
+    nm, noise = np.arange(380.0, 780.0, 0.05), np.random.default_rng(0).standard_normal((2, 8000))
+    lamp = np.exp(-(((nm - 570.0) / 60.0) ** 2)) * (1 + 0.02 * noise[0]) + 0.003 * np.maximum(noise[1], 0.0)
+    assert not emission_lines_nm(Spectrum(nm, lamp)).size
+    lamp[1000] += 50.0  # a line of 2 % of the light
+    assert emission_lines_nm(Spectrum(nm, lamp)) == pytest.approx([430.0])
+
+
 def test_a_lamps_lines_get_bands_of_their_own_that_no_plan_merges() -> None:
     assert np.allclose(emission_lines_nm(illuminant("sodium_low")), [588.995, 589.592])
     nm, width_nm = fine_bands([illuminant("sodium_low")])
