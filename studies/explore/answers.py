@@ -21,7 +21,7 @@ from studies.explore.messages import Header, sensor_terms, write_dropped
 from studies.explore.slow import stand_in
 from studies.explore.source import Rendered
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
-from studies.photograph.camera import calibrate, noted
+from studies.photograph.camera import calibrate, with_notes
 from studies.study.render_noise import monte_carlo_share, noise_note
 from studies.study.scene_source import first_light
 
@@ -112,7 +112,7 @@ def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
         raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
     exposed = expose_scene(rendered.transport, controls, memo)
     light = first_light(exposed.transport.groups, illuminant(controls.reference_light))
-    raw = noted(exposed.raw, exposed.sensor, calibrate(exposed.sensor, light), controls.sensor)
+    raw = with_notes(exposed.raw, exposed.sensor, calibrate(exposed.sensor, light), controls.sensor)
     memo.check()
     with TemporaryDirectory() as folder:
         (path,) = write_raw(raw, Path(folder) / "explored.dng")

@@ -118,7 +118,9 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
     return groups
 
 
-def worded(report: ReportData, axis: int, a: int, b: int) -> list[tuple[Group, tuple[str, str, str, str, str]]]:
+def comparison_words(
+    report: ReportData, axis: int, a: int, b: int
+) -> list[tuple[Group, tuple[str, str, str, str, str]]]:
     """Groups as of `groups_of`, and what is said of each.
 
     That is who is better, what it is worth in light, whether a white balance misses by more, what the two have in
@@ -187,7 +189,7 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
                 metric.key: _flat(leads(metric, sides[i][metric.key], sides[j][metric.key])) for metric in metrics
             }
         for a, b in permutations(range(length), 2) if axis in RIVALS else ():
-            compared, key = worded(report, axis, a, b), f"{a} {b}"
+            compared, key = comparison_words(report, axis, a, b), f"{a} {b}"
             groups = [group for group, _ in compared]
             across["answers"][key] = [
                 {"said": said, "light": light, "balance": balance, "times": " ".join(filter(None, further))}
@@ -237,12 +239,13 @@ def markdown(report: ReportData, command: str, a: int) -> str:
     b = of.b if a == of.a else next(value for value in range(len(axis.values)) if value != a)
     words = [
         " ".join(filter(None, ("-", code(x.title) if x.title else "", said, light, balance, best)))
-        for x, (said, light, balance, _, best) in worded(report, of.compared, a, b)
+        for x, (said, light, balance, _, best) in comparison_words(report, of.compared, a, b)
     ]
+    seeds = "1 seed" if len(report.seeds) == 1 else f"{len(report.seeds)} seeds"
     parts = [
         f"# {code(report.title)}",
         f"    {command}",
-        f"rodcone {report.rodcone}, study {code(report.name)}, {len(report.seeds)} seed{'s'[: len(report.seeds) - 1]}. "
+        f"rodcone {report.rodcone}, study {code(report.name)}, {seeds}. "
         f"{code(axis.values[a])} beside {code(axis.values[b])}:",
         "\n".join(words),
         f"Lead of {code(axis.values[a])}, half the 95 % interval over seeds after ±. **Bold**: behind by what a person "

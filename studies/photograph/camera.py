@@ -277,10 +277,12 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         colour = calibrate(sensor, light or illuminant("D65"))
     except InputError:
         colour = None
-    return noted(raw, sensor, colour)
+    return with_notes(raw, sensor, colour)
 
 
-def noted(raw: RawImage, sensor: SensorConfig, colour: ColourCalibration | None, source: str | Path = "") -> RawImage:
+def with_notes(
+    raw: RawImage, sensor: SensorConfig, colour: ColourCalibration | None, source: str | Path = ""
+) -> RawImage:
     """Raw image with what a camera notes beside a frame: its name, by the sensor's preset or file, lens and colours."""
     name = Path(source).stem.encode("ascii", "replace").decode() or raw.camera
     return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)

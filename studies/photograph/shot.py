@@ -29,7 +29,7 @@ from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending, write_raw
 from sensor.response import expected_electrons
 from sensor.shake import held_lens
-from studies.photograph.camera import calibrate, noted
+from studies.photograph.camera import calibrate, with_notes
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
@@ -210,7 +210,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
     taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
-    raws = [noted(frame, sensor, colour, order.sensor) for frame in taken]
+    raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)
     if opened is not None:
