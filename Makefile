@@ -48,7 +48,8 @@ TESTS := not slow
 test-any-cpu: $(VENV)/installed-dev
 	@$(BIN)/python tests/any_cpu/configurations.py --cpu "$(CPU)" -q -n auto --maxprocesses 8 --dist worksteal -m "$(TESTS)"
 
-# A part that passed has a stamp, which newer code makes void; `make --keep-going verify` goes on after one that fails.
+# A part that passed has a stamp of when it began, which newer code makes void; `make --keep-going verify` goes on after
+# one that fails.
 CODE = $(shell find rodcone render scenes sensor isp studies tests benchmarks -name "*.py")
 SLOW = $(shell grep -rl --include="test_*.py" "pytest.mark.slow" tests)
 verify: $(addprefix out/verify/,$(SLOW) any-cpu faults fuzz soak)
@@ -57,8 +58,9 @@ out/verify/faults: PART = tests/faults/plant_faults.py
 out/verify/fuzz: PART = tests/fuzz/run.py --seconds 3600
 out/verify/soak: PART = tests/soak/soak.py
 out/verify/%: $(CODE) | $(VENV)/installed-dev
-	@echo "$*" && $(BIN)/python $(or $(PART),-m pytest -q -m slow $*)
-	@mkdir -p $(@D) && touch $@
+	@mkdir -p $(@D) && touch $@.begun && echo "$*"
+	@$(BIN)/python $(or $(PART),-m pytest -q -m slow $*)
+	@mv $@.begun $@
 
 hard-cases: $(VENV)/installed-dev
 	@PYTHONPATH=tests $(BIN)/python -m hard.page
