@@ -51,6 +51,8 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
             OWN,
         ): "similarity of noisy samples takes those that noise raised alike together: 0.5 % of a sample's "
         "noise in W at 6 e⁻; from 10 e⁻ a pixel on under 0.1 %, which 48 frames don't tell from none",
+        ("sigma_s_0.001_dark", "pictures unbiased"): "light between a channel's samples is drawn neutral; in planes "
+        "that nothing smooths noise lies there",
         ("balance_1e6", "bounded"): _NEUTRAL,
         ("largest_number", "linear"): "the readout holds means at 1e30 e⁻, over any well",
         (
