@@ -192,9 +192,8 @@ def warn_if_full(raw: RawImage) -> None:
 def warn_if_dark(raw: RawImage) -> None:
     """Warn of a frame that shows nothing but its dark noise; one of no time at all is meant so."""
     lit = float(np.mean(raw.electrons > DARK_SIGMAS * raw.dark_noise_e))
-    if (
-        raw.exposure_s > 0 and not _dark_full(raw) and lit < max(LEAST_LIT, 1.5 / (raw.dn.size + 1))
-    ):  # of few pixels one may be so by chance
+    least_lit = max(LEAST_LIT, 1.5 / (raw.dn.size + 1))  # of few pixels one may be lit by chance
+    if raw.exposure_s > 0 and not _dark_full(raw) and lit < least_lit:
         warnings.warn(
             f"exposure_s: {1 - lit:.1%} of the pixels read no more than dark noise ({raw.dark_noise_e:.2g} e-) at "
             f"{raw.exposure_s:g} s; give a longer time, or more light",

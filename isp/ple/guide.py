@@ -100,8 +100,8 @@ def _colourfulness(
     return np.asarray(np.clip((most - GREY) / (COLOURED - GREY), 0.0, 1.0), np.float32)
 
 
-def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: float, most: Singles) -> None:
-    """Overwrite a colour (2, 2, row, column) by the share `most` at most, but for its samples, those of `site`."""
+def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: float, share: Singles) -> None:
+    """Overwrite a colour (2, 2, row, column) by `share` at most, but for its samples, those of `site`."""
     others = [phase for phase in np.ndindex(2, 2) if phase != site]
     b, a, middle, variance = _line(plane[site], guide[site])
     around = sum(np.roll(b, step, axis) for step in (1, -1) for axis in (0, 1))
@@ -112,7 +112,7 @@ def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: fl
     differences = [plane[phase] - line for phase, line in zip(others, lines, strict=True)]
     squares = _means(np.mean(np.square(differences), axis=0))
     for phase, difference in zip(others, differences, strict=True):
-        plane[phase] -= most * (squares / (missed + squares)) * difference
+        plane[phase] -= share * (squares / (missed + squares)) * difference
 
 
 def _carried(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:
