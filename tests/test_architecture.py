@@ -13,8 +13,6 @@ MODULES = sorted(path for name in PACKAGES for path in (ROOT / name).rglob("*.py
 SCRIPTS = sorted(path for name in ("tests", "benchmarks") for path in (ROOT / name).rglob("*.py"))
 TEXTS = {".py", ".md", ".toml", ".yaml", ".yml", ".cff", ".html", ".j2", ".css", ".js", ".json", ".csv", ".txt", ""}
 
-MOST_MODULE_LINES = 300
-LONG_MODULES = {"render/integrator/dense.py"}  # one algorithm, read from top to bottom
 MOST_FUNCTION_LINES, MOST_WITHOUT_SECTIONS = 100, 50
 MOST_MODULES_A_FOLDER = 20
 ONE_A_THING = ("scenes", "studies/commands", "studies/paper")  # a scene, a command, a figure: as many as there are
@@ -65,12 +63,6 @@ def test_no_module_binds_a_packages_bare_name() -> None:
 
 def functions(path: Path) -> Iterator[ast.FunctionDef | ast.AsyncFunctionDef]:
     return (node for node in nodes(path) if isinstance(node, ast.FunctionDef | ast.AsyncFunctionDef))
-
-
-def test_a_module_can_be_read_in_one_go() -> None:
-    lines = {name_of(path): len(path.read_text("utf-8").splitlines()) for path in MODULES}
-    wrong = {name: count for name, count in lines.items() if count > MOST_MODULE_LINES and name not in LONG_MODULES}
-    assert not wrong, f"{wrong} lines; split a module at {MOST_MODULE_LINES} where it holds two things"
 
 
 def test_a_long_function_has_sections() -> None:
