@@ -44,7 +44,6 @@ from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.presets import preset, vary
 from studies.design.expect import MIDDLE, expect, lens_of, noise_of, responses_e, sampling_of, view_of
-from studies.design.search import Goal, best_tile
 from studies.metrics.confidence import half_width
 from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import capture, colour_fit, develop_to_scale
@@ -64,7 +63,7 @@ MOSAICS: Mapping[str, Mapping[str, str]] = {
     **{rows: {} for rows in ("RBWB/GRGR/RWBB/BGRG", "WRWG/GWBW", "GRGB/GBGR")},
     "rccb": {"C": "W"},
     "ryyb": {"Y": "G"},
-    "BRBR/RGRG/BRBR/RGWG": {},  # found by `rodcone design low_noise`
+    "BRBR/RGRG/BRBR/RGWG": {},  # found by `benchmarks/design_mosaic.py`
     "cyym": {"C": "R", "Y": "G", "M": "B"},
     "cygm": {"C": "R", "M": "B", "Y": "W"},
     "cmyw": {"C": "R", "M": "G", "Y": "B"},
@@ -238,6 +237,8 @@ def linear_db(prior: str, sensor: SensorConfig, time_s: float) -> float:
 
 def known_order() -> str:
     """Gains over Bayer where photons are the only noise, 1000 in W: random tiles, the best that is found."""
+    from design_search import Goal, best_tile
+
     photons, rng = preset(PAGE.parent / "eye" / "photons.toml"), np.random.default_rng(0)
     time_s, tiles = 8.6e-3, ["/".join("".join(row) for row in rng.choice(list("RGBW"), (4, 4))) for _ in range(20)]
     lines = ["| over Bayer [dB] | random | best |", "|---|---|---|"]

@@ -1,4 +1,4 @@
-"""Cameras of `rodcone design --filters` beside Bayer and RGBW by simulation: `docs/make/filters.py HASH`.
+"""Cameras of `benchmarks/design_mosaic.py --filters` beside Bayer and RGBW by simulation: `docs/make/filters.py HASH`.
 
 Ten scenes are drawn from HASH, a commit's, lit by D65, photographed at seven levels, in each by chips of their own, and
 developed by `ple`, whose prior is trained anew for the cameras found, docs/filters/. Radiance, priors and rows are

@@ -13,6 +13,8 @@ from rodcone.files import write_files
 from studies.sweep.export import read_rows
 from studies.sweep.row import Row
 
+sys.path.append(str(Path(__file__).resolve().parents[2] / "benchmarks"))  # which pages may quote
+
 Parts = tuple[dict[str, str], str, str]  # of a page, by name; its figure as SVG, empty for none; its table as CSV
 
 csv_text = partial(csv_of, line_end="\n")  # as git keeps the results' tables

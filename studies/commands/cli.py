@@ -49,7 +49,6 @@ app.command("studies.commands.characterise:characterise", name="characterise", h
 app.command("studies.commands.dataset:dataset", name="dataset", help="Make raw frames and their truth to train on.")
 app.command("studies.commands.demo:demo", name="demo", help="Compare RGBW and Bayer from moonlight to daylight.")
 app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
-app.command("studies.commands.design:design", name="design", help="Search for the best mosaic for a range of light.")
 app.command("studies.commands.doctor:doctor", name="doctor", help="Say what is installed, and whether all is well.")
 app.command("studies.commands.expect:expect", name="expect", help="Compute which error to expect in which light.")
 app.command("studies.commands.explore:explore", name="explore", help="Open a page on which sliders change a camera.")

@@ -17,7 +17,7 @@ from sensor.presets import preset, vary
 from studies.commands.console import print_json, print_table, require_place
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
-from studies.pages.design_page import gain_svg
+from studies.pages.gain_plot import gain_svg
 from studies.study.levels import UNITS, levels_between, parse_exposure, parse_level
 
 

@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
+from design_slope import error_slopes
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
-from isp.design.slope import error_slopes
 
 PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
 MIDDLE = np.array([2, 3])

@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
+from design_search import BEHIND, Goal, camera_db
+from design_slope import error_slopes
 from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
-from isp.design.slope import error_slopes
 from isp.design.spectral_prior import load_prior
 from render.spectrum import Floats, Spectrum
 from rodcone.progress import Step
@@ -17,7 +18,6 @@ from sensor.optics import camera_equation
 from sensor.presets import vary
 from sensor.response import electrons_per_irradiance
 from studies.design.expect import MIDDLE, LitPrior, drawn_pixels, exposed, metric_rows, sites_of, spread_of, view_of
-from studies.design.search import BEHIND, Goal, camera_db
 
 STEP_NM = 20.0  # between the bumps that a filter's transmittance is made of, and their standard deviation
 
