@@ -15,7 +15,7 @@ from render.spectrum import (
     luminance,
     published_spectra,
 )
-from rodcone.csv_file import read_columns
+from rodcone.curve_file import is_curve_file, read_columns
 from rodcone.errors import InputError, one_line, require_range, unknown
 from rodcone.optional import quietly_imported
 
@@ -26,6 +26,8 @@ _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
 # 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
 MOON_SLOPE_PER_NM = 1.48e-3
 _NUMBER = re.compile(r"\d{4,5}")  # too large for a name's
+# Units of a column that no factor turns into power per wavelength.
+_NOT_POWER = re.compile(r"\b(?:[µμu]?mol\w*|photons?|quanta|dBm?|log\w*|counts?)\b", re.IGNORECASE)
 _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
@@ -52,11 +54,6 @@ def lines_nm(name: str) -> tuple[float, ...]:
     return _LINES[name][0] if name in _LINES else ()
 
 
-def is_light_file(name: str) -> bool:
-    """Whether a light's name is that of a CSV file, a lamp that was measured."""
-    return name.lower().endswith(".csv")
-
-
 def illuminant(name: str) -> Spectrum:
     """Spectrum of a named light with a luminance of 1 cd/m^2.
 
@@ -64,8 +61,9 @@ def illuminant(name: str) -> Spectrum:
     ----------
     name : str
         One of `names()`; or ``3000K`` or ``3000 K``, a black body; or ``D7000K``, daylight of that temperature; or what
-        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s; or a CSV file,
-        ``led.csv``, with the columns ``wavelength_nm`` and one more, in any unit of power. It is read at each call.
+        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s; or a file,
+        ``led.csv``, ``.txt``, ``.spd`` or ``.spdx``, of wavelengths and one more column, in any unit of power
+        (`rodcone.curve_file.read_columns`). It is read at each call.
 
     Raises
     ------
@@ -76,7 +74,7 @@ def illuminant(name: str) -> Spectrum:
         raise InputError(
             f"illuminant: {name!r} is no name; allowed: names such as D65; write '{name} K' for a black body"
         )
-    return _measured(name) if is_light_file(name) else _named(name)
+    return _measured(name) if is_curve_file(name) else _named(name)
 
 
 def _measured(path: str) -> Spectrum:
@@ -84,6 +82,12 @@ def _measured(path: str) -> Spectrum:
     if len(columns) != 2:
         raise InputError(
             f"illuminant: {path!r} has {len(columns) - 1} columns beside wavelength_nm; allowed: 1; keep one lamp"
+        )
+    column = list(columns)[1]
+    if unit := _NOT_POWER.search(column):
+        raise InputError(
+            f"illuminant: {path!r}: its column {column!r} is in {unit[0]}; allowed: power per wavelength, "
+            "in any unit; convert it"
         )
     try:
         nm, values = columns.values()

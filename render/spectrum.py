@@ -263,6 +263,7 @@ def optical_constant(material: str, part: str) -> Spectrum | None:
 
 
 PLANCK_J_S = 6.62607015e-34  # exact, SI 2019
+ELECTRON_C = 1.602176634e-19  # charge of an electron, exact
 LIGHT_M_S = 299792458.0  # exact
 LUMINOUS_EFFICACY_LM_W = 683.0  # SI: K_cd at 540 THz
 

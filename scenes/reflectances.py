@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from render.spectrum import Floats, Spectrum, published_spectra
-from rodcone.csv_file import read_columns
+from rodcone.curve_file import read_columns
 from rodcone.errors import InputError, in_place
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from render.spectrum import Spectrum
-from rodcone.errors import InputError, in_place, read_errors
+from rodcone.errors import InputError, in_place, read_errors, require_name
 from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
@@ -20,6 +20,7 @@ from sensor.photodiodes import binned
 _SETTINGS = ("bits", "black_level_dn", "white_level_dn", "window_nm")
 MOST_PRNU = 0.1  # of a signal: sensors have 0.003 to 0.02
 MOST_OUTSIDE = 0.01  # share of a response outside the window
+OF_TABLES = ("csv", "quantum_efficiency", "ir_cut")  # keys of [responses] that may name a file
 _OF_READINGS = ("read_noise_e", "dsnu_e", "full_well_e")  # keys of each of several readings, in place of the pixel's
 
 
@@ -33,8 +34,9 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
         ``window_nm``, ``binning`` ("charge" or "digital"), ``readout`` ("merged" or "switched") with ``[[readings]]``
         (fields of `Reading`), ``[[channels]]`` (fields of `ChannelReading`), and ``[responses]``: ``csv``, its
-        ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a CSV) and ``ir_cut`` (nm, or a
-        CSV). Names of CSV files are relative to the TOML's folder.
+        ``range_nm``, its ``quantum_efficiency`` ("included", "relative", a number, or a table), its ``unit``
+        ("per_photon" by default, or "per_watt") and ``ir_cut`` (nm, or a table). The tables are files of curves
+        (`rodcone.curve_file.read_columns`), whose names are relative to the TOML's folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -95,6 +97,7 @@ class _ResponsesTable:
     csv: str
     range_nm: tuple[float, float]
     quantum_efficiency: str | float
+    unit: str = "per_photon"
     ir_cut: str | float | None = None
 
 
@@ -128,6 +131,7 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
     tile = tile_of(table.cfa) if cfa is None else cfa
     if table.responses is not None:
         responses = _responses(table.responses, folder)
+        _check_channels(tile, responses, table.responses.csv)
     else:
         responses = rgbw() if set(channels(tile)) <= set("RGBW") else built_in()
     # Of another mosaic than the file's own, a channel that only that one has falls away.
@@ -159,13 +163,25 @@ def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:
 def _responses(table: _ResponsesTable, folder: Path) -> Responses:
     scale = table.quantum_efficiency
     efficiency = None if scale in ("included", "relative") else scale
-    responses = read_csv(
+    require_name("responses: unit", table.unit, ("per_photon", "per_watt"))
+    return read_csv(
         folder / table.csv,
         range_nm=table.range_nm,
         ir_cut=_number_or_curve(table.ir_cut, folder),
         quantum_efficiency=_number_or_curve(efficiency, folder),
+        unit=table.unit,
+        relative=scale == "relative",
     )
-    return Responses(responses.curves, relative=scale == "relative")
+
+
+def _check_channels(tile: Tile, responses: Responses, name: str) -> None:
+    """Raise `InputError` where a channel of the mosaic has no column in the file of responses."""
+    needed, columns = channels(tile), list(responses.curves)
+    if set(needed) - set(columns):
+        raise InputError(
+            f"responses: {name!r} has the columns {', '.join(columns)}; allowed: one for each channel of the mosaic, "
+            f"{', '.join(needed)}; rename them in its header"
+        )
 
 
 def _number_or_curve(value: str | float | None, folder: Path) -> float | Spectrum | None:

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from render.illuminants import illuminant
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, photons_per_joule
-from rodcone.csv_file import read_columns
+from render.spectrum import DEFAULT_WAVELENGTH_NM, ELECTRON_C, Floats, Spectrum, band_widths, photons_per_joule
+from rodcone.curve_file import read_columns
 from rodcone.display import Axes, brief, draw_curves
 from rodcone.doors import method
 from rodcone.errors import InputError, require_keys, require_range
@@ -172,6 +172,8 @@ def read_csv(
     range_nm: tuple[float, float] | None = None,
     ir_cut: float | Spectrum | None = None,
     quantum_efficiency: float | Spectrum | None = None,
+    unit: str = "per_photon",
+    relative: bool = False,
 ) -> Responses:
     """Read measured responses: a header ``wavelength_nm,R,G,...`` and one row a wavelength.
 
@@ -185,6 +187,12 @@ def read_csv(
         Filter in front: the wavelength from which it lets nothing through, or its transmittance.
     quantum_efficiency : float or Spectrum, optional
         Of the photodiode, which multiplies every curve. None where the file holds it.
+    unit : str
+        ``per_photon``; or ``per_watt`` for responses per radiant power, which are divided by the wavelength. These are
+        amperes per watt, and so give electrons per photon, unless they are relative or a quantum efficiency is given:
+        then the greatest of them becomes 1.
+    relative : bool
+        Whether only their ratios are known.
 
     Raises
     ------
@@ -194,6 +202,8 @@ def read_csv(
     """
     curves = _table(path)
     nm = next(iter(curves.values())).wavelength_nm
+    if unit == "per_watt":
+        curves = _per_photon(curves, amperes=not relative and quantum_efficiency is None)
     if range_nm is not None:
         curves = {channel: _within(curve, range_nm, str(path)) for channel, curve in curves.items()}
     if quantum_efficiency is not None:
@@ -205,7 +215,7 @@ def read_csv(
         require_range("ir_cut", ir_cut, nm[0] + 1e-9, 1e5, "give nm within the file's wavelengths, or a curve")
         last = min(float(ir_cut), float(nm[-1]) if range_nm is None else range_nm[1])
         curves = {name: _within(curve, (float(curve.wavelength_nm[0]), last), "") for name, curve in curves.items()}
-    return Responses(curves)
+    return Responses(curves, relative)
 
 
 def read_curve(path: str | Path) -> Spectrum:
@@ -227,6 +237,16 @@ def _table(path: str | Path) -> dict[str, Spectrum]:
     columns = read_columns(path, "responses")
     nm = columns.pop("wavelength_nm")
     return {name: Spectrum(nm, column) for name, column in columns.items()}
+
+
+def _per_photon(curves: dict[str, Spectrum], *, amperes: bool) -> dict[str, Spectrum]:
+    """Responses per radiant power as responses per photon: h c / (e wavelength) electrons per photon for 1 A/W."""
+    per_photon = {
+        name: Spectrum(x.wavelength_nm, x.values / (photons_per_joule(x.wavelength_nm) * ELECTRON_C))
+        for name, x in curves.items()
+    }
+    greatest = max(float(curve.values.max()) for curve in per_photon.values())
+    return per_photon if amperes or greatest <= 0 else {n: x * (1.0 / greatest) for n, x in per_photon.items()}
 
 
 def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectrum:

@@ -140,9 +140,9 @@ class RenderOrder:
         Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default, and a lamp's lines apart.
     light : tuple of str
         GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
-        alone, for all of them; may be given several times. An illuminant is a name or a CSV file: lamp=led.csv.
+        alone, for all of them; may be given several times. An illuminant is a name or a file: lamp=led.csv.
     chart : str, optional
-        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
+        File (.csv, .txt, .spd) of reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     level : str, optional
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.

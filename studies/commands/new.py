@@ -7,6 +7,7 @@ from types import MappingProxyType
 
 from cyclopts import App
 
+from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_absent, require_keys, require_range
 from rodcone.files import check_place, require_ending, write_files
 from rodcone.toml_file import read_toml
@@ -154,7 +155,7 @@ def _named(study_file: Path) -> list[str]:
     for name in read_toml(study_file).get("sensors", ()):
         if name.endswith(".toml"):
             responses = read_toml(study_file.parent / name).get("responses", {}).values()
-            curves = [value for value in responses if isinstance(value, str) and value.endswith(".csv")]
+            curves = [value for value in responses if isinstance(value, str) and is_curve_file(value)]
             files += [name, *(str(Path(name).parent / curve) for curve in curves)]
     return list(dict.fromkeys(files))
 

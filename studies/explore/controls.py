@@ -12,10 +12,11 @@ import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.settings import DEFAULTS, PAPER, Settings
-from render.illuminants import illuminant, is_light_file, spectral_luminance
+from render.illuminants import illuminant, spectral_luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum
 from render.transport import Transport
+from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_fields, require_keys, require_name, require_range
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
@@ -186,7 +187,7 @@ def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
     emitters = lamps.values() if isinstance(lamps, dict) else ()
     spectra = [lamp.get("spectrum") for lamp in emitters if isinstance(lamp, dict)]
     for light in (content.get("reference_light"), *spectra):  # before anything reads it
-        if isinstance(light, str) and is_light_file(light):
+        if isinstance(light, str) and is_curve_file(light):
             raise InputError(
                 f"light: {light!r} is a file on this machine; allowed: an illuminant's name; load the "
                 "file on the page, as a table"

@@ -74,10 +74,10 @@ class Order:
         Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str
         ILLUMINANT, such as A, in place of all of the scene's lights, or GROUP=ILLUMINANT in place of one group, each at
-        the same luminance; may be given several times. It is a name or a CSV file, such as sky=led.csv. For a file of
+        the same luminance; may be given several times. It is a name or a file, such as sky=led.csv. For a file of
         radiance the light that it was lit by.
     chart : str, optional
-        CSV file with the reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
+        File (.csv, .txt, .spd) of reflectances of color_checker's patches, 1 to 24: wavelength_nm and a column each.
     white_balance : str
         Illuminant, such as D65, under which grey is shown as grey; as-shot for the scene's first light, which is known
         here, and that of --light, or D65, for a file of radiance.

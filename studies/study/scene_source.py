@@ -50,7 +50,7 @@ def open_scene(
     trust, extend
         As of `load_scene_file`.
     light, chart : str, optional
-        Options of a catalogue scene's builder: its light, and a CSV file of reflectances for color_checker's patches.
+        Options of a catalogue scene's builder: its light, and a file of reflectances for color_checker's patches.
     define : sequence of str
         ``NAME=VALUE`` of a scene file's $parameters.
 

@@ -10,6 +10,7 @@ from isp.processors.own import processor_of, require_consent, user_file
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
 from render.spectrum import VISIBLE_NM
+from rodcone.curve_file import ENDINGS as CURVES
 from rodcone.display import brief
 from rodcone.errors import InputError, in_place, require_fields, require_keys, require_range, require_whole, unknown
 from sensor.config import LONGEST_S
@@ -27,7 +28,7 @@ WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
 PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gray World belongs
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 SPP = 1, 1 << 16, "give samples per pixel"
-FILES = (".xml", ".toml", ".csv", *ENDINGS)  # endings of values that name a file
+FILES = (".xml", ".toml", *CURVES, *ENDINGS)  # endings of values that name a file
 
 
 @dataclass(frozen=True)
@@ -44,7 +45,7 @@ class SceneChoice:
     extend : str, optional
         ``hold``: surfaces go on at their end values outside their tables.
     chart : str, optional
-        CSV file with the reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
+        File (``.csv``, ``.spd``) of reflectances of ``color_checker``'s patches, in place of the ColorChecker's.
     define : tuple of str
         ``NAME=VALUE`` of a Mitsuba scene's $parameters.
     spp : int, optional
@@ -123,7 +124,7 @@ class Condition:
     ----------
     scene : SceneChoice
     spectrum : str
-        An illuminant's name or CSV file, or ``own``.
+        An illuminant's name or file, or ``own``.
     level : str
         ``25cd/m2`` (mean scene luminance) or ``500lux`` (on the reference plane).
     exposure : str

@@ -15,9 +15,9 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from render.illuminants import is_light_file
 from rodcone.colour_spaces import decode_srgb
 from rodcone.csv_file import csv_text
+from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_keys, unknown
 from rodcone.files import finite, require_ending, write_files
 from scenes.catalog import load
@@ -188,7 +188,7 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
     scene, measure = CHARTS.get(name, ("metamers", pair_delta_e))
     if row.scene != scene:
         raise InputError(f"show: {name} is known of scene {scene}, not of {row.scene}; leave it out, or give --where")
-    if name == TRUE_PAIRS and is_light_file(row.spectrum):
+    if name == TRUE_PAIRS and is_curve_file(row.spectrum):
         raise InputError(
             f"show: {name} under {row.spectrum}, whose file isn't in the database; allowed: lights by name; "
             "leave it out, or give --where"

@@ -13,10 +13,11 @@ import numpy as np
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from render.denoised.relight import relight_denoised
-from render.illuminants import illuminant, is_light_file
+from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
 from render.transport import Transport
+from rodcone.curve_file import is_curve_file
 from rodcone.digests import digest_inputs
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, at_level_s, most_informative_s
@@ -80,7 +81,7 @@ def frame_key(
 
     The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
     """
-    light = illuminant(spectrum) if is_light_file(spectrum) else spectrum
+    light = illuminant(spectrum) if is_curve_file(spectrum) else spectrum
     area = [] if study.equal_area is None else [study.equal_area]
     return digest_inputs([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
 

@@ -130,6 +130,12 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
     assert changed.wavelength_nm.tolist() == [400.0, 700.0]
 
 
+@loop("name", ["lamp.spd", "lamp.txt", "LAMP.SPD", "lamp.tsv"])
+def test_a_lamp_by_any_name_of_a_table_is_a_lamp(tmp_path, name):
+    (tmp_path / name).write_text("400\t1,5\n700\t1,5\n", "utf-8")
+    assert np.ptp(illuminant(str(tmp_path / name)).values) == 0.0
+
+
 @loop(
     ("text", "words"),
     [
@@ -137,6 +143,8 @@ def test_a_lamp_of_a_file_has_a_luminance_of_one_in_any_unit_and_is_read_anew(tm
         ("watts,a\n400,1\n700,1\n", "has header"),
         ("wavelength_nm,a\n400,1\n700,-1\n", "finite numbers >= 0"),
         ("wavelength_nm,a\n900,1\n1000,1\n", "it gives no visible light"),
+        ("nm,PPFD [µmol/m2/s]\n400,1\n700,1\n", "its column 'PPFD [µmol/m2/s]' is in µmol; allowed: power"),
+        ("nm,dBm\n400,1\n700,1\n", "is in dBm"),
     ],
 )
 def test_a_file_that_is_no_lamp_is_refused_by_name_in_one_line(tmp_path, text, words):

@@ -9,7 +9,7 @@ from refusal import refusal
 
 from render.illuminants import illuminant
 from render.spectrum import Spectrum
-from rodcone.csv_file import MOST_BYTES
+from rodcone.curve_file import MOST_BYTES
 from rodcone.errors import InputError
 from sensor.curves import read_csv, read_curve, rgbw
 
@@ -70,19 +70,17 @@ def test_a_csv_gives_the_curves_that_it_holds(tmp_path, name):
 @loop(
     ("text", "parts"),
     [
-        ("wavelength,R\n0.4,0.1\n0.5,0.2\n", ("wavelengths up to 0.5", "convert them")),
+        ("wavelength,R\n0.4,0.1\n0.5,0.2\n", ("wavelengths up to 0.5", "convert")),
         ("wavelength_nm,R,G\n400,0.1\n500,0.2\n", ("['wavelength_nm', 'R', 'G']",)),
-        ("wavelength_nm,R\n", ("wavelength_nm", "header")),
-        ("", ("can't be read (it is empty)", "CSV of numbers, with commas between them, and a header")),
-        ("nm;R\n400;0.1\n500;0.2\n", ("can't be read", "with commas between them")),
-        ("wavelength_nm,R\n400,0.1\n500,high\n", ("can't be read", "'high'", "CSV of numbers")),
-        ("wavelength_nm,R\n400,0.1\n500\n", ("can't be read", "CSV of numbers")),
+        ("wavelength_nm,R\n", ("wavelength_nm", "holds no table of numbers")),
+        ("", ("can't be read (it is empty)", "give a table")),
+        ("wavelength_nm,R\n400,0.1\n500,high\n", ("line 3 ('500,high')", "no row of numbers")),
+        ("wavelength_nm,R\n400,0.1\n500\n", ("line 3 ('500')", "no row of numbers")),
         ("wavelength_nm,R,G\n400,20,30\n500,56,67.8\n", ("R reaches 56", "allowed: 0 to 1", "divide per cent by 100")),
         ("wavelength_nm,R\n400,-0.1\n500,0.2\n", ("finite numbers >= 0",)),
-        ("wavelength_nm,R\n500,0.1\n400,0.2\n", ("has wavelengths 500 then 400; allowed: strictly increasing",)),
-        ("wavelength_nm,R\n400,0.5\ninf,0.5\n", ("strictly increasing",)),
+        ("nm,R\n500,0.1\n400,0.2\n450,0\n", ("has wavelengths 500 then 400; allowed: strictly increasing",)),
+        ("wavelength_nm,R\n400,0.5\ninf,0.5\n", ("line 3 ('inf,0.5')", "no row of numbers")),
         ("wavelength_nm,R\n400,0.1\n400,0.2\n", ("has wavelengths 400 then 400;", "each wavelength once")),
-        ("wavelength_nm,R\ninf,0.5\ninf,0.5\n", ("has wavelengths inf then inf; allowed: strictly increasing",)),
     ],
 )
 def test_a_csv_that_holds_no_curves_is_refused_in_one_line(tmp_path, text, parts):
@@ -159,9 +157,22 @@ def test_a_single_curve_is_read_and_a_second_column_or_per_cent_refused(tmp_path
     refusal(read_curve, write(tmp_path, "wavelength_nm,t\n400,50\n500,90\n"), match="divide per cent by 100")
 
 
+@loop("qe", [0.2, 0.65])
+def test_amperes_per_watt_become_electrons_per_photon(tmp_path, qe):
+    # R = qe e lambda / (h c); 1239.84 nm is the wavelength at which 1 A/W is one electron a photon (CODATA 2018)
+    nm = np.array([450.0, 550.0, 650.0])
+    rows = "".join(f"{x},{float(qe * x / 1239.841984)!r}\n" for x in nm)
+    path = write(tmp_path, "nm,R\n" + rows)
+    np.testing.assert_allclose(read_csv(path, unit="per_watt").curves["R"].values, qe, rtol=1e-9)
+    relative = read_csv(path, unit="per_watt", relative=True)
+    np.testing.assert_allclose(relative.curves["R"].values, 1.0, rtol=1e-9)
+    assert relative.relative
+    np.testing.assert_allclose(read_csv(path, unit="per_watt", quantum_efficiency=0.5).curves["R"].values, 0.5)
+
+
 @pytest.mark.timeout(10)
 def test_a_pipe_a_file_too_large_and_a_missing_one_are_refused(tmp_path):
-    refusal(read_csv, tmp_path / "absent.csv", match=r"absent\.csv.*can't be read.*give a CSV")
+    refusal(read_csv, tmp_path / "absent.csv", match=r"absent\.csv.*can't be read.*give a table")
     os.mkfifo(tmp_path / "pipe.csv")
     refusal(read_csv, tmp_path / "pipe.csv", match="a folder or a device")
     (tmp_path / "large.csv").write_bytes(b"wavelength_nm,R\n" + MOST_BYTES * b"1")

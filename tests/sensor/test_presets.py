@@ -157,6 +157,24 @@ def test_responses_that_leave_something_to_guess_are_refused(tmp_path, text, par
     refusal(read_sensor, write(tmp_path, whole), words=("camera.toml", *parts))
 
 
+def test_responses_take_every_spelling_and_unit_of_a_table(tmp_path):
+    write(tmp_path, "380 0,1 0,2 0,3\n780 0,4 0,1 0,2\n", "x.spd")
+    bayer = (
+        'cfa = "bayer"\n' + LEAST + LENS + STATED.replace("curves.csv", "x.spd") + 'quantum_efficiency = "included"\n'
+    )
+    refusal(
+        read_sensor,
+        write(tmp_path, bayer),
+        match=r"'x.spd' has the columns 1, 2, 3; allowed: one for each channel of the mosaic, R, G, B; rename them",
+    )
+    write(tmp_path, "nm R G B\n400 0,1 0,2 0,3\n700 0,4 0,1 0,2\n", "x.spd")
+    per_photon = read_sensor(write(tmp_path, bayer)).responses.curves["R"]
+    per_watt = read_sensor(write(tmp_path, bayer + 'unit = "per_watt"\n')).responses.curves["R"]
+    assert per_photon.values == pytest.approx([0.1, 0.4])
+    assert per_watt.values == pytest.approx([0.1 * 1239.841984 / 400, 0.4 * 1239.841984 / 700], rel=1e-9)
+    refusal(read_sensor, write(tmp_path, bayer + 'unit = "per_lux"\n'), match="per_lux")
+
+
 def test_a_window_that_is_not_stated_is_told_where_it_takes_some_of_a_response(tmp_path):
     write(tmp_path, "wavelength_nm,W\n350,0\n400,0.5\n700,0.5\n1000,0.2\n", "nir.csv")
     mono = 'cfa = "mono"\n' + LEAST + LENS
