@@ -19,13 +19,13 @@ from isp.design.expected_error import FAR, Doubles, Gaussians, Noise, best_estim
 def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[Doubles, Doubles]:
     """Slopes of `sample_variance` by the mean and by the spread of expected electrons."""
     lit, mean_e = mean_e > 0, np.maximum(mean_e, 0.0)
-    total = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2 + spread_e2
+    total = noise.law.variance(mean_e) + spread_e2
     distance = np.minimum((noise.full_e - mean_e) / np.sqrt(total), FAR)
     share, by_distance = opening(distance)
     # The variance is total / share - spread.
     by_distance = -total / share**2 * by_distance
     by_total = 1 / share - by_distance * distance / (2 * total)
-    by_mean = by_total * (noise.shot + 2 * noise.prnu**2 * mean_e) - by_distance / np.sqrt(total)
+    by_mean = by_total * noise.law.slope(mean_e) - by_distance / np.sqrt(total)
     return by_mean * lit, by_total - 1
 
 

@@ -11,6 +11,7 @@ from render.spectrum import Floats
 from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
+from sensor.noise_law import NoiseLaw
 
 
 @dataclass(frozen=True)
@@ -85,7 +86,7 @@ def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
 
 @dataclass(frozen=True)
 class NoiseStep:
-    """Noise of samples from a level on: shot e + read_noise_e^2 + dsnu_e^2 + (prnu e)^2 at e electrons [e-^2].
+    """Noise of samples from a level on: the terms of a `sensor.noise_law.NoiseLaw`, as a raw file holds them.
 
     Attributes
     ----------
@@ -107,6 +108,11 @@ class NoiseStep:
 
     def __post_init__(self) -> None:
         require_fields(self, "noise_steps: ")
+
+    @property
+    def law(self) -> NoiseLaw:
+        """Variance by the mean, from `from_e` on; what columns' gains make of dark current and light left out."""
+        return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
 
 @dataclass(frozen=True)
@@ -136,6 +142,11 @@ class ChannelNoise:
 
     def __post_init__(self) -> None:
         require_fields(self, "channel_noise: ")
+
+    @property
+    def law(self) -> NoiseLaw:
+        """Variance by the mean; what columns' gains make of dark current and light left out."""
+        return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
     @property
     def dark_noise_e(self) -> float:

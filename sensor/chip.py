@@ -87,11 +87,6 @@ class PixelConfig:
         return self.voltage_swing_v * 1e6 / self.conversion_gain_uv_per_e
 
 
-def room_e(pixel: PixelConfig, exposure_s: float) -> float:
-    """Photo-electrons that fill a well beside the mean of its dark current [e-]."""
-    return pixel.full_well_e - pixel.dark_current_e_per_s * exposure_s
-
-
 @dataclass(frozen=True)
 class Reading:
     """A reading: another gain, another time, or another part of the pixel.

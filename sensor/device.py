@@ -12,7 +12,7 @@ from sensor.cfa import block_sums
 from sensor.config import SensorConfig, check_frame
 from sensor.photodiodes import check_chip
 from sensor.random import NoiseTerm, draw_key, normals
-from sensor.readings.merge import at_sites
+from sensor.readings.resolve import by_site, chip_readings, several
 
 _MOST_KEPT = 1 << 18  # pixels of a chip whose draws are kept: 2 MB each
 
@@ -63,7 +63,7 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     check_chip(sensor)
     in_charge = sensor.chip.in_charge
     key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
-    pixel, readings = sensor.photosites.pixel, sensor.chip.readings
+    pixel = sensor.photosites.pixel
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
 
     def drawn(dsnu_e: float | NDArray[np.float64], photodiode: int, reading: int) -> Device:
@@ -80,10 +80,12 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
             hot = normals(key, NoiseTerm.HOT, shape, photodiode) < scipy.special.ndtri(pixel.hot_pixel_share)
         return Device(photo_response=response, dark_offset_e=offset_e, column_gain=column_gain, hot=hot)
 
-    dsnu_e = at_sites(sensor.photosites, shape, pixel.dsnu_e, lambda x: x.pixel_of(pixel).dsnu_e)
+    readings = chip_readings(sensor.photosites, exposure_s=0.0)
+    if not several(readings):
+        return drawn(by_site([x.sensor.pixel.dsnu_e for x in readings], readings, shape), 0, 0)
     photodiodes = list(dict.fromkeys(x.photodiode for x in readings))
-    of_readings = tuple(drawn(x.dsnu_e, photodiodes.index(x.photodiode), number) for number, x in enumerate(readings))
-    return replace(of_readings[0], readings=of_readings) if of_readings else drawn(dsnu_e, 0, 0)
+    every = [drawn(x.sensor.pixel.dsnu_e, photodiodes.index(x.photodiode), n) for n, x in enumerate(readings)]
+    return replace(every[0], readings=tuple(every))
 
 
 @lru_cache(maxsize=8)

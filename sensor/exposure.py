@@ -11,8 +11,8 @@ from rodcone.errors import require_name, require_range
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage
-from sensor.readings.merge import of_channel, under_well
-from sensor.readout import as_read, noise_variance
+from sensor.readings.resolve import at_channel, chip_readings, resolve, unsaturated
+from sensor.readout import frame_variance
 from sensor.response import behind_filters, channel_electrons
 
 MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
@@ -82,8 +82,8 @@ def _share_of_well_s(
 
 def _dark_per_second_e(sensor: SensorConfig, channel: str) -> float:
     """Dark current that a channel's sites would have in the whole time without a density, as their light is given."""
-    alone, share = of_channel(sensor, channel)
-    return alone.pixel.dark_current_e_per_s / share
+    reading = at_channel(chip_readings(sensor, exposure_s=1.0), channel)[0]
+    return reading.sensor.pixel.dark_current_e_per_s / reading.share
 
 
 def at_level_s(unit_s: float, level: float, rule: str, sensor: SensorConfig) -> float:
@@ -162,10 +162,10 @@ def information_bits(expected_e: NDArray[np.float64], sensor: SensorConfig, expo
     expected_e : (h, w) float64
         Photo-electrons, as `sensor.response.expected_electrons`.
     """
-    sensor = as_read(sensor, expected_e, exposure_s)
-    variance = noise_variance(expected_e, sensor, exposure_s)
+    readings = resolve(sensor, expected_e, exposure_s)
+    variance = frame_variance(expected_e, readings)
     bits = 0.5 * np.log2(1.0 + expected_e**2 / variance)
-    return float(np.where(under_well(expected_e, sensor, exposure_s), bits, 0.0).mean())
+    return float(np.where(unsaturated(expected_e, readings), bits, 0.0).mean())
 
 
 def _dark_full(raw: RawImage) -> bool:

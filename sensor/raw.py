@@ -213,18 +213,19 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
         Of the mosaic, or of a part of it that begins with a whole tile.
     """
     light = np.maximum(electrons, 0.0)
-    both = 2 * raw.column_gain_spread**2  # of a column's gain, which light and dark current have in common
-    variance = light * raw.prnu
-    variance *= variance
-    variance += light * (1 + both * raw.dark_current_e)
-    variance += raw.dark_noise_e**2
+
+    def variance_of(noise: NoiseStep | ChannelNoise, dark_current_e: float, mean_e: NDArray[Any]) -> NDArray[Any]:
+        # a column's gain is one factor of what light and dark current gave
+        both = 2 * raw.column_gain_spread**2 * dark_current_e
+        return replace(noise.law, shot=noise.shot + both).variance(mean_e)
+
+    variance = variance_of(raw._plain(""), raw.dark_current_e, light)
     parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise, float]]
     parts = [(light >= step.from_e, step, raw.dark_current_e) for step in raw.noise_steps]
     parts += [(mask(raw.cfa, noise.channel, light.shape), noise, noise.dark_current_e) for noise in raw.channel_noise]
-    for where, noise, dark_e in parts:
-        bright_e, slope = light[where], noise.shot + both * dark_e
-        variance[where] = slope * bright_e + noise.read_noise_e**2 + noise.dsnu_e**2 + (noise.prnu * bright_e) ** 2
-    return np.asarray(variance)
+    for where, noise, dark_current_e in parts:
+        variance[where] = variance_of(noise, dark_current_e, light[where])
+    return variance
 
 
 def channel_variance(raw: RawImage, mean_e: ArrayLike) -> NDArray[np.float64]:

@@ -1,6 +1,6 @@
 """From expected photo-electrons to digital numbers: every noise source in physical order, and their variance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import hypot, sqrt
 from typing import Any, TypeAlias
 
@@ -8,13 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
-from sensor.cfa import block_sums, mask
+from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
-from sensor.readings.merge import as_metered, dimmed, merge_readings, of_channel, read_by_channel
-from sensor.readings.noise import merged_variance, merged_variances, of_reading, switched_to
+from sensor.readings.channels import join
+from sensor.readings.merge import merge
+from sensor.readings.noise import merged_variance, merged_variances
+from sensor.readings.resolve import PlainReading, at_channel, by_site, law_by_site, light_of, resolve, several
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
 # number among those of one charge.
@@ -130,25 +132,29 @@ def read_out(
             "draw the device with the frame's shape"
         )
 
-    def once(light_e: NDArray[np.floating], camera: SensorConfig, patterns: Device = device) -> RawImage:
-        dn = draw(light_e, camera, patterns, exposure_s, draw_key(rng), 0)
-        return as_raw(dn, camera, exposure_s, engine, patterns.hot)
+    return read(expected, resolve(sensor, expected, exposure_s), device, rng, draw=draw, engine=engine)
 
-    if sensor.chip.channels:
-        return read_by_channel(expected, as_read(sensor, expected, exposure_s), once)
-    if not sensor.chip.readings:
-        return once(expected, sensor)
-    if sensor.chip.switched:
-        index = switched_to(sensor, expected, exposure_s)
-        return once(expected, of_reading(sensor, index), device.readings[index])
-    readings = sensor.chip.readings
+
+def read(
+    expected_e: NDArray[np.floating],
+    readings: Sequence[PlainReading],
+    device: Device,
+    rng: np.random.Generator,
+    *,
+    draw: DrawFrame = draw_frame,
+    engine: str = "numpy",
+) -> RawImage:
+    """Draw each reading of one exposure and merge them; parameters as of `read_out`, the camera resolved."""
     keys = {charge: draw_key(rng) for charge in dict.fromkeys(x.charge for x in readings)}
     raws = []
-    for number, (reading, patterns) in enumerate(zip(readings, device.readings, strict=True)):
-        alone = of_reading(sensor, number)
-        dn = draw(expected * reading.share, alone, patterns, exposure_s, keys[reading.charge], number)
-        raws.append(as_raw(dn, alone, exposure_s, engine, patterns.hot))
-    return merge_readings(raws, sensor, exposure_s)
+    for number, (x, light_e) in enumerate(zip(readings, light_of(expected_e, readings), strict=True)):
+        patterns = device if x.patterns is None else device.readings[x.patterns]
+        # Readings of every pixel draw read noise by their number; each channel that is read apart has a key of its own.
+        dn = draw(light_e, x.sensor, patterns, x.exposure_s, keys[x.charge], number if x.sites is None else 0)
+        raws.append(as_raw(dn, x.sensor, x.exposure_s, engine, patterns.hot))
+    if len(raws) == 1:
+        return raws[0]
+    return merge(readings, raws) if several(readings) else join(readings, raws)
 
 
 def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[np.float64]:
@@ -195,34 +201,17 @@ def noise_variance(
     channel : str, optional
         Channel of all of them; left out, they are a mosaic's, (h, w). Cameras that read all channels alike don't ask.
     """
-    sensor = as_read(sensor, np.asarray(expected_e), exposure_s, channel)
-    if sensor.chip.channels:
-        return _variance_by_channel(np.asarray(expected_e), sensor, exposure_s, channel)
-    pixel = sensor.pixel
-    signal = spread_charge(np.asarray(expected_e, dtype=np.float64), pixel.crosstalk)
-    if sensor.chip.readings:
-        return merged_variance(signal, sensor, exposure_s)
-    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
-    collected = signal + pixel.dark_current_e_per_s * exposure_s + hot_share * hot_e
-    variance = collected + (pixel.prnu * signal) ** 2 + hot_share * (1 - hot_share) * hot_e**2
-    # a product of independent factors: E[gain^2] E[collected^2] - E[collected]^2
-    variance = variance + pixel.column_gain_spread**2 * (variance + collected**2)
-    dark = pixel.read_noise_e**2 + pixel.fixed_dark_e**2 + sensor.gain_e_per_dn**2 / 12
-    return np.asarray(variance + dark)
+    expected = np.asarray(expected_e, dtype=np.float64)
+    return frame_variance(expected, resolve(sensor, expected, exposure_s, channel))
 
 
-def _variance_by_channel(
-    expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None
-) -> NDArray[np.float64]:
-    if channel is not None:
-        alone, share = of_channel(sensor, channel)
-        return noise_variance(expected_e * share, alone, exposure_s) / share**2
-    light = dimmed(expected_e, sensor)
-    variance = noise_variance(light, of_channel(sensor, "")[0], exposure_s)
-    for reading in sensor.chip.channels:
-        at, alone = mask(sensor.cfa, reading.channel, light.shape), of_channel(sensor, reading.channel)[0]
-        variance[at] = noise_variance(light * reading.time_share, alone, exposure_s)[at] / reading.share**2
-    return variance
+def frame_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
+    """`noise_variance` of a frame whose camera is resolved."""
+    crosstalk = readings[0].pixel.crosstalk
+    if several(readings):
+        return merged_variance(spread_charge(expected_e, crosstalk), readings)
+    density = by_site([x.light_share for x in readings], readings, expected_e.shape)
+    return law_by_site(readings, expected_e.shape).variance(spread_charge(expected_e * density, crosstalk) / density)
 
 
 def noise_sources(
@@ -232,40 +221,17 @@ def noise_sources(
 
     Their squares sum to `noise_variance`, which says what each of them is.
     """
-    sensor = as_read(sensor, np.array([expected_e]), exposure_s, channel)
-    if sensor.chip.channels:
-        alone, share = of_channel(sensor, channel)
-        return {name: noise / share for name, noise in noise_sources(expected_e * share, alone, exposure_s).items()}
-    if sensor.chip.readings:
-        merged_e2 = merged_variances(np.array([expected_e]), sensor, exposure_s)
-        return {name: float(value[0]) ** 0.5 for name, value in merged_e2.items()}
-    pixel = sensor.pixel
-    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
-    dark_e = pixel.dark_current_e_per_s * exposure_s
-    variance_e2 = {
-        "shot noise": expected_e,
-        "dark current": dark_e,
-        "hot pixels": hot_share * hot_e + hot_share * (1 - hot_share) * hot_e**2,
-        "PRNU": (pixel.prnu * expected_e) ** 2,
-    }
-    collected_e2 = sum(variance_e2.values()) + (expected_e + dark_e + hot_share * hot_e) ** 2
-    variance_e2 |= {
-        "column gains": pixel.column_gain_spread**2 * collected_e2,
-        "DSNU": pixel.dsnu_e**2,
-        "column offsets": pixel.column_offset_e**2,
-        "read noise": pixel.read_noise_e**2,
-        "quantisation": sensor.gain_e_per_dn**2 / 12,
-    }
-    return {name: value**0.5 for name, value in variance_e2.items()}
+    return sources_of(expected_e, at_channel(resolve(sensor, np.array([expected_e]), exposure_s, channel), channel))
 
 
-def as_read(
-    sensor: SensorConfig, expected_e: NDArray[Any], exposure_s: float, channel: str | None = None
-) -> SensorConfig:
-    """Camera with the gain and the channels' times that it takes for a frame; `channel` as of `noise_variance`."""
-    if sensor.chip.channels:
-        return as_metered(sensor, expected_e, exposure_s, channel)
-    return of_reading(sensor, switched_to(sensor, expected_e, exposure_s)) if sensor.chip.switched else sensor
+def sources_of(expected_e: float, readings: Sequence[PlainReading]) -> dict[str, float]:
+    """`noise_sources` of readings of every pixel."""
+    light = np.array([expected_e])
+    if several(readings):
+        variances_e2 = merged_variances(light, readings)
+    else:
+        variances_e2 = {name: law.variance(light) for name, law in readings[0].sources.items()}
+    return {name: float(value[0]) ** 0.5 for name, value in variances_e2.items()}
 
 
 def as_raw(

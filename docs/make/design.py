@@ -43,6 +43,7 @@ from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.presets import preset, vary
+from sensor.readings.resolve import chip_readings
 from studies.design.expect import MIDDLE, expect, lens_of, noise_of, responses_e, sampling_of, view_of
 from studies.metrics.confidence import half_width
 from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
@@ -231,7 +232,7 @@ def linear_db(prior: str, sensor: SensorConfig, time_s: float) -> float:
     spectral, view, lens = load_spectral(prior), view_of(prior, "D65"), lens_of(sensor, blur=False)
     patches = sampled(spectral.patches, sampling_of(sensor, responses_e(sensor, view), lens), MIDDLE, lens)
     rows, unit = xyz_to_srgb(view.xyz.T).T / sqrt(3), LEVELS["classroom"] / spectral.reflectances.mean() * time_s
-    forms, noise = np.broadcast_to(rows.T @ rows, (1, *patches.within.shape)), noise_of(sensor, time_s)
+    forms, noise = np.broadcast_to(rows.T @ rows, (1, *patches.within.shape)), noise_of(chip_readings(sensor, time_s))
     return -10 * log10(np.mean([m**2 * expected_error(patches, m * unit, noise, forms) for m in spectral.reflectances]))
 
 

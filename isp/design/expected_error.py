@@ -22,6 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfcx, ndtr
 
+from sensor.noise_law import NoiseLaw
+
 Doubles = NDArray[np.float64]
 LEAST_SHARE = 1e-8  # of a sample's variance that reading it explains, at the least
 FAR = 8.0  # standard deviations below the well: never full
@@ -58,24 +60,18 @@ class Gaussians:
 
 @dataclass(frozen=True)
 class Noise:
-    """What a sample's noise is made of.
+    """Noise of a patch's samples, and where they are full.
 
     Attributes
     ----------
-    dark_e : float or (sample,) float64
-        Standard deviation of what doesn't depend on light [e-]: read noise, fixed offsets, dark current, rounding.
-    prnu : float or (sample,) float64
-        Relative standard deviation of the pixels' gain.
+    law : NoiseLaw
+        Of numbers, or of (sample,) float64.
     full_e : float or (sample,) float64
         Electrons at which a sample is full; inf for none.
-    shot : float or (sample,) float64
-        Variance of shot noise over the electrons: over 1 where a sample stands for more than it counts.
     """
 
-    dark_e: float | Doubles
-    prnu: float | Doubles
+    law: NoiseLaw
     full_e: float | Doubles
-    shot: float | Doubles = 1.0
 
 
 @cache
@@ -117,7 +113,7 @@ def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Double
         Mean of the expected electrons, and their variance over the prior.
     """
     mean_e = np.maximum(mean_e, 0.0)
-    total = noise.shot * mean_e + noise.dark_e**2 + (noise.prnu * mean_e) ** 2 + spread_e2
+    total = noise.law.variance(mean_e) + spread_e2
     return np.asarray(total / opening((noise.full_e - mean_e) / np.sqrt(total))[0] - spread_e2)
 
 

@@ -118,7 +118,7 @@ def characterise(
     if sensor.chip.readings:
         raise InputError(
             f"sensor: {len(sensor.chip.readings)} readings of a pixel; allowed: one, for the standard has no other; "
-            "give one of them (--reading 1, sensor.readings.noise.of_reading)"
+            "give one of them (--reading 1, sensor.readings.resolve.chip_readings)"
         )
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
     result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)

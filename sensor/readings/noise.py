@@ -7,15 +7,14 @@ those of one photodiode, a column's amplifier to all, read noise to none. The be
     w = C^-1 1 / (1^T C^-1 1),    of variance w^T C w.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from sensor.chip import Chip
-from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
+from sensor.readings.resolve import PlainReading
 
 # A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
 # its well: its own noise then clips once in 1e9 pixels.
@@ -41,45 +40,24 @@ class Seams:
     above_e: Floats
 
 
-def shares(sensor: SensorConfig) -> Floats:
+def shares(readings: Sequence[PlainReading]) -> Floats:
     """Share of the whole pixel's electrons of the whole exposure in each reading."""
-    return np.array([x.share for x in sensor.chip.readings])
+    return np.array([x.share for x in readings])
 
 
-def whole_share(sensor: SensorConfig) -> float:
+def whole_share(readings: Sequence[PlainReading]) -> float:
     """What all charges hold together, over the whole pixel's electrons: the unit of the merged electrons."""
-    return float(sum({x.charge: x.share for x in sensor.chip.readings}.values()))
+    return float(sum({x.charge: x.share for x in readings}.values()))
 
 
-def of_reading(sensor: SensorConfig, index: int) -> SensorConfig:
-    """Sensor of one reading alone, which takes its share of the light and of the dark current."""
-    reading, pixel = sensor.chip.readings[index], sensor.pixel
-    pixel_of_one = replace(
-        pixel,
-        read_noise_e=reading.read_noise_e,
-        dsnu_e=reading.dsnu_e,
-        full_well_e=reading.full_well_e,
-        dark_current_e_per_s=pixel.dark_current_e_per_s * reading.share,
-        hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * reading.share,
-    )
-    return replace(sensor, pixel=pixel_of_one, chip=Chip())
-
-
-def switched_to(sensor: SensorConfig, expected_e: Floats, exposure_s: float) -> int:
-    """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
-    bright_e = float(np.percentile(expected_e, METERED_PERCENTILE)) + sensor.pixel.dark_current_e_per_s * exposure_s
-    quiet_first = sorted(range(len(sensor.chip.readings)), key=lambda i: sensor.chip.readings[i].read_noise_e)
-    holding = [i for i in quiet_first if bright_e <= METERED_SHARE * sensor.chip.readings[i].full_well_e]
-    return holding[0] if holding else max(quiet_first, key=lambda i: sensor.chip.readings[i].full_well_e)
-
-
-def dark_electrons(sensor: SensorConfig, exposure_s: float) -> float:
+def dark_electrons(readings: Sequence[PlainReading]) -> float:
     """Mean electrons of dark current and hot pixels in the whole pixel."""
-    pixel = sensor.pixel
-    return (pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s) * exposure_s
+    pixel = readings[0].pixel
+    dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
+    return dark_e_per_s * readings[0].exposure_s
 
 
-def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> dict[str, Floats]:
+def covariances(expected_e: Floats, readings: Sequence[PlainReading]) -> dict[str, Floats]:
     """Covariance of the readings' estimates of the whole pixel's electrons, by source of noise; without clipping.
 
     Parameters
@@ -92,15 +70,15 @@ def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> 
     dict of str to (n, reading, reading) float64
         By the names of `sensor.readout.noise_sources` [e-^2].
     """
-    pixel, readings = sensor.pixel, sensor.chip.readings
-    share = shares(sensor)
+    pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
+    share = shares(readings)
     light = np.asarray(expected_e, dtype=np.float64)[:, None, None]
     identity = np.eye(len(readings))
     charge = np.array([[a.charge == b.charge for b in readings] for a in readings]) / share
     photodiode = np.array([[a.photodiode == b.photodiode for b in readings] for a in readings]) * 1.0
     hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
     spread_e2 = hot_share * (1 - hot_share) * hot_e**2
-    gain_e = np.array([of_reading(sensor, i).gain_e_per_dn for i in range(len(readings))])
+    gain_e = np.array([x.sensor.gain_e_per_dn for x in readings])
 
     by_source = {
         "shot noise": light * charge,
@@ -108,12 +86,12 @@ def covariances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> 
         "hot pixels": hot_share * hot_e * charge + spread_e2 * photodiode,
         "PRNU": (pixel.prnu * light) ** 2 * photodiode,
     }
-    collected = sum(by_source.values()) + (light + dark_electrons(sensor, exposure_s)) ** 2
+    collected = sum(by_source.values()) + (light + dark_electrons(readings)) ** 2
     by_source |= {
         "column gains": pixel.column_gain_spread**2 * collected,
-        "DSNU": identity * (np.array([x.dsnu_e for x in readings]) / share) ** 2,
+        "DSNU": identity * (np.array([x.sensor.pixel.dsnu_e for x in readings]) / share) ** 2,
         "column offsets": pixel.column_offset_e**2 / np.outer(share, share),
-        "read noise": identity * (np.array([x.read_noise_e for x in readings]) / share) ** 2,
+        "read noise": identity * (np.array([x.sensor.pixel.read_noise_e for x in readings]) / share) ** 2,
         "quantisation": identity * (gain_e / share) ** 2 / 12,
     }
     shape = (len(light), len(readings), len(readings))
@@ -130,27 +108,27 @@ def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
     return weights
 
 
-def seams(sensor: SensorConfig, exposure_s: float) -> Seams:
+def seams(readings: Sequence[PlainReading]) -> Seams:
     """Where the merge leaves readings out: 6 standard deviations under the well, but not under half of it."""
-    full_e = np.array([x.full_well_e for x in sensor.chip.readings]) / shares(sensor)
-    total = sum(covariances(full_e, sensor, exposure_s).values())
+    full_e = np.array([x.sensor.pixel.full_well_e for x in readings]) / shares(readings)
+    total = sum(covariances(full_e, readings).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
     clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-    above_e = clear_e - dark_electrons(sensor, exposure_s)  # under 0 where dark current alone fills the reading
+    above_e = clear_e - dark_electrons(readings)  # under 0 where dark current alone fills the reading
     order = np.argsort(above_e, kind="stable")
     return Seams(order, above_e[order])
 
 
-def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> Mapping[str, Floats]:
+def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Mapping[str, Floats]:
     """Variance of the merge by source, over chips and exposures [e-^2 of the whole pixel], shape of `expected_e`.
 
     Around a seam some pixels keep the reading that fills and some leave it out, by their merged light; that is not
     correlated with what the readings differ by, so that the variances add by the shares of the pixels.
     """
     light = np.ravel(np.asarray(expected_e, dtype=np.float64))
-    by_source = covariances(light, sensor, exposure_s)
+    by_source = covariances(light, readings)
     total = np.asarray(sum(by_source.values()))
-    at = seams(sensor, exposure_s)
+    at = seams(readings)
     merged_e2 = dict.fromkeys(by_source, np.zeros_like(light))
     pixel_share = np.ones_like(light)  # of pixels whose merged light is over the seams so far
     for number, above_e in enumerate(at.above_e):
@@ -165,11 +143,11 @@ def merged_variances(expected_e: Floats, sensor: SensorConfig, exposure_s: float
     return {name: value.reshape(np.shape(expected_e)) for name, value in merged_e2.items()}
 
 
-def merged_variance(expected_e: Floats, sensor: SensorConfig, exposure_s: float) -> Floats:
+def merged_variance(expected_e: Floats, readings: Sequence[PlainReading]) -> Floats:
     """Sum of `merged_variances`; for frames of many pixels interpolated between levels of light."""
     light = np.asarray(expected_e, dtype=np.float64)
     if light.size <= _LEVELS:
-        return np.asarray(sum(merged_variances(light, sensor, exposure_s).values()))
-    most_e = max(float(light.max()), 2 * sensor.pixel.full_well_e)
+        return np.asarray(sum(merged_variances(light, readings).values()))
+    most_e = max(float(light.max()), 2 * readings[0].pixel.full_well_e)
     levels = np.concatenate([[0.0], np.geomspace(1e-3, most_e, _LEVELS - 1)])
-    return np.interp(light, levels, merged_variance(levels, sensor, exposure_s))
+    return np.interp(light, levels, merged_variance(levels, readings))

@@ -12,8 +12,8 @@ from render.spectrum import fine_bands
 from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
-from sensor.readings.merge import under_well
-from sensor.readout import as_read, noise_variance
+from sensor.readings.resolve import resolve, unsaturated
+from sensor.readout import frame_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel, in_bands
 from studies.study.study import OWN, Condition, SceneChoice, Study, conditions, label, most_spp
@@ -141,10 +141,10 @@ def weigh(
     scale = level_cd_m2 * exposure_s
     # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
     expected_e = scale * np.maximum(sensor_effects.full.mean(axis=0), 0.0)
-    sensor = as_read(sensor, expected_e, exposure_s)
-    below = under_well(expected_e, sensor, exposure_s)
+    readings = resolve(sensor, expected_e, exposure_s)
+    below = unsaturated(expected_e, readings)
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
-    noise_e2 = _mean(noise_variance(expected_e, sensor, exposure_s)[below]) or 1.0
+    noise_e2 = _mean(frame_variance(expected_e, readings)[below]) or 1.0
     blurred, sharp = sensor_effects.blurred**2 * pilot.spp, sensor_effects.sharp**2 * pilot.spp
     # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength. Both are of
     # light before diffraction, and a pixel without light has neither noise nor jitter.

@@ -15,8 +15,7 @@ from sensor.config import SensorConfig
 from sensor.emva1288.characterise import Characterisation
 from sensor.emva1288.characterise import characterise as measure
 from sensor.presets import preset as sensor_preset
-from sensor.readings.merge import of_channel
-from sensor.readings.noise import of_reading
+from sensor.readings.resolve import at_channel, chip_readings
 from studies.commands.console import Time, print_json, print_table, require_new, require_place, say
 from studies.metrics.truth import GREY
 from studies.pages.plots import snr_svg, transfer_svg
@@ -68,18 +67,21 @@ class Frames:
         """Sensor of which one reading or channel is measured, where it has several."""
         require_absent(f"for {preset!r}; allowed: with --from and --dark", window=self.window)
         sensor = sensor_preset(preset)
+        readings = chip_readings(sensor, self.exposure)
+        apart = readings[0].sites is not None
         if self.reading is not None:
-            if not sensor.chip.readings:
+            if len(readings) == 1 or apart:
                 raise InputError(f"reading: {self.reading} of {preset!r}, whose pixels are read once; leave it out")
-            require_whole("reading", self.reading, 1, len(sensor.chip.readings), f"{preset!r} has so many")
-            sensor = of_reading(sensor, self.reading - 1)
-        if sensor.chip.channels:
-            if self.channel is not None:
-                require_name(f"channel of {preset!r}, which reads channels apart", self.channel, sensor.channels)
-            return of_channel(sensor, self.channel)[0]
+            require_whole("reading", self.reading, 1, len(readings), f"{preset!r} has so many")
         if self.channel is not None:
-            raise InputError(f"channel: {self.channel!r} of {preset!r}, whose channels are read alike; leave it out")
-        return sensor
+            if not apart:
+                raise InputError(
+                    f"channel: {self.channel!r} of {preset!r}, whose channels are read alike; leave it out"
+                )
+            require_name(f"channel of {preset!r}, which reads channels apart", self.channel, sensor.channels)
+        if self.reading is not None:
+            return readings[self.reading - 1].sensor
+        return at_channel(readings, self.channel)[0].sensor if apart else sensor
 
 
 DEFAULT = Frames()

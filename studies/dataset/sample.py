@@ -19,17 +19,13 @@ from render.spectrum import luminance, tristimulus
 from render.surfaces import see_surfaces
 from render.transport import Transport
 from rodcone.digests import digest, digest_file, digest_inputs
-from sensor.capture import expose
 from sensor.cfa import mask
-from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.raw import RawImage
-from sensor.readings.merge import of_channel
-from sensor.readings.noise import dark_electrons
-from sensor.readout import as_read, noise_sources, noise_variance
+from sensor.readings.resolve import PlainReading, at_channel, resolve
+from sensor.readout import frame_variance, read, sources_of
 from sensor.response import channel_electrons
-from studies.photograph.snr import noise_parabola
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, charged_share
 from studies.study.study import Condition
@@ -100,31 +96,35 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     place = np.s_[row : row + height, column : column + width]
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_opened(frame.electrons)[place], dtype=np.float64) * light
+    sensor = frame.sensor
     # a channel's metered time is the frame's, in its parts too
-    metered = frame.sensor.chip.channels
-    sensor = as_read(frame.sensor, _opened(frame.electrons) * light, cell.exposure_s) if metered else frame.sensor
+    readings = resolve(sensor, np.asarray(_opened(frame.electrons) * light), cell.exposure_s)
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.part is not None:
         stream = stream.spawn(sample.part + 1)[-1]
     device = draw_device(sensor, (height, width), device_stream(cell.condition.sensor, sample.mosaic, cell.seed))
-    raw = expose(expected_e, sensor, cell.exposure_s, device, stream, exact=True)
+    raw = read(expected_e, readings, device, stream)
     arrays: Arrays = {"raw": raw.dn}
     scales = {"mosaic_e": light, "channels_e": light, "xyz": cell.luminance_cd_m2}
     for name, path in sample.files.items():
         plane = _opened(path)[place] * scales.get(name, 1)
         arrays[name] = np.ascontiguousarray(plane, dtype=np.uint16 if name == "ids" else np.float32)
-    return arrays, _facts(sample, sensor, raw, expected_e, _opened(frame.errors)[:, *place] * light)
+    return arrays, _facts(sample, readings, raw, expected_e, _opened(frame.errors)[:, *place] * light)
 
 
 def _facts(
-    sample: Sample, sensor: SensorConfig, raw: RawImage, expected_e: NDArray[np.float64], errors_e: NDArray[Any]
+    sample: Sample,
+    readings: Sequence[PlainReading],
+    raw: RawImage,
+    expected_e: NDArray[np.float64],
+    errors_e: NDArray[Any],
 ) -> dict[str, Any]:
-    cell = sample.cell
-    variance_e2 = noise_variance(expected_e, sensor, cell.exposure_s)
+    cell, sensor = sample.cell, sample.cell.frame.sensor
+    variance_e2 = frame_variance(expected_e, readings)
     # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
     shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
-    alone = {name: of_channel(sensor, name) for name in mean_e}
+    by_channel = {name: at_channel(readings, name) for name in mean_e}
     return {
         "rodcone": VERSION,
         **{name: getattr(sample, name) for name in ("key", "split", "scene_hash")},
@@ -136,18 +136,15 @@ def _facts(
         "window": list(sample.window),
         **{name: getattr(cell, name) for name in ("luminance_cd_m2", "exposure_s", "white_cd_m2")},
         **{name: getattr(raw, name) for name in ("black_dn", "white_dn", "gain_e_per_dn")},
-        "noise": noise_coefficients(sensor, cell.exposure_s),
-        "sources_e": {name: noise_sources(value, sensor, cell.exposure_s, name) for name, value in mean_e.items()},
+        "noise": noise_coefficients(readings, raw.gain_e_per_dn),
+        "sources_e": {name: sources_of(value, by_channel[name]) for name, value in mean_e.items()},
         "mean_e": mean_e,
-        "dark_above_black_e": {
-            name: dark_electrons(x, cell.exposure_s) / share - raw.noise_of(name).dark_current_e
-            for name, (x, share) in alone.items()
-        },
-        "full_well_e": {name: x.pixel.full_well_e / share for name, (x, share) in alone.items()},
+        "dark_above_black_e": {name: x.dark_e - raw.noise_of(name).dark_current_e for name, (x,) in by_channel.items()},
+        "full_well_e": {name: x.full_well_e for name, (x,) in by_channel.items()},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
         "render_noise": {
-            "mean": charged_share(errors_e, expected_e, sensor, cell.exposure_s),
+            "mean": charged_share(errors_e, expected_e, readings),
             "of_95_percent": float(np.quantile(shares, OF_PIXELS)),
         },
         "groups": list(sample.illuminants["groups"]),
@@ -161,15 +158,17 @@ def frame_labels(condition: Condition) -> dict[str, Any]:
     return {name: value for name, value in labels(condition).items() if name not in ("white_balance", "frames")}
 
 
-def noise_coefficients(sensor: SensorConfig, exposure_s: float) -> dict[str, dict[str, float]]:
+def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -> dict[str, dict[str, float]]:
     """Variance of a pixel of each channel: a x + b + c x^2 [DN^2], x its mean above black [DN], dark current left out.
 
     b holds all that doesn't depend on light, a x the shot noise, c x^2 what is in proportion to it: PRNU.
     """
-    gain, result = sensor.gain_e_per_dn, {}
-    for name in sensor.channels:
-        dark, slope, square = noise_parabola(sensor, exposure_s, name)
-        result[name] = {"a": slope / gain, "b": dark / gain**2, "c": square}
+    result = {}
+    for name in readings[0].sensor.channels:
+        law = at_channel(readings, name)[0].law
+        dark_e2 = law.dark_e**2 + law.fixed_e**2
+        figures = law.shot / gain_e_per_dn, dark_e2 / gain_e_per_dn**2, law.prnu**2
+        result[name] = {key: float(value) for key, value in zip("abc", figures, strict=True)}
     return result
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
-from math import hypot, log10, sqrt
+from math import log10, sqrt
 
 import numpy as np
 import scipy
@@ -15,12 +15,12 @@ from render.spectrum import Floats, tristimulus
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import InputError, require_name
 from sensor.cfa import Tile, channel_map, channels
-from sensor.chip import room_e
 from sensor.config import SensorConfig
 from sensor.diffraction import sampled_otf
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
+from sensor.noise_law import NoiseLaw
 from sensor.optics import WAVELENGTH_NM, camera_equation
-from sensor.readings.merge import as_metered, of_channel
+from sensor.readings.resolve import PlainReading, at_channel, resolve
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, light_of
@@ -234,18 +234,13 @@ def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -
     `per_second_e` are electrons behind every filter, shape (h, w, channel).
     """
     time_s = exposure_of_electrons_s(exposure, per_second_e, sensor) if isinstance(exposure, str) else exposure
-    return time_s, noise_of(as_metered(sensor, behind_filters(per_second_e * time_s, sensor), time_s), time_s)
+    return time_s, noise_of(resolve(sensor, behind_filters(per_second_e * time_s, sensor), time_s))
 
 
-def noise_of(sensor: SensorConfig, exposure_s: float) -> Noise:
+def noise_of(readings: Sequence[PlainReading]) -> Noise:
     """Noise of a patch's samples, every source of the sensor in it; channels may be read apart."""
-
-    def of(channel: str) -> tuple[float, ...]:
-        alone, share = of_channel(sensor, channel)
-        pixel, rounding_e = alone.pixel, alone.gain_e_per_dn / sqrt(12)
-        dark_current_e = pixel.dark_current_e_per_s * exposure_s
-        dark_e = hypot(pixel.read_noise_e, pixel.fixed_dark_e, rounding_e, sqrt(dark_current_e))
-        return dark_e / share, pixel.fixed_gain, room_e(pixel, exposure_s) / share, 1 / share
-
-    dark_e, prnu, full_e, shot = np.array([of(name) for name in channels(sensor.cfa)])[sites_of(sensor.cfa)].T
-    return Noise(dark_e=dark_e, prnu=prnu, full_e=full_e, shot=shot)
+    tile = readings[0].sensor.cfa
+    by_channel = [at_channel(readings, name)[0] for name in channels(tile)]
+    numbers = [[x.law.shot, x.law.dark_e, x.law.fixed_e, x.law.prnu, x.headroom_e] for x in by_channel]
+    *law, full_e = np.array(numbers)[sites_of(tile)].T
+    return Noise(NoiseLaw(*law), full_e)

@@ -2,6 +2,7 @@
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from math import hypot
 from types import MappingProxyType
 from typing import Any
@@ -16,8 +17,8 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_name, require_whole
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
-from sensor.readings.merge import at_sites, dimmed, of_channel
-from sensor.readout import as_read, noise_sources, noise_variance, spread_charge
+from sensor.readings.resolve import PlainReading, at_channel, behind_densities, by_site, resolve
+from sensor.readout import frame_variance, sources_of, spread_charge
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
@@ -134,28 +135,21 @@ def noise_scale_e(exposed: Exposed) -> float:
     return float(np.sqrt(_variance_e2(exposed).mean()))
 
 
+def _readings(exposed: Exposed) -> tuple[PlainReading, ...]:
+    readings = resolve(exposed.sensor, exposed.expected_e, exposed.exposure_s)
+    return readings if exposed.shot_noise else tuple(replace(x, poisson=0.0) for x in readings)
+
+
 def _variance_e2(exposed: Exposed) -> Image:
-    """Variance of each pixel of one frame [e-^2], without shot noise less that of the Poisson counts."""
-    pixel, variance = exposed.sensor.pixel, noise_variance(exposed.expected_e, exposed.sensor, exposed.exposure_s)
-    if exposed.shot_noise:
-        return variance
-    hot_e_per_s = pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
-    dark_e = (pixel.dark_current_e_per_s + hot_e_per_s) * exposed.exposure_s / _light_share(exposed)
-    shot = np.ones(variance.shape)
-    for noise in exposed.raw.channel_noise:
-        shot[mask(exposed.raw.cfa, noise.channel, exposed.raw.shape)] = noise.shot
-    return np.asarray(variance - (1 + pixel.column_gain_spread**2) * shot * (_collected_e(exposed) + dark_e))
+    """Variance of each pixel of one frame [e-^2]."""
+    return frame_variance(exposed.expected_e, _readings(exposed))
 
 
 def _collected_e(exposed: Exposed) -> Image:
     """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
-    lit_e = dimmed(exposed.expected_e, exposed.sensor)
-    return np.asarray(spread_charge(lit_e, exposed.sensor.pixel.crosstalk) / _light_share(exposed))
-
-
-def _light_share(exposed: Exposed) -> float | Image:
-    """What the densities in front of channels that are read apart let through, over which their samples stand."""
-    return at_sites(exposed.sensor, exposed.expected_e.shape, 1.0, lambda reading: reading.light_share)
+    readings = _readings(exposed)
+    lit_e = spread_charge(behind_densities(exposed.expected_e, readings), exposed.sensor.pixel.crosstalk)
+    return np.asarray(lit_e / by_site([x.light_share for x in readings], readings, lit_e.shape))
 
 
 def _grey(share: Image) -> Bytes:
@@ -251,16 +245,5 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
 def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
     channel = str(channel_map(exposed.sensor.cfa, exposed.raw.shape)[row, column])
-    sensor, factor = of_channel(
-        as_read(exposed.sensor, exposed.expected_e, exposed.exposure_s), channel
-    )  # in electrons of its own
-    pixel, time_s, signal_e = sensor.pixel, exposed.exposure_s, factor * float(_collected_e(exposed)[row, column])
-    sources = noise_sources(signal_e, sensor, time_s)
-    if not exposed.shot_noise:
-        share, hot_e = pixel.hot_pixel_share, pixel.hot_pixel_dark_current_e_per_s * time_s
-        counted_e = signal_e + pixel.dark_current_e_per_s * time_s + share * hot_e
-        gains_e2 = sources["column gains"] ** 2 - pixel.column_gain_spread**2 * counted_e
-        sources |= {"shot noise": 0.0, "dark current": 0.0, "hot pixels": (share * (1 - share)) ** 0.5 * hot_e}
-        sources["column gains"] = max(gains_e2, 0.0) ** 0.5
-    sources = {name: noise_e / factor for name, noise_e in sources.items()}
+    sources = sources_of(float(_collected_e(exposed)[row, column]), at_channel(_readings(exposed), channel))
     return {**sources, "total": hypot(*sources.values())}

@@ -1,5 +1,6 @@
 """An even neutral field before a camera in closed form: electrons, SNR, and the light that an SNR takes."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
 
@@ -7,10 +8,9 @@ import numpy as np
 
 from render.spectrum import Floats
 from rodcone.errors import require_name
-from sensor.chip import room_e
 from sensor.config import SensorConfig
-from sensor.readings.merge import of_channel
-from sensor.readings.noise import dark_electrons, merged_variance, of_reading, switched_to
+from sensor.readings.noise import dark_electrons, merged_variance
+from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
 from sensor.readout import noise_variance
 from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
 
@@ -46,7 +46,7 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
 
     Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
     """
-    of_channel(sensor, channel)  # which asks for one
+    at_channel(chip_readings(sensor, exposure_s), channel)  # which asks for one
     if channel is not None:
         require_name("channel", channel, sensor.channels)
     even = replace(sensor, pixel=replace(sensor.pixel, crosstalk=0.0))
@@ -80,55 +80,45 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
     electrons = dict(zip(sensor.channels, of[:, None] * luminance_cd_m2, strict=True))
     ratios = {}
     for name, e in electrons.items():
-        alone, share = of_channel(sensor, name)
-        full_e = room_e(alone.pixel, exposure_s) / share
+        full_e = max(x.headroom_e for x in at_channel(chip_readings(sensor, exposure_s), name))
         metered = any(x.metered for x in sensor.chip.channels if x.channel == name)  # in time, before the well is full
         ratios[name] = np.where(metered | (e < full_e), snr(e, sensor, exposure_s, name), np.nan)
     return ratios
 
 
-def noise_parabola(sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> tuple[float, float, float]:
-    """a, b, c of the variance a + b e + c e^2 of a pixel in an even field [e-^2]; parameters as of `noise_variance`."""
-    well_e = sensor.pixel.full_well_e  # three points give the parabola; so far apart, no digits are lost
-    fields = (np.full((1, 1), share * well_e) for share in (0.0, 0.5, 1.0))
-    a, half, full = (float(noise_variance(field, sensor, exposure_s, channel)[0, 0]) for field in fields)
-    c = (full - 2 * half + a) * 2 / well_e**2
-    return a, (full - a) / well_e - c * well_e, c
-
-
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> float:
     """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
 
-    By `noise_parabola` e solves (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
-    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before. A metered channel is seen in its
-    longest time, for light that a shorter one is needed for has more SNR than a full well.
+    A metered channel is seen in its longest time, for light that a shorter one is needed for has more SNR than a full
+    well. Of several readings it is the least light with this SNR; beyond a seam it may be less again for a while.
     """
-    if sensor.chip.channels:
-        alone, share = of_channel(sensor, channel)
-        return electrons_at_snr(snr, alone, exposure_s) / share
-    if sensor.chip.readings:
-        return _electrons_at_snr_of_readings(snr, sensor, exposure_s)
-    a, b, c = noise_parabola(sensor, exposure_s)
-    lead = 1 - snr**2 * c
+    readings = at_channel(chip_readings(sensor, exposure_s), channel)
+    if sensor.chip.switched:
+        light_e = [(x.patterns, e) for x in readings if np.isfinite(e := _electrons_of_law(snr, x))]
+        taken = [e for number, e in light_e if resolve(sensor, np.array([e]), exposure_s)[0].patterns == number]
+        return min(taken, default=np.inf)
+    return _electrons_of_merged(snr, readings) if several(readings) else _electrons_of_law(snr, readings[0])
+
+
+def _electrons_of_law(snr: float, reading: PlainReading) -> float:
+    """Photo-electrons at which one reading reaches an SNR.
+
+    With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
+    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
+    """
+    law = reading.law
+    a, b, lead = law.dark_e**2 + law.fixed_e**2, law.shot, 1 - snr**2 * law.prnu**2
     if lead <= 0:
         return float("inf")
     electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)
-    return float(electrons) if electrons < room_e(sensor.pixel, exposure_s) else float("inf")
+    return float(electrons) if electrons < reading.headroom_e else float("inf")
 
 
-def _electrons_at_snr_of_readings(snr: float, sensor: SensorConfig, exposure_s: float) -> float:
-    """The least light with this SNR; beyond a seam it may be less again for a while."""
-    if sensor.chip.switched:
-        count = len(sensor.chip.readings)
-        light_e = [electrons_at_snr(snr, of_reading(sensor, number), exposure_s) for number in range(count)]
-        fits = (
-            np.isfinite(e) and switched_to(sensor, np.array([e]), exposure_s) == number
-            for number, e in enumerate(light_e)
-        )
-        return min((e for e, fit in zip(light_e, fits, strict=True) if fit), default=np.inf)
-    levels = np.geomspace(1e-3, sensor.pixel.full_well_e, 8000)[:-1]
-    ratio = levels / np.sqrt(merged_variance(levels, sensor, exposure_s))
-    above = np.flatnonzero((ratio >= snr) & (levels + dark_electrons(sensor, exposure_s) < sensor.pixel.full_well_e))
+def _electrons_of_merged(snr: float, readings: Sequence[PlainReading]) -> float:
+    well_e = readings[0].pixel.full_well_e
+    levels = np.geomspace(1e-3, well_e, 8000)[:-1]
+    ratio = levels / np.sqrt(merged_variance(levels, readings))
+    above = np.flatnonzero((ratio >= snr) & (levels + dark_electrons(readings) < well_e))
     if above.size == 0:
         return float("inf")
     part = slice(max(above[0] - 1, 0), above[0] + 1)

@@ -1,6 +1,6 @@
 """Monte Carlo noise of a render beside the sensor's own noise: its share, the line that tells it, a render without."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from math import ceil, log2
 from typing import Any
 
@@ -14,8 +14,8 @@ from render.transport import Transport
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
-from sensor.readings.merge import under_well
-from sensor.readout import as_read, noise_variance
+from sensor.readings.resolve import PlainReading, resolve, unsaturated
+from sensor.readout import frame_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
 # What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result, and for how
@@ -53,29 +53,31 @@ def monte_carlo_share(
         The share that so many of the pixels (0 to 1) stay under; left out, mean variance over mean variance.
     """
     if expected_e.ndim == 2:
-        variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
+        variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
     else:
         parts = zip(sensor.channels, expected_e, strict=True)
-        of_channels = [_noise_and_room(plane, sensor, exposure_s, name) for name, plane in parts]
+        of_channels = [_noise_and_room(plane, resolve(sensor, plane, exposure_s, name)) for name, plane in parts]
         variance_e2, inside = (np.stack(arrays) for arrays in zip(*of_channels, strict=True))
     if not inside.any():
         return 0.0
-    monte_carlo, sensor_noise_e2 = error_e[inside] ** 2, variance_e2[inside]
     if of_pixels is None:
-        return float(monte_carlo.mean() / sensor_noise_e2.mean())
-    return float(np.quantile(monte_carlo / sensor_noise_e2, of_pixels))
+        return _mean_share(error_e, variance_e2, inside)
+    return float(np.quantile(error_e[inside] ** 2 / variance_e2[inside], of_pixels))
 
 
 def _noise_and_room(
-    expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
+    expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
     """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
-    sensor = as_read(sensor, expected_e, exposure_s, channel)
-    return noise_variance(expected_e, sensor, exposure_s, channel), under_well(expected_e, sensor, exposure_s, channel)
+    return frame_variance(expected_e, readings), unsaturated(expected_e, readings)
+
+
+def _mean_share(error_e: NDArray[np.floating], variance_e2: NDArray[np.float64], inside: NDArray[np.bool_]) -> float:
+    return float(np.square(error_e[inside]).mean() / variance_e2[inside].mean())
 
 
 def charged_share(
-    errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
+    errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> float:
     """Monte Carlo variance that a frame is charged, over the sensor's own noise variance; 0 where the well is full.
 
@@ -85,14 +87,14 @@ def charged_share(
         One draw of the unbiased light's error [e-]; or what denoised light differs by from two folds: the mean of their
         product is its whole squared error, and its upper limit is charged (`render.denoised.relight`).
     expected_e : (h, w) float64
-    sensor, exposure_s
-        As of `monte_carlo_share`.
+    readings : sequence of PlainReading
+        That the camera takes of the frame (`sensor.readings.resolve.resolve`).
     """
-    if len(errors_e) == 1:
-        return monte_carlo_share(errors_e[0], expected_e, sensor, exposure_s)
-    variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
+    variance_e2, inside = _noise_and_room(expected_e, readings)
     if not inside.any():
         return 0.0
+    if len(errors_e) == 1:
+        return _mean_share(errors_e[0], variance_e2, inside)
     sensor_noise_e2 = variance_e2[inside].sum() / inside.size
     return measured_error(errors_e[0], errors_e[1], inside / sensor_noise_e2).upper
 
@@ -137,7 +139,7 @@ def speckle_sizes(
     Where the render's noise is under the sensor's only single bright samples reach so far. Parameters as of
     `monte_carlo_share`, of one frame.
     """
-    variance_e2, inside = _noise_and_room(expected_e, sensor, exposure_s)
+    variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
     size = np.abs(error_e) / np.sqrt(variance_e2)
     return np.asarray(size[(size > SPECKLE) & inside])
 

@@ -20,6 +20,7 @@ from sensor.capture import expose
 from sensor.cfa import block_sums, mask
 from sensor.device import draw_device
 from sensor.raw import RawImage
+from sensor.readings.resolve import resolve
 from sensor.response import behind_filters
 from sensor.shake import shaken
 from studies.metrics.quality import TruePicture, appearance, measure, true_picture
@@ -113,7 +114,9 @@ def run_cell(cell: Cell) -> Row:
         budget_share=cell.budget_share,
         **figures,
         mc_share=charged_share(
-            errors_e * frames, pixels_e * frames, merged_sensor(sensor, frames), cell.exposure_s * frames
+            errors_e * frames,
+            pixels_e * frames,
+            resolve(merged_sensor(sensor, frames), pixels_e * frames, cell.exposure_s * frames),
         ),
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),

@@ -24,6 +24,7 @@ from sensor.emva1288.photon_transfer import bench
 from sensor.photodiodes import binned
 from sensor.raw import noise_at_sites
 from sensor.readings.noise import dark_electrons, whole_share
+from sensor.readings.resolve import chip_readings
 from sensor.readout import noise_sources, noise_variance, read_out
 from studies.photograph.snr import electrons_at_snr
 
@@ -93,7 +94,7 @@ def assert_variance(samples, stated, what):
 def check_stated_variance(kind, names):
     sensor = camera(kind, **terms_of(names))
     (raw,) = frame(sensor, LIGHT_E)
-    samples = raw.electrons / (whole_share(sensor) if sensor.chip.readings else 1.0)
+    samples = raw.electrons / whole_share(chip_readings(sensor, TIME_S))
     by_source = noise_sources(LIGHT_E, sensor, TIME_S)
     stated = float(noise_variance(np.array([[LIGHT_E]]), sensor, TIME_S)[0, 0])
     assert_variance(samples, stated, (kind, names))
@@ -148,7 +149,7 @@ def test_light_for_an_snr_leaves_dark_current_its_room_in_the_well(kind, share):
     """Dark current fills a share of the well: an SNR has its light just where a frame of that light isn't full."""
     per_site = share * WELL_E / TIME_S / camera(kind).chip.sites ** 2
     sensor = camera(kind, read_noise_e=5.0, dark_current_e_per_s=per_site)
-    room_e = sensor.pixel.full_well_e - dark_electrons(sensor, TIME_S)
+    room_e = sensor.pixel.full_well_e - dark_electrons(chip_readings(sensor, TIME_S))
     assert room_e == pytest.approx((1 - share) * WELL_E)
     for light_e, fits in ((0.9 * room_e, True), (1.1 * room_e, False)):
         ratio = light_e / float(noise_variance(np.array([[light_e]]), sensor, TIME_S)[0, 0]) ** 0.5

@@ -7,6 +7,7 @@ from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
 from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
+from sensor.noise_law import NoiseLaw
 
 PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
 MIDDLE = np.array([2, 3])
@@ -44,7 +45,7 @@ def error(prior: Gaussians, scale: float, noise: Noise) -> float:
 
 @pytest.mark.parametrize("spread", [0.0, 0.3])
 def test_one_component_gives_textbook_lmmse_and_the_blur_that_a_picture_keeps(spread: float) -> None:
-    prior, noise, scale = mixture(1), Noise(dark_e=2.0, prnu=0.01, full_e=np.inf), 50.0
+    prior, noise, scale = mixture(1), Noise(NoiseLaw(shot=1.0, dark_e=2.0, prnu=0.01), full_e=np.inf), 50.0
     c, mean = covariance(prior, 0), prior.means[0].ravel()
     lens = np.eye(PIXELS) + spread * np.random.default_rng(9).random((PIXELS, PIXELS))
     sampling, blur = np.einsum("spc,pq->sqc", mosaic(), lens), np.kron(lens, np.eye(COEFFICIENTS))
@@ -61,7 +62,7 @@ def test_one_component_gives_textbook_lmmse_and_the_blur_that_a_picture_keeps(sp
 
 
 def test_draws_have_the_error_of_a_known_component_and_no_estimator_a_smaller_one() -> None:
-    prior, noise, scale, draws = mixture(4), Noise(dark_e=3.0, prnu=0.0, full_e=np.inf), 5.0, 4000
+    prior, noise, scale, draws = mixture(4), Noise(NoiseLaw(shot=1.0, dark_e=3.0), full_e=np.inf), 5.0, 4000
     rng = np.random.default_rng(4)
     h = scale * mosaic().reshape(PIXELS, -1)
     covariances = [covariance(prior, j) for j in range(4)]
@@ -102,13 +103,13 @@ def test_pooling_keeps_mean_and_covariance() -> None:
 
 
 def test_an_endless_well_has_a_smaller_error() -> None:
-    ended, endless = (Noise(dark_e=2.0, prnu=0.01, full_e=full_e) for full_e in (100.0, np.inf))
+    ended, endless = (Noise(NoiseLaw(shot=1.0, dark_e=2.0, prnu=0.01), full_e=full_e) for full_e in (100.0, np.inf))
     assert error(mixture(3), 10.0, endless) < error(mixture(3), 10.0, ended)
 
 
 def test_without_samples_the_error_is_that_of_the_prior() -> None:
     prior = mixture(2)
-    blind = Noise(dark_e=1e9, prnu=0.0, full_e=np.inf)
+    blind = Noise(NoiseLaw(shot=1.0, dark_e=1e9), full_e=np.inf)
     alone = prior.weights @ [np.diag(covariance(prior, k)).reshape(PIXELS, -1)[MIDDLE].sum() for k in range(2)] / 2
     assert_allclose(error(prior, 1.0, blind), alone, rtol=1e-9)
 
@@ -116,7 +117,7 @@ def test_without_samples_the_error_is_that_of_the_prior() -> None:
 def test_a_known_signal_has_the_information_of_a_censored_gaussian() -> None:
     """Fisher information of a sample of known noise: the variance of the score, by quadrature."""
     for mean_e in (80.0, 100.0, 115.0):
-        noise = Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+        noise = Noise(NoiseLaw(shot=0.0, dark_e=10.0), full_e=100.0)
         y = np.linspace(mean_e - 80.0, 100.0, 20001)
         density = np.exp(-(((y - mean_e) / 10.0) ** 2) / 2) / (10.0 * np.sqrt(2 * np.pi))
         step = 1e-4
@@ -129,7 +130,7 @@ def test_a_known_signal_has_the_information_of_a_censored_gaussian() -> None:
 def test_a_lone_sample_that_may_be_full_leaves_what_draws_leave() -> None:
     """The variance of the signal given a sample, or given that it is full, of a million draws; five deviations."""
     rng, spread, draws = np.random.default_rng(3), 900.0, 1_000_000
-    noise = Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+    noise = Noise(NoiseLaw(shot=0.0, dark_e=10.0), full_e=100.0)
     for mean_e in (80.0, 100.0, 150.0):
         signal = mean_e + 30.0 * rng.standard_normal(draws)
         total = signal + 10.0 * rng.standard_normal(draws)
@@ -143,7 +144,7 @@ def test_a_lone_sample_that_may_be_full_leaves_what_draws_leave() -> None:
 
 def test_of_three_samples_that_may_be_full_the_error_is_near_that_of_draws() -> None:
     """Exact by draws of what is hidden, for neighbours alike and unlike; the form is a quarter off at most."""
-    rng, noise = np.random.default_rng(5), Noise(dark_e=10.0, prnu=0.0, full_e=100.0, shot=0.0)
+    rng, noise = np.random.default_rng(5), Noise(NoiseLaw(shot=0.0, dark_e=10.0), full_e=100.0)
     for alike, means in [(0.5, (80.0, 100.0, 120.0)), (0.9, (80.0, 95.0, 110.0)), (0.9, (120.0, 120.0, 120.0))]:
         signal, mean_e = 900.0 * (alike + (1 - alike) * np.eye(3)), np.array(means)
         total = signal + 100.0 * np.eye(3)
@@ -165,7 +166,8 @@ def test_of_three_samples_that_may_be_full_the_error_is_near_that_of_draws() -> 
 
 def test_the_slope_is_that_of_differences() -> None:
     """Central differences, one entry of H after another; some samples are half full."""
-    prior, noise, rng = mixture(3), Noise(dark_e=2.0, prnu=0.01, full_e=60.0), np.random.default_rng(7)
+    noise = Noise(NoiseLaw(shot=1.0, dark_e=2.0, prnu=0.01), full_e=60.0)
+    prior, rng = mixture(3), np.random.default_rng(7)
     sampling, scales = mosaic(), (40.0, 3.0)
     rows = [[rng.standard_normal((3, len(MIDDLE), d, COEFFICIENTS)) for d in (2, 1)] for _ in scales]
 

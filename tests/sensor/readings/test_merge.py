@@ -23,8 +23,8 @@ from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.random import poisson
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.readings.merge import as_metered, of_channel, under_well
-from sensor.readings.noise import covariances, of_reading, seams, shares, whole_share
+from sensor.readings.noise import covariances, seams, shares, whole_share
+from sensor.readings.resolve import at_channel, chip_readings, resolve, unsaturated
 from sensor.readout import draw_frame, noise_sources, noise_variance, read_out
 from studies.photograph.camera import calibrate
 from studies.photograph.snr import electrons_at_snr
@@ -36,7 +36,7 @@ EXACT = pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
 
 def levels_of(sensor):
     """Light over six decades, and each seam in steps of a third of its noise."""
-    at = seams(sensor, TIME_S).above_e
+    at = seams(chip_readings(sensor, TIME_S)).above_e
     fine = [
         e + step * np.sqrt(noise_variance(np.array([e]), sensor, TIME_S)[0])
         for e in at[:-1]
@@ -50,7 +50,7 @@ def levels_of(sensor):
 @pytest.mark.parametrize("name", HDR)
 def test_the_merge_has_the_mean_of_the_light_and_the_noise_of_the_closed_form(name, exact):
     sensor = preset(name)
-    whole = whole_share(sensor)
+    whole = whole_share(chip_readings(sensor, TIME_S))
     chips, rng = np.random.default_rng(11), np.random.default_rng(12)
     levels = levels_of(sensor)[:: 3 if exact else 1]
     for light in levels:
@@ -81,7 +81,7 @@ def test_a_raw_image_states_what_columns_gains_make_of_light_and_dark_current_to
     sensor = replace(sensor, pixel=replace(sensor.pixel, prnu=0.0, column_gain_spread=0.03, dark_current_e_per_s=1e4))
     light, device = np.full((8, 8), 1000.0), draw_device(sensor, (8, 8), np.random.default_rng(3))
     raw = expose(light, sensor, 0.1, device, np.random.default_rng(4))
-    whole = whole_share(sensor) if name in HDR else 1.0
+    whole = whole_share(chip_readings(sensor, 0.1)) if name in HDR else 1.0
     stated = noise_at_sites(raw, whole * light) / whole**2
     np.testing.assert_allclose(stated, noise_variance(light, sensor, 0.1), rtol=0.01)
 
@@ -93,7 +93,7 @@ def test_a_reading_that_dark_current_fills_is_left_out(name, share):
     sensor, shape = preset(name), (128, 128)
     well_e = min(reading.full_well_e / reading.share for reading in sensor.chip.readings)
     sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=share * well_e / 0.1, prnu=0.0))
-    device, whole = draw_device(sensor, shape, np.random.default_rng(3)), whole_share(sensor)
+    device, whole = draw_device(sensor, shape, np.random.default_rng(3)), whole_share(chip_readings(sensor, 0.1))
     for light in (0.0, 0.01 * sensor.pixel.full_well_e, 0.2 * sensor.pixel.full_well_e):
         raw = expose(np.full(shape, light), sensor, 0.1, device, np.random.default_rng(4))
         stated = noise_at_sites(raw, np.full(shape, whole * light)).mean()
@@ -110,13 +110,14 @@ def test_readings_covary_as_their_charges_and_photodiodes_say(name, draw, light)
     device = draw_device(sensor, SHAPE, chips)
     keys = {}
     samples = []
-    for number, reading in enumerate(sensor.chip.readings):
-        own = of_reading(sensor, number)
+    readings = chip_readings(sensor, TIME_S)
+    for number, reading in enumerate(readings):
+        own = reading.sensor
         key = keys.setdefault(reading.charge, int(rng.integers(2**63)))
         dn = draw(np.full(SHAPE, light * reading.share), own, device.readings[number], TIME_S, key, number)
         samples.append((dn.astype(float) - own.black_dn).ravel() * own.gain_e_per_dn / reading.share)
     found = np.cov(samples)
-    meant = sum(covariances(np.array([light]), sensor, TIME_S).values())[0]
+    meant = sum(covariances(np.array([light]), readings).values())[0]
     # standard error of a covariance of Gaussians; 4 of them in at most 9 entries: 6e-4
     error = np.sqrt((np.outer(np.diag(meant), np.diag(meant)) + meant**2) / samples[0].size)
     assert (np.abs(found - meant) < 4 * error).all(), (found, meant)
@@ -145,7 +146,7 @@ def test_two_readings_of_one_charge_see_the_same_electrons_beside_a_lamp():
         return seen[-1]
 
     for number in range(2):
-        draw_frame(light, of_reading(sensor, number), chip.readings[number], 0.01, 7, number, drawn)
+        draw_frame(light, chip_readings(sensor, 0.01)[number].sensor, chip.readings[number], 0.01, 7, number, drawn)
     assert np.array_equal(*seen)
 
 
@@ -166,7 +167,7 @@ def test_a_camera_that_switches_gives_one_gain_s_frame():
     sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
     device = draw_device(sensor, (32, 32), np.random.default_rng(1))
     for light, index in ((100.0, 0), (5000.0, 1)):
-        own = of_reading(sensor, index)
+        own = chip_readings(sensor, TIME_S)[index].sensor
         raw = expose(np.full((32, 32), light), sensor, TIME_S, device, np.random.default_rng(2), exact=True)
         dark_e = own.pixel.dark_current_e_per_s * TIME_S
         assert raw.read_noise_e == pytest.approx(np.hypot(own.pixel.read_noise_e, np.sqrt(dark_e)), rel=1e-12)
@@ -183,7 +184,7 @@ def test_a_burst_is_merged_as_frames_of_one_reading_are():
         frames = [expose(np.full(SHAPE, 3000.0), sensor, TIME_S, device, rng) for _ in range(4)]
         merged = merged_raw(frames)
         assert merged.electrons.mean() == pytest.approx(sum(frame.electrons.mean() for frame in frames), rel=1e-6)
-        assert merged.exposure_s == pytest.approx(4 * whole_share(sensor) * TIME_S)
+        assert merged.exposure_s == pytest.approx(4 * whole_share(chip_readings(sensor, TIME_S)) * TIME_S)
         assert [step.from_e for step in merged.noise_steps] == [4 * step.from_e for step in frames[0].noise_steps]
         refusal(merged_raw, [frames[0], replace(frames[1], exposure_s=1.0)], match="each of several readings")
 
@@ -212,8 +213,8 @@ def test_a_chip_of_other_patterns_has_shares_of_dark_current_and_hot_pixels():
     hot = np.zeros(SHAPE, bool)
     hot[tuple(raw.defects.T)] = True
     np.testing.assert_array_equal(hot, device.hot)
-    assert raw.electrons[hot].mean() / whole_share(sensor) == pytest.approx(1000.0, rel=0.01)
-    assert shares(sensor).tolist() == [1.0, 0.0625]
+    assert raw.electrons[hot].mean() / whole_share(chip_readings(sensor, TIME_S)) == pytest.approx(1000.0, rel=0.01)
+    assert shares(chip_readings(sensor, TIME_S)).tolist() == [1.0, 0.0625]
 
 
 @loop("name", ["low_noise", *HDR, "white_apart"])
@@ -301,7 +302,7 @@ def test_dark_frames_of_each_channel_have_its_read_noise_and_dsnu(reading):
     dark = np.stack([shot(sensor, np.zeros(FRAME), seed).electrons for seed in range(8)])
     for channel, apart in (("W", reading), ("G", ChannelReading("G"))):
         read_e, dsnu_e = apart.read_noise_e or 1.5, apart.dsnu_e or 1.0
-        alone = of_channel(sensor, channel)[0]
+        alone = at_channel(chip_readings(sensor, EXPOSURE_S), channel)[0].sensor
         variance = (read_e**2 + dsnu_e**2 + alone.gain_e_per_dn**2 / 12) / apart.share**2
         values = dark[:, mask(RGBW, channel, FRAME)]
         assert values.var() == pytest.approx(variance, rel=stats.norm.isf(5e-6) * np.sqrt(2 / values.size)), channel
@@ -330,8 +331,8 @@ def test_dark_current_takes_its_part_of_each_channel_s_well(reading):
         at = mask(RGBW, channel, FRAME)
         for part in (0.999, 1.001):
             light = np.full(FRAME, part * full_e[white])
-            assert (under_well(light, sensor, EXPOSURE_S)[at] == (part < 1)).all()
-            assert (under_well(light[at], sensor, EXPOSURE_S, channel) == (part < 1)).all()
+            assert (unsaturated(light, resolve(sensor, light, EXPOSURE_S))[at] == (part < 1)).all()
+            assert (unsaturated(light[at], resolve(sensor, light[at], EXPOSURE_S, channel)) == (part < 1)).all()
 
 
 def test_the_other_channels_draw_what_they_draw_where_nothing_is_apart():
@@ -373,7 +374,7 @@ def test_a_metered_channel_takes_the_time_that_holds_its_bright_end():
         (30_000.0, 2 ** (-22 / 16)),
     ):
         light = scene(white_e - 2000 * EXPOSURE_S)  # the rest is dark current
-        reading = as_metered(sensor, light, EXPOSURE_S).chip.channels[0]
+        reading = resolve(sensor, light, EXPOSURE_S)[1]
         assert reading.time_share == pytest.approx(time_share, rel=1e-12), white_e
         assert reading.time_share * white_e <= 0.8 * 15_000
         raw = shot(sensor, light, 2)
@@ -381,7 +382,7 @@ def test_a_metered_channel_takes_the_time_that_holds_its_bright_end():
         assert raw.exposure_s == EXPOSURE_S
         assert not raw.saturated.any()
     least = camera(ChannelReading("W", metered=True, time_share=0.125))
-    assert as_metered(least, scene(10.0), EXPOSURE_S).chip.channels[0].time_share == 0.125
+    assert resolve(least, scene(10.0), EXPOSURE_S)[1].time_share == 0.125
 
 
 def test_rules_of_exposure_look_at_each_channel_s_own_well():

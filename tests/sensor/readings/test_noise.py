@@ -17,16 +17,8 @@ from sensor.device import draw_device
 from sensor.exposure import exposure_of_electrons_s
 from sensor.presets import low_noise, preset, preset_file
 from sensor.readings.merge import noise_of_merged
-from sensor.readings.noise import (
-    best_weights,
-    covariances,
-    merged_variance,
-    merged_variances,
-    of_reading,
-    seams,
-    switched_to,
-    whole_share,
-)
+from sensor.readings.noise import best_weights, covariances, merged_variance, merged_variances, seams, whole_share
+from sensor.readings.resolve import chip_readings, resolve
 from sensor.readout import noise_sources, noise_variance
 from studies.photograph.snr import electrons_at_snr, snr
 
@@ -54,9 +46,9 @@ def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
     sensor = preset(name)
     sensor = replace(sensor, pixel=replace(sensor.pixel, **REAL_PIXEL | {"crosstalk": 0.0}))
     light = np.array([0.0, 0.3, 40.0, 5000.0])
-    total = sum(covariances(light, sensor, 0.02).values())
+    total = sum(covariances(light, chip_readings(sensor, 0.02)).values())
     for index, reading in enumerate(sensor.chip.readings):
-        alone = noise_variance(light * reading.share, of_reading(sensor, index), 0.02)
+        alone = noise_variance(light * reading.share, chip_readings(sensor, 0.02)[index].sensor, 0.02)
         np.testing.assert_allclose(total[:, index, index] * reading.share**2, alone, rtol=1e-12)
 
 
@@ -65,8 +57,8 @@ def test_two_gains_of_one_charge_share_its_shot_noise_and_average_their_read_noi
     light = np.array([0.0, 1.0, 100.0, 1500.0])
     read_e2 = 1.0 / (1.0 / 2.0**2 + 1.0 / 6.0**2)
     # quantisation is 1e-3 of a variance of 4 or less
-    np.testing.assert_allclose(merged_variance(light, sensor, 0.01), light + read_e2, rtol=1e-3)
-    weights = best_weights(np.asarray(sum(covariances(light, sensor, 0.01).values())), np.array([0, 1]))
+    np.testing.assert_allclose(merged_variance(light, chip_readings(sensor, 0.01)), light + read_e2, rtol=1e-3)
+    weights = best_weights(np.asarray(sum(covariances(light, chip_readings(sensor, 0.01)).values())), np.array([0, 1]))
     np.testing.assert_allclose(weights[:, 0], 36 / (36 + 4), rtol=1e-3)
 
 
@@ -77,8 +69,8 @@ def test_two_charges_without_dark_noise_add_their_photons():
     # the converter's step of 61 e- is all dark noise there is: 310 e-^2 of each over its share
     for sensor, whole in ((split, 0.8), (apart, 1.25)):
         fine = replace(sensor, bits=16)
-        assert whole_share(fine) == pytest.approx(whole)
-        assert merged_variance(light, fine, 0.01)[1] == pytest.approx(1e5 / whole, rel=1e-3)
+        assert whole_share(chip_readings(fine, 0.01)) == pytest.approx(whole)
+        assert merged_variance(light, chip_readings(fine, 0.01))[1] == pytest.approx(1e5 / whole, rel=1e-3)
 
 
 @loop("name", HDR)
@@ -94,19 +86,20 @@ def test_sources_sum_to_the_variance_and_frames_are_interpolated_within_a_thousa
 
 def test_at_a_seam_half_of_the_pixels_have_lost_the_reading():
     sensor = dual()
-    seam = float(seams(sensor, 0.01).above_e[0])
+    seam = float(seams(chip_readings(sensor, 0.01)).above_e[0])
     assert seam == pytest.approx(2000.0 - 6.0 * np.sqrt(2000.0 + 4.0), rel=1e-5)
-    below, at, above = merged_variance(seam * np.array([0.8, 1.0, 1.2]), sensor, 0.01)
+    below, at, above = merged_variance(seam * np.array([0.8, 1.0, 1.2]), chip_readings(sensor, 0.01))
     assert at == pytest.approx(seam + (below - 0.8 * seam + above - 1.2 * seam) / 2, rel=1e-6)
     assert above == pytest.approx(1.2 * seam + 36.0, rel=1e-3)
 
 
 def test_a_camera_that_switches_takes_the_quietest_gain_that_holds_the_bright_end():
     sensor = switched(preset("dual_gain"))
-    high, low = (of_reading(sensor, index) for index in (0, 1))
-    assert [switched_to(sensor, np.array([e]), 0.01) for e in (10.0, 1746.0, 1747.0, 8e3, 1e5)] == [0, 0, 1, 1, 1]
+    high, low = (x.sensor for x in chip_readings(sensor, 0.01))
+    lights_e = (10.0, 1746.0, 1747.0, 8e3, 1e5)
+    assert [resolve(sensor, np.array([e]), 0.01)[0].patterns for e in lights_e] == [0, 0, 1, 1, 1]
     hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1000.0))
-    assert [switched_to(hot, np.array([e]), 1.0) for e in (10.0, 746.0, 747.0)] == [0, 0, 1]
+    assert [resolve(hot, np.array([e]), 1.0)[0].patterns for e in (10.0, 746.0, 747.0)] == [0, 0, 1]
     frame = np.array([[5.0, 1000.0], [20.0, 3000.0]])
     np.testing.assert_array_equal(noise_variance(frame, sensor, 0.01), noise_variance(frame, low, 0.01))
     np.testing.assert_array_equal(noise_variance(frame / 10, sensor, 0.01), noise_variance(frame / 10, high, 0.01))
@@ -126,10 +119,11 @@ def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
 @loop(("count", "most"), [(1, 0.065), (64, 0.13)])
 def test_noise_steps_of_a_frame_and_of_a_burst_are_as_near_to_the_closed_form_as_stated(name, count, most):
     sensor, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")
-    whole, at = whole_share(sensor), seams(sensor, 0.02).above_e
-    for number, step in enumerate(noise_of_merged(sensor, 0.02)):
+    readings = chip_readings(sensor, 0.02)
+    whole, at = whole_share(readings), seams(readings).above_e
+    for number, step in enumerate(noise_of_merged(readings)):
         light = np.linspace(1.05 * at[number - 1] if number else 0.0, 0.97 * at[number], 200)
-        by_source = merged_variances(light, sensor, 0.02).items()
+        by_source = merged_variances(light, readings).items()
         found = whole**2 * sum(value * (count if source in fixed else 1) for source, value in by_source)
         electrons = whole * light
         stated = step.shot * electrons + step.read_noise_e**2

@@ -143,7 +143,7 @@ def test_a_worker_with_another_rodcone_is_refused(name: str, tmp_path: Path, mon
 def test_a_shards_key_covers_all_code_that_decides_its_samples(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sample_module, "digest_file", lambda path: path.name)
     covered = set(sample_module.code_digests.__wrapped__())
-    assert {"shards.py", "sample.py", "snr.py", "render_noise.py", "frames.py"} <= covered
+    assert {"shards.py", "sample.py", "render_noise.py", "frames.py"} <= covered
 
 
 @pytest.mark.slow

@@ -15,6 +15,7 @@ from scenes.catalog import load
 from sensor.chip import ChannelReading
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.presets import low_noise
+from sensor.readings.resolve import chip_readings
 from studies.dataset.sample import Arrays, Sample, group_shares, make_sample, noise_coefficients, scene_hash
 from studies.study.lit_scene import open_choice
 from studies.study.study import RenderLimits, SceneChoice, Study
@@ -117,7 +118,7 @@ def test_coefficients_are_those_of_the_data_sheet(crosstalk: float) -> None:
     terms = {"read_noise_e": 3.0, "dsnu_e": 2.0, "prnu": 0.02, "dark_current_e_per_s": 50.0}
     sensor, time_s = with_pixel(**terms, crosstalk=crosstalk), 0.1
     gain = sensor.gain_e_per_dn
-    for noise in noise_coefficients(sensor, time_s).values():
+    for noise in noise_coefficients(chip_readings(sensor, time_s), gain).values():
         assert noise["a"] == pytest.approx(1 / gain, rel=1e-9)
         assert noise["b"] == pytest.approx((3.0**2 + 2.0**2 + 50.0 * 0.1 + gain**2 / 12) / gain**2, rel=1e-9)
         assert noise["c"] == pytest.approx(0.02**2, rel=1e-9)

@@ -17,6 +17,7 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
 from sensor.config_file import read_sensor
+from sensor.noise_law import NoiseLaw
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset, vary
 from studies.design.expect import MIDDLE, drawn_pixels, expect, lens_of, metric_rows, responses_e, sampling_of, view_of
@@ -55,7 +56,7 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
     green_e = np.array([2.0, 5.0, 20.0, 100.0, 500.0])  # from white
     held, seen = load_prior("drawn"), view_of("drawn", "D65")
     matrix = np.asarray(calibrate(RGBW, illuminant("D65")).to_srgb)[:, :3]
-    responses, noise = responses_e(RGBW, seen), Noise(dark_e=1.8, prnu=0.0, full_e=np.inf)
+    responses, noise = responses_e(RGBW, seen), Noise(NoiseLaw(shot=1.0, dark_e=1.8), full_e=np.inf)
     white = np.linalg.lstsq(held.spectra, np.ones(len(held.spectra)), rcond=None)[0]
     to_srgb = matrix @ (responses / (responses @ white)[:, None])[:3]
     per_cd_m2 = neutral_electrons(BAYER, seen.light, 1.0)[1]
@@ -155,7 +156,7 @@ def test_a_tile_and_a_prior_turned_or_mirrored_together_have_the_same_error() ->
         prior = replace(patches, means=patches.means[:, moved.ravel()], factors=patches.factors[:, moved.ravel()])
         sensor = preset("low_noise", tile)
         samples = sampled(prior, sampling_of(sensor, responses_e(sensor, seen), sharp), MIDDLE, sharp)
-        return float(expected_error(samples, 5.0, Noise(dark_e=2.0, prnu=0.0, full_e=np.inf), forms)[0])
+        return float(expected_error(samples, 5.0, Noise(NoiseLaw(shot=1.0, dark_e=2.0), full_e=np.inf), forms)[0])
 
     still = error(pixels, ("RG", "BW"))
     assert error(np.rot90(pixels), ("GW", "RB")) == pytest.approx(still, rel=1e-9)

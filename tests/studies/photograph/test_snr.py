@@ -13,7 +13,7 @@ from sensor.config import with_channel_readings
 from sensor.device import draw_device
 from sensor.photodiodes import binned
 from sensor.presets import low_noise, preset, table1_output
-from sensor.readings.noise import of_reading
+from sensor.readings.resolve import chip_readings
 from studies.metrics.truth import light_of
 from studies.paper.setup import shot_noise_alone
 from studies.photograph.snr import channel_e, electrons_at_snr, light_for_snr, snr, snr_at
@@ -113,5 +113,5 @@ def test_a_camera_that_switches_its_gain_takes_each_light_as_a_frame_of_its_own(
     sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
     light_e = np.array([[10.0, 8e3]])
     for number, (index, together) in enumerate(zip((0, 1), snr(light_e, sensor, EXPOSURE_S)[0], strict=True)):
-        alone = of_reading(sensor, index)
+        alone = chip_readings(sensor, EXPOSURE_S)[index].sensor
         assert together == pytest.approx(float(snr(light_e[:, [number]], alone, EXPOSURE_S)[0, 0]), rel=1e-12)

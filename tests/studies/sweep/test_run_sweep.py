@@ -23,6 +23,7 @@ from render.engine import render
 from scenes.catalog import load
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
+from sensor.readings.resolve import chip_readings
 from sensor.response import expected_electrons
 from studies.study.render_noise import charged_share, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
@@ -228,7 +229,7 @@ def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured
         expected_electrons(form_image(view, sensor), sensor, row.exposure_s)
         for view in relight_denoised(transport, luminance_cd_m2=1.0)
     )
-    share = charged_share(np.stack([whole - fold for fold in folds]), whole, sensor, row.exposure_s)
+    share = charged_share(np.stack([whole - fold for fold in folds]), whole, chip_readings(sensor, row.exposure_s))
     assert row.mc_share == pytest.approx(share, rel=1e-3)  # single precision
     assert json.loads(row.render)["relative_mc_error"] > transport.relative_mc_error  # of all pixels, and their limit
 

@@ -1,0 +1,304 @@
+"""A camera resolved for one exposure: the plain readings that its raw image is made of.
+
+A plain reading is a camera that reads every pixel once, and what its samples stand for. A camera without several
+readings is a tuple of one, and so is one that bins. Of a pixel that is read at several gains, times or photodiodes each
+is a plain reading of all pixels. Of channels that are read apart, after a time of their own, behind a neutral density
+or at another conversion gain, each is a plain reading of that channel's sites.
+
+The raw image holds all in one unit: e electrons are what a pixel would collect of its whole light in the whole time.
+A reading that takes the share s of it counts s e electrons, of which everything that a pixel does is said; over s,
+their shot noise has the variance e / s, and their well and dark noise are 1 / s times as large.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from math import sqrt
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.errors import InputError
+from sensor.cfa import mask
+from sensor.chip import ChannelReading, Chip, PixelConfig
+from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
+from sensor.noise_law import NoiseLaw, total
+
+Values: TypeAlias = NDArray[Any]
+_STEPS = 16.0  # of a metered time to an octave: frames of one scene take the same one
+
+
+@dataclass(frozen=True)
+class PlainReading:
+    """One reading of one exposure.
+
+    Attributes
+    ----------
+    sensor : SensorConfig
+        A camera all of whose pixels are read once, in electrons of this reading's own.
+    exposure_s : float
+        The whole time [s]; the sensor's dark current is that of the reading's share of it.
+    pixel : PixelConfig
+        Of the raw image, in its electrons.
+    light_share : float
+        Share of a pixel's light that the photodiode, or the density in front of it, takes.
+    time_share : float
+        Share of the whole time after which it is read.
+    photodiode : str
+        Which one: readings of another have other shot noise and another PRNU.
+    sites : str or None
+        Channels at whose sites the raw image holds this reading; None where it reads every pixel.
+    patterns : int or None
+        Its number among `sensor.device.Device.readings`; None of a chip with one set of patterns.
+    poisson : float
+        Variance of the counted electrons over their mean: 0 of `sensor.readout.draw_mean_frame`.
+    """
+
+    sensor: SensorConfig
+    exposure_s: float
+    pixel: PixelConfig
+    light_share: float = 1.0
+    time_share: float = 1.0
+    photodiode: str = ""
+    sites: str | None = None
+    patterns: int | None = None
+    poisson: float = 1.0
+
+    @property
+    def share(self) -> float:
+        """Share of a pixel's electrons in the whole time that this reading counts."""
+        return self.light_share * self.time_share
+
+    @property
+    def charge(self) -> tuple[str, float, str | None]:
+        """What readings of the same charge, so of one shot noise, have in common."""
+        return self.photodiode, self.time_share, self.sites
+
+    @property
+    def dark_e(self) -> float:
+        """Mean electrons of dark current and hot pixels, in the raw image's electrons."""
+        pixel = self.sensor.pixel
+        hot_e_per_s = pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
+        return (pixel.dark_current_e_per_s + hot_e_per_s) * self.exposure_s / self.share
+
+    @property
+    def full_well_e(self) -> float:
+        """Electrons that fill it, dark current's among them, in the raw image's electrons."""
+        return self.sensor.pixel.full_well_e / self.share
+
+    @property
+    def headroom_e(self) -> float:
+        """Photo-electrons that fill it beside the mean of its dark current, in the raw image's electrons."""
+        pixel = self.sensor.pixel
+        return (pixel.full_well_e - pixel.dark_current_e_per_s * self.exposure_s) / self.share
+
+    @cached_property
+    def sources(self) -> dict[str, NoiseLaw]:
+        """Law of each source of a sample's noise over chips and exposures, in the raw image's electrons."""
+        sources = pixel_sources(self.sensor, self.exposure_s, self.poisson)
+        return {name: law.over(self.share) for name, law in sources.items()}
+
+    @cached_property
+    def law(self) -> NoiseLaw:
+        """Law of a sample's noise over chips and exposures, in the raw image's electrons; without clipping."""
+        return total(self.sources.values())
+
+
+def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0) -> dict[str, NoiseLaw]:
+    """Law of each source of noise of a pixel that is read once; of a chip drawn at random, without clipping.
+
+    Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
+    and column offsets, read noise and quantisation (gain^2 / 12).
+    """
+    pixel = sensor.pixel
+    dark_e = pixel.dark_current_e_per_s * exposure_s
+    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    collected = {
+        "shot noise": NoiseLaw(shot=poisson),
+        "dark current": NoiseLaw(dark_e=sqrt(poisson * dark_e)),
+        "hot pixels": NoiseLaw(
+            dark_e=sqrt(poisson * hot_share * hot_e), fixed_e=sqrt(hot_share * (1 - hot_share)) * hot_e
+        ),
+        "PRNU": NoiseLaw(prnu=pixel.prnu),
+    }
+    # A product of independent factors: E[gain^2] E[collected^2] - E[collected]^2, collected of mean e + m.
+    of_all, mean_dark_e, spread = total(collected.values()), dark_e + hot_share * hot_e, pixel.column_gain_spread
+    column_gains = NoiseLaw(
+        shot=spread**2 * (of_all.shot + 2 * mean_dark_e),
+        dark_e=spread * of_all.dark_e,
+        fixed_e=spread * np.hypot(of_all.fixed_e, mean_dark_e),
+        prnu=spread * np.hypot(of_all.prnu, 1.0),
+    )
+    return collected | {
+        "column gains": column_gains,
+        "DSNU": NoiseLaw(fixed_e=pixel.dsnu_e),
+        "column offsets": NoiseLaw(fixed_e=pixel.column_offset_e),
+        "read noise": NoiseLaw(dark_e=pixel.read_noise_e),
+        "quantisation": NoiseLaw(dark_e=sensor.gain_e_per_dn / sqrt(12)),
+    }
+
+
+def chip_readings(sensor: SensorConfig, exposure_s: float) -> tuple[PlainReading, ...]:
+    """Every reading that the chip can take: each gain of one that switches, metered channels in their longest time."""
+    chip, pixel = sensor.chip, sensor.pixel
+    if chip.readings:
+        return tuple(
+            PlainReading(
+                sensor=replace(
+                    sensor,
+                    pixel=replace(
+                        pixel,
+                        read_noise_e=reading.read_noise_e,
+                        dsnu_e=reading.dsnu_e,
+                        full_well_e=reading.full_well_e,
+                        dark_current_e_per_s=pixel.dark_current_e_per_s * reading.share,
+                        hot_pixel_dark_current_e_per_s=pixel.hot_pixel_dark_current_e_per_s * reading.share,
+                    ),
+                    chip=Chip(),
+                ),
+                exposure_s=exposure_s,
+                pixel=pixel,
+                light_share=reading.light_share,
+                time_share=reading.time_share,
+                photodiode=reading.photodiode,
+                patterns=number,
+            )
+            for number, reading in enumerate(chip.readings)
+        )
+    if not chip.channels:
+        return (PlainReading(sensor, exposure_s, pixel),)
+    apart = [reading.channel for reading in chip.channels]
+    alike = "".join(name for name in sensor.channels if name not in apart)
+    plain = PlainReading(replace(sensor, chip=replace(chip, channels=())), exposure_s, pixel, sites=alike)
+    own = (
+        PlainReading(
+            sensor=replace(sensor, pixel=reading.pixel_of(pixel), chip=Chip()),
+            exposure_s=exposure_s,
+            pixel=pixel,
+            light_share=reading.light_share,
+            time_share=reading.time_share,
+            sites=reading.channel,
+        )
+        for reading in chip.channels
+    )
+    return (plain, *own)
+
+
+def resolve(
+    sensor: SensorConfig, expected_e: Values, exposure_s: float, channel: str | None = None
+) -> tuple[PlainReading, ...]:
+    """Readings that a camera takes of a frame: the gain that it switches to, and the times that metered channels take.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+    expected_e : array
+        Expected photo-electrons of the raw image's pixels in the whole time, of a mosaic, (h, w); with `channel`, of
+        that channel, any shape.
+    exposure_s : float
+        The whole time [s].
+    channel : str, optional
+        Channel of all of them, whose readings alone are returned, as if they read every pixel.
+    """
+    chip = sensor.chip
+    if chip.channels and channel is None and expected_e.ndim < 2:
+        raise _no_channel(sensor, apart=[x.channel for x in chip.channels])
+    if chip.switched:
+        every = chip_readings(sensor, exposure_s)
+        return (every[_switched(every, expected_e)],)
+    if any(reading.metered for reading in chip.channels):
+        timed = tuple(_timed(x, sensor, expected_e, exposure_s, channel) for x in chip.channels)
+        sensor = replace(sensor, chip=replace(chip, channels=timed))
+    readings = chip_readings(sensor, exposure_s)
+    return readings if channel is None else at_channel(readings, channel)
+
+
+def _switched(readings: Sequence[PlainReading], expected_e: Values) -> int:
+    """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
+    dark_e = readings[0].pixel.dark_current_e_per_s * readings[0].exposure_s
+    bright_e = float(np.percentile(expected_e, METERED_PERCENTILE)) + dark_e
+    wells_e = [x.sensor.pixel.full_well_e for x in readings]
+    quiet_first = sorted(range(len(readings)), key=lambda i: readings[i].sensor.pixel.read_noise_e)
+    holding = [i for i in quiet_first if bright_e <= METERED_SHARE * wells_e[i]]
+    return holding[0] if holding else max(quiet_first, key=lambda i: wells_e[i])
+
+
+def _timed(
+    reading: ChannelReading, sensor: SensorConfig, expected_e: Values, exposure_s: float, channel: str | None
+) -> ChannelReading:
+    """Reading with the share of the time that puts its channel's bright end where an exposure puts it."""
+    if not reading.metered or channel not in (None, reading.channel):
+        return reading
+    seen_e = expected_e[mask(sensor.cfa, reading.channel, expected_e.shape)] if channel is None else expected_e
+    bright_e = float(np.percentile(seen_e, METERED_PERCENTILE)) * reading.light_share
+    filling_e = max(bright_e + sensor.pixel.dark_current_e_per_s * exposure_s, 1e-9)
+    share = METERED_SHARE * reading.pixel_of(sensor.pixel).full_well_e / filling_e
+    steps = np.floor(_STEPS * np.log2(min(share, 1.0)) + 1e-6) / _STEPS
+    return replace(reading, time_share=max(min(reading.time_share, float(2**steps)), 1e-6), metered=False)
+
+
+def at_channel(readings: Sequence[PlainReading], channel: str | None) -> tuple[PlainReading, ...]:
+    """Those of a frame's readings that read a channel's sites, as if they read every pixel.
+
+    Raises
+    ------
+    InputError
+        Without a channel for a camera that reads channels apart.
+    """
+    if readings[0].sites is None:
+        return tuple(readings)
+    if channel is None:
+        raise _no_channel(readings[0].sensor, apart=[str(x.sites) for x in readings[1:]])
+    return tuple(replace(x, sites=None) for x in readings if channel in str(x.sites))
+
+
+def _no_channel(sensor: SensorConfig, apart: Sequence[str]) -> InputError:
+    return InputError(
+        f"channel: none given for a camera that reads {', '.join(apart)} apart; allowed: "
+        f"{', '.join(sensor.channels)}; give one"
+    )
+
+
+def several(readings: Sequence[PlainReading]) -> bool:
+    """Whether every pixel is read several times, so that the readings are merged."""
+    return len(readings) > 1 and readings[0].sites is None
+
+
+def by_site(
+    values: Sequence[float], readings: Sequence[PlainReading], shape: tuple[int, ...]
+) -> float | NDArray[np.float64]:
+    """One value of each reading at the sites that it reads, (h, w); a number where one reads every pixel."""
+    if readings[0].sites is None:
+        return values[0]
+    result = np.empty(shape)
+    for value, reading in zip(values, readings, strict=True):
+        result[mask(reading.sensor.cfa, str(reading.sites), (shape[0], shape[1]))] = value
+    return result
+
+
+def law_by_site(readings: Sequence[PlainReading], shape: tuple[int, ...]) -> NoiseLaw:
+    """Law of the samples of a frame whose pixels are read once: of numbers, or of arrays (h, w)."""
+    laws = [x.law for x in readings]
+    names = [field.name for field in fields(NoiseLaw)]
+    return NoiseLaw(**{name: by_site([getattr(law, name) for law in laws], readings, shape) for name in names})
+
+
+def behind_densities(expected_e: Values, readings: Sequence[PlainReading]) -> Values:
+    """Electrons of the whole time behind each site's density: they move between pixels as they come."""
+    return np.asarray(expected_e * by_site([x.light_share for x in readings], readings, expected_e.shape))
+
+
+def light_of(expected_e: Values, readings: Sequence[PlainReading]) -> tuple[Values, ...]:
+    """Expected photo-electrons of every pixel for each reading, in its own electrons."""
+    if readings[0].sites is None:
+        return tuple(expected_e if x.share == 1 else expected_e * x.share for x in readings)
+    lit_e = behind_densities(expected_e, readings)
+    return tuple(lit_e * x.time_share for x in readings)
+
+
+def unsaturated(expected_e: Values, readings: Sequence[PlainReading]) -> NDArray[np.bool_]:
+    """Which pixels of a frame light and dark current do not fill."""
+    if readings[0].sites is None:
+        return np.asarray(expected_e < max(x.headroom_e for x in readings))
+    return np.asarray(expected_e < by_site([x.headroom_e for x in readings], readings, expected_e.shape))
