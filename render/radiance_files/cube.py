@@ -1,11 +1,8 @@
 """Cubes of radiance or reflectance: NumPy's ``.npy``, ENVI, and plain ``.mat``, with a TOML beside them that says what
 they hold.
-
-ENVI's pictures are a text header, ``.hdr``, and the numbers as they are in a file beside it; fields are named as in
-"ENVI Header Files" (NV5 Geospatial's documentation).
 """
 
-import re
+import warnings
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -14,36 +11,28 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from render.radiance_files.file_checks import bands_between, require_extent, require_file
+from render.radiance_files.envi import open_envi
+from render.radiance_files.file_checks import bands_between, require_extent, require_file, require_reflectances
 from render.radiance_files.mat_file import read_numbers
 from rodcone.errors import InputError, in_place, read_errors, require_name, require_range
 from rodcone.toml_file import read_toml, strict_converter, structured
 from rodcone.types import Floats
 
-_MOST_HEADER_BYTES = 1 << 20  # of ENVI; one of 500 bands with their names takes 20 kB
-_TYPES = {1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8"}
-_SIDES = {"height": "lines", "width": "samples", "wavelength": "bands"}
-_ORDER = {
-    "bsq": ("wavelength", "height", "width"),
-    "bil": ("height", "wavelength", "width"),
-    "bip": ("height", "width", "wavelength"),
-}
-_ENDINGS = ("", ".raw", ".img", ".dat", ".bin", ".bsq", ".bil", ".bip")
-_FIELD = re.compile(r"^\s*([^=;\n]+?)\s*=\s*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
-_UNITS = {"nanometers": 1.0, "micrometers": 1000.0, "unknown": 1.0}
 KINDS = RADIANCE, REFLECTANCE = "radiance", "reflectance"
 AXES = ("height", "width", "wavelength")
-MOST_OVER_ONE = 0.01  # of a reflectance's values: highlights and noise; more is another unit
 
 
 @dataclass(frozen=True)
 class Stored:
-    """Numbers of a file as they stand in it: their axes, and wavelengths and scale where the file states them."""
+    """Numbers of a file as they stand in it: their axes, and where the file states them wavelengths, the gain and
+    offset of each band, and which bands are of use.
+    """
 
     values: NDArray[Any]
     axes: tuple[str, ...]
     wavelength_nm: Floats | None = None
-    scale: float = 1.0
+    law: tuple[Floats, Floats] | None = None
+    good: NDArray[np.bool_] | None = None
 
 
 @dataclass(frozen=True)
@@ -87,7 +76,8 @@ def read_cube(path: str | Path) -> SpectralRadiance:
     Beside it lies a TOML of the same name with ``holds`` ("radiance" [W m^-2 sr^-1 nm^-1] or "reflectance" [0 to 1]);
     ``wavelength_nm``, one number a band or the first and the last of evenly spaced ones, or in a ``.mat`` the name of a
     variable (ENVI's header states them); ``axes``, in the order of the array, ``height``, ``width`` and ``wavelength``
-    by default, which a ``.mat`` has to name; ``variable`` of a ``.mat``; ``scale``, what a stored 1 is worth.
+    by default, which a ``.mat`` has to name; ``variable`` of a ``.mat``; ``scale``, what a stored 1 is worth (in place
+    of ENVI's reflectance scale factor), or a 1 that ENVI's gain and offset values give. Bands are sorted by wavelength.
 
     Raises
     ------
@@ -108,16 +98,19 @@ def read_cube(path: str | Path) -> SpectralRadiance:
             )
         values = np.moveaxis(stored.values, [stored.axes.index(name) for name in AXES], (0, 1, 2))
         require_extent(*values.shape)
-        centres, widths = bands_between(_wavelengths(stored, described, values.shape[2]))
+        nm = _wavelengths(stored, described, values.shape[2])
+        used = np.argsort(nm, kind="stable")
+        used = used if stored.good is None else used[stored.good[used]]
+        centres, widths = bands_between(nm[used])
+        gains, offsets = (np.ones(nm.size), np.zeros(nm.size)) if stored.law is None else stored.law
+        scale = 1.0 if described.scale is None else described.scale
+        scaled = np.empty((*values.shape[:2], used.size), dtype=np.float32)
         with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
-            scaled = np.asarray(values, dtype=np.float32) * np.float32(described.scale or stored.scale)
+            for place, band in enumerate(used):
+                scaled[..., place] = (values[..., band] * gains[band] + offsets[band]) * scale
         cube = SpectralRadiance(scaled, centres, width_nm=widths)
-        over = float((scaled > 1).mean())
-        if described.holds == REFLECTANCE and over > MOST_OVER_ONE:
-            raise InputError(
-                f"{over:.0%} of its reflectances exceed 1; allowed: {MOST_OVER_ONE:.0%}, of highlights; give scale, "
-                "such as 0.01 for per cent"
-            )
+        if described.holds == REFLECTANCE:
+            require_reflectances(scaled)
     return cube
 
 
@@ -162,85 +155,40 @@ def _read_npy(path: Path, described: Description) -> Stored:
     return Stored(values, described.axes or AXES)
 
 
-def data_file(header: str | Path) -> Path:
-    """File of the numbers: of the header's name without ``.hdr``, or with another ending.
-
-    Raises
-    ------
-    InputError
-        Where there is none.
-    """
-    stem = Path(header).with_suffix("")
-    for ending in _ENDINGS:
-        beside = stem.with_name(stem.name + ending)
-        if beside.is_file():
-            return beside
-    raise InputError(
-        f"there are no numbers beside it; allowed: {stem.name} with one of {', '.join(_ENDINGS[1:])}; add it"
-    )
-
-
-def _open_envi(header: Path, _: Description) -> Stored:
-    """Open ENVI's picture; its numbers stay in their file until they are read.
-
-    Raises
-    ------
-    InputError
-        For a header that isn't ENVI's, lacks a number or is compressed, or a data file of another size.
-    """
-    if require_file(header) > _MOST_HEADER_BYTES:
-        raise InputError(f"its header is over {_MOST_HEADER_BYTES} bytes; give the .hdr of an ENVI picture")
-    text = header.read_text("utf-8", errors="replace")
-    if not text.startswith("ENVI"):
-        raise InputError("it doesn't begin with ENVI; give the .hdr of an ENVI picture")
-    fields = {" ".join(key.lower().split()): value.strip() for key, value in _FIELD.findall(text)}
-    size = {axis: _whole(fields, name, 1 << 20) for axis, name in _SIDES.items()}
-    require_extent(*size.values())
-    kind, order = _whole(fields, "data type", 99), fields.get("interleave", "").lower()
-    if kind not in _TYPES or order not in _ORDER:
+def _open_envi(header: Path, described: Description) -> Stored:
+    """ENVI's picture, with the law from its numbers to what the description says that they hold."""
+    picture = open_envi(header)
+    law = picture.radiance
+    if described.holds == REFLECTANCE:
+        if picture.factor is not None:
+            bands = picture.good.size
+            law = (np.full(bands, picture.factor), np.zeros(bands)) if described.scale is None else None
+        else:
+            law = picture.reflectance or picture.radiance
+        stated = picture.factor is not None or picture.reflectance is not None
+        if stated and picture.radiance is not None:
+            warnings.warn("its data gain values, of radiance, are left aside: it holds reflectance", stacklevel=3)
+    elif law is not None and described.scale is None:
         raise InputError(
-            f"data type {kind} and interleave {order!r} are not allowed; give one of {', '.join(map(str, _TYPES))} "
-            f"(real numbers) and one of {', '.join(_ORDER)}"
+            "data gain values: in which unit of radiance they are, its header doesn't say; ENVI's own is "
+            "W m^-2 sr^-1 um^-1; give scale in the .toml: 0.001 for that, 1 for W m^-2 sr^-1 nm^-1"
         )
-    if _whole(fields, "file compression", 1, "0"):
-        raise InputError("file compression: 1 is not allowed; save it without")
-    dtype = np.dtype((">" if _whole(fields, "byte order", 1, "0") else "<") + _TYPES[kind])
-    offset, numbers = _whole(fields, "header offset", 1 << 40, "0"), data_file(header)
-    shape = tuple(size[axis] for axis in _ORDER[order])
-    needed = offset + dtype.itemsize * int(np.prod(shape, dtype=np.int64))
-    if require_file(numbers) < needed:
+    elif law is None and (picture.factor or picture.reflectance) and described.scale is None:
         raise InputError(
-            f"{numbers.name} has {numbers.stat().st_size} bytes, its header stands for {needed}; copy it whole"
+            "its header states a scale or gains of reflectance, the .toml that it holds radiance; correct one, or give "
+            "scale"
         )
-    values = np.memmap(numbers, dtype, "r", offset, shape)
-    scale = 1.0 / _number(fields.get("reflectance scale factor", "1"))
-    return Stored(values, _ORDER[order], _envi_wavelengths(fields), scale)
-
-
-def _envi_wavelengths(fields: dict[str, str]) -> Floats | None:
-    if "wavelength" not in fields:
-        return None
-    unit = fields.get("wavelength units", "unknown").lower()
-    if unit not in _UNITS:
-        raise InputError(f"wavelength units: {unit!r} is not allowed; give Nanometers or Micrometers")
-    return np.array([_number(part) for part in fields["wavelength"].strip("{} \n").split(",")]) * _UNITS[unit]
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        value = np.nan
-    if not 1e-30 < value < 1e30:
-        raise InputError(f"{text.strip()!r} in its header is not a number above 0; correct it")
-    return value
-
-
-def _whole(fields: dict[str, str], name: str, most: int, default: str | None = None) -> int:
-    text = fields.get(name, default)
-    if text is None or not re.fullmatch(r"\d{1,13}", text) or int(text) > most:
-        raise InputError(f"{name}: {text!r} is not a whole number of 0 to {most}; correct the header")
-    return int(text)
+    if picture.ignored is not None:
+        count = int((picture.values == picture.ignored).sum())
+        if count and picture.ignored != 0:
+            raise InputError(f"data ignore value: {count} of its numbers are {picture.ignored:g}, no data; crop it")
+        if count:
+            warnings.warn(f"{count} of its numbers are 0, its data ignore value: they count as dark", stacklevel=3)
+    if not picture.good.any():
+        raise InputError("bbl: it marks every band as bad; allowed: two good bands or more; correct it")
+    if not picture.good.all():
+        warnings.warn(f"{int((~picture.good).sum())} bands that its bbl marks as bad are left out", stacklevel=3)
+    return Stored(picture.values, picture.axes, picture.wavelength_nm, law, picture.good)
 
 
 def _read_mat(path: Path, described: Description) -> Stored:

@@ -12,6 +12,7 @@ import io
 import re
 import warnings
 from collections.abc import Iterable, Mapping
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
@@ -20,7 +21,13 @@ import OpenEXR
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
-from render.radiance_files.file_checks import MOST_EXPANSION, bands_between, require_extent, require_file
+from render.radiance_files.file_checks import (
+    MOST_EXPANSION,
+    bands_between,
+    require_extent,
+    require_file,
+    require_reflectances,
+)
 from render.spectrum import band_widths, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, in_place, one_line, read_errors, require_range
@@ -42,30 +49,29 @@ def channel_name(wavelength_nm: float) -> str:
     return f"S0.{number}nm"
 
 
-def radiance_channels(names: Iterable[str]) -> dict[str, float]:
-    """Wavelength [nm] of each S0 channel, in the order of wavelength; S1 to S3 and other channels are left out.
+def spectral_channels(names: Iterable[str]) -> tuple[bool, dict[str, float]]:
+    """Whether a picture holds reflectance, and the wavelength [nm] of each of its channels, in the order of wavelength.
+
+    Channels of radiance are ``S0``, of reflectance ``T``; S1 to S3 and other channels are left out.
 
     Raises
     ------
     InputError
-        Where there is none, where two have the same wavelength, or where the picture has reflectance channels, which
-        need a light before there is radiance.
+        Where there are none or both, or where two have the same wavelength.
     """
     names = list(names)
     matches = {name: match for name in names if (match := _SPECTRAL.fullmatch(name))}
-    kinds = {match[1] for match in matches.values()}
-    if "T" in kinds:
-        raise InputError(
-            "it holds reflectances (T channels); allowed: radiance (S0 channels); light it, then save that"
-        )
-    nm = {name: _to_nm(name, match) for name, match in matches.items() if match[1] == "S0"}
-    if not nm:
+    kinds = {match[1] for match in matches.values()} & {"S0", "T"}
+    if not kinds:
         shown = ", ".join(sorted(names)[:8]) + (", ..." if len(names) > 8 else "")
         raise InputError(f"it has the channels {shown}; allowed: spectral ones such as S0.550,0nm; save it as spectral")
+    if len(kinds) > 1:
+        raise InputError("it holds radiance (S0 channels) and reflectance (T); allowed: one; save them apart")
+    nm = {name: _to_nm(name, match) for name, match in matches.items() if match[1] in kinds}
     ordered = dict(sorted(nm.items(), key=lambda item: item[1]))
     if len(set(ordered.values())) < len(ordered):
         raise InputError(f"two of the channels {', '.join(ordered)} have one wavelength; allowed: one each; remove one")
-    return ordered
+    return "T" in kinds, ordered
 
 
 def _to_nm(name: str, match: re.Match[str]) -> float:
@@ -86,7 +92,7 @@ def write_bands(wavelength_nm: Floats, width_nm: Floats) -> str:
 
 
 def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tuple[Floats, Floats]:
-    """Band centres and widths [nm] of a file's radiance channels.
+    """Band centres and widths [nm] of a file's spectral channels.
 
     As rodcone's own attribute states them, if it still fits the channels; else the names' wavelengths, as
     `bands_between` takes them. A `UserWarning` names what has to be assumed.
@@ -141,6 +147,7 @@ PREVIEW_TEXT = (
 )
 _MAGIC = b"\x76\x2f\x31\x01"
 _HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
+MOST_ASPECT = 1e-3  # of a pixel's width over its height, from 1: a pixel in a thousand
 MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
 
 
@@ -202,10 +209,24 @@ def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
     return np.clip(xyz / white @ XYZ_TO_SRGB_ROUNDED.T, 0.0, _HALF_MAX).astype(np.float32), white
 
 
-def read_exr(path: str | Path) -> SpectralRadiance:
-    """Read radiance from a spectral OpenEXR file, rodcone's own or another program's.
+def exr_holds_reflectance(path: str | Path) -> bool:
+    """Whether a spectral OpenEXR file holds reflectances, by its header.
 
-    Any S0 channels in any order, in half or float, with or without a preview. What has
+    Raises
+    ------
+    InputError
+        As `read_exr` for a file that holds no spectral picture.
+    """
+    require_file(Path(path))
+    with in_place(str(path)), _damage():
+        header = _part(Path(path), header_only=True).header
+        return spectral_channels(channel.name for channel in header["channels"])[0]
+
+
+def read_exr(path: str | Path) -> SpectralRadiance:
+    """Read a spectral OpenEXR file, rodcone's own or another program's; reflectance stands in the place of radiance.
+
+    Any S0 or T channels in any order, in half or float, with or without a preview. What has
     to be assumed is named by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
     that is smaller than its frame the part that is there is read.
 
@@ -222,22 +243,39 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     Raises
     ------
     InputError
-        Where there is no file, no spectral OpenEXR in it, it holds reflectances, deep data, several parts or subsampled
-        channels, its size is over the limits, it is damaged, or a value is negative or not finite.
+        Where there is no file, no spectral OpenEXR in it, it holds radiance and reflectance, deep data, several parts,
+        subsampled channels, pixels that aren't square or an environment map; where over 1 % of its reflectances exceed
+        1, its size is over the limits, it is damaged, or a value is negative or not finite.
     """
     path = Path(path)
     size = require_file(path)
-    damage = (KeyError, TypeError, ValueError, OverflowError)
-    with in_place(str(path)), read_errors("its header is damaged", "save it again", damage):
+    with in_place(str(path)), _damage():
         header = _part(path, header_only=True).header
-        bands = radiance_channels(channel.name for channel in header["channels"])
-        check_units(header, bands)
+        reflectance, bands = spectral_channels(channel.name for channel in header["channels"])
+        _check_geometry(header)
+        if not reflectance:
+            check_units(header, bands)
         centres, widths = read_bands(bands, header)
         error = float(header.get(ERROR, 0.0))
         height, width = _extent(header, size)
         planes = _planes(path, list(bands), (height, width))
         values = np.moveaxis(planes, 0, -1)
+        if reflectance:
+            require_reflectances(values)
         return SpectralRadiance(values, wavelength_nm=centres, relative_mc_error=error, width_nm=widths)
+
+
+def _damage() -> AbstractContextManager[None]:
+    return read_errors("its header is damaged", "save it again", (KeyError, TypeError, ValueError, OverflowError))
+
+
+def _check_geometry(header: Mapping[str, Any]) -> None:
+    """Raise `InputError` for pixels that aren't those of a flat picture with square pixels."""
+    aspect = float(header.get("pixelAspectRatio", 1.0))
+    if abs(aspect - 1.0) > MOST_ASPECT:
+        raise InputError(f"pixelAspectRatio: {aspect:g} is not allowed; give square pixels, 1; scale it")
+    if "envmap" in header:
+        raise InputError("envmap: it is an environment map, of all directions; allowed: a picture; render one with it")
 
 
 def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:

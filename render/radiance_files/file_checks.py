@@ -5,6 +5,7 @@ from math import inf
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from render.spectrum import band_widths
 from rodcone.errors import InputError
@@ -15,6 +16,7 @@ MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; 
 MOST_CHANNELS = 4096  # ten times the bands of 1 nm over the visible; OpenEXR's time grows with their square
 # A black picture shrinks by 957 in ZIP, 405 in PIZ, 1264 in PXR24; more is a file that claims what it doesn't hold.
 MOST_EXPANSION = 2000
+MOST_OVER_ONE = 0.01  # of a reflectance's values: highlights and noise; more is another unit
 SMALL_BYTES = 1 << 26  # of a .mat file's numbers, which is no harm: 64 MiB
 
 
@@ -49,6 +51,16 @@ def require_extent(height: int, width: int, channels: int, file_bytes: float = i
         )
     if needed > max(small_bytes, MOST_EXPANSION * file_bytes):
         raise InputError(f"{file_bytes} bytes can't hold the {needed} bytes of pixels that it declares; save it again")
+
+
+def require_reflectances(values: NDArray[np.float32]) -> None:
+    """Raise `InputError` where more than the share of highlights and noise exceeds a reflectance of 1."""
+    over = float((values > 1).mean())
+    if over > MOST_OVER_ONE:
+        raise InputError(
+            f"{over:.0%} of its reflectances exceed 1; allowed: {MOST_OVER_ONE:.0%}, of highlights; give scale, such "
+            "as 0.01 for per cent"
+        )
 
 
 def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:

@@ -44,7 +44,11 @@ def read_numbers(path: Path, keys: Collection[str]) -> Mapping[str, NDArray[Any]
     with path.open("rb") as file:
         header = file.read(_HEADER_BYTES)
     if header.startswith((b"MATLAB 7.3", b"\x89HDF")):
-        raise InputError(f"{path}: it is a -v7.3 (HDF5) file; allowed: level 5; in MATLAB save it with save -v7")
+        raise InputError(
+            f"{path}: it is a -v7.3 (HDF5) file; allowed: level 5; in MATLAB save it with save -v7; or convert it: "
+            f"pip install mat73 scipy; python -c \"import mat73, scipy.io; scipy.io.savemat('{path.stem}_v7.mat', "
+            f"mat73.loadmat('{path.name}'))\""
+        )
     if header[126:128] not in (b"IM", b"MI"):
         raise InputError(f"{path}: it is no level 5 .mat file; allowed: MATLAB's -v6 or -v7; save it with save -v7")
     most = min(MOST_BYTES, max(SMALL_BYTES, MOST_EXPANSION * size))

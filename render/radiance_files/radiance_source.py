@@ -10,8 +10,9 @@ from render.illuminants import illuminant
 from render.level import SceneMeans
 from render.radiance import SpectralRadiance
 from render.radiance_files import cube, photo
-from render.radiance_files.cube import REFLECTANCE, cube_holds, data_file, description, read_cube
-from render.radiance_files.exr import read_exr
+from render.radiance_files.cube import REFLECTANCE, cube_holds, description, read_cube
+from render.radiance_files.envi import data_file
+from render.radiance_files.exr import exr_holds_reflectance, read_exr
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.reference import open_reference
 from render.scene import LightGroup
@@ -47,14 +48,16 @@ def is_iset(path: str | Path) -> bool:
 
 
 def is_reflectance(path: str | Path) -> bool:
-    """Whether a file holds reflectances, which any light can light: a photograph, or a cube that says so.
+    """Whether a file holds reflectances, which any light can light: a photograph, or a cube or OpenEXR that says so.
 
     Raises
     ------
     InputError
-        For a cube without a description.
+        For a cube without a description, and an OpenEXR file that can't be read.
     """
     suffix = Path(path).suffix.lower()
+    if suffix == ".exr":
+        return exr_holds_reflectance(path)
     if suffix in cube.EXTENSIONS and not is_iset(path):
         return cube_holds(path) == REFLECTANCE
     return suffix in photo.EXTENSIONS

@@ -68,10 +68,45 @@ def test_envis_interleaves_types_and_byte_orders(order: str, kind: int, dtype: s
     assert [path.name for path in files_of(tmp_path / "desk.hdr")] == ["desk.hdr", "desk.toml", "desk.img"]
 
 
-def test_micrometres_are_nanometres_in_the_end(tmp_path: Path) -> None:
+@loop(("unit", "per_nm"), [("Micrometers", 1e-3), ("um", 1e-3), ("µm", 1e-3), ("Nanometres", 1.0), ("nm", 1.0)])
+def test_units_of_wavelengths_are_those_that_instruments_write(tmp_path: Path, unit: str, per_nm: float) -> None:
     (tmp_path / "desk").write_bytes(CUBE.transpose(2, 0, 1).astype("<f4").tobytes())
-    found = read_cube(envi(tmp_path, unit="Micrometers", nm=", ".join(map(str, NM / 1000))))
+    found = read_cube(envi(tmp_path, unit=unit, nm=", ".join(map(str, NM * per_nm)) + " ,"))
     assert found.wavelength_nm == pytest.approx(NM)
+
+
+def list_of(values: np.ndarray) -> str:
+    return f"{{{', '.join(map(repr, values.tolist()))}}}"
+
+
+def test_envis_gains_and_offsets_are_applied_band_by_band(tmp_path: Path) -> None:
+    gains, offsets = 1e-5 * np.arange(1, 8), 0.002 * np.arange(1, 8)
+    (tmp_path / "desk.img").write_bytes(np.full((7, 5, 6), 1000, "<u2").tobytes())
+    law = f"data gain values = {list_of(gains)}\ndata offset values = {list_of(offsets)}\n"
+    found = read_cube(envi(tmp_path, law, kind=12))
+    assert found.values[0, 0] == pytest.approx(1000 * gains + offsets, rel=1e-6)
+    assert found.values[0, 0, 0] == pytest.approx(0.012)  # 1000 x 1e-5 + 0.002
+    reflectance = law.replace("data ", "data reflectance ")
+    assert read_cube(envi(tmp_path, reflectance, kind=12)).values == pytest.approx(found.values)
+    envi(tmp_path, law, kind=12)
+    (tmp_path / "desk.toml").write_text('holds = "radiance"\n', "utf-8")
+    assert "in which unit of radiance" in refusal(read_cube, tmp_path / "desk.hdr")
+    (tmp_path / "desk.toml").write_text('holds = "radiance"\nscale = 0.001\n', "utf-8")
+    assert read_cube(tmp_path / "desk.hdr").values[0, 0, 0] == pytest.approx(0.012e-3)
+
+
+def test_bands_are_sorted_and_bad_ones_left_out(tmp_path: Path) -> None:
+    stored = CUBE[..., ::-1].transpose(2, 0, 1).astype("<f4")
+    (tmp_path / "desk.img").write_bytes(stored.tobytes())
+    header = envi(tmp_path, nm=", ".join(map(str, NM[::-1])))
+    found = read_cube(header)
+    assert found.wavelength_nm.tolist() == NM.tolist()
+    assert found.values == pytest.approx(CUBE, rel=1e-6)
+    (tmp_path / "desk.hdr").write_text(header.read_text() + "bbl = {0, 1, 1, 1, 1, 1, 1}\n")
+    with pytest.warns(UserWarning, match="1 bands that its bbl marks as bad"):
+        found = read_cube(header)
+    assert found.wavelength_nm.tolist() == NM[:-1].tolist()  # the file's first is the longest wavelength
+    assert found.values == pytest.approx(CUBE[..., :-1], rel=1e-6)
 
 
 def test_reflectances_are_lit_by_any_light_and_white_has_100_cd_m2(tmp_path: Path) -> None:
@@ -125,11 +160,22 @@ def test_what_does_not_agree_is_refused_in_one_line(cube: np.ndarray, text: str,
         ({"offset": 1}, "has 840 bytes, its header stands for 841"),
         ({"offset": "9" * 14}, "header offset"),
         ({"unit": "Parsec"}, "wavelength units: 'parsec'"),
-        ({"nm": "400, x"}, "'x' in its header is not a number"),
+        ({"nm": "400, x"}, "wavelength: 'x' in its header is not a number"),
+        ({"unit": "Wavenumber"}, "wavelength units: 'wavenumber'"),
+        ({"more": "data gain values = {1, 2}\n"}, "data gain values: 2 numbers don't fit 7 bands"),
+        ({"more": "data gain valeus = {1, 2}\n"}, "did you mean 'data gain values'"),
+        ({"more": "major frame offsets = {0, 16}\n"}, "major frame offsets: '{0, 16}' changes values"),
+        ({"more": "file type = ENVI Classification\n"}, "file type: 'ENVI Classification'"),
+        ({"more": f"data ignore value = {np.float32(CUBE[0, 0, 0])}\n"}, "data ignore value: 1 of its numbers"),
+        (
+            {"more": f"reflectance scale factor = 10\ndata reflectance gain values = {{{', '.join(7 * ['0.2'])}}}\n"},
+            "reflectance scale factor: 10 and the data reflectance gain and offset values disagree",
+        ),
+        ({"more": f"bbl = {{{', '.join(7 * '0')}}}\n"}, "bbl: it marks every band as bad"),
         ({"nm": "400, 500"}, "2 numbers don't fit"),
         ({"more": "file compression = 1\n"}, "file compression: 1"),
         ({"more": "lines = 1000000\n"}, "1000000 x 6 pixels are not allowed"),
-        ({"more": "reflectance scale factor = 0\n"}, "'0' in its header"),
+        ({"more": "reflectance scale factor = 0\n"}, "0 is not a number above 0"),
     ],
 )
 def test_a_damaged_envi_header_is_refused_in_one_line(changes: dict[str, object], words: str, tmp_path: Path) -> None:

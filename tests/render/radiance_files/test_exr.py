@@ -12,10 +12,12 @@ from refusal import refusal
 
 from render.loader import mitsuba_module
 from render.radiance import SpectralRadiance
-from render.radiance_files.exr import LAYOUT_UNITS, channel_name, radiance_channels, read_bands, read_exr, write_exr
+from render.radiance_files.exr import LAYOUT_UNITS, channel_name, read_bands, read_exr, spectral_channels, write_exr
 from render.radiance_files.file_checks import MOST_BYTES, MOST_EXPANSION, MOST_SIDE, bands_between, require_extent
+from render.radiance_files.radiance_source import is_reflectance, load_radiance
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads
+from scenes.reflectances import color_checker
 
 FLOAT = np.finfo(np.float32)
 
@@ -144,9 +146,30 @@ def test_the_authors_own_file_of_d65_is_read(samples: Path) -> None:
     assert read.luminance()[0, 0] == pytest.approx(683 * 10567, rel=5e-4)
 
 
-@loop("name", ["Ohta1997.exr", "BiSpectral.exr"])
-def test_reflectances_of_the_authors_and_colour_science_are_refused(samples: Path, name: str) -> None:
-    refusal(read_exr, samples / name, match="reflectances")
+def test_reflectances_of_colour_science_are_those_of_the_colorchecker(samples: Path) -> None:
+    path = samples / "Ohta1997.exr"
+    assert is_reflectance(path)
+    read = read_exr(path)
+    assert read.shape[:2] == (4, 6)
+    for patch, (_, curve) in zip(read.values.reshape(24, -1), color_checker(), strict=True):
+        assert patch == pytest.approx(np.interp(read.wavelength_nm, curve.wavelength_nm, curve.values), abs=2e-3)
+
+
+def test_bispectral_reflectances_are_refused(samples: Path) -> None:
+    refusal(read_exr, samples / "BiSpectral.exr", match="no wavelength in nm|radiance")
+
+
+def test_reflectances_are_lit_by_any_light_as_those_of_a_cube(tmp_path: Path) -> None:
+    nm = np.arange(400.0, 701.0, 20.0)
+    path = write_by_hand(tmp_path / "a.exr", {f"T.{x:g}nm": plane(0.5) for x in nm}, emissiveUnits=None)
+    np.save(tmp_path / "a.npy", np.full((3, 4, nm.size), 0.5))
+    (tmp_path / "a.toml").write_text('holds = "reflectance"\nwavelength_nm = [400, 700]\n')
+    for light in ("D65", "A"):
+        lit, cube = load_radiance(path, light), load_radiance(tmp_path / "a.npy", light)
+        assert lit.values == pytest.approx(cube.values, rel=1e-6)
+        assert lit.luminance() == pytest.approx(np.full((3, 4), 50.0), rel=0.02)
+    write_by_hand(path, {f"T.{x:g}nm": plane(50.0) for x in nm})
+    refusal(load_radiance, path, match="100% of its reflectances exceed 1")
 
 
 def test_channels_in_any_order_are_put_in_the_order_of_wavelength(tmp_path: Path) -> None:
@@ -161,7 +184,7 @@ def test_channels_in_any_order_are_put_in_the_order_of_wavelength(tmp_path: Path
 
 @loop(("name", "nm"), [("S0.550nm", 550.0), ("S0.550,25nm", 550.25), ("S0.5,5E2nm", 550.0)])
 def test_wavelength_of_a_channel_name(name: str, nm: float) -> None:
-    assert list(radiance_channels([name]).values()) == [pytest.approx(nm, rel=1e-12)]
+    assert list(spectral_channels([name])[1].values()) == [pytest.approx(nm, rel=1e-12)]
 
 
 @loop("compression", ["NO", "RLE", "ZIPS", "ZIP", "PIZ", "PXR24", "DWAA"])
@@ -239,8 +262,8 @@ def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
 @loop(
     ("channels", "attributes", "told"),
     [
-        ({"T.500nm": 1, "T.510nm": 1}, {}, "reflectance"),
-        ({"S0.500nm": 1, "S0.510nm": 1, "T.500nm": 1}, {}, "reflectance"),
+        ({"S0.500nm": 1, "S0.510nm": 1, "T.500nm": 1}, {}, "radiance (S0 channels) and reflectance (T)"),
+        ({"S0.500nm": 1, "S0.510nm": 1}, {"pixelAspectRatio": 2.0}, "pixelAspectRatio: 2 is not allowed"),
         ({"R": 1, "G": 1, "B": 1}, {}, "channels B, G, R;"),
         ({"S1.500nm": 1}, {}, "channels S1.500nm;"),
         ({"beauty.S0.500nm": 1}, {}, "beauty"),

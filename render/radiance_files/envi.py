@@ -1,0 +1,234 @@
+"""ENVI's pictures: a text header, ``.hdr``, and the numbers as they are in a file beside it.
+
+Fields are named as in "ENVI Header Files" (NV5 Geospatial's documentation). Every one that changes values, geometry or
+their meaning is applied, or refused by name.
+"""
+
+import re
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.radiance_files.file_checks import require_extent, require_file
+from rodcone.curve_file import LENGTHS_NM
+from rodcone.errors import InputError
+from rodcone.types import Floats
+
+_MOST_HEADER_BYTES = 1 << 20  # of ENVI; one of 500 bands with their names takes 20 kB
+_TYPES = {1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8"}
+_SIDES = {"height": "lines", "width": "samples", "wavelength": "bands"}
+_ORDER = {
+    "bsq": ("wavelength", "height", "width"),
+    "bil": ("height", "wavelength", "width"),
+    "bip": ("height", "width", "wavelength"),
+}
+_ENDINGS = ("", ".raw", ".img", ".dat", ".bin", ".bsq", ".bil", ".bip")
+_FIELD = re.compile(r"^\s*([^=;\n]+?)\s*=\s*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
+_NO_UNIT = ("", "unknown")  # of wavelengths: nm are taken, which values under 50 contradict
+
+# The known fields. What the specification gives a meaning to and is in none of these three is applied nowhere.
+_APPLIED = (
+    *("lines", "samples", "bands", "header offset", "data type", "interleave", "byte order", "file type"),
+    *("file compression", "wavelength", "wavelength units", "bbl", "data ignore value", "reflectance scale factor"),
+    *("data gain values", "data offset values", "data reflectance gain values", "data reflectance offset values"),
+)
+_REFUSED = {  # but where it stands for nothing, by what that is
+    "major frame offsets": "0",
+    "minor frame offsets": "0",
+    "complex function": "",
+    "classes": "0",
+    "read procedures": "",
+}
+_WITHOUT_EFFECT = (
+    *("acquisition time", "band names", "class lookup", "class names", "cloud cover", "coordinate system string"),
+    *("default bands", "default stretch", "dem band", "dem file", "description", "fwhm", "geo points", "map info"),
+    *("pixel size", "product type", "projection info", "rpc info", "security tag", "sensor type", "solar irradiance"),
+    *("spectra names", "sun azimuth", "sun elevation", "time", "timestamp", "x start", "y start", "z plot average"),
+    *("z plot range", "z plot titles"),
+)
+
+
+@dataclass(frozen=True)
+class EnviPicture:
+    """ENVI's picture, its numbers still in their file.
+
+    Attributes
+    ----------
+    values : array
+        As they stand in the file, (axes in the file's order).
+    axes : tuple of str
+        ``height``, ``width`` and ``wavelength`` in that order.
+    wavelength_nm : (band,) float64 or None
+    radiance, reflectance : tuple of (band,) float64, or None
+        Gain and offset of each band to radiance and to reflectance, where the header states them.
+    factor : float or None
+        What a stored 1 is in reflectance, where the header states one divisor for all; agrees with `reflectance`.
+    good : (band,) bool
+        Bands that are not marked as bad.
+    ignored : float or None
+        Value that stands for no data.
+    """
+
+    values: NDArray[Any]
+    axes: tuple[str, ...]
+    wavelength_nm: Floats | None
+    radiance: tuple[Floats, Floats] | None
+    reflectance: tuple[Floats, Floats] | None
+    factor: float | None
+    good: NDArray[np.bool_]
+    ignored: float | None
+
+
+def data_file(header: str | Path) -> Path:
+    """File of the numbers: of the header's name without ``.hdr``, or with another ending.
+
+    Raises
+    ------
+    InputError
+        Where there is none.
+    """
+    stem = Path(header).with_suffix("")
+    for ending in _ENDINGS:
+        beside = stem.with_name(stem.name + ending)
+        if beside.is_file():
+            return beside
+    raise InputError(
+        f"there are no numbers beside it; allowed: {stem.name} with one of {', '.join(_ENDINGS[1:])}; add it"
+    )
+
+
+def open_envi(header: Path) -> EnviPicture:
+    """Open ENVI's picture; its numbers stay in their file until they are read.
+
+    Raises
+    ------
+    InputError
+        For a header that isn't ENVI's, lacks a number, has a field that changes values and can't be applied, or a data
+        file of another size.
+    """
+    fields = _fields(header)
+    size = {axis: _whole(fields, name, 1 << 20) for axis, name in _SIDES.items()}
+    require_extent(*size.values())
+    kind, order = _whole(fields, "data type", 99), fields.get("interleave", "").lower()
+    if kind not in _TYPES or order not in _ORDER:
+        raise InputError(
+            f"data type {kind} and interleave {order!r} are not allowed; give one of {', '.join(map(str, _TYPES))} "
+            f"(real numbers) and one of {', '.join(_ORDER)}"
+        )
+    if _whole(fields, "file compression", 1, "0"):
+        raise InputError("file compression: 1 is not allowed; save it without")
+    dtype = np.dtype((">" if _whole(fields, "byte order", 1, "0") else "<") + _TYPES[kind])
+    offset, numbers = _whole(fields, "header offset", 1 << 40, "0"), data_file(header)
+    shape = tuple(size[axis] for axis in _ORDER[order])
+    needed = offset + dtype.itemsize * int(np.prod(shape, dtype=np.int64))
+    if require_file(numbers) < needed:
+        raise InputError(
+            f"{numbers.name} has {numbers.stat().st_size} bytes, its header stands for {needed}; copy it whole"
+        )
+    bands = size["wavelength"]
+    ignored = fields.get("data ignore value")
+    return EnviPicture(
+        np.memmap(numbers, dtype, "r", offset, shape),
+        _ORDER[order],
+        _wavelengths(fields),
+        _law(fields, "data gain values", "data offset values", bands),
+        *_reflectance(fields, bands),
+        _list(fields, "bbl", bands, 1.0) != 0,
+        None if ignored is None else _number("data ignore value", ignored),
+    )
+
+
+def _fields(header: Path) -> dict[str, str]:
+    """Fields of a header by their names; one that changes values and isn't applied is refused."""
+    if require_file(header) > _MOST_HEADER_BYTES:
+        raise InputError(f"its header is over {_MOST_HEADER_BYTES} bytes; give the .hdr of an ENVI picture")
+    text = header.read_text("utf-8", errors="replace")
+    if not text.startswith("ENVI"):
+        raise InputError("it doesn't begin with ENVI; give the .hdr of an ENVI picture")
+    fields = {" ".join(key.lower().replace("_", " ").split()): value.strip() for key, value in _FIELD.findall(text)}
+    for name, nothing in _REFUSED.items():
+        if set(fields.get(name, nothing).strip("{} \n").replace(" ", "").split(",")) - {nothing, ""}:
+            raise InputError(f"{name}: {fields[name][:40]!r} changes values or their places and can't be applied; save "
+                             "the picture without it")  # fmt: skip
+    if fields.get("file type", "ENVI Standard").lower() not in ("envi standard", "envi"):
+        raise InputError(f"file type: {fields['file type']!r} is not allowed; give an ENVI Standard picture")
+    for name in fields:
+        near = get_close_matches(name, _APPLIED, n=1, cutoff=0.85)
+        if near and name not in (*_APPLIED, *_WITHOUT_EFFECT):
+            raise InputError(f"field {name!r} is unknown; did you mean {near[0]!r}? Correct the header, or take it out")
+    return fields
+
+
+def _law(fields: Mapping[str, str], gains: str, offsets: str, bands: int) -> tuple[Floats, Floats] | None:
+    """Gain and offset of each band; None where the header states neither."""
+    if gains not in fields and offsets not in fields:
+        return None
+    return _list(fields, gains, bands, 1.0), _list(fields, offsets, bands, 0.0)
+
+
+def _reflectance(fields: Mapping[str, str], bands: int) -> tuple[tuple[Floats, Floats] | None, float | None]:
+    """Gain and offset of each band to reflectance, and the one factor; both only where they are alike."""
+    law = _law(fields, "data reflectance gain values", "data reflectance offset values", bands)
+    if "reflectance scale factor" not in fields:
+        return law, None
+    factor = _number("reflectance scale factor", fields["reflectance scale factor"])
+    if not 1e-30 < factor < 1e30:
+        raise InputError(f"reflectance scale factor: {factor:g} is not a number above 0; correct it")
+    one = np.full(bands, 1.0 / factor), np.zeros(bands)
+    if law is not None and not np.allclose(law, one, rtol=1e-6, atol=0.0):
+        raise InputError(
+            f"reflectance scale factor: {factor:g} and the data reflectance gain and offset values disagree; allowed: "
+            "one of them; take the other out"
+        )
+    return law, 1.0 / factor
+
+
+def _wavelengths(fields: Mapping[str, str]) -> Floats | None:
+    if "wavelength" not in fields:
+        return None
+    unit = fields.get("wavelength units", "").lower()
+    if unit not in LENGTHS_NM and unit not in _NO_UNIT:
+        raise InputError(f"wavelength units: {unit!r} is not allowed; give Nanometers or Micrometers")
+    values = np.array([_number("wavelength", part) for part in _parts(fields["wavelength"])])
+    if unit in _NO_UNIT:
+        warnings.warn("its header states no wavelength units: nm are taken", stacklevel=4)
+    return values * LENGTHS_NM.get(unit, 1.0)
+
+
+def _parts(text: str) -> list[str]:
+    """Entries of a list, without the empty one behind a last comma."""
+    parts = [part.strip() for part in text.strip("{} \t\r\n").split(",")]
+    return parts[:-1] if parts[-1] == "" else parts
+
+
+def _list(fields: Mapping[str, str], name: str, bands: int, default: float) -> Floats:
+    """Number for each band."""
+    if name not in fields:
+        return np.full(bands, default)
+    values = np.array([_number(name, part) for part in _parts(fields[name])])
+    if values.size != bands:
+        raise InputError(f"{name}: {values.size} numbers don't fit {bands} bands; give one each")
+    return values
+
+
+def _number(name: str, text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not -1e300 < value < 1e300:
+        raise InputError(f"{name}: {text.strip()[:40]!r} in its header is not a number; correct it")
+    return value
+
+
+def _whole(fields: Mapping[str, str], name: str, most: int, default: str | None = None) -> int:
+    text = fields.get(name, default)
+    if text is None or not re.fullmatch(r"\d{1,13}", text) or int(text) > most:
+        raise InputError(f"{name}: {text!r} is not a whole number of 0 to {most}; correct the header")
+    return int(text)
