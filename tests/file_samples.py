@@ -1,6 +1,7 @@
 """Files that tests and the fuzzer begin from: raw images with hard numbers, and what other programs write."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,7 @@ def other_camera(
     orientation: int = 1,
     noise: tuple[float, ...] | None = None,
     colours: bool = True,
+    more: Mapping[int, tuple[str, Values]] | None = None,
 ) -> Path:
     """Digital negative of some camera, without a word from rodcone."""
     tags: dict[int, tuple[str, Values]] = {
@@ -115,6 +117,7 @@ def other_camera(
         tags[50778] = ("H", (21,))
     if noise is not None:
         tags[51041] = ("d", noise)
+    tags |= more or {}
     write_mosaic(path, dn, CFA, dict(sorted(tags.items())), {33434: ("2I", rational(0.01)), 33437: ("2I", rational(4))})
     return path
 

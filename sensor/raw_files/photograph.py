@@ -5,7 +5,6 @@ each channel and, but for some digital negatives, says nothing about noise.
 Those say it in NoiseProfile (DNG 1.4 specification, tag 51041).
 """
 
-import struct
 from pathlib import Path
 from typing import Any
 
@@ -20,12 +19,10 @@ from rodcone.optional import optional_library
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channel_map, is_bayer
 from sensor.raw import RawImage
+from sensor.raw_files.dng_levels import directories, dng_levels
 from sensor.raw_files.noise_estimate import NoiseEstimate, estimate_noise
-from sensor.raw_files.tiff import read_directory
 
 NOISE_PROFILE = 51041
-_SUB_DIRECTORIES = 330  # SubIFDs (TIFF 6.0, Supplement 1)
-_MOST_DIRECTORIES = 64  # of a file
 
 
 def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
@@ -50,38 +47,18 @@ def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
 
 
 def _profile(path: Path) -> Floats:
-    """Numbers of the first profile among the file's chain of pictures and those below them; empty where none is found.
-
-    tifffile follows damaged chains for minutes; here a few directories are looked into, and no tag is read but two.
-    """
-    with path.open("rb") as file:
-        head = file.read(8)
-        order = {b"II*\0": "<", b"MM\0*": ">"}.get(head[:4])
-        if order is None or len(head) < 8:
-            return np.empty(0)  # no TIFF, but a camera's own format
-        waiting, offsets = list(struct.unpack(f"{order}I", head[4:])), {0}
-        while waiting and len(offsets) <= _MOST_DIRECTORIES:
-            start = waiting.pop(0)
-            if start in offsets:
-                continue
-            offsets.add(start)
-            try:
-                tags, following = read_directory(file, start, (NOISE_PROFILE, _SUB_DIRECTORIES), str(path), order)
-            except InputError:
-                continue  # damaged: others may be whole
-            form, values = tags.get(NOISE_PROFILE, ("", ()))
-            if form == "d":
-                return np.array(values)
-            form, starts = tags.get(_SUB_DIRECTORIES, ("", ()))
-            if form == "I":
-                waiting += [int(start) for start in starts[:_MOST_DIRECTORIES]]
-            waiting.append(following)
+    """Numbers of the first profile among the file's pictures; empty where none is found."""
+    for tags in directories(path, (NOISE_PROFILE,)):
+        form, values = tags.get(NOISE_PROFILE, ("", ()))
+        if form == "d":
+            return np.array(values)
     return np.empty(0)
 
 
 EXTRA = "photographs"
 # What is assumed where neither the file nor the frame tells: a pixel of a present-day camera.
 ASSUMED_FULL_WELL_E, ASSUMED_DARK_NOISE_E = 30_000.0, 3.0
+MOST_DN = 65_535  # of 16-bit samples
 # Of a file's bytes, at 2 a pixel. Lossless JPEG spends a bit or more on a pixel: it swells 16 times at most.
 MOST_EXPANSION = 200
 # Linear sRGB to XYZ adapted to D50.
@@ -94,7 +71,8 @@ def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
     Returns
     -------
     RawImage
-        Its black level is the largest of the channels', the others' samples shifted up to it. Its matrix is the one
+        Its black level is the largest of the samples', the others shifted up to it: of a digital negative as its own
+        tags have it for each row and column, of other files as LibRaw has it for each channel. Its matrix is the one
         that LibRaw holds for the camera, for daylight, under both of a calibration's illuminants.
     dict
         ``reader``; ``noise``: where gain and dark noise come from (``profile of the file``, ``estimated from the
@@ -135,9 +113,19 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
     if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
         raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
     names, indices = opened.color_desc.decode("ascii", "replace"), np.asarray(opened.raw_colors_visible)
+    levels = dng_levels(path, opened.raw_image.shape)  # a library moves margins, and the pattern's phase with them
+    samples = opened.raw_image_visible
+    if levels is not None:
+        indices, samples = np.asarray(opened.raw_colors)[levels.area], opened.raw_image[levels.area]
     if names != "RGBG" or indices.max() > 3:
         raise InputError(f"{path}: its colours are {names!r}; allowed: Bayer's R, G and B; take another file")
-    sites = _turned(np.array(list(names))[indices], opened.sizes.flip)
+    colours = np.array(list(names))[indices]
+    if levels is not None and np.any(channel_map(levels.tile, samples.shape) != colours):
+        raise InputError(
+            f"{path}: its CFAPattern is {levels.tile}, LibRaw reads {tuple(''.join(row[:2]) for row in colours[:2])}; "
+            "allowed: files that both read alike; save it anew with a DNG converter"
+        )
+    sites = _turned(colours, opened.sizes.flip)
     tile = tuple("".join(row[:2]) for row in sites[:2])
     if not is_bayer(tile) or np.any(channel_map(tile, (sites.shape[0], sites.shape[1])) != sites):
         raise InputError(
@@ -146,27 +134,28 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
         )
 
     # levels
-    black_levels = np.array(opened.black_level_per_channel, dtype=np.intp)
-    black = black_levels[indices]  # of each pixel [DN]
-    white = int(opened.white_level)
-    if not black.max() < white:
+    of_channels = np.array(opened.black_level_per_channel, dtype=np.float64)
+    black = of_channels[indices] if levels is None else levels.black_dn  # of each pixel [DN]
+    white = float(opened.white_level if levels is None or levels.white_dn is None else levels.white_dn)
+    top = float(np.ceil(black.max()))
+    if not 0 <= top < white <= MOST_DN:
         raise InputError(f"{path}: black {black.max():g} is not under white {white:g}; it is damaged or no photograph")
-    dn = np.minimum(opened.raw_image_visible + (black.max() - black), white)
+    dn = np.clip(samples + np.rint(top - black), 0, white)  # at most half a DN off, where black has a fraction
     upright = _turned(dn.astype(np.uint16), opened.sizes.flip)
 
     # noise and colours
-    full_dn = float(white - black.max())
+    full_dn = white - top
     noise, source = read_noise_profile(path, full_dn), "profile of the file"
     if noise is None:
-        noise, source = estimate_noise(upright.astype(np.float64) - black.max(), full_dn), "estimated from the frame"
+        noise, source = estimate_noise(upright.astype(np.float64) - top, full_dn), "estimated from the frame"
     if noise is None:
         noise, source = NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E), "assumed"
     colour, facts = _colour(opened)
     raw = RawImage(
         dn=upright,
         cfa=tile,
-        black_dn=float(black.max()),
-        white_dn=float(white),
+        black_dn=top,
+        white_dn=white,
         gain_e_per_dn=noise.gain_e_per_dn,
         read_noise_e=noise.dark_noise_e,
         dsnu_e=0.0,
@@ -177,8 +166,8 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
         iso=_positive(opened.other.iso_speed, 1.0),
         colour=colour,
     )
-    levels = {"noise": source, "gain_e_per_dn": noise.gain_e_per_dn, "dark_noise_e": raw.dark_noise_e}
-    return raw, {"reader": reader, **levels, **facts}
+    told = {"noise": source, "gain_e_per_dn": noise.gain_e_per_dn, "dark_noise_e": raw.dark_noise_e}
+    return raw, {"reader": reader, **told, **facts}
 
 
 def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:

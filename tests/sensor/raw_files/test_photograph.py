@@ -13,6 +13,8 @@ from file_samples import other_camera, over_black
 from loop import loop
 from refusal import refusal
 
+from sensor.cfa import channel_map
+from sensor.raw_files.dng import rational
 from sensor.raw_files.photograph import ASSUMED_DARK_NOISE_E, ASSUMED_FULL_WELL_E, read_noise_profile, read_photograph
 from sensor.raw_files.raw_file import open_raw, read_raw
 
@@ -164,3 +166,91 @@ def test_a_profile_is_found_in_either_byte_order_and_below_the_first_picture(
     assert read is not None
     assert read.gain_e_per_dn == pytest.approx(10.0)
     assert read.dark_noise_e == pytest.approx(1.0)
+
+
+# Levels, areas and patterns as a file's own tags have them: LibRaw moves an odd margin, and not the levels with it.
+
+LEVELS = np.array([[200.0, 256.0], [300.0, 240.0]])
+COLOURS = np.array([[300.0, 800.0], [800.0, 400.0]])  # R, G, G, B of RGGB over black
+
+
+def repeated(pattern: np.ndarray, area: tuple[int, int, int, int], shape: tuple[int, int]) -> np.ndarray:
+    """Pattern over a frame, from the first row and column of an area on."""
+    rows, columns = np.mgrid[: shape[0], : shape[1]]
+    return pattern[(rows - area[0]) % pattern.shape[0], (columns - area[1]) % pattern.shape[1]]
+
+
+@loop("area", [(0, 0, 66, 66), (1, 0, 65, 66), (0, 1, 66, 65), (1, 1, 65, 65), (2, 2, 64, 64), (3, 5, 60, 62)])
+@loop("orientation", [1, 6])
+def test_black_and_colours_begin_where_the_active_area_begins(
+    area: tuple[int, int, int, int], orientation: int, tmp_path: Path
+) -> None:
+    dn = repeated(COLOURS + LEVELS, area, (66, 66)).astype(np.uint16)
+    more = {50713: ("H", (2, 2)), 50714: ("2I", rational(LEVELS)), 50829: ("I", area)}
+    raw = read_raw(other_camera(tmp_path / "shot.dng", dn, orientation=orientation, more=more))
+    assert raw.shape == (area[2] - area[0], area[3] - area[1])[:: -1 if orientation == 6 else 1]
+    for channel, level in (("R", 300.0), ("G", 800.0), ("B", 400.0)):
+        held = raw.dn[np.array(channel_map(raw.cfa, raw.shape)) == channel] - raw.black_dn
+        assert (held.min(), held.max()) == (level, level)
+
+
+def test_rows_and_columns_have_blacks_of_their_own(tmp_path: Path) -> None:
+    area, rows, columns = (1, 3, 65, 64), np.arange(64) - 30.0, np.arange(61) * 0.5
+    pattern = np.array([[500.0, 510.0, 520.0]])  # a repeat of another size than the mosaic's
+    black = repeated(pattern, area, (66, 66))[1:65, 3:64] + rows[:, None] + columns[None]
+    dn = np.zeros((66, 66), np.uint16)
+    dn[1:65, 3:64] = np.rint(black + repeated(COLOURS, (0, 0, 0, 0), (64, 61)))
+    more = {
+        50713: ("H", (1, 3)),
+        50714: ("2I", rational(pattern)),
+        50715: ("2i", rational(columns)),
+        50716: ("2i", rational(rows)),
+        50829: ("I", area),
+    }
+    raw = read_raw(other_camera(tmp_path / "shot.dng", dn, more=more))
+    assert np.abs(raw.dn - raw.black_dn - repeated(COLOURS, (0, 0, 0, 0), (64, 61))).max() <= 1.0  # two roundings
+
+
+def test_a_table_of_linear_values_comes_before_black(tmp_path: Path) -> None:
+    table = tuple(min(2 * number, 16_000) for number in range(8192))
+    more = {50712: ("H", table), 50713: ("H", (1, 1)), 50714: ("2I", (100, 1))}
+    raw = read_raw(other_camera(tmp_path / "shot.dng", np.full(SHAPE, 400, np.uint16), more=more))
+    assert np.unique(raw.dn - raw.black_dn).tolist() == [700.0]
+
+
+@loop(
+    ("more", "words"),
+    [
+        ({50711: ("H", (2,))}, "CFALayout"),
+        ({50718: ("2I", (2, 1, 1, 1))}, "DefaultScale"),
+        ({50715: ("2i", (1, 1))}, "BlackLevelDeltaH has 1 values for 60"),
+        ({50713: ("H", (2, 3))}, "BlackLevel has 4 values for a pattern of (2, 3)"),
+    ],
+)
+def test_tags_that_change_samples_and_do_not_fit_are_refused_by_name(more: dict, words: str, tmp_path: Path) -> None:
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), more=more)
+    refusal(read_photograph, path, words=(words,))
+
+
+def test_opcodes_that_are_not_applied_are_told(tmp_path: Path) -> None:
+    gains = struct.pack(">5I", 1, 9, 0x01030000, 1, 4) + bytes(4)
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), more={51009: ("U", gains)})
+    with pytest.warns(UserWarning, match="GainMap of OpcodeList2 is not applied"):
+        read_photograph(path)
+
+
+def test_a_mosaic_below_a_preview_has_its_own_levels(tmp_path: Path) -> None:
+    dn = (repeated(COLOURS + LEVELS, (0, 0, 0, 0), SHAPE)).astype(np.uint16)
+    camera = [(50706, "B", 4, bytes((1, 4, 0, 0))), (271, "s", 6, b"Other\0"), (272, "s", 2, b"X\0")]
+    camera += [(50708, "s", 8, b"Other X\0"), (50721, "2i", 9, rational(MATRIX)), (50778, "H", 1, 21)]
+    mosaic = [(33421, "H", 2, (2, 2)), (33422, "B", 4, bytes((0, 1, 1, 2))), (50713, "H", 2, (2, 2))]
+    mosaic += [(50714, "2I", 4, rational(LEVELS)), (50717, "I", 1, WHITE)]
+    types = {"B": 1, "s": 2, "H": 3, "I": 4, "2I": 5, "2i": 10}
+    first, second = ([(c, types[form], n, value, True) for c, form, n, value in tags] for tags in (camera, mosaic))
+    with tifffile.TiffWriter(tmp_path / "a.dng", byteorder="<", bigtiff=False) as file:
+        file.write(
+            np.zeros((8, 8, 3), np.uint8), photometric="rgb", subifds=1, subfiletype=1, metadata=None, extratags=first
+        )
+        file.write(dn, photometric=32803, subfiletype=0, metadata=None, extratags=second)
+    raw = read_raw(tmp_path / "a.dng")
+    assert np.array_equal(raw.dn - raw.black_dn, repeated(COLOURS, (0, 0, 0, 0), SHAPE))

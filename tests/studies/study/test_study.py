@@ -86,7 +86,7 @@ def test_faults_are_told_in_one_line() -> None:
         ({"white_balances": ("grey-world",)}, "did you mean 'gray-world'"),
         ({"spectra": ("D66",)}, "did you mean 'D65'"),
         ({"scenes": (SceneChoice("still_life", "AA"),)}, "illuminant: 'AA' is unknown"),
-        ({"scenes": (SceneChoice("x.exr"),), "spectra": ("A",)}, "can't relight x.exr"),
+        ({"scenes": (SceneChoice("x.mat"),), "spectra": ("A",)}, "can't relight x.mat"),
         ({"sensors": ("low_nose",)}, "did you mean 'low_noise'"),
         ({"processors": ("bayers",)}, "did you mean 'bayer'"),
         ({"seeds": (-1,)}, "give whole numbers"),
