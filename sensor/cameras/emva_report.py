@@ -4,6 +4,7 @@ Equations are numbered as in release 4.0 Linear of the standard.
 """
 
 import tomllib
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi, sqrt
@@ -15,6 +16,7 @@ import scipy
 
 from rodcone.errors import InputError, in_place, read_errors, require_keys, require_range, require_whole
 from rodcone.toml_file import read_toml
+from sensor.cameras.emva_checks import doubts
 from sensor.cameras.numbers import PixelNumbers, Sourced
 
 # Symbols, each with what is allowed and its unit. Those of RESULTS follow from the others: a check, and no input.
@@ -67,11 +69,19 @@ def read_report(path: Path) -> EmvaReport:
     ------
     InputError
         For a file that can't be read, an unknown or missing key, or a value out of range; the file is named.
+
+    Warns
+    -----
+    UserWarning
+        For each figure that contradicts others, or looks like another unit (`sensor.cameras.emva_checks.doubts`).
     """
     with read_errors(f"EMVA report: {str(path)!r} can't be read", "give a TOML file with a table [report]"):
         content = read_toml(path)
     with in_place(f"EMVA report {str(path)!r}"):
-        return _report(content)
+        report = _report(content)
+    for doubt in doubts(report.figures, report.bits, report.black_level_dn):
+        warnings.warn(f"EMVA report {str(path)!r}: {doubt}", stacklevel=2)
+    return report
 
 
 def numbers_of(report: EmvaReport) -> PixelNumbers:

@@ -115,3 +115,30 @@ def test_a_shipped_report_reads_has_source_and_date_and_gives_a_pixel(path):
 )
 def test_a_hostile_report_is_refused_in_one_line_that_names_it(tmp_path, text, words):
     refusal(read_report, write(tmp_path, text), words=(words, "report.toml"))
+
+
+# Figures that contradict one another. The shipped reports and `WHOLE` pass without a word: warnings are errors.
+
+
+@loop(
+    ("old", "new", "words"),
+    [
+        ("eta = 60", "eta = 0.6", r"eta = 0\.6 per cent looks like a fraction; give 60 if"),
+        ("PRNU1288 = 0.5", "PRNU1288 = 0.005", r"PRNU1288 = 0\.005 per cent looks like a fraction; give 0\.5 if"),
+        ("mu_e_sat = 9500", "mu_e_sat = 9.5", r"mu_e_sat = 9\.5 e- looks like thousands; give 9500 if"),
+        ("K = 0.4", "K = 2.5", r"at 2\.375e\+04 DN above black; the converter has 4000 there; K looks like e-/DN"),
+        ("K = 0.4", "K = 2.5", r"give 0\.4 DN/e-"),
+        ("bits = 12", "bits = 10", r"at 3800 DN above black; the converter has 928 there$"),
+        ("SNR_max_dB = 39.8", "SNR_max_dB = 45", r"SNR_max_dB = 45 dB, but sqrt\(mu_e_sat\) of 9500 e- is 39\.8 dB"),
+        # 20 log10(9500 / (sqrt(25 + 1 / 12 / 0.16) + 0.5)) = 64.66 dB
+        ("SNR_max_dB = 39.8", "DR_dB = 70", r"DR_dB = 70 dB, but mu_e_sat over 5\.55 e- .* is 64\.7 dB"),
+        ("SNR_max_dB = 39.8", "DR_dB = 64.6\nmu_e_min = 9", r"mu_e_sat over mu_e_min is 60\.5 dB"),
+    ],
+)
+def test_figures_that_contradict_others_or_look_like_another_unit_are_told(old, new, words, tmp_path):
+    with pytest.warns(UserWarning, match=words):
+        read_report(write(tmp_path, HEAD + WHOLE.replace(old, new)))
+
+
+def test_figures_that_agree_are_read_without_a_word(tmp_path):
+    read_report(write(tmp_path, HEAD + WHOLE.replace("SNR_max_dB = 39.8", "SNR_max_dB = 40.5\nDR_dB = 64")))
