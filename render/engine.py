@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from render.cache import load_transport, save_transport
+from render.combinations import check_combinations
 from render.combine import emission
 from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
@@ -150,6 +151,7 @@ def _checked_film(
     require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
+    check_combinations(scene)
     check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
     return Film(
         size=(int(size[0]), int(size[1])),

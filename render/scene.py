@@ -1,6 +1,6 @@
 """A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from operator import getitem
@@ -30,6 +30,7 @@ COLOURED_EMITTERS = ("envmap", "sunsky")
 OWN_SIDE = 256  # pixels, of a scene that states no size
 HELD_NM = (100.0, 20_000.0)  # as far as held ends go
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
+_NO_SURFACES = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS, "irradiancemeter")  # parts of a shape
 
 
 @dataclass(frozen=True)
@@ -125,6 +126,7 @@ class Scene:
             raise unknown(f"scene {self.name}: reference_plane", self.reference_plane, self.geometry)
         if self.extend not in (None, "hold"):
             raise unknown(f"scene {self.name}: extend", self.extend, ("hold",))
+        object.__setattr__(self, "geometry", _with_black_lamps(self.geometry, present))
         if self.extend:
             object.__setattr__(self, "geometry", _hold(self.geometry, present))
 
@@ -212,6 +214,35 @@ def table_of(node: Node) -> Spectrum | None:
 
 def _numbers(text: Any) -> Floats:
     return np.array(str(text).replace(",", " ").split(), dtype=np.float64)
+
+
+def _with_black_lamps(geometry: Node, emitters: Mapping[str, str]) -> Node:
+    """Copy of a scene in which the surface of every area light is stated.
+
+    Mitsuba gives a shape without a BSDF a black surface where it emits and a grey one (0.5) where it doesn't. A lamp
+    that another light group shines on is such a shape without its emitter, and has to stay black.
+    """
+    result = geometry
+    for path in [path for path, kind in emitters.items() if kind == "area" and "/" in path]:
+        *way, _ = path.split("/")
+        shape = reduce(getitem, way, result)
+        if not any(map(_is_surface, shape.values())):
+            result = _with_part(result, way, {**shape, "black": {"type": "diffuse", "reflectance": uniform_node(0.0)}})
+    return result
+
+
+def _is_surface(part: Any) -> bool:
+    """Whether a part of a shape is its surface: a description, a reference, or one that Mitsuba has loaded."""
+    if isinstance(part, dict):
+        return part.get("type") not in _NO_SURFACES
+    return any(kind.__name__ == "BSDF" for kind in type(part).__mro__)
+
+
+def _with_part(node: Node, way: Sequence[str], part: Node) -> Node:
+    """Copy of a node in which the part at the end of `way` is another."""
+    if not way:
+        return part
+    return {**node, way[0]: _with_part(node[way[0]], way[1:], part)}
 
 
 def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:

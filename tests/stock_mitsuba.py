@@ -1,5 +1,6 @@
 """Mitsuba's own `path` and `specfilm` on a scene of this project: what the engine is compared with."""
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -7,6 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from render.loader import mitsuba_module
 from render.scene import Scene
+from render.user_scene.scene_paths import search_path
 
 
 def stock(
@@ -33,3 +35,30 @@ def stock(
     loaded = mi.load_dict(description)
     made = [np.asarray(mi.render(loaded, spp=spp, seed=seed + k), np.float64) for k in range(passes)]
     return np.moveaxis(np.stack(made), -1, 1) / widths[:, None, None]
+
+
+_BAND = (
+    '<spectrum name="band{}" type="regular"><float name="wavelength_min" value="{}"/>'
+    '<float name="wavelength_max" value="{}"/><string name="values" value="1, 1"/></spectrum>'
+)
+
+
+def spectral_film(size: tuple[int, int], nm: NDArray[np.float64], width_nm: float) -> str:
+    """Sampler and film of a scene's XML whose pixels are sums over bands."""
+    bands = "".join(_BAND.format(i, centre - width_nm / 2, centre + width_nm / 2) for i, centre in enumerate(nm))
+    return (
+        f'<sampler type="multijitter"/><film type="specfilm"><integer name="width" value="{size[1]}"/>'
+        f'<integer name="height" value="{size[0]}"/><string name="component_format" value="float32"/>'
+        f'<rfilter type="box"/>{bands}</film>'
+    )
+
+
+def picture_of_file(path: Path, spp: int, seed: int) -> NDArray[np.float64]:
+    """Mitsuba's own render of a scene's XML as it stands."""
+    mi, kept = mitsuba_module(), mitsuba_module().file_resolver()
+    mi.set_file_resolver(search_path(mi, path.parent))
+    try:
+        loaded = mi.load_file(str(path))
+    finally:
+        mi.set_file_resolver(kept)
+    return np.asarray(mi.render(loaded, spp=spp, seed=seed), np.float64)

@@ -143,7 +143,8 @@ def test_lit_removes_the_groups_that_are_not_named():
     assert "sky" not in lit
     assert lit["lamp"]["emitter"] == {"type": "area", "radiance": uniform_node(1.0)}
     assert "emitter" not in scene().lit({"sky": uniform_node(1.0)})["lamp"]
-    assert scene().lit({})["lamp"] == {"type": "sphere", "center": [0.0, 3.0, 0.0]}
+    black = {"type": "diffuse", "reflectance": uniform_node(0.0)}
+    assert scene().lit({})["lamp"] == {"type": "sphere", "center": [0.0, 3.0, 0.0], "black": black}
 
 
 def test_several_lights_of_one_shape_keep_their_own_groups():

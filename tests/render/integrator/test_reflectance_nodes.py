@@ -13,11 +13,11 @@ import pytest
 from PIL import Image
 from scipy.stats import norm
 from scipy.stats import t as student
+from stock_mitsuba import picture_of_file, spectral_film
 
 from render.engine import render
 from render.loader import Film, load_groups, mitsuba_module
 from render.user_scene.scene_file import load_scene_file
-from render.user_scene.scene_paths import search_path
 
 FALSE_ALARM, CAUGHT = 1e-4, 0.04
 BANDS_NM, WIDTH_NM, DEPTH = np.linspace(400.0, 750.0, 8), 40.0, 4
@@ -143,15 +143,6 @@ ROULETTE = 1, 2, 1 << 30
 COMPARISONS = (len(PAINTS) * len(LAMPS) + len(SURFACES) + len(SCENES) + len(ROULETTE)) * BANDS_NM.size
 
 
-def bands() -> str:
-    ends = '<float name="wavelength_min" value="{}"/><float name="wavelength_max" value="{}"/>'
-    return "".join(
-        f'<spectrum name="band{index}" type="regular">{ends.format(nm - WIDTH_NM / 2, nm + WIDTH_NM / 2)}'
-        '<string name="values" value="1, 1"/></spectrum>'
-        for index, nm in enumerate(BANDS_NM)
-    )
-
-
 def wall(place: str) -> str:
     """Quad of 4 m with texture coordinates and a colour at each corner."""
     return (
@@ -172,11 +163,7 @@ BLACK_ROOM = (
     '<shape type="sphere"><float name="radius" value="20"/><boolean name="flip_normals" value="true"/>'
     '<bsdf type="diffuse"><spectrum name="reflectance" value="0"/></bsdf></shape>'
 )
-FILM = (
-    '<sampler type="multijitter"/>'
-    '<film type="specfilm"><integer name="width" value="8"/><integer name="height" value="6"/>'
-    f'<string name="component_format" value="float32"/><rfilter type="box"/>{bands()}</film>'
-)
+FILM = spectral_film((6, 8), BANDS_NM, WIDTH_NM)
 
 
 def write_scene(folder: Path, paint: str, lights: str, camera: str = PERSPECTIVE) -> Path:
@@ -218,13 +205,7 @@ def write_measured(path: Path) -> None:
 
 def stock(path: Path) -> np.ndarray:
     """Means over the picture of Mitsuba's own renders of the file, (draw, band)."""
-    mi, kept = mitsuba_module(), mitsuba_module().file_resolver()
-    mi.set_file_resolver(search_path(mi, path.parent))
-    try:
-        loaded = mi.load_file(str(path))
-    finally:
-        mi.set_file_resolver(kept)
-    made = [np.asarray(mi.render(loaded, spp=4 * SPP, seed=10_000 + k), np.float64) for k in range(DRAWS)]
+    made = [picture_of_file(path, 4 * SPP, seed=10_000 + k) for k in range(DRAWS)]
     return np.stack([picture.mean(axis=(0, 1)) for picture in made]) / WIDTH_NM
 
 

@@ -1,0 +1,169 @@
+"""Pairs of features that Mitsuba 3.9 renders rightly each by itself, and wrongly together: refused before a render.
+
+Each row of the table in docs/render.md was tried against stock Mitsuba and against a copy of the shape without the
+second feature (`tests/render/test_combinations.py`): an instance's picture has to be that of a copy in its place.
+"""
+
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from render.scene import Node, Scene, emitter_paths, walk
+from rodcone.errors import InputError
+from rodcone.types import Floats
+
+# Of rounded numbers in a file: a tenth of what a float32 of Mitsuba's resolves over a picture of 10 000 pixels.
+_SLACK = 1e-5
+_MESHES = ("obj", "ply", "serialized")
+# Shapes on which a map of normals or heights comes out turned where they are mirrored, beside meshes with normals.
+_MAPS_TURN = {"normalmap": ("rectangle", "disk", "cube", "cylinder"), "bumpmap": ("rectangle", "cube")}
+
+
+@dataclass(frozen=True)
+class _Instance:
+    """An instance of a shape group: its name, the group's name and parts, and its transform's upper 3x4."""
+
+    name: str
+    group_name: str
+    group: Node
+    matrix: Floats
+
+
+def check_combinations(scene: Scene) -> None:
+    """Raise `InputError` for a pair of features that Mitsuba renders wrongly together, with the shape's name."""
+    for what, reason, fix in _wrong_pairs(scene.geometry):
+        raise InputError(f"scene {scene.name}: {what}: Mitsuba 3.9 {reason}; allowed: {fix}")
+
+
+def _wrong_pairs(geometry: Node) -> Iterator[tuple[str, str, str]]:
+    """Each wrong pair: the shape and what it has, what Mitsuba does with it, and what is right in its place."""
+    parts = _parts_by_name(geometry)
+    yield from _lamps_in_groups(parts)
+    for instance in _instances(geometry, parts):
+        yield from _wrong_in_an_instance(instance, parts)
+    for path, shape in walk(geometry):
+        yield from _wrong_by_its_transform("/".join(path), shape, parts)
+
+
+def _lamps_in_groups(parts: Mapping[str, Node]) -> Iterator[tuple[str, str, str]]:
+    for name, group in parts.items():
+        for path in emitter_paths(group) if group["type"] == "shapegroup" else ():
+            holder = path.partition("/")[0]
+            shape = f"shape {group[holder].get('id', holder)!r} of shapegroup {name!r}"
+            yield f"{shape} emits inside a shapegroup", "can't instance lights", "a lamp outside of the group"
+
+
+def _wrong_in_an_instance(instance: _Instance, parts: Mapping[str, Node]) -> Iterator[tuple[str, str, str]]:
+    moved = not np.allclose(instance.matrix, np.eye(4)[:3], rtol=0, atol=_SLACK)
+    for key, shape in instance.group.items():
+        if not isinstance(shape, dict):
+            continue
+        name, where = shape.get("id", key), f"in shapegroup {instance.group_name!r}, which instance {instance.name!r}"
+        surfaces = list(_with_referred(shape, parts))
+        colours = [str(part.get("name")) for part in surfaces if part["type"] == "mesh_attribute"]
+        if moved and (vertex := [colour for colour in colours if colour.startswith("vertex_")]):
+            yield (
+                f"shape {name!r} {where} moves, has colours per vertex ({vertex[0]})",
+                "interpolates them at the wrong place of an instance",
+                "face_* colours, or a copy of the mesh in the instance's place",
+            )
+        if _mirrors(instance.matrix) and any(part["type"] == "normalmap" for part in surfaces):
+            yield (
+                f"shape {name!r} {where} mirrors, has a normalmap",
+                "turns one axis of the normals the wrong way round in a mirrored instance",
+                "a bumpmap, or a shape of its own, turned instead of mirrored, in the instance's place",
+            )
+
+
+def _wrong_by_its_transform(name: str, shape: Node, parts: Mapping[str, Node]) -> Iterator[tuple[str, str, str]]:
+    kind, transform = shape.get("type"), _matrix(shape.get("to_world"))
+    if kind in (*_MAPS_TURN["normalmap"], *_MESHES) and _mirrors(transform):
+        maps = {part["type"] for part in _with_referred(shape, parts)} & _MAPS_TURN.keys()
+        for turned in sorted(turned for turned in maps if _has_normals(shape, _MAPS_TURN[turned])):
+            yield (
+                f"shape {name!r} is mirrored by its to_world and has a {turned}",
+                "turns what the map says the wrong way round on a mirrored shape",
+                "the shape turned, and its picture mirrored, or the shape without the map",
+            )
+    if kind == "sphere" and _is_uneven(transform[:, :3]):
+        yield (
+            f"shape {name!r} is a sphere whose to_world stretches its axes differently",
+            "makes another sphere of it, not an ellipsoid",
+            "one scale for all axes, or the plain sphere in a shapegroup and the transform on its instance",
+        )
+    emits = any(isinstance(part, dict) and part.get("type") == "area" for part in shape.values())
+    if kind == "cylinder" and emits and _is_uneven(transform[:, :2]):
+        yield (
+            f"shape {name!r} is a cylinder that emits, and its to_world stretches x and y differently",
+            "takes another area for its light",
+            "one scale for x and y, or a mesh",
+        )
+
+
+def _parts_by_name(geometry: Node) -> dict[str, Node]:
+    """All parts that a reference can name: by key or by id."""
+    named: dict[str, Node] = {}
+    for path, part in walk(geometry):
+        if part.get("type") != "ref":
+            named.setdefault(path[-1], part)
+            named[str(part.get("id", path[-1]))] = part
+    return named
+
+
+def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]:
+    for path, node in walk(geometry):
+        if node.get("type") != "instance":
+            continue
+        for key, child in node.items():
+            if not isinstance(child, dict):
+                continue
+            name = str(child["id"] if child.get("type") == "ref" else child.get("id", key))
+            group = parts.get(name, {})
+            if group.get("type") == "shapegroup":
+                yield _Instance("/".join(path), name, group, _matrix(node.get("to_world")))
+
+
+def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
+    """All parts under a node, those that it refers to among them, each once."""
+    pending, met = [node], set()
+    while pending:
+        part = pending.pop()
+        if part.get("type") == "ref":
+            part = parts.get(str(part.get("id")), {})
+        if part and id(part) not in met:
+            met.add(id(part))
+            yield part
+            pending += [child for child in part.values() if isinstance(child, dict)]
+
+
+def _matrix(transform: Any) -> Floats:
+    """Upper 3x4 of a `to_world`, whatever holds it; of none that of a shape which stays in its place."""
+    if transform is None:
+        return np.eye(4)[:3]
+    return np.array(getattr(transform, "matrix", transform), np.float64).reshape(4, 4)[:3]
+
+
+def _mirrors(transform: Floats) -> bool:
+    return bool(np.linalg.det(transform[:, :3]) < 0)
+
+
+def _has_normals(shape: Node, kinds: tuple[str, ...]) -> bool:
+    """Whether a shape is one of `kinds`, or a mesh whose file states normals of its vertices and keeps them."""
+    if shape["type"] not in _MESHES or "filename" not in shape:
+        return shape["type"] in kinds
+    if shape.get("face_normals"):
+        return False
+    content = Path(str(shape["filename"])).read_bytes() if Path(str(shape["filename"])).is_file() else b""
+    if shape["type"] == "ply":
+        return re.search(rb"^property\s+\w+\s+nx\s", content.partition(b"end_header")[0], re.MULTILINE) is not None
+    return shape["type"] == "serialized" or re.search(rb"^vn\s", content, re.MULTILINE) is not None
+
+
+def _is_uneven(axes: Floats) -> bool:
+    """Whether a transform stretches its axes differently, or shears them: no multiple of a rotation."""
+    gram = axes.T @ axes
+    return not np.allclose(gram, gram[0, 0] * np.eye(len(gram)), rtol=0, atol=_SLACK * max(1e-30, gram[0, 0]))
