@@ -7,10 +7,12 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from isp.converters import write_with_bayer as write_raw
 from isp.picture import Picture as Picture
 from isp.picture import finish as finish
 from isp.processors.catalogue import Processor as Processor
 from isp.processors.catalogue import names as processors
+from isp.remosaic import remosaic as remosaic
 from render.denoised.relight import relight_denoised as relight_denoised
 from render.geometry import look_at as look_at
 from render.geometry import to_world as to_world
@@ -50,7 +52,6 @@ from sensor.presets import names as sensors
 from sensor.presets import preset as preset
 from sensor.raw import RawImage as RawImage
 from sensor.raw_files.raw_file import read_raw as read_raw
-from sensor.raw_files.raw_file import write_raw as write_raw
 from studies.budget.ledger import Plan
 from studies.commands.report import write_report as report
 from studies.design.expect import ExpectedError
@@ -130,6 +131,7 @@ __all__ = [
     "read_study",
     "reference_plan",
     "relight_denoised",
+    "remosaic",
     "render",
     "report",
     "run_in_processes",

@@ -149,4 +149,4 @@ def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     monkeypatch.chdir(tmp_path)
     (block,) = PYTHON.findall(README)
     exec(block.replace("(256, 256), spp=64", "(32, 32), spp=16"), {})
-    assert sorted(path.name for path in tmp_path.iterdir()) == ["bayer.png", "rgbw.dng", "rgbw.png"]
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["bayer.png", "rgbw.dng", "rgbw.png", "rgbw_bayer.dng"]

@@ -1,4 +1,7 @@
-"""A Bayer or RGBW mosaic, 2x2 or quad, as a digital negative: DNG 1.4, uncompressed, one 16-bit CFA image.
+"""A Bayer or RGBW mosaic, 2x2 or quad, as a digital negative: DNG 1.4, uncompressed, one CFA image.
+
+Samples are whole numbers of 16 bits, or single-precision floats. Floats are multiplied by a power of two, which loses
+nothing, so that the white level lies between 32 768 and 65 535: converters take levels of 16 bits alone.
 
 Tags and their meaning: Adobe, "Digital Negative (DNG) Specification", version 1.4.0.0, 2012. What they can't hold
 exactly (most have rationals of 32 bits) is repeated in DNGPrivateData, as JSON behind ``rodcone`` and a zero byte.
@@ -6,8 +9,12 @@ Reading takes the calibration from there, and refuses a file whose public levels
 """
 
 import struct
+from dataclasses import replace
+from datetime import datetime
 from fractions import Fraction
+from math import ceil, isclose, log2
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,8 +23,20 @@ from rodcone.errors import InputError
 from rodcone.files import replacing
 from sensor.cfa import Tile, is_bayer, is_rgbw, plain
 from sensor.raw import RawImage
+from sensor.raw_files.brightness import stops_to_white
 from sensor.raw_files.raw_json import parse_json, raw_image, to_json
-from sensor.raw_files.tiff import CFA, EXIF, Tags, Values, read_mosaic, read_tags, text, write_mosaic
+from sensor.raw_files.tiff import (
+    CFA,
+    COMPRESSION,
+    EXIF,
+    STRIP_OFFSETS,
+    Tags,
+    Values,
+    read_mosaic,
+    read_tags,
+    text,
+    write_mosaic,
+)
 
 PRIVATE = b"rodcone\0"
 PRIVATE_DATA = 50740
@@ -25,6 +44,9 @@ MAKER, MAKE = 271, "rodcone"
 CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
 OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
+BASELINE_EXPOSURE, IMAGE_NUMBER = 50730, 37393
+LEAST_BYTES = 100_000  # RawTherapee 5.9 takes no smaller file for a raw one
+CROPPED_PX = 2  # on each side: Adobe's DNG SDK warns of less for interpolation
 _COMPARED = {
     CFA_REPEAT: "CFARepeatPatternDim",
     CFA_PATTERN: "CFAPattern",
@@ -35,15 +57,25 @@ _COMPARED = {
     F_NUMBER: "FNumber",
     ISO: "PhotographicSensitivity",
 }
+_NEAR = {EXPOSURE_TIME: 0.1, F_NUMBER: 0.05}  # to which Adobe's writer rounds them: times and stops marked on cameras
 _COLOURS = {"R": 0, "G": 1, "B": 2, "W": 6}  # numbers of CFAPattern and CFAPlaneColor; 6 is white
 _ILLUMINANT_A, _ILLUMINANT_D65 = 17, 21  # EXIF LightSource
 _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
 
 
-def write_dng(raw: RawImage, path: Path) -> Path:
+def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: datetime | None = None) -> Path:
     """Write a digital negative; gives its path. LibRaw and what is built on it open frames from 22 pixels a side.
 
     BlackLevel is a whole number, since raw converters cut fractions off; `read_dng` gives back the exact one.
+
+    Parameters
+    ----------
+    raw : RawImage
+    path : Path
+    frame : int, optional
+        Number of the exposure in a burst (ImageNumber).
+    written : datetime, optional
+        What the file gives as its date; now, where left out.
 
     Raises
     ------
@@ -52,14 +84,15 @@ def write_dng(raw: RawImage, path: Path) -> Path:
     OSError
         Where the folder is missing or can't be written.
     """
-    tags = dng_tags(raw)
+    tags, moment = dng_tags(raw), _moment_tags(written or datetime.now(), frame)
+    dn = raw.dn * np.float32(_sample_scale(raw)) if raw.dn.dtype.kind == "f" else raw.dn
     with replacing(path) as (part,):
-        write_mosaic(part, raw.dn, CFA, tags, exif_tags(raw))
+        write_mosaic(part, dn, CFA, tags, {**exif_tags(raw), **moment}, LEAST_BYTES)
     return path
 
 
 def read_dng(path: Path) -> RawImage:
-    """Read a digital negative that `write_dng` wrote.
+    """Read a digital negative that `write_dng` wrote, or Adobe's writer from one without compression.
 
     Raises
     ------
@@ -75,16 +108,35 @@ def read_dng(path: Path) -> RawImage:
     raw = raw_image(parse_json(content[len(PRIVATE) :], str(path)), dn, str(path))
     if not is_in_dng(raw.cfa):
         raise InputError(f"{path}: its calibration has the mosaic {raw.cfa}; allowed: an unchanged file; write it anew")
+    # Files of version 0.1 have floats as they are, and black's fraction.
+    earlier: dict[int, list[tuple[str, Values]]] = {
+        BLACK_LEVEL: [("2I", rational(raw.black_dn)), ("2I", rational(round(raw.black_dn)))],
+        WHITE_LEVEL: [("I", (int(raw.white_dn),))],
+    }
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
-        of_file, of_calibration = (directory[code][1] if code in directory else None for directory in (tags, expected))
-        # Files of version 0.1 have black's fraction there.
-        if of_file != of_calibration and (code, of_file) != (BLACK_LEVEL, rational(raw.black_dn)):
-            stated, right = ("missing" if x is None else tuple(x[:8]) for x in (of_file, of_calibration))
+        of_file, allowed = tags.get(code), [expected.get(code), *earlier.get(code, [])]
+        if not any(_agree(of_file, each, _NEAR.get(code, 1e-6)) for each in allowed):
+            stated, right = ("missing" if x is None else tuple(x[1][:8]) for x in (of_file, allowed[0]))
             raise InputError(
                 f"{path}: {name} is {stated}, the calibration says {right}; allowed: an unchanged file; write it anew"
             )
-    return raw
+    scaled = dn.dtype.kind == "f" and _agree(tags.get(WHITE_LEVEL), expected[WHITE_LEVEL])
+    exact: Any = dn / np.float32(_sample_scale(raw)) if scaled else dn
+    return replace(raw, dn=exact)
+
+
+def _agree(one: tuple[str, Values] | None, other: tuple[str, Values] | None, relative: float = 1e-6) -> bool:
+    """Whether two tags say the same, rationals within a relative difference."""
+    if one is None or other is None or "2I" not in (one[0], other[0]):
+        return (one and one[1]) == (other and other[1])
+    (a, b), (c, d) = (tuple(x[1]) if len(x[1]) == 2 else (0, 0) for x in (one, other))
+    return b > 0 and d > 0 and isclose(a / b, c / d, rel_tol=relative, abs_tol=1e-9)
+
+
+def _sample_scale(raw: RawImage) -> float:
+    """Power of two that floats are multiplied by in the file."""
+    return 2.0 ** -ceil(log2(max(raw.white_dn, 1.0) / 65_535)) if raw.dn.dtype.kind == "f" else 1.0
 
 
 def is_in_dng(tile: Tile) -> bool:
@@ -93,10 +145,15 @@ def is_in_dng(tile: Tile) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Whether a file says that `write_dng` wrote it, and not a camera or another program."""
+    """Whether a file is a mosaic of rodcone's as `write_dng` lays it out: uncompressed, in strips.
+
+    What another program compressed is LibRaw's to read.
+    """
     try:
         with path.open("rb") as file:
-            return read_tags(file, (MAKER,), str(path)).get(MAKER) == text(MAKE)
+            tags = read_tags(file, (MAKER, COMPRESSION, STRIP_OFFSETS), str(path))
+            plain_strips = tags.get(COMPRESSION, ("", ()))[1] == (1,) and STRIP_OFFSETS in tags
+            return tags.get(MAKER) == text(MAKE) and plain_strips
     except (InputError, OSError):
         return False
 
@@ -108,7 +165,8 @@ def dng_tags(raw: RawImage) -> Tags:
     apart: S is the shot noise, 1 / full scale in electrons, with what columns' gains make of light beside dark current;
     O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is where the well begins to clip
     (`RawImage.saturation_e`). WhiteLevel is one for all channels: converters clip what one that is read apart holds
-    beyond it.
+    beyond it. BaselineExposure is `stops_to_white`, less what converters brighten already: they scale the channel that
+    answers most to a neutral to 1, development green.
 
     Raises
     ------
@@ -123,6 +181,7 @@ def dng_tags(raw: RawImage) -> Tags:
             "allowed: black of 0 or more, a whole white; write a .tif instead"
         )
     colour, (height, width) = raw.colour, raw.shape
+    scale, is_float = _sample_scale(raw), raw.dn.dtype.kind == "f"
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
         MAKER: text(MAKE),
@@ -131,12 +190,14 @@ def dng_tags(raw: RawImage) -> Tags:
         CFA_REPEAT: ("H", (len(raw.cfa), len(raw.cfa[0]))),
         CFA_PATTERN: ("B", bytes(_COLOURS[channel] for row in raw.cfa for channel in row)),
         50706: ("B", bytes((1, 4, 0, 0))),  # DNGVersion
-        50707: ("B", bytes((1, 1, 0, 0))),  # DNGBackwardVersion: all that is newer may be skipped
+        # DNGBackwardVersion: all that is newer may be skipped, but for floating point.
+        50707: ("B", bytes((1, 4 if is_float else 1, 0, 0))),
         50708: text(f"rodcone {raw.camera}"),  # UniqueCameraModel
         50710: ("B", bytes(_COLOURS[channel] for channel in raw.channels)),  # CFAPlaneColor
         50711: ("H", (1,)),  # CFALayout: a rectangle
-        BLACK_LEVEL: ("2I", rational(round(raw.black_dn))),
-        WHITE_LEVEL: ("I", (int(raw.white_dn),)),
+        BLACK_LEVEL: ("2I", rational(round(raw.black_dn * scale))),
+        WHITE_LEVEL: ("I", (round(raw.white_dn * scale),)),
+        BASELINE_EXPOSURE: ("2i", rational(stops_to_white(raw) - log2(colour.neutral.max()))),
         50728: ("2I", rational(colour.neutral / colour.neutral.max())),  # AsShotNeutral
         50721: ("2i", rational(colour.xyz_to_camera_a)),  # ColorMatrix1, for illuminant A
         50722: ("2i", rational(colour.xyz_to_camera_d65)),  # ColorMatrix2, for D65
@@ -148,6 +209,9 @@ def dng_tags(raw: RawImage) -> Tags:
         50829: ("I", (0, 0, height, width)),  # ActiveArea
         51041: ("d", _noise_profile(raw)),  # NoiseProfile
     }
+    if min(height, width) > 2 * CROPPED_PX:
+        tags[50719] = ("I", (CROPPED_PX, CROPPED_PX))  # DefaultCropOrigin: column, row
+        tags[50720] = ("I", (width - 2 * CROPPED_PX, height - 2 * CROPPED_PX))  # DefaultCropSize
     if colour.neutral.size == 4:  # a fourth plane asks for a way back to three: W carries no colour here
         tags |= dict.fromkeys((50725, 50726), ("2i", rational(np.eye(3, 4))))  # ReductionMatrix1, 2
     if raw.defects is not None and is_bayer(raw.cfa):
@@ -177,6 +241,19 @@ def exif_tags(raw: RawImage) -> Tags:
         tags[F_NUMBER] = ("2I", rational(raw.f_number))
     if raw.iso is not None:
         tags[ISO] = ("H", (min(max(round(raw.iso), 1), 65_535),))
+    return tags
+
+
+def _moment_tags(written: datetime, frame: int | None) -> Tags:
+    """Tags of the time of an exposure, which is that of writing, and of its number in a burst."""
+    date = written.strftime("%Y:%m:%d %H:%M:%S")
+    tags: dict[int, tuple[str, Values]] = {
+        36867: text(date),  # DateTimeOriginal
+        36868: text(date),  # DateTimeDigitized
+        37521: text(f"{written.microsecond // 1000:03d}"),  # SubSecTimeOriginal
+    }
+    if frame is not None:
+        tags[IMAGE_NUMBER] = ("I", (frame,))
     return tags
 
 

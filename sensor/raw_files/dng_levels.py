@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.cfa import Tile
-from sensor.raw_files.tiff import CFA, HEIGHT, PHOTOMETRIC, WIDTH, Tags, read_directory
+from sensor.raw_files.tiff import CFA, HEIGHT, PHOTOMETRIC, SUB_DIRECTORIES, WIDTH, Tags, read_directory
 
-_SUB_DIRECTORIES = 330  # SubIFDs (TIFF 6.0, Supplement 1)
 _MOST_DIRECTORIES = 64  # of a file
 
 # The known tags that change samples, their place or their meaning. LibRaw applies LINEARIZATION.
@@ -95,11 +94,11 @@ def directories(path: Path, codes: Collection[int]) -> Iterator[Tags]:
                 continue
             offsets.add(start)
             try:
-                tags, following = read_directory(file, start, {*codes, _SUB_DIRECTORIES}, str(path), order)
+                tags, following = read_directory(file, start, {*codes, SUB_DIRECTORIES}, str(path), order)
             except InputError:
                 continue  # damaged: others may be whole
             yield tags
-            form, starts = tags.get(_SUB_DIRECTORIES, ("", ()))
+            form, starts = tags.get(SUB_DIRECTORIES, ("", ()))
             if form == "I":
                 waiting += [int(start) for start in starts[:_MOST_DIRECTORIES]]
             waiting.append(following)

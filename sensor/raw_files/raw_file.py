@@ -25,8 +25,15 @@ def check_ending(path: Path, tile: Tile) -> None:
         )
 
 
-def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
+def write_raw(raw: RawImage, path: str | Path, *, frame: int | None = None) -> tuple[Path, ...]:
     """Write a raw file; gives the paths of what was written, the picture first.
+
+    Parameters
+    ----------
+    raw : RawImage
+    path : str or Path
+    frame : int, optional
+        Number of the exposure in a burst, which a .dng notes.
 
     Raises
     ------
@@ -37,7 +44,7 @@ def write_raw(raw: RawImage, path: str | Path) -> tuple[Path, ...]:
     """
     path = Path(path)
     check_ending(path, raw.cfa)
-    return (write_dng(raw, path),) if path.suffix.lower() == ".dng" else write_tiff(raw, path)
+    return (write_dng(raw, path, frame=frame),) if path.suffix.lower() == ".dng" else write_tiff(raw, path)
 
 
 def read_raw(path: str | Path) -> RawImage:

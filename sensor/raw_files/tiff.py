@@ -21,7 +21,8 @@ Tags = Mapping[int, tuple[str, Values]]  # by code: format of one value (below),
 
 WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC = 256, 257, 258, 259, 262
 STRIP_OFFSETS, SAMPLES_PER_PIXEL, STRIP_BYTE_COUNTS, SAMPLE_FORMAT = 273, 277, 279, 339
-EXIF = 34665
+EXIF, SUB_DIRECTORIES = 34665, 330  # the latter: SubIFDs (TIFF 6.0, Supplement 1)
+_MOST_SUB_DIRECTORIES = 16  # that are looked into for the mosaic
 _EXIF_PLACE = 34664  # no tag's code: tifffile doesn't write EXIF, so this entry is written and then changed into it
 MIN_IS_BLACK, CFA = 1, 32803
 _LAYOUT = (WIDTH, HEIGHT, BITS_PER_SAMPLE, COMPRESSION, PHOTOMETRIC, STRIP_OFFSETS, SAMPLES_PER_PIXEL)
@@ -36,8 +37,12 @@ _MOST_VALUE_BYTES = 1 << 20  # of one tag: a million pixel rows in strips of fou
 _LONGEST_SIDE = 1 << 17  # pixels; no single chip is larger
 
 
-def write_mosaic(path: Path, dn: NDArray[Any], photometric: int, tags: Tags, exif: Tags | None = None) -> None:
+def write_mosaic(
+    path: Path, dn: NDArray[Any], photometric: int, tags: Tags, exif: Tags | None = None, least_bytes: int = 0
+) -> None:
     """Write an uncompressed TIFF with further tags, and an Exif directory with those of `exif`.
+
+    Zeros behind the last byte make the file as large as `least_bytes`.
 
     Raises
     ------
@@ -64,6 +69,8 @@ def write_mosaic(path: Path, dn: NDArray[Any], photometric: int, tags: Tags, exi
             stream.write(_directory(exif, start))
             stream.seek(entry)
             stream.write(struct.pack("<HHII", EXIF, 4, 1, start))
+    with path.open("ab") as stream:
+        stream.write(bytes(max(least_bytes - stream.tell(), 0)))
 
 
 def _directory(tags: Tags, start: int) -> bytes:
@@ -105,11 +112,21 @@ def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tu
 
 
 def read_tags(file: BinaryIO, codes: Collection[int], name: str) -> Tags:
-    """Tags of these codes from the first directory and the Exif directory that it names."""
+    """Tags of these codes from the first directory, the Exif directory that it names, and that of the mosaic.
+
+    Other programs write a preview into the first directory, and the mosaic into one below it, whose tags count.
+    """
     head = file.read(8)
     if head[:4] != b"II*\0" or len(head) < 8:
         raise InputError(f"{name}: not a little-endian TIFF or DNG; allowed: files that `rodcone capture` wrote")
-    tags, _ = read_directory(file, struct.unpack("<I", head[4:])[0], codes, name)
+    wanted = {*codes, SUB_DIRECTORIES, PHOTOMETRIC}
+    tags, _ = read_directory(file, struct.unpack("<I", head[4:])[0], wanted, name)
+    if tags.get(PHOTOMETRIC, ("", ()))[1] != (CFA,) and SUB_DIRECTORIES in tags:
+        for start in whole(tags, SUB_DIRECTORIES, name)[:_MOST_SUB_DIRECTORIES]:
+            below, _ = read_directory(file, start, wanted, name)
+            if below.get(PHOTOMETRIC, ("", ()))[1] == (CFA,):
+                tags |= below
+                break
     if EXIF in tags:
         tags |= read_directory(file, whole(tags, EXIF, name)[0], codes, name)[0]
     return tags

@@ -13,7 +13,9 @@ from sensor.raw import RawImage
 from sensor.readings.noise import Floats, best_weights, covariances, seams, shares, whole_share
 from sensor.readings.resolve import PlainReading
 
-MERGED_WHITE_DN = 2**24 - 1  # linear words of 24 bits, as chips that merge give them; single precision holds them all
+# Linear words of 24 bits, as chips that merge give them; single precision holds them all. Black and white are whole
+# numbers of 16 bits too, in which a negative states them.
+MERGED_WHITE_DN = 256 * 65_535
 _ROUNDS = 6  # of the weights, as of `sensor.burst`
 _LEVELS = 512  # of light, between which weights are interpolated
 
@@ -40,7 +42,7 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
 
     full_e = max(pixel.full_well_e - dark_current_e, 1.0) * whole
     dark_e = BLACK_SIGMAS * hypot(base.read_noise_e, base.dsnu_e)
-    black_dn = ceil(MERGED_WHITE_DN * dark_e / (full_e + dark_e))
+    black_dn = 256 * ceil(65_535 * dark_e / (full_e + dark_e))
     gain_e = full_e / (MERGED_WHITE_DN - black_dn)
     electrons = np.where(raws[last].saturated, full_e, np.minimum(electrons, full_e))
     hot = [raw.defects for raw in raws if raw.defects is not None]

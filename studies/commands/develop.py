@@ -56,8 +56,8 @@ class DevelopOrder:
     bits : int
         Bits a channel: 8 or 16.
     ev : float, optional
-        Brightness in stops; at 0 a full well is white. By default the 99th percentile of the picture's luminance is
-        shown at 90 % of white.
+        Brightness in stops; at 0 a full well is white. By default the exposure's 99th percentile of luminance is shown
+        at 90 % of white, by every processor alike.
     white_balance : str, optional
         Illuminant, such as D65, under which grey is shown as grey; as-shot for the one that capture or the camera set,
         as raw converters do; or gray-world, found in the picture as in the paper. By default as-shot, and gray-world

@@ -14,7 +14,6 @@ from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.own import processor_of, require_consent
 from render.illuminants import illuminant
-from rodcone.colour_spaces import white_of
 from rodcone.display import brief
 from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
@@ -22,6 +21,7 @@ from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import is_bayer, plain
 from sensor.raw import RawImage
+from sensor.raw_files.brightness import stops_to_white
 from sensor.raw_files.raw_file import open_raw
 from studies.study.scene_source import asked_size
 from studies.study.study import AS_SHOT, WHITE_BALANCES, default_balance
@@ -133,8 +133,8 @@ def develop_file(
     isp, trust_code
         As `processor` and `trust_code` of `develop`.
     ev : float, optional
-        Brightness in stops: at 0 green's full well is white. Left out, the 99th percentile of the picture's luminance
-        comes to 90 % of white, which noise raises in the deepest dark; for looking, not for measuring.
+        Brightness in stops: at 0 green's full well is white. Left out, `sensor.raw_files.brightness.stops_to_white`, by
+        which the exposure's 99th percentile of luminance comes to 90 % of white; for looking, not for measuring.
     white_balance : str, optional
         As of `develop`.
     encoding : str
@@ -159,7 +159,7 @@ def develop_file(
         )
     picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
     linear = _scaled(picture.rgb / raw.full_well_e, height, width)
-    stops = _stops(linear) if ev is None else ev
+    stops = stops_to_white(raw) if ev is None else ev
     facts = {
         "raw": str(paths[0]) if len(paths) == 1 else [str(file) for file in paths],
         "isp": isp or mosaic_processor(raw),
@@ -187,9 +187,3 @@ def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) 
     if size == raw_size:
         return linear
     return np.asarray(resize_local_mean(linear, size, channel_axis=-1))
-
-
-def _stops(linear: NDArray[np.float64]) -> float:
-    """Stops that bring the 99th percentile of luminance to 90 % of white; 0 for a picture without light."""
-    white = white_of(linear)
-    return -float(np.log2(white)) if white > 0 else 0.0

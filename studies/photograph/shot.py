@@ -7,7 +7,7 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.remosaic import remosaic
+from isp.converters import converter_note, write_with_bayer
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -20,13 +20,12 @@ from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
 from rodcone.progress import Step, render_words
 from sensor.capture import capture
-from sensor.cfa import is_bayer
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s, warn_if_dark
 from sensor.optics import form_image, left_out, spreads
 from sensor.presets import preset
-from sensor.raw_files.raw_file import check_ending, write_raw
+from sensor.raw_files.raw_file import check_ending
 from sensor.response import expected_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
@@ -61,8 +60,8 @@ class Order:
         Scene by name such as color_checker, a Mitsuba scene (.xml), spectral radiance (.exr, or ISETCam's .mat), a cube
         described by a .toml (.npy, ENVI's .hdr, .mat), a photograph (.jpg, .png), or .npz of rodcone reference.
     out : str or Path
-        Raw file to write: .dng for Bayer and 2x2 RGBW (with a re-mosaiced Bayer one beside it, NAME_bayer.dng), .tif
-        with a .json beside it for any mosaic.
+        Raw file to write: .dng for Bayer, 2x2 RGBW and quads of both (beside what not every raw converter develops a
+        16-bit Bayer one for them, NAME_bayer.dng), .tif with a .json beside it for any mosaic.
     sensor : str or Path
         Sensor preset by name, or a preset file.
     cfa : str, optional
@@ -140,7 +139,7 @@ class Taken:
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
-    """Photograph and write; a negative of RGBW or a quad mosaic gets a Bayer one beside it, ``NAME_bayer.dng``.
+    """Photograph and write; a negative that not every converter develops gets ``NAME_bayer.dng`` beside it.
 
     Parameters
     ----------
@@ -224,14 +223,11 @@ def take(order: Order, step: Step | None = None) -> Taken:
 
     # The files.
     places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
-    converted = is_bayer(raw.cfa) or out.suffix.lower() != ".dng"  # by raw converters
-    bayer = remosaic(raw) if not converted and order.frames == 1 else None
-    paths = tuple(path for frame, place in zip(raws, places, strict=True) for path in write_raw(frame, place))
-    if bayer is not None:
-        paths += write_raw(bayer, out.with_stem(out.stem + "_bayer"))
-    if not converted and "W" in raw.channels:
-        other = f"{paths[-1].name}, re-mosaiced" if bayer is not None else "a .dng of one exposure, re-mosaiced"
-        notes += [f"{out.name}: other programs read its mosaic as four colours, such as GMCY; for them give {other}"]
+    numbers = [None] if order.frames == 1 else range(1, order.frames + 1)
+    parts = zip(raws, places, numbers, strict=True)
+    paths = tuple(path for frame, place, number in parts for path in write_with_bayer(frame, place, frame=number))
+    if out.suffix.lower() == ".dng":
+        notes += filter(None, [converter_note(raw, places[0])])
     facts = {
         "paths": [str(path) for path in paths],
         "source": str(order.source),

@@ -322,7 +322,7 @@ def test_a_wrong_number_of_arguments_shows_the_right_call() -> None:
     rows: tuple[tuple[Callable[[], Any], str], ...] = (
         (public.capture, "capture: missing a required argument: 'radiance'; call it as capture(radiance, sensor"),
         (lambda: public.scenes(1), "scenes: too many positional arguments; call it as scenes()"),
-        (lambda: public.write_raw(RAW, "a.dng", 8), "call it as write_raw(raw, path)"),
+        (lambda: public.write_raw(RAW, "a.dng", 8), "call it as write_raw(raw, path, frame)"),
         (lambda: public.capture(RADIANCE, time=1), "unexpected keyword argument 'time'"),
     )
     for call, words in rows:
@@ -334,7 +334,7 @@ def test_arguments_in_each_others_place_are_told_so() -> None:
     for call, words in {
         (
             lambda: public.write_raw("a.dng", RAW)
-        ): "raw and path stand in each other's place; write write_raw(raw, path)",
+        ): "raw and path stand in each other's place; write write_raw(raw, path, frame)",
         (lambda: public.write_exr("a.exr", RADIANCE)): "write write_exr(radiance, path, scene)",
         (lambda: public.write_picture("a.png", np.ones((2, 2)))): "write write_picture(picture, path",
         (lambda: public.capture("low_noise", RADIANCE)): "radiance and sensor stand in each other's place",

@@ -2,6 +2,8 @@
 
 import struct
 from dataclasses import replace
+from datetime import datetime
+from math import log2
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +18,16 @@ from render.illuminants import illuminant
 from sensor.cfa import MOSAICS, RGBW, Tile, is_bayer
 from sensor.presets import preset
 from sensor.raw import RawImage
+from sensor.raw_files.brightness import stops_to_white
 from sensor.raw_files.dng import (
+    BASELINE_EXPOSURE,
     BLACK_LEVEL,
+    EXPOSURE_TIME,
+    LEAST_BYTES,
+    MAKER,
     OPCODES,
     PRIVATE_DATA,
+    WHITE_LEVEL,
     dng_tags,
     exif_tags,
     is_own,
@@ -27,7 +35,8 @@ from sensor.raw_files.dng import (
     read_dng,
     write_dng,
 )
-from sensor.raw_files.tiff import CFA, EXIF, write_mosaic
+from sensor.raw_files.raw_file import open_raw
+from sensor.raw_files.tiff import CFA, EXIF, SUB_DIRECTORIES, write_mosaic
 from sensor.readout import as_raw
 from studies.photograph.camera import calibrate
 
@@ -272,3 +281,128 @@ def test_whose_negative_it_is(tmp_path: Path) -> None:
     (tmp_path / "other.dng").write_bytes(b"MM\0*" + bytes(20))
     assert not is_own(tmp_path / "other.dng")
     assert not is_own(tmp_path / "none.dng")
+
+
+# What converters and Adobe's writer ask for.
+
+
+def tags_of(path: Path) -> dict[str, object]:
+    with tifffile.TiffFile(path) as file:
+        return {tag.name: tag.value for tag in file.pages.first.tags}
+
+
+def merged(white_dn: float = 256 * 65_535, black_dn: float = 3 * 256) -> RawImage:
+    """Floats as merged readings have them, with the smallest and the largest."""
+    dn = np.random.default_rng(3).uniform(0, white_dn, (30, 41)).astype(np.float32)
+    dn.flat[:3] = 0, white_dn, np.finfo(np.float32).tiny * 2**20
+    return replace(exposure(), dn=dn, white_dn=white_dn, black_dn=black_dn)
+
+
+def test_floats_stand_on_a_scale_of_16_bits_and_come_back_bit_for_bit(tmp_path: Path) -> None:
+    for white_dn, black_dn, stored in (
+        (256 * 65_535, 768, (65_535, 3)),
+        (16_383, 10, (65_532, 40)),
+        (1e5 + 1, 0, (50_000, 0)),
+    ):
+        raw = merged(white_dn, black_dn)
+        path = write_dng(raw, tmp_path / "merged.dng")
+        assert same(read_dng(path), raw)
+        tags = tags_of(path)
+        assert (tags["WhiteLevel"], tags["BlackLevel"]) == (stored[0], (stored[1], 1))
+        assert tags["DNGBackwardVersion"] == bytes([1, 4, 0, 0])
+        with tifffile.TiffFile(path) as file:
+            assert 32_767 < file.pages.first.asarray().max() <= 65_535.5
+    write_dng(exposure(), tmp_path / "whole.dng")
+    assert tags_of(tmp_path / "whole.dng")["DNGBackwardVersion"] == bytes([1, 1, 0, 0])
+
+
+def test_floats_of_an_earlier_version_stand_as_they_are_and_are_still_read(tmp_path: Path) -> None:
+    raw = merged()
+    earlier = {BLACK_LEVEL: ("2I", rational(raw.black_dn)), WHITE_LEVEL: ("I", (int(raw.white_dn),))}
+    write_mosaic(tmp_path / "shot.dng", raw.dn, CFA, {**dng_tags(raw), **earlier}, exif_tags(raw))
+    assert same(read_dng(tmp_path / "shot.dng"), raw)
+
+
+def test_a_small_file_is_as_large_as_rawtherapee_wants_raw_files_to_be(tmp_path: Path) -> None:
+    small = write_dng(exposure(), tmp_path / "small.dng").read_bytes()
+    assert len(small) == LEAST_BYTES
+    large = write_dng(exposure(shape=(222, 260)), tmp_path / "large.dng").stat().st_size
+    assert 2 * 222 * 260 < large < 2 * 222 * 260 + 8000
+
+
+def test_two_pixels_at_each_edge_are_left_to_interpolation(tmp_path: Path) -> None:
+    tags = tags_of(write_dng(exposure(), tmp_path / "shot.dng"))
+    assert (tags["DefaultCropOrigin"], tags["DefaultCropSize"]) == ((2, 2), (37, 26))
+    assert "DefaultCropSize" not in tags_of(write_dng(exposure(shape=(4, 41)), tmp_path / "shot.dng"))
+
+
+def test_a_file_tells_when_it_was_written_and_which_exposure_of_a_burst_it_is(tmp_path: Path) -> None:
+    path = tmp_path / "shot.dng"
+    write_dng(exposure(), path, frame=3, written=datetime(2026, 2, 3, 14, 5, 6, 78_900))
+    exif = tags_of(path)["ExifTag"]
+    assert isinstance(exif, dict)
+    assert (exif["DateTimeOriginal"], exif["DateTimeDigitized"]) == ("2026:02:03 14:05:06",) * 2
+    assert (exif["SubsecTimeOriginal"], exif["ImageNumber"]) == ("078", 3)
+    write_dng(exposure(), path)
+    exif = tags_of(path)["ExifTag"]
+    assert isinstance(exif, dict)
+    assert "ImageNumber" not in exif
+
+
+def test_baseline_exposure_is_what_development_adds_to_a_converter(tmp_path: Path) -> None:
+    # Converters scale the channel that answers most to a neutral to 1, development green.
+    for cfa in ("bayer", "rgbw"):
+        raw = negative(cfa)
+        assert raw.colour is not None
+        numerator, denominator = dng_tags(raw)[BASELINE_EXPOSURE][1]
+        expected = stops_to_white(raw) - log2(raw.colour.neutral.max())
+        assert numerator / denominator == pytest.approx(expected, abs=1e-6)
+
+
+def test_adobe_s_writer_may_write_rationals_otherwise_and_round_the_exposure(tmp_path: Path) -> None:
+    raw, path = exposure(), tmp_path / "shot.dng"
+    for time, allowed in (((1, 30), True), ((1, 32), True), ((1, 40), False)):
+        exif = {**exif_tags(raw), EXPOSURE_TIME: ("2I", time)}
+        write_mosaic(path, raw.dn, CFA, {**dng_tags(raw), BLACK_LEVEL: ("2I", (2560, 256))}, exif)
+        if allowed:
+            assert same(read_dng(path), raw)
+        else:
+            refusal(read_dng, path, match=r"ExposureTime is \(1, 40\), the calibration says \(1, 30\)")
+
+
+def with_preview(raw: RawImage, path: Path) -> Path:
+    """Negative as Adobe's writer makes it: a preview of 8 bits first, the mosaic in a directory below."""
+
+    def extra(chosen: dict[int, tuple[str, object]]) -> list[tuple[object, ...]]:
+        kinds = {"2I": 5, "2i": 10, "s": 2, "B": 1, "I": 4, "H": 3, "d": 12, "U": 7}
+        halves = {"2I": 2, "2i": 2}
+        return [
+            (code, kinds[form], len(values) // halves.get(form, 1), values, True)
+            for code, (form, values) in chosen.items()
+        ]
+
+    tags = dict(dng_tags(raw)) | {EXPOSURE_TIME: exif_tags(raw)[EXPOSURE_TIME]}
+    tags |= {code: tag for code, tag in exif_tags(raw).items() if code != 36864}
+    first = {code: tags.pop(code) for code in (MAKER, PRIVATE_DATA, 50706, 50721, 33434, 33437, 34855)}
+    del tags[254], tags[272], tags[274]
+    with tifffile.TiffWriter(path, byteorder="<") as file:
+        preview = np.zeros((8, 12, 3), np.uint8)
+        file.write(preview, photometric="rgb", subifds=1, subfiletype=1, metadata=None, extratags=extra(first))
+        file.write(raw.dn, photometric="cfa", metadata=None, extratags=extra(tags))
+    return path
+
+
+def test_a_mosaic_below_a_preview_is_read(tmp_path: Path) -> None:
+    raw = exposure()
+    path = with_preview(raw, tmp_path / "adobe.dng")
+    with tifffile.TiffFile(path) as file:
+        assert (file.pages.first.photometric, len(file.pages.first.tags[SUB_DIRECTORIES].value)) == (2, 1)
+    assert is_own(path)
+    assert same(open_raw(path)[0], raw)
+
+
+def test_a_mosaic_that_another_program_compressed_is_libraws_to_read(tmp_path: Path) -> None:
+    path = write_dng(exposure(), tmp_path / "shot.dng")
+    path.write_bytes(patched(path.read_bytes(), 259, struct.pack("<HIHH", 3, 1, 7, 0)))
+    assert not is_own(path)
+    assert "LibRaw" in open_raw(path)[1]["reader"]

@@ -1,0 +1,52 @@
+"""The brightness at which a raw image is shown: one rule for development and for a negative's BaselineExposure."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.colour_spaces import luminance_of_srgb, white_of
+from rodcone.errors import InputError
+from sensor.cfa import mask
+from sensor.raw import RawImage, channel_variance
+
+MOST_NOISE = 0.1  # of the level that is shown as white: the cells of the mean grow until their noise is under it
+LEAST_CELLS = 256  # that a percentile is taken of
+
+
+def stops_to_white(raw: RawImage) -> float:
+    """Stops by which a raw image is brightened, so that the 99th percentile of its luminance is shown at 90 % of white.
+
+    The luminance is that of means over cells: one tile of the mosaic, and more where noise would raise the percentile.
+    So it depends on the exposure alone, and is the same for every way to develop it. 0 for a frame without light.
+
+    Raises
+    ------
+    InputError
+        For a raw image without colours.
+    """
+    if raw.colour is None:
+        raise InputError("raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, light)")
+    names = raw.channels[:3]
+    balance = 1 / raw.colour.neutral[: len(names)]
+    weights = np.asarray(luminance_of_srgb(raw.colour.to_srgb.T)) * balance  # luminance of each channel's electrons
+    electrons = raw.electrons
+    sites = [sum(row.count(name) for row in raw.cfa) for name in names]  # of a tile
+    tile = np.array([len(raw.cfa), len(raw.cfa[0])])
+    tiles = 1
+    while True:
+        planes = np.stack([_cell_means(electrons, mask(raw.cfa, x, raw.shape), tile * tiles) for x in names], axis=-1)
+        white_e = white_of(planes @ weights)
+        sample_e2 = channel_variance(raw, max(white_e, 0.0) * raw.colour.neutral)[: len(names)]
+        noise_e = float(np.sqrt(weights**2 @ (sample_e2 / sites))) / tiles
+        if noise_e <= MOST_NOISE * white_e or np.prod(np.array(raw.shape) // (2 * tile * tiles)) < LEAST_CELLS:
+            return -float(np.log2(white_e / raw.full_well_e)) if white_e > 0 else 0.0
+        tiles *= 2
+
+
+def _cell_means(electrons: NDArray[np.float64], at: NDArray[np.bool_], cell: NDArray[np.intp]) -> NDArray[np.float64]:
+    """Mean of a channel's samples in each whole cell of the mosaic; of a frame smaller than a cell, the whole mean."""
+    height, width = (min(n, size) for n, size in zip(cell, electrons.shape, strict=True))
+    rows, columns = electrons.shape[0] // height, electrons.shape[1] // width
+    inside = slice(rows * height), slice(columns * width)
+    parts = (x[inside].reshape(rows, height, columns, width).sum(axis=(1, 3)) for x in (electrons * at, at))
+    total, count = parts
+    return np.asarray(total / np.maximum(count, 1))
