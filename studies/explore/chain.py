@@ -22,7 +22,7 @@ from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, at_level_s, exposure_of_electrons_s, most_informative_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, at_level_s, best_exposure_s, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage
@@ -179,13 +179,15 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     # Exposure
     exposure_s = controls.exposure_s
     if controls.exposure != TIME:
-        rules = (AUTO, AUTO_W) if controls.exposure == AUTO_INFORMATION else (controls.exposure,)
-        times_s = []
-        for rule in rules:  # both look at a percentile, which goes with the level
-            metered = (lit_so, rule, sensor.pixel.full_well_e, sensor.pixel.dark_current_e_per_s)
-            unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
-            times_s.append(min(exposure_s, at_level_s(unit_s, scale, rule, sensor)))
-        exposure_s = most_informative_s(mosaicked_e * scale, sensor, times_s)
+        rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
+        # The rule looks at a percentile, which goes with the level.
+        metered = (lit_so, rule, sensor.pixel.full_well_e, sensor.pixel.dark_current_e_per_s)
+        unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
+        time_s = at_level_s(unit_s, scale, rule, sensor)
+        if controls.exposure == AUTO_INFORMATION:
+            exposure_s = best_exposure_s(mosaicked_e * scale, sensor, time_s, exposure_s)
+        else:
+            exposure_s = min(exposure_s, time_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)

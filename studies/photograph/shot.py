@@ -68,7 +68,7 @@ class Order:
         Mosaic by name, or rows such as RG/BW; the preset's own by default.
     exposure : str
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
-        brightest W, auto:information for the one of the two whose samples hold more.
+        brightest W, auto:information for the time of a ladder that leaves the least expected error in the picture.
     level : str, optional
         Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str

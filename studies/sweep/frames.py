@@ -20,7 +20,7 @@ from render.transport import Transport
 from rodcone.curve_file import is_curve_file
 from rodcone.digests import digest_inputs
 from sensor.config import SensorConfig
-from sensor.exposure import AUTO, AUTO_W, at_level_s, most_informative_s
+from sensor.exposure import AUTO, AUTO_W, at_level_s, best_exposure_s
 from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
@@ -151,18 +151,14 @@ def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longe
     asked_s = parse_exposure(exposure)
     if asked_s is not None:
         return asked_s
-    for_green_s, for_white_s = (
-        min(longest_s, at_level_s(unit_s, luminance_cd_m2, rule, frame.sensor))
-        for unit_s, rule in ((frame.auto_s, AUTO), (frame.auto_w_s, AUTO_W))
-    )
-    if exposure == AUTO:
-        return for_green_s
-    if exposure == AUTO_W or for_green_s == for_white_s:
-        return for_white_s
+    if exposure in (AUTO, AUTO_W):
+        unit_s = frame.auto_s if exposure == AUTO else frame.auto_w_s
+        return min(longest_s, at_level_s(unit_s, luminance_cd_m2, exposure, frame.sensor))
     per_second_e = np.load(frame.electrons, allow_pickle=False) * luminance_cd_m2
     if per_second_e.ndim == 3:
         per_second_e = behind_filters(per_second_e, frame.sensor)
-    return most_informative_s(per_second_e, frame.sensor, (for_green_s, for_white_s))
+    green_s = at_level_s(frame.auto_s, luminance_cd_m2, AUTO, frame.sensor)
+    return best_exposure_s(per_second_e, frame.sensor, green_s, longest_s)
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:

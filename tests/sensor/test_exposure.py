@@ -8,21 +8,21 @@ from builders import any_order
 from loop import loop
 from refusal import refusal
 
+from sensor.cfa import mask
 from sensor.chip import ChannelReading, Chip
 from sensor.config import LONGEST_S
 from sensor.exposure import (
-    RULES,
     at_level_s,
     auto_exposure_s,
+    best_exposure_s,
     exposure_by_rule_s,
     exposure_of_electrons_s,
-    information_bits,
-    most_informative_s,
+    picture_error,
 )
 from sensor.optics import SpectralIrradiance
 from sensor.photodiodes import binned
 from sensor.presets import preset
-from sensor.response import channel_electrons
+from sensor.response import behind_filters, channel_electrons
 
 NM = np.arange(385.0, 780.0, 10.0)
 
@@ -114,29 +114,33 @@ def tiles(*lights):
     return np.hstack([light * tile for light in lights])
 
 
-def bits(*electrons, dark_e2=0.0):
-    """Information of samples, in numbers."""
-    return sum(0.5 * np.log2(1 + e * e / (e + dark_e2)) for e in electrons)
+def left(prior, variance_e2, electrons, samples=1):
+    """Variance that so many samples leave of a relative deviation: the inverse of the sum of precisions."""
+    return 1 / (1 / prior**2 + samples * electrons**2 / variance_e2)
 
 
 @loop("read_noise_e", [0.0, 30.0])
-def test_information_of_a_flat_tile_in_closed_form(read_noise_e):
+def test_error_of_a_flat_field_in_closed_form(read_noise_e):
+    """All sites are the brightest: each weighs 1. R, G, B tell the colour by the samples of four tiles."""
     sensor = ideal(read_noise_e)
-    rounding = sensor.gain_e_per_dn**2 / 12
-    dark_e2 = read_noise_e**2 + rounding
-    found = information_bits(tiles(1000.0), sensor, 1.0)
-    assert found == pytest.approx(bits(500, 500, 1000, 5000, dark_e2=dark_e2) / 4, rel=1e-9)
-    # the same light three times as long fills W: its bits are gone
-    found = information_bits(tiles(3000.0), sensor, 1.0)
-    assert found == pytest.approx(bits(1500, 1500, 3000, dark_e2=dark_e2) / 4, rel=1e-9)
+    dark_e2 = read_noise_e**2 + sensor.gain_e_per_dn**2 / 12
+    found = picture_error(tiles(1000.0), sensor, 1.0)
+    colour = np.mean([left(0.2, e + dark_e2, e, samples=4) for e in (500.0, 500.0, 1000.0)])
+    detail = np.mean([left(0.3, e + dark_e2, e) for e in (500.0, 500.0, 1000.0, 5000.0)])
+    assert found == pytest.approx((colour + detail) / 2.4**2, rel=1e-6)
+    # Ten times the light fills W, whose detail is lost whole, and nothing else.
+    e = np.array([5000.0, 5000.0, 10_000.0])
+    known = np.mean(left(0.2, e + dark_e2, e, samples=4)) + left(0.3, e + dark_e2, e).sum() / 4
+    assert picture_error(tiles(10_000.0), sensor, 1.0) == pytest.approx((known + 0.3**2 / 4) / 2.4**2, rel=1e-4)
 
 
 def test_dark_current_leaves_less_of_the_well_to_light():
-    """10 500 e- of it leave 4500 of 15 000, which white's 5000 fill."""
+    """10 500 e- of it leave 4500 of 15 000, which white's 5000 fill: its detail is lost whole."""
     sensor = ideal()
-    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1000.0))
-    expected = bits(500, 500, 1000, dark_e2=10_500 + sensor.gain_e_per_dn**2 / 12) / 4
-    assert information_bits(tiles(1000.0), sensor, 10.5) == pytest.approx(expected, rel=1e-9)
+    hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1000.0))
+    dark_e2, e = 10_500 + sensor.gain_e_per_dn**2 / 12, np.array([500.0, 500.0, 1000.0])
+    known = np.mean(left(0.2, e + dark_e2, e, samples=4)) + left(0.3, e + dark_e2, e).sum() / 4
+    assert picture_error(tiles(1000.0), hot, 10.5) == pytest.approx((known + 0.3**2 / 4) / 2.4**2, rel=1e-3)
 
 
 def test_a_pixel_that_the_chosen_gain_cannot_hold_tells_nothing():
@@ -144,34 +148,43 @@ def test_a_pixel_that_the_chosen_gain_cannot_hold_tells_nothing():
     sensor = preset("dual_gain")
     sensor = replace(sensor, chip=replace(sensor.chip, readout="switched"))
     quiet, deep = sorted(reading.full_well_e for reading in sensor.chip.readings)
-    dim, lamp = np.full((20, 20), 10.0), np.full((20, 20), 10.0)
-    dim[7, 7], lamp[7, 7] = 0.0, (quiet + deep) / 2
-    assert information_bits(lamp, sensor, 0.01) == pytest.approx(information_bits(dim, sensor, 0.01), rel=1e-9)
+    lamp, more = np.full((20, 20), 10.0), np.full((20, 20), 10.0)
+    lamp[7, 7], more[7, 7] = (quiet + deep) / 2, 0.9 * deep
+    assert picture_error(lamp, sensor, 0.01) == pytest.approx(picture_error(more, sensor, 0.01), rel=0.02)
 
 
-def test_where_nothing_is_full_the_longer_time_wins_and_where_only_w_counts_the_shorter():
+def test_where_nothing_is_full_the_longest_time_wins_and_a_flat_field_fills_no_channel():
     sensor = ideal()
-    assert most_informative_s(tiles(100.0), sensor, (5.0, 1.0)) == 5.0
-    assert most_informative_s(tiles(100.0), sensor, (1.0, 5.0)) == 5.0
-    # a flat field whose W is full at 1 s: four channels beat three, each with half a bit an octave more
-    assert most_informative_s(tiles(3500.0), sensor, (1.0, 0.8)) == 0.8
-    assert most_informative_s(tiles(3500.0), sensor, (1.0, 1.0)) == 1.0
+    assert best_exposure_s(tiles(1.0), sensor, 12_000.0, longest_s=5.0) == 5.0
+    time_s = best_exposure_s(tiles(3500.0), sensor, 12_000.0 / 3500.0, 1e6)
+    assert 0.4 < 5 * 3500.0 * time_s / 15_000.0 < 1.0  # of white's well
 
 
-@loop("read_noise_e", [0.0, 10.0, 30.0])
-def test_the_share_of_full_w_at_which_the_times_are_equal_is_the_closed_forms(read_noise_e):
-    # Two levels: tiles of G 6000 a second, whose W is full at 1 s, and of 60, whose W never is.
-    sensor = ideal(read_noise_e)
-    dark_e2 = read_noise_e**2 + sensor.gain_e_per_dn**2 / 12
-    of = lambda *electrons: bits(*electrons, dark_e2=dark_e2)  # noqa: E731
-    lost = of(600, 600, 1200, 6000) - of(3000, 3000, 6000)  # of a bright tile, by 1 s in place of 0.2: negative is won
-    won = of(30, 30, 60, 300) - of(6, 6, 12, 60)
-    equal = won / (lost + won)
-    assert 0.1 < equal < 0.9
-    for share, best in ((equal - 0.02, 1.0), (equal + 0.02, 0.2)):
-        bright = round(200 * share)
-        row = tiles(*[6000.0] * bright, *[60.0] * (200 - bright))
-        assert most_informative_s(row, sensor, (1.0, 0.2)) == best
+def test_a_red_picture_fills_no_channel_of_either_mosaic():
+    """Red surfaces beside a grey card, by the mosaic's own time: where green decides, red is full in most of them."""
+    rng = np.random.default_rng(5)
+    red = np.array([5.0, 1.0, 0.5, 8.0]) * rng.uniform(100.0, 1000.0, (64, 64, 1))
+    for cfa in ("bayer", "rgbw"):
+        sensor = preset("low_noise", cfa)
+        per_second_e = red[..., [list("RGBW").index(name) for name in sensor.channels]]
+        shares = {}
+        for rule in ("auto", "auto:information"):
+            time_s = exposure_of_electrons_s(rule, per_second_e, sensor, 1e6)
+            full = behind_filters(per_second_e, sensor) * time_s > sensor.pixel.full_well_e
+            shares[rule] = full[mask(sensor.cfa, "R", full.shape)].mean()
+        assert shares["auto"] > 0.5
+        assert shares["auto:information"] < 0.01
+
+
+def test_the_time_is_the_rung_of_least_error():
+    rng, sensor = np.random.default_rng(8), preset("low_noise")
+    for spread in (0.3, 1.0, 2.0):
+        frame = tiles(*np.exp(rng.normal(5.0, spread, 300)))
+        green_s = 12_000.0 / np.percentile(frame, 99)
+        found = best_exposure_s(frame, sensor, green_s, 1e6)
+        rungs = green_s * 2.0 ** (-np.arange(-6, 19) / 3)
+        errors = [picture_error(frame * time_s, sensor, time_s) for time_s in rungs]
+        assert found == pytest.approx(rungs[np.argmin(errors)], rel=1e-12)
 
 
 def test_rules_by_name():
@@ -180,8 +193,8 @@ def test_rules_by_name():
     for_green, for_white = (auto_exposure_s(light, sensor, 1e6, channel=channel) for channel in "GW")
     assert exposure_by_rule_s("auto", light, sensor, 1e6) == for_green
     assert exposure_by_rule_s("auto:W", light, sensor, 1e6) == for_white < for_green / 4
-    assert exposure_by_rule_s("auto:information", light, sensor, 1e6) in (for_green, for_white)
-    for rule in RULES:  # G of three channels in place of four: other products of matrices over the bands
+    assert for_white / 2 < exposure_by_rule_s("auto:information", light, sensor, 1e6) < for_green / 2
+    for rule in ("auto", "auto:W"):  # G of three channels in place of four: other products of matrices over the bands
         assert exposure_by_rule_s(rule, light, bayer, 1e6) == pytest.approx(for_green, rel=any_order(NM.size))
     refusal(
         exposure_by_rule_s, "auto:w", light, sensor, match=r"exposure: 'auto:w' is unknown; .*did you mean 'auto:W'"

@@ -232,3 +232,16 @@ def test_exposure_meters_no_surface_that_reflects_more_than_all_light() -> None:
     for prior in PRIORS:
         reflectances = drawn_pixels(prior) @ load_prior(prior).spectra.T
         assert reflectances.max() == pytest.approx(1.0)  # some would, and are taken down to that
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("cfa", ["rgbw", "bayer"])
+def test_more_light_never_costs_and_the_ladders_time_is_the_forecasts_own_best(cfa: str) -> None:
+    """Over 13 to 1000 cd/m2 at thirds of a stop of the time; the rule's own error knows nothing of the prior."""
+    sensor = preset("low_noise", cfa)
+    rows = expect(sensor, [13.0, 30.0, 63.0, 106.0, 1000.0])
+    gained = np.diff([row.psnr_db for row in rows])
+    assert gained.min() > -0.05
+    chosen = rows[-1]
+    others = [expect(sensor, [1000.0], exposure=chosen.exposure_s * 2.0 ** (k / 3))[0].psnr_db for k in (-3, -1, 1, 3)]
+    assert max(others) - chosen.psnr_db < 0.05
