@@ -142,6 +142,7 @@ __all__ = [
     "take",
     "to_world",
     "with_channel_readings",
+    "with_gain",
     "with_readings",
     "write_exr",
     "write_picture",
@@ -175,6 +176,8 @@ def capture(
     exact: bool = False,
     samples_per_pixel: int = 1,
     shake: str | None = None,
+    gain: float | None = None,
+    iso: float | None = None,
 ) -> RawImage: ...
 def channel_electrons(irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
 def characterise(
@@ -235,4 +238,5 @@ def sweep(
     clock: Clock | None = None,
 ) -> Swept: ...
 def with_channel_readings(sensor: _Sensor, readings: Sequence[ChannelReading]) -> SensorConfig: ...
+def with_gain(sensor: _Sensor, gain: float) -> SensorConfig: ...
 def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...

@@ -168,6 +168,8 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
         "ratio": _range(1e-6, 1e6, "give signal over noise"),
         **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
+        "gain": _range(1.0, 1024.0, "give a factor, 1 where a full well reads the converter's top"),
+        "iso": _range(1e-3, 1e9, "give a speed, such as 400"),
         **dict.fromkeys(("electrons", "expected_e"), _array(least=0.0)),
         "levels_cd_m2": lambda name, value: _array(least=1e-9)(name, value).ravel(),
         "exposure": _exposure,

@@ -189,7 +189,8 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
         replace(x, full_well_e=burst.full_well_e, read_noise_e=burst.read_noise_e, dsnu_e=burst.dsnu_e)
         for x, burst in apart
     )
-    return replace(sensor, pixel=pixel, chip=Chip(readings=readings, readout=sensor.chip.readout, channels=channels))
+    chip = Chip(readings=readings, readout=sensor.chip.readout, channels=channels)
+    return replace(sensor, pixel=pixel, chip=chip, converter_noise_dn=sensor.converter_noise_dn / sqrt(count))
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:

@@ -212,6 +212,8 @@ class Binning:
         One of the four.
     bits, black_level_dn, white_level_dn : int, and int or None
         Of the converter, as of `SensorConfig`, where it reads one photodiode.
+    converter_noise_dn : float
+        The same.
     """
 
     way: str
@@ -219,6 +221,7 @@ class Binning:
     bits: int
     black_level_dn: int | None
     white_level_dn: int | None
+    converter_noise_dn: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.display import brief
 from rodcone.doors import method
-from rodcone.errors import InputError, require_fields, require_keys, require_whole
+from rodcone.errors import InputError, require_fields, require_keys, require_range, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
@@ -19,6 +19,7 @@ from sensor.curves import Responses, rgbw
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
 METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
 METERED_PERCENTILE = 99.0
+MOST_GAIN = 1024.0
 LONGEST_S = 0.066  # exposure time that a rule chooses at most: Parmar & Wandell 2009, Figure 5, 66 ms
 
 
@@ -81,6 +82,14 @@ class SensorConfig:
         Reading of a full well, at which the converter clips; None gives its top.
     chip : Chip
         Photodiodes and readings behind a pixel.
+    gain : float
+        Amplification between pixel and converter, 1 where a full well reads the converter's top: that is the well over
+        the gain (`with_gain`).
+    converter_noise_dn : float
+        Standard deviation of the noise that comes after the amplifier [DN], beside quantisation: in electrons it falls
+        as the gain rises. `PixelConfig.read_noise_e` is what comes before, the same at every gain.
+    gain_limit : float
+        Gain up to which an automatic exposure amplifies once its time is the longest; 1 for none.
     """
 
     pixel: PixelConfig
@@ -92,12 +101,23 @@ class SensorConfig:
     window_nm: tuple[float, float] = VISIBLE_NM
     white_level_dn: int | None = None
     chip: Chip = field(default_factory=Chip)
+    gain: float = 1.0
+    converter_noise_dn: float = 0.0
+    gain_limit: float = 1.0
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
+        require_range("gain", self.gain, 1.0, MOST_GAIN, "give a factor; at 1 a full well reads the converter's top")
+        require_range("gain_limit", self.gain_limit, 1.0, MOST_GAIN, "give a factor, 1 for none")
+        require_range("converter_noise_dn", self.converter_noise_dn, 0.0, 2.0**self.bits, "give DN, 0 for none")
+        if self.chip.readings and max(self.gain, self.gain_limit) > 1:
+            raise InputError(
+                f"gain: {max(self.gain, self.gain_limit):g} with several readings, which have gains of their own; "
+                "allowed: 1; leave it out, or describe one reading in [pixel]"
+            )
         if self.white_level_dn is not None:
             require_whole(
                 "white_level_dn", self.white_level_dn, 1, 2**self.bits - 1, "give DN up to the converter's top"
@@ -124,17 +144,17 @@ class SensorConfig:
 
     @method
     def metered_well_e(self, channel: str) -> float:
-        """Photo-electrons of the whole pixel that fill its most sensitive photodiode: what an exposure aims at.
+        """Photo-electrons of the whole pixel that its most sensitive photodiode can read: what an exposure aims at.
 
         What shorter times and smaller photodiodes hold beyond it is room for lamps. Of a channel that is read apart,
         what its longest time holds.
         """
         for apart in self.chip.channels:
             if apart.channel == channel:
-                return apart.pixel_of(self.pixel).full_well_e / apart.share
+                return apart.pixel_of(self.pixel).full_well_e / apart.share / self.gain
         readings = self.chip.readings
         most = max((x.share for x in readings), default=1.0)
-        return max((x.full_well_e / most for x in readings if x.share == most), default=self.pixel.full_well_e)
+        return max((x.full_well_e / most for x in readings if x.share == most), default=self.top_e)
 
     @property
     def channels(self) -> tuple[str, ...]:
@@ -169,6 +189,7 @@ class SensorConfig:
             bits=binning.bits,
             black_level_dn=binning.black_level_dn,
             white_level_dn=binning.white_level_dn,
+            converter_noise_dn=binning.converter_noise_dn,
             chip=Chip(),
         )
 
@@ -195,14 +216,30 @@ class SensorConfig:
         if self.black_level_dn is not None:
             return int(self.black_level_dn)
         dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)
-        # The converter spans black and well: b / white = dark / (dark + well). Rounding errors make no DN more.
-        least = self.white_dn * dark_e / (self.pixel.full_well_e + dark_e)
+        # The converter spans black and top: b / white = dark / (dark + top). Rounding errors make no DN more.
+        least = self.white_dn * dark_e / (self.top_e + dark_e)
+        least = hypot(least, BLACK_SIGMAS * self.converter_noise_dn)
         return min(ceil(least - 1e-9), self.white_dn - 1)
 
     @property
+    def top_e(self) -> float:
+        """Electrons that read the converter's top: the well over the gain."""
+        return self.pixel.full_well_e / self.gain
+
+    @property
     def gain_e_per_dn(self) -> float:
-        """Electrons per DN: the full well reads the converter's top."""
-        return self.pixel.full_well_e / (self.white_dn - self.black_dn)
+        """Electrons per DN."""
+        return self.top_e / (self.white_dn - self.black_dn)
+
+    @property
+    def converter_noise_e(self) -> float:
+        """Standard deviation of the noise after the amplifier, in electrons before it [e-]."""
+        return self.converter_noise_dn * self.gain_e_per_dn
+
+    @property
+    def read_noise_e(self) -> float:
+        """Standard deviation of the temporal noise of reading, before and after the amplifier [e-]."""
+        return hypot(self.pixel.read_noise_e, self.converter_noise_e)
 
 
 def check_frame(sensor: SensorConfig, shape: tuple[int, ...]) -> None:

@@ -2,7 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
-from math import ceil
+from math import ceil, floor, log2
 from types import MappingProxyType
 
 import numpy as np
@@ -13,6 +13,7 @@ from rodcone.errors import require_name, require_range
 from sensor.cfa import mask
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
+from sensor.photodiodes import with_gain
 from sensor.raw import RawImage
 from sensor.readings.resolve import at_channel, by_site, chip_readings, resolve
 from sensor.readout import frame_variance
@@ -130,24 +131,59 @@ def exposure_of_electrons_s(
     InputError
         As `exposure_by_rule_s`.
     """
+    return exposed_by_rule(rule, per_second_e, sensor, longest_s)[0]
+
+
+def exposed_by_rule(
+    rule: str, per_second_e: NDArray[np.float64], sensor: SensorConfig, longest_s: float = LONGEST_S
+) -> tuple[float, SensorConfig]:
+    """Exposure by one of `RULES` [s], and the camera at the gain that it takes once that time is the longest.
+
+    Parameters
+    ----------
+    per_second_e : (h, w, channel) float64
+        Electrons of each channel in a second.
+
+    Raises
+    ------
+    InputError
+        As `exposure_by_rule_s`.
+    """
     require_name("exposure", rule, RULES)
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = sensor.channels
     unit = sensor.unit_channel
+    metered = "W" if rule == AUTO_W and "W" in names else unit
+    wish_s = _share_of_well_s(per_second_e[..., names.index(metered)], sensor, metered, np.inf)
     if rule != AUTO_INFORMATION:
-        metered = "W" if rule == AUTO_W and "W" in names else unit
-        return _share_of_well_s(per_second_e[..., names.index(metered)], sensor, metered, longest_s)
-    green_s = _share_of_well_s(per_second_e[..., names.index(unit)], sensor, unit, np.inf)
-    return best_exposure_s(behind_filters(per_second_e, sensor), sensor, green_s, longest_s)
+        return amplified(sensor, wish_s, longest_s)
+    return best_exposure(behind_filters(per_second_e, sensor), sensor, wish_s, longest_s)
 
 
-def best_exposure_s(
+def amplified(sensor: SensorConfig, wish_s: float, longest_s: float) -> tuple[float, SensorConfig]:
+    """Time of an automatic exposure [s], and the camera at its gain.
+
+    Beyond the longest time the gain rises, in thirds of a stop and up to `SensorConfig.gain_limit`, so that what a
+    longer time would have put at the converter's top stands there, or less than a third of a stop under it.
+
+    Parameters
+    ----------
+    wish_s : float
+        Time that fills the converter's range at the sensor's own gain; inf where there is no light.
+    """
+    times = min(wish_s / longest_s, sensor.gain_limit / sensor.gain)
+    if times <= 1:
+        return min(wish_s, longest_s), sensor
+    return longest_s, with_gain(sensor, sensor.gain * 2 ** (floor(3 * log2(times) + 1e-9) / 3))
+
+
+def best_exposure(
     per_second_e: NDArray[np.float64], sensor: SensorConfig, green_s: float, longest_s: float = LONGEST_S
-) -> float:
-    """Exposure time of a ladder that leaves the least expected error in the picture [s]; of equal ones the longest.
+) -> tuple[float, SensorConfig]:
+    """Time [s] and gain of a ladder that leave the least expected error in the picture; of equal ones the longest.
 
-    The ladder rises in thirds of a stop from a 64th of `green_s` to four times as long, and ends at `longest_s`. It
-    goes by the light, so that twice the light takes half the time.
+    The ladder rises in thirds of a stop from a 64th of `green_s` to four times as long; at `longest_s` it goes on in
+    gains (`amplified`). It goes by the light, so that twice the light takes half the time.
 
     Parameters
     ----------
@@ -159,9 +195,10 @@ def best_exposure_s(
     longest_s : float
     """
     few_e = _few_tiles(sensor.pixel_sums(per_second_e), len(sensor.cfa), len(sensor.cfa[0]))
-    ladder_s = np.minimum(green_s * 2.0 ** (np.arange(*_LADDER_THIRDS) / -3.0), longest_s)
-    times_s: list[float] = np.unique(ladder_s)[::-1].tolist()
-    return min(times_s, key=lambda time_s: picture_error(few_e * time_s, sensor, time_s))
+    wishes_s: list[float] = (green_s * 2.0 ** (np.arange(*_LADDER_THIRDS) / -3.0)).tolist()
+    rungs = [amplified(sensor, wish_s, longest_s) for wish_s in wishes_s]
+    apart = {(time_s, camera.gain): (time_s, camera) for time_s, camera in rungs}.values()
+    return min(apart, key=lambda rung: picture_error(few_e * rung[0], rung[1], rung[0]))
 
 
 def _few_tiles(mosaic: NDArray[np.float64], height: int, width: int) -> NDArray[np.float64]:

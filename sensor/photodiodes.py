@@ -43,7 +43,8 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
             f"bits: {sensor.bits} with binning {DIGITAL!r}: four readings sum to two bits more than a raw file's "
             f"16; allowed: up to {MOST_BITS_SUMMED}; give fewer bits, or binning {CHARGE!r}"
         )
-    chip = replace(sensor.chip, binning=Binning(way, pixel, sensor.bits, sensor.black_level_dn, sensor.white_level_dn))
+    settings = sensor.bits, sensor.black_level_dn, sensor.white_level_dn, sensor.converter_noise_dn
+    chip = replace(sensor.chip, binning=Binning(way, pixel, *settings))
     four = replace(
         pixel,
         pitch_um=2 * pixel.pitch_um,
@@ -72,8 +73,27 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
         bits=sensor.bits + 2,
         black_level_dn=4 * sensor.black_dn,
         white_level_dn=4 * sensor.white_dn,
+        converter_noise_dn=2 * sensor.converter_noise_dn,
         chip=chip,
     )
+
+
+def with_gain(sensor: SensorConfig, gain: float) -> SensorConfig:
+    """Camera at a fixed gain, which no automatic exposure raises; converter, black level and noise follow it.
+
+    Parameters
+    ----------
+    gain : float
+        Over that at which a full well reads the converter's top; 1 or more.
+
+    Raises
+    ------
+    InputError
+        For a gain out of range, or a camera of several readings, which have gains of their own.
+    """
+    binning = sensor.chip.binning
+    one = replace(sensor.photosites, gain=gain, gain_limit=1.0)
+    return binned(one, binning.way) if binning else one
 
 
 def binned_tile(tile: Tile) -> Tile:
@@ -105,4 +125,4 @@ def check_chip(sensor: SensorConfig) -> None:
 
 
 def _converted(sensor: SensorConfig) -> tuple[object, ...]:
-    return sensor.pixel, sensor.bits, sensor.black_dn, sensor.white_dn
+    return sensor.pixel, sensor.bits, sensor.black_dn, sensor.white_dn, sensor.converter_noise_dn

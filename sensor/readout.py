@@ -61,7 +61,8 @@ def convert(
     """Digital numbers of what the wells hold, shape (h, w); binned, (h / 2, w / 2).
 
     Pixels that bin in charge are summed, and their floating diffusion clips; the column's amplifier multiplies; fixed
-    offsets and read noise are added; the converter rounds and clips; readings that bin in digital numbers are summed.
+    offsets and read noise, before the gain and after it, are added; the converter, whose top is the well over the gain,
+    rounds and clips; readings that bin in digital numbers are summed.
     """
     converter = sensor
     if sensor.chip.in_charge:
@@ -70,8 +71,8 @@ def convert(
         converter = sensor.photosites
     read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
     read_e = read_e + device.dark_offset_e
-    if converter.pixel.read_noise_e:
-        read_e += converter.pixel.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
+    if converter.read_noise_e:
+        read_e += converter.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
     return dn if sensor.chip.in_charge else sensor.pixel_sums(dn)
@@ -251,7 +252,7 @@ def as_raw(
         black_dn=min(sensor.black_dn + dark_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
         white_dn=sensor.white_dn,
         gain_e_per_dn=sensor.gain_e_per_dn,
-        read_noise_e=hypot(pixel.read_noise_e, sqrt(dark_e)),
+        read_noise_e=hypot(sensor.read_noise_e, sqrt(dark_e)),
         dsnu_e=hypot(pixel.fixed_dark_e, pixel.column_gain_spread * dark_e),
         prnu=pixel.fixed_gain,
         column_gain_spread=pixel.column_gain_spread,

@@ -132,9 +132,9 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
     """Even levels up to 1.1 times the well and a few dim ones; dark times that fill the quickest pixels to a third."""
     pixel = sensor.pixel
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
-    longest_s = min(0.3 * pixel.full_well_e / current, 1e6) if current else 1.0
-    even = np.linspace(0, 1.1 * pixel.full_well_e, 56)[1:]
-    dim = np.geomspace(1e-4 * pixel.full_well_e, even[0], 8)[:-1]  # too dim to weigh in a fit: for the plot
+    longest_s = min(0.3 * sensor.top_e / current, 1e6) if current else 1.0
+    even = np.linspace(0, 1.1 * sensor.top_e, 56)[1:]
+    dim = np.geomspace(1e-4 * sensor.top_e, even[0], 8)[:-1]  # too dim to weigh in a fit: for the plot
     light_e = np.concatenate([dim, even])
     dark_times_s = tuple(np.linspace(0, longest_s, 6))
     return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=32, dark_times_s=dark_times_s)
@@ -144,8 +144,8 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
     """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
     # Frames
     dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)
-    bright = take_stack(expose, 0.5 * sensor.pixel.full_well_e, plan.exposure_s, plan.frames)
-    full = take_stack(expose, 2 * sensor.pixel.full_well_e, plan.exposure_s, 2)
+    bright = take_stack(expose, 0.5 * sensor.top_e, plan.exposure_s, plan.frames)
+    full = take_stack(expose, 2 * sensor.top_e, plan.exposure_s, 2)
     transfer = take_transfer(expose, plan.light_e, plan.exposure_s)
     slopes = dark_slopes(expose, plan.dark_times_s)
 
@@ -160,6 +160,7 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
     # Light that equals the noise, in the standard's form.
     threshold_e = sqrt(max(dark.variance_dn2, 0.0)) / gain[0] + 0.5
     expected = configured(sensor, plan.exposure_s)
+    beyond_e = sensor.pixel.full_well_e - sensor.top_e
     estimates = (
         ("gain", "DN/e-", gain),
         ("dark noise", "e-", emva.dark_noise(dark, gain)),
@@ -170,7 +171,7 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
         ("dark current", "e-/s", current),
         ("hot pixels", "1", hot_share),
         ("their dark current", "e-/s", hot_current),
-        ("full well", "e-", emva.well(full, dark, gain, column_gain[0], dark_e)),
+        ("full well", "e-", emva.well(full, dark, gain, column_gain[0], dark_e, beyond_e)),
         ("saturation", "e-", (saturation_e, 0.0)),
         ("threshold", "e-", (threshold_e, 0.0)),
         ("dynamic range", "dB", (_decibels(saturation_e / threshold_e), 0.0)),
@@ -201,11 +202,11 @@ def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Charact
 
 
 def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
-    """Each figure without measurement error; saturation is the well's, as if all pixels clipped at once."""
+    """Each figure without measurement error; saturation is the converter's top, as if all pixels clipped at once."""
     pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
     hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
     dark_e = pixel.dark_current_e_per_s * exposure_s + share * hot_e
-    dark_noise_e = sqrt(pixel.read_noise_e**2 + dark_e)
+    dark_noise_e = sqrt(sensor.read_noise_e**2 + dark_e)
     threshold_e = hypot(dark_noise_e, sensor.gain_e_per_dn / sqrt(12)) + 0.5
     return {
         "gain": 1 / sensor.gain_e_per_dn,
@@ -217,11 +218,11 @@ def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
         "dark current": pixel.dark_current_e_per_s,
         "hot pixels": share if pixel.hot_pixel_dark_current_e_per_s else 0.0,
         "their dark current": pixel.hot_pixel_dark_current_e_per_s if share else 0.0,
-        "full well": pixel.full_well_e,
-        "saturation": pixel.full_well_e,
+        "full well": sensor.top_e,
+        "saturation": sensor.top_e,
         "threshold": threshold_e,
-        "dynamic range": _decibels(pixel.full_well_e / threshold_e),
-        "greatest SNR": _decibels(sqrt(pixel.full_well_e)),
+        "dynamic range": _decibels(sensor.top_e / threshold_e),
+        "greatest SNR": _decibels(sqrt(sensor.top_e)),
         "linearity error": 0.0,
     }
 

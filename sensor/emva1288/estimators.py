@@ -4,7 +4,7 @@ All take statistics in DN and give a value and the standard error of that value,
 nothing in them knows what was configured.
 """
 
-from math import hypot, inf, pi, sqrt
+from math import erfc, exp, hypot, inf, pi, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,16 +94,21 @@ def column_gain(dark: Stack, bright: Stack) -> Estimate:
     return _root(variance / added.mean() ** 2, error / added.mean() ** 2)
 
 
-def well(full: Stack, dark: Stack, gain_dn_per_e: Estimate, column_spread: float, dark_e: float) -> Estimate:
-    """Full well [e-] from the mean of frames in which every pixel is clipped.
+def well(
+    full: Stack, dark: Stack, gain_dn_per_e: Estimate, column_spread: float, dark_e: float, beyond_e: float
+) -> Estimate:
+    """Electrons at the converter's top [e-] from the mean of frames in which every pixel is clipped.
 
-    The well reads at the converter's top, which cuts the upper half of the noise behind the well off: the mean of
-    min(0, x) of a normal x is -sigma / sqrt(2 pi). `dark_e` are the electrons that a dark frame collects.
+    Where a full well reads the top, that cuts the upper half of the noise behind the well off: the mean of min(0, x) of
+    a normal x is -sigma / sqrt(2 pi), and -sigma (phi(a) - a Phi(-a)) where the well holds a sigma, `beyond_e`, more.
+    `dark_e` are the electrons that a dark frame collects.
     """
     slope, error = gain_dn_per_e
     full_e = float(full.mean_dn.mean() - dark.mean_dn.mean()) / slope + dark_e
     noise_e = sqrt(max(dark.variance_dn2 + dark.spatial_dn2, 0.0)) / slope
-    full_e += hypot(noise_e, column_spread * full_e) / sqrt(2 * pi)
+    sigma_e = hypot(noise_e, column_spread * full_e)
+    a = beyond_e / sigma_e if sigma_e else 0.0
+    full_e += sigma_e * (exp(-(a**2) / 2) / sqrt(2 * pi) - a * erfc(a / sqrt(2)) / 2)
     return full_e, full_e * error / slope
 
 

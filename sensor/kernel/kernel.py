@@ -163,7 +163,7 @@ def read_frame(
     read_e = jit.Float64(collected_e)
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
-    read_noise_e = dr.opaque(jit.Float64, pixel.read_noise_e) * jit.Float64(read_normal)
+    read_noise_e = dr.opaque(jit.Float64, one.read_noise_e) * jit.Float64(read_normal)
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))

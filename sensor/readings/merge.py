@@ -113,6 +113,7 @@ def noise_of_merged(readings: Sequence[PlainReading]) -> list[NoiseStep]:
     Dark noise is told where a step begins, the light's shot noise and PRNU where it ends: there each counts.
     """
     at, whole = seams(readings), whole_share(readings)
+    temporal = ("read noise", "converter noise", "quantisation", "dark current")
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
     of_columns_e2 = (pixel.column_gain_spread * pixel.dark_current_e_per_s * exposure_s) ** 2
     starts_e = np.maximum([0.0, *at.above_e[:-1]], 0.0)
@@ -125,7 +126,7 @@ def noise_of_merged(readings: Sequence[PlainReading]) -> list[NoiseStep]:
             NoiseStep(
                 from_e=whole * float(start_e),
                 shot=whole * bright["shot noise"] / float(end_e),
-                read_noise_e=whole * sqrt(dark["read noise"] + dark["quantisation"] + dark["dark current"]),
+                read_noise_e=whole * sqrt(sum(dark[name] for name in temporal)),
                 dsnu_e=whole * sqrt(dark["DSNU"] + dark["column offsets"] + of_columns_e2),
                 prnu=hypot(sqrt(bright["PRNU"]) / float(end_e), pixel.column_gain_spread),
             )

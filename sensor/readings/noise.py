@@ -92,6 +92,7 @@ def covariances(expected_e: Floats, readings: Sequence[PlainReading]) -> dict[st
         "DSNU": identity * (np.array([x.sensor.pixel.dsnu_e for x in readings]) / share) ** 2,
         "column offsets": pixel.column_offset_e**2 / np.outer(share, share),
         "read noise": identity * (np.array([x.sensor.pixel.read_noise_e for x in readings]) / share) ** 2,
+        "converter noise": identity * (np.array([x.sensor.converter_noise_e for x in readings]) / share) ** 2,
         "quantisation": identity * (gain_e / share) ** 2 / 12,
     }
     shape = (len(light), len(readings), len(readings))

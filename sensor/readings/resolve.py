@@ -84,14 +84,13 @@ class PlainReading:
 
     @property
     def full_well_e(self) -> float:
-        """Electrons that fill it, dark current's among them, in the raw image's electrons."""
-        return self.sensor.pixel.full_well_e / self.share
+        """Electrons that reach its converter's top, dark current's among them, in the raw image's electrons."""
+        return self.sensor.top_e / self.share
 
     @property
     def headroom_e(self) -> float:
-        """Photo-electrons that fill it beside the mean of its dark current, in the raw image's electrons."""
-        pixel = self.sensor.pixel
-        return (pixel.full_well_e - pixel.dark_current_e_per_s * self.exposure_s) / self.share
+        """Photo-electrons that it can read beside the mean of its dark current, in the raw image's electrons."""
+        return (self.sensor.top_e - self.sensor.pixel.dark_current_e_per_s * self.exposure_s) / self.share
 
     @cached_property
     def sources(self) -> dict[str, NoiseLaw]:
@@ -109,7 +108,7 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
     """Law of each source of noise of a pixel that is read once; of a chip drawn at random, without clipping.
 
     Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
-    and column offsets, read noise and quantisation (gain^2 / 12).
+    and column offsets, read noise, what comes after the amplifier, and quantisation (a DN^2 / 12).
     """
     pixel = sensor.pixel
     dark_e = pixel.dark_current_e_per_s * exposure_s
@@ -135,6 +134,7 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
         "DSNU": NoiseLaw(fixed_e=pixel.dsnu_e),
         "column offsets": NoiseLaw(fixed_e=pixel.column_offset_e),
         "read noise": NoiseLaw(dark_e=pixel.read_noise_e),
+        "converter noise": NoiseLaw(dark_e=sensor.converter_noise_e),
         "quantisation": NoiseLaw(dark_e=sensor.gain_e_per_dn / sqrt(12)),
     }
 
@@ -233,7 +233,7 @@ def _timed(
     seen_e = expected_e[mask(sensor.cfa, reading.channel, expected_e.shape)] if channel is None else expected_e
     bright_e = float(np.percentile(seen_e, METERED_PERCENTILE)) * reading.light_share
     filling_e = max(bright_e + sensor.pixel.dark_current_e_per_s * exposure_s, 1e-9)
-    share = METERED_SHARE * reading.pixel_of(sensor.pixel).full_well_e / filling_e
+    share = METERED_SHARE * reading.pixel_of(sensor.pixel).full_well_e / sensor.gain / filling_e
     steps = np.floor(_STEPS * np.log2(min(share, 1.0)) + 1e-6) / _STEPS
     return replace(reading, time_share=max(min(reading.time_share, float(2**steps)), 1e-6), metered=False)
 

@@ -14,12 +14,13 @@ from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig
-from sensor.exposure import AUTO, at_level_s
+from sensor.exposure import AUTO, amplified, at_level_s
 from sensor.presets import preset, vary
 from studies.budget.bands import counts, groups_of, wide_bands
 from studies.budget.choice import choose
 from studies.budget.ledger import KERNEL, PilotNoise, Plan, Weighed, ledger, weigh
 from studies.budget.terms import LENS_TERMS, SHAKE, effects, horizontal_view_deg, shake_effect
+from studies.study.gain import at_gain
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, open_all, under, white_spectrum
 from studies.study.model import ImageModel, in_bands, unit_exposure_s
@@ -171,14 +172,15 @@ def _weigh_all(pilot: Pilot, study: Study) -> Iterator[Weighed]:
                 for condition in conditions(study, pilot.opened.choice):
                     if (condition.spectrum, condition.sensor) == (spectrum, name):
                         level = level_luminance(condition.level, lux)
-                        exposure_s = parse_exposure(condition.exposure)
+                        exposure_s, camera = parse_exposure(condition.exposure), at_gain(sensor, condition.gain)
                         if exposure_s is None:
-                            exposure_s = min(study.longest_exposure_s, at_level_s(auto_s, level, AUTO, sensor))
+                            wish_s = at_level_s(auto_s, level, AUTO, sensor) * sensor.gain / camera.gain
+                            exposure_s, camera = amplified(camera, wish_s, study.longest_exposure_s)
                         sensor_effects = of_any_time
                         if lens.shake_um:
                             shake = shake_effect(lit, sensor, lens, exposure_s, rng)
                             sensor_effects = replace(of_any_time, lens={**of_any_time.lens, SHAKE: shake})
-                        together = merged_sensor(sensor, condition.frames), exposure_s * condition.frames
+                        together = merged_sensor(camera, condition.frames), exposure_s * condition.frames
                         yield weigh(condition, mosaic, together[0], sensor_effects, level, together[1], noise)
 
 

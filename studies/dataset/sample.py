@@ -28,7 +28,7 @@ from sensor.readout import frame_variance, read, sources_of
 from sensor.response import channel_electrons
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, charged_share
-from studies.study.study import Condition
+from studies.study.study import OWN, Condition
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
 from studies.sweep.provenance import deciding_modules, versions
@@ -140,6 +140,7 @@ def _facts(
         "sources_e": {name: sources_of(value, by_channel[name]) for name, value in mean_e.items()},
         "mean_e": mean_e,
         "dark_above_black_e": {name: x.dark_e - raw.noise_of(name).dark_current_e for name, (x,) in by_channel.items()},
+        "gain": sensor.gain,
         "full_well_e": {name: x.full_well_e for name, (x,) in by_channel.items()},
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
@@ -155,7 +156,8 @@ def _facts(
 
 def frame_labels(condition: Condition) -> dict[str, Any]:
     """Scene, spectrum, level, exposure and sensor by their names: of a condition what decides a single frame."""
-    return {name: value for name, value in labels(condition).items() if name not in ("white_balance", "frames")}
+    left_out = ("white_balance", "frames", *(["gain"] if condition.gain == OWN else []))
+    return {name: value for name, value in labels(condition).items() if name not in left_out}
 
 
 def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -> dict[str, dict[str, float]]:

@@ -22,7 +22,7 @@ from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, at_level_s, best_exposure_s, exposure_of_electrons_s
+from sensor.exposure import AUTO, AUTO_INFORMATION, amplified, at_level_s, best_exposure, exposure_of_electrons_s
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage
@@ -151,7 +151,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     """Light the scene, image it and read the chip out."""
     require_keys("lamps: light group", controls.lamps, transport.groups)
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
-    terms = (_items(controls.lens), _items(controls.pixel), controls.bits, controls.shot_noise)
+    terms = (_items(controls.lens), _items(controls.pixel), controls.bits, controls.gain, controls.shot_noise)
     camera = (controls.sensor, controls.mosaic, *terms)
     optics = (controls.sensor, controls.mosaic, _items(controls.lens))
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
@@ -181,13 +181,13 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     if controls.exposure != TIME:
         rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
         # The rule looks at a percentile, which goes with the level.
-        metered = (lit_so, rule, sensor.pixel.full_well_e, sensor.pixel.dark_current_e_per_s)
+        metered = (lit_so, rule, sensor.top_e, sensor.pixel.dark_current_e_per_s)
         unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
         time_s = at_level_s(unit_s, scale, rule, sensor)
         if controls.exposure == AUTO_INFORMATION:
-            exposure_s = best_exposure_s(mosaicked_e * scale, sensor, time_s, exposure_s)
+            exposure_s, sensor = best_exposure(mosaicked_e * scale, sensor, time_s, exposure_s)
         else:
-            exposure_s = min(exposure_s, time_s)
+            exposure_s, sensor = amplified(sensor, time_s, exposure_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)

@@ -21,8 +21,9 @@ from rodcone.errors import InputError, require_fields, require_keys, require_nam
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
-from sensor.config import LONGEST_S, SensorConfig
+from sensor.config import LONGEST_S, MOST_GAIN, SensorConfig
 from sensor.exposure import AUTO_INFORMATION, RULES
+from sensor.photodiodes import with_gain
 from sensor.presets import VARIATIONS, names
 from studies.metrics.truth import Light, light_in_bands
 from studies.study.scene_source import LIGHT, first_light, replaceable_luminance
@@ -84,6 +85,8 @@ class Controls:
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
     bits : int or None
         Of the converter; None takes the preset's.
+    gain : float or None
+        Between pixel and converter; None takes the preset's, which an automatic exposure may raise.
     shot_noise : bool
         Whether light and dark current come as Poisson counts; False, which no camera does, takes their means.
     processor : str
@@ -115,6 +118,7 @@ class Controls:
     lens: Mapping[str, float] = field(default_factory=dict)
     pixel: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = None
+    gain: Annotated[float | None, (1.0, MOST_GAIN, "give a factor, 1 where a full well reads the top")] = None
     shot_noise: bool = True
     processor: str = "interleaved"
     settings: Mapping[str, float] = field(default_factory=dict)
@@ -286,9 +290,10 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
         raise InputError(
             f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
         )
-    return replace(
+    camera = replace(
         base,
         lens=replace(base.lens, **controls.lens),
         pixel=replace(base.pixel, **controls.pixel),
         bits=base.bits if controls.bits is None else controls.bits,
     )
+    return camera if controls.gain is None else with_gain(camera, controls.gain)

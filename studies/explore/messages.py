@@ -84,6 +84,7 @@ def sensor_terms(sensor: SensorConfig) -> Header:
         "lens": {term: getattr(sensor.lens, term) for term in LENS},
         "pixel": {term: getattr(sensor.pixel, term) for term in PIXEL},
         "bits": sensor.bits,
+        "gain": sensor.gain,
     }
 
 

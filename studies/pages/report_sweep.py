@@ -24,7 +24,8 @@ from studies.pages.report_data import ReportCell, ReportData, ReportLevel, Repor
 from studies.pages.report_pictures import ReportPictures, busiest, opened, read_pictures, view_order
 from studies.pages.report_text import exposure_name, level_text, way_name, with_signs
 from studies.photograph.clock import machine
-from studies.study.study import label
+from studies.study.gain import gain_text
+from studies.study.study import OWN, label
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import in_words, made_by, require_alike, threads, versions
@@ -98,8 +99,9 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
 def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[str]) -> list[ReportCell]:
     """Return a cell for each combination that was asked for; one that isn't made yet has no row."""
     by_place = {
-        (r.scene, r.spectrum, r.sensor, (r.exposure, r.frames), r.white_balance, r.level, r.processor, r.seed): r
+        (r.scene, r.spectrum, r.sensor, way, r.white_balance, r.level, r.processor, r.seed): r
         for r in row_list
+        for way in [(r.exposure, r.frames, r.gain)]
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in row_list}
     levels, sensors = study["levels"], [label(name) for name in study["sensors"]]
@@ -114,9 +116,10 @@ def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[s
     return cells
 
 
-def _ways(study: Mapping[str, Any]) -> list[tuple[str, int]]:
-    """Return each exposure with each number of frames; the report's exposures are these."""
-    return list(product(study["exposures"], study["frames"]))
+def _ways(study: Mapping[str, Any]) -> list[tuple[str, int, str]]:
+    """Return each exposure with each number of frames and each gain; the report's exposures are these."""
+    gains = [gain_text(gain, None) for gain in study["gains"]] + [gain_text(None, iso) for iso in study["isos"]]
+    return list(product(study["exposures"], study["frames"], gains or [OWN]))
 
 
 def _exposure_rules(study: Mapping[str, Any]) -> str:

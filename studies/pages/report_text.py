@@ -7,8 +7,9 @@ from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from sensor.presets import names
 from studies.metrics.metric import Metric
 from studies.pages.report_data import ReportCell
+from studies.study.gain import ISO
 from studies.study.levels import parse_exposure, parse_level
-from studies.study.study import AS_SHOT, GRAY_WORLD
+from studies.study.study import AS_SHOT, GRAY_WORLD, OWN
 
 MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
@@ -106,9 +107,10 @@ def exposure_name(exposure: str) -> str:
     return (AUTOMATIC[time] if seconds is None else duration(seconds)) + comma + balance
 
 
-def way_name(exposure: str, frames: int = 1) -> str:
-    """Write an exposure, and frames of a burst."""
-    return exposure + ("" if frames == 1 else f", {frames} frames")
+def way_name(exposure: str, frames: int = 1, gain: str = OWN) -> str:
+    """Write an exposure, frames of a burst, and a gain that isn't the sensor's own."""
+    burst = "" if frames == 1 else f", {frames} frames"
+    return exposure + burst + ("" if gain == OWN else f", {gain}" if gain.startswith(ISO) else f", gain {gain}")
 
 
 def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:

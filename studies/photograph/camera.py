@@ -23,17 +23,17 @@ from sensor.calibration import ColourCalibration
 from sensor.capture import capture as frame_of
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.exposure import AUTO_INFORMATION, exposure_by_rule_s
-from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
+from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
+from sensor.optics import SpectralIrradiance, falloff, form_image, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
-from sensor.response import electrons_per_irradiance
+from sensor.response import channel_electrons, electrons_per_irradiance
 from sensor.shake import held_lens
-from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
+from studies.metrics.truth import GREY, Light, light_in_bands
+from studies.study.gain import at_gain, gain_text, iso_speed
 
 LEAST_COLOUR = 1e-5  # of the signals, in the weaker of two directions: less is the rounding of a light of a line or two
 GREY_COLOUR = 0.01  # of the channels' own differences, under a light that shows no colours
-ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
 
 
 def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
@@ -63,21 +63,6 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
         camera_to_xyz_a=to_xyz_a,
         camera_to_xyz_d65=to_xyz_d65,
     )
-
-
-def iso_speed(sensor: SensorConfig) -> float | None:
-    """Saturation-based speed of green under D65; None where the mosaic has no G or it collects nothing.
-
-    The exposure that fills the well with green's mean; no half stop of headroom is taken off.
-    """
-    if "G" not in sensor.channels:
-        return None
-    neutral = neutral_electrons(sensor, _in_bands(illuminant("D65")), 1.0)
-    electrons_per_cd_m2 = float(neutral[sensor.channels.index("G")])
-    if electrons_per_cd_m2 <= 0:
-        return None
-    per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(sensor.unit_channel)
 
 
 def _in_bands(spectrum: Spectrum) -> Light:
@@ -237,6 +222,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     exact: bool = False,
     samples_per_pixel: int = 1,
     shake: str | None = None,
+    gain: float | None = None,
+    iso: float | None = None,
 ) -> RawImage:
     """Take one exposure; the raw image holds what `develop` needs.
 
@@ -246,7 +233,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     sensor : SensorConfig, optional
         Left out, the preset ``low_noise``.
     exposure_s : float, optional
-        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposure_by_rule_s`.
+        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposed_by_rule`, which may raise
+        the gain of a camera that states a `SensorConfig.gain_limit`.
     device, rng, exact, samples_per_pixel
         As `sensor.capture.capture` takes them.
     light : Spectrum, optional
@@ -254,6 +242,10 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         it the raw image holds none, and `calibrate` says why.
     shake : str, optional
         ``hand`` for a camera held in the hand (`sensor.shake`); left out, what the sensor's lens states.
+    gain : float, optional
+        Fixed gain between pixel and converter, 1 or more; left out, the sensor's own.
+    iso : float, optional
+        Saturation-based speed in the gain's place.
 
     Raises
     ------
@@ -266,11 +258,11 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
     """
     sensor = preset("low_noise") if sensor is None else sensor
-    sensor = replace(sensor, lens=held_lens(sensor.lens, shake))
+    sensor = at_gain(replace(sensor, lens=held_lens(sensor.lens, shake)), gain_text(gain, iso))
     subject: SpectralRadiance | SpectralIrradiance = radiance
     if exposure_s is None:
         image = form_image(radiance, sensor, samples_per_pixel)
-        exposure_s = exposure_by_rule_s(AUTO_INFORMATION, image, sensor)
+        exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, channel_electrons(image, sensor, 1.0), sensor)
         subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:

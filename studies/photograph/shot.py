@@ -22,13 +22,14 @@ from rodcone.progress import Step, render_words
 from sensor.capture import capture
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
-from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_by_rule_s, warn_if_dark
-from sensor.optics import form_image, left_out, spreads
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
+from sensor.optics import SpectralIrradiance, form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending
-from sensor.response import expected_electrons
+from sensor.response import channel_electrons, expected_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
+from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
@@ -69,6 +70,11 @@ class Order:
     exposure : str
         Time such as 20ms or 1/50, 0s for a dark frame, or a rule: auto for the brightest green, auto:W for the
         brightest W, auto:information for the time of a ladder that leaves the least expected error in the picture.
+    gain : float, optional
+        Fixed gain between pixel and converter, 1 or more, at which the converter's top is the well over it; the
+        sensor's own by default, which a rule of exposure raises up to its gain_limit once its time is the longest.
+    iso : float, optional
+        Saturation-based speed in the gain's place.
     level : str, optional
         Light, such as 25cd/m2 (mean scene luminance) or 500lux (on its reference plane); the scene's own by default.
     light : tuple of str
@@ -109,6 +115,8 @@ class Order:
     sensor: str | Path = "low_noise"
     cfa: str | None = None
     exposure: str = AUTO_INFORMATION
+    gain: float | None = None
+    iso: float | None = None
     level: str | None = None
     light: tuple[str, ...] = ()
     chart: str | None = None
@@ -154,7 +162,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     OSError
         Where the folder can't be written.
     """
-    sensor, opened, exposure_s = _check(order)
+    sensor, opened, asked_s = _check(order)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
     # what is looked at, and the light that the camera's colours are set to
@@ -204,7 +212,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
             f"{luminance_cd_m2:.3g} cd/m2"
         ]
     image = form_image(radiance, sensor)
-    exposure_s = exposure_by_rule_s(order.exposure, image, sensor) if exposure_s is None else exposure_s
+    exposure_s, sensor = _exposure(order, asked_s, image, sensor)
     subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
@@ -236,6 +244,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
         "size": list(raw.shape),
         "seed": order.seed,
         "exposure_s": exposure_s,
+        "gain": sensor.gain,
         "iso": raw.iso,
         "engine": raw.engine,
         "luminance_cd_m2": luminance_cd_m2,
@@ -247,6 +256,15 @@ def take(order: Order, step: Step | None = None) -> Taken:
     return Taken(paths, facts, tuple(notes))
 
 
+def _exposure(
+    order: Order, asked_s: float | None, image: SpectralIrradiance, sensor: SensorConfig
+) -> tuple[float, SensorConfig]:
+    """Exposure time [s], asked for or by a rule, and the camera at the gain that it takes."""
+    if asked_s is not None:
+        return asked_s, sensor
+    return exposed_by_rule(order.exposure, channel_electrons(image, sensor, 1.0), sensor)
+
+
 def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
     """Expected electrons of the raw image's pixels, shape (h, w)."""
     return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s))
@@ -254,7 +272,7 @@ def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float
 
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
     """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
-    sensor = preset(order.sensor, order.cfa)
+    sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
     check_ending(Path(order.out), sensor.cfa)
     if order.size is not None:

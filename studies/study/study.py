@@ -18,6 +18,7 @@ from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
+from studies.study.gain import at_gain, gain_text
 from studies.study.levels import check_known, check_range, parse_exposure, parse_level
 from studies.study.model import LensTerms
 
@@ -27,6 +28,7 @@ MOST_FRAMES = 64
 WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
 PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gray World belongs
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
+_GAINS = ("gains", "isos")
 SPP = 1, 1 << 16, "give samples per pixel"
 FILES = (".xml", ".toml", *CURVES, *ENDINGS)  # endings of values that name a file
 
@@ -135,6 +137,8 @@ class Condition:
         Of `WHITE_BALANCES`.
     frames : int
         Exposures, each of that time, that are merged before they are developed.
+    gain : str
+        ``own``, the sensor's, which a rule of exposure may raise; a factor such as ``8``, or ``ISO 400``.
     """
 
     scene: SceneChoice
@@ -144,15 +148,18 @@ class Condition:
     sensor: str
     white_balance: str = AS_SHOT
     frames: int = 1
+    gain: str = OWN
 
 
 @dataclass(frozen=True)
 class Study:
-    """Axes of a sweep, and how its pictures are made. Every combination of the nine axes is a cell.
+    """Axes of a sweep, and how its pictures are made. Every combination of the ten axes is a cell.
 
     `trust_code` is the consent to run the user's own Python files among `processors`; no study file can give it.
     `sensor_side_um` gives all sensors one longer side: pixels follow from each pitch, and pictures are averaged to the
     pixels of the coarsest before they are measured. Left out, a pixel of the render is one of every sensor.
+    `gains` are fixed gains between pixel and converter, `isos` saturation-based speeds in their place; without either
+    each sensor has its own.
     `white_balances` left out are those that `default_balance` has for the processors.
     `title` heads the report; where it is empty, `name` does.
 
@@ -171,6 +178,8 @@ class Study:
     processors: tuple[str, ...] = ("interleaved", "bayer")
     seeds: tuple[int, ...] = (0,)
     frames: tuple[int, ...] = (1,)
+    gains: tuple[float, ...] = ()
+    isos: tuple[float, ...] = ()
     name: str = "study"
     title: str = ""
     longest_exposure_s: Annotated[float, (1e-9, 1e6, "give seconds above 0")] = LONGEST_S
@@ -183,7 +192,7 @@ class Study:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name in _LISTS:  # from Python they may be lists, and files Paths
+        for name in (*_LISTS, *_GAINS):  # from Python they may be lists, and files Paths
             if isinstance(values := getattr(self, name), list | tuple):
                 object.__setattr__(self, name, tuple(str(x) if isinstance(x, Path) else x for x in values))
         for place in ("", "render.", "lens.", "budget."):
@@ -192,7 +201,14 @@ class Study:
         object.__setattr__(self, "white_balances", balances)
         _check_axes(self)
         _check_cameras(self)
+        _check_gains(self)
         _check_shares_and_sizes(self)
+
+    @property
+    def gain_texts(self) -> tuple[str, ...]:
+        """Values of the axis of gains, as `Condition` has them."""
+        texts = [gain_text(gain, None) for gain in self.gains] + [gain_text(None, iso) for iso in self.isos]
+        return tuple(texts) or (OWN,)
 
     @cached_property
     def equal_area(self) -> EqualArea | None:
@@ -210,8 +226,8 @@ def default_balance(processor: str) -> str:
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
     """All combinations of scenes (or of one alone) and of the axes that decide a picture; the last varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
-    axes = (scenes, study.spectra, study.levels, study.exposures, study.sensors, study.white_balances, study.frames)
-    return [Condition(*place) for place in product(*axes)]
+    camera = study.exposures, study.sensors, study.white_balances, study.frames, study.gain_texts
+    return [Condition(*place) for place in product(scenes, study.spectra, study.levels, *camera)]
 
 
 def most_spp(study: Study, scene: SceneChoice) -> int:
@@ -263,6 +279,21 @@ def _check_axes(study: Study) -> None:
                         f"spectra: {spectrum!r} can't relight {scene.source}, a picture whose light is in it; "
                         f"allowed: {OWN}; put the scene into a study of its own"
                     )
+
+
+def _check_gains(study: Study) -> None:
+    """Check gains or speeds, and that every sensor has them."""
+    for name in _GAINS:
+        for value in getattr(study, name):
+            require_range(name, None if isinstance(value, bool) else value, 1e-3, 1e9, "give factors or speeds above 0")
+    if len(set(study.gain_texts)) < len(study.gain_texts) or (study.gains and study.isos):
+        raise InputError(
+            f"gains: {list(study.gains)} and isos: {list(study.isos)} are not allowed; give values of one of the two, "
+            "each once"
+        )
+    for name, gain in product(study.sensors, study.gain_texts):
+        with in_place(f"sensor {label(name)}"):
+            at_gain(preset(name), gain)
 
 
 def _check_cameras(study: Study) -> None:

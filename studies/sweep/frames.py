@@ -20,12 +20,13 @@ from render.transport import Transport
 from rodcone.curve_file import is_curve_file
 from rodcone.digests import digest_inputs
 from sensor.config import SensorConfig
-from sensor.exposure import AUTO, AUTO_W, at_level_s, best_exposure_s
+from sensor.exposure import AUTO, AUTO_W, amplified, at_level_s, best_exposure
 from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.equal_area import grid
+from studies.study.gain import at_gain
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
@@ -146,19 +147,25 @@ def make_frames(
         keep_facts(folder, key, facts)
 
 
-def exposure_s_of(frame: UnitFrame, exposure: str, luminance_cd_m2: float, longest_s: float) -> float:
-    """Exposure time of a frame at a mean luminance [s]; `exposure` as `studies.study.study.Condition` has it."""
-    asked_s = parse_exposure(exposure)
+def exposure_of(
+    frame: UnitFrame, exposure: str, gain: str, luminance_cd_m2: float, longest_s: float
+) -> tuple[float, SensorConfig]:
+    """Exposure time of a frame at a mean luminance [s], and its camera at its gain.
+
+    `exposure` and `gain` are as `studies.study.study.Condition` has them.
+    """
+    asked_s, sensor = parse_exposure(exposure), at_gain(frame.sensor, gain)
     if asked_s is not None:
-        return asked_s
+        return asked_s, sensor
+    less = frame.sensor.gain / sensor.gain  # the frame's times fill the converter's range at its own gain
     if exposure in (AUTO, AUTO_W):
         unit_s = frame.auto_s if exposure == AUTO else frame.auto_w_s
-        return min(longest_s, at_level_s(unit_s, luminance_cd_m2, exposure, frame.sensor))
+        return amplified(sensor, less * at_level_s(unit_s, luminance_cd_m2, exposure, frame.sensor), longest_s)
     per_second_e = np.load(frame.electrons, allow_pickle=False) * luminance_cd_m2
     if per_second_e.ndim == 3:
         per_second_e = behind_filters(per_second_e, frame.sensor)
-    green_s = at_level_s(frame.auto_s, luminance_cd_m2, AUTO, frame.sensor)
-    return best_exposure_s(per_second_e, frame.sensor, green_s, longest_s)
+    green_s = less * at_level_s(frame.auto_s, luminance_cd_m2, AUTO, frame.sensor)
+    return best_exposure(per_second_e, sensor, green_s, longest_s)
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:

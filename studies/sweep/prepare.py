@@ -37,7 +37,7 @@ from studies.study.render_noise import render_share
 from studies.study.study import Study, conditions, label, mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
-from studies.sweep.frames import UnitFrame, colours_under, exposure_s_of, frame_key, make_frames, read_frame
+from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, make_frames, read_frame
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
@@ -184,7 +184,9 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             imaged = condition.spectrum, condition.sensor, image.lens, software.mosaic
             frame = frames[imaged]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
-            exposure_s = exposure_s_of(frame, condition.exposure, luminance, job.study.longest_exposure_s)
+            exposure_s, sensor = exposure_of(
+                frame, condition.exposure, condition.gain, luminance, job.study.longest_exposure_s
+            )
             made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
             cells += [
                 Cell(
@@ -195,7 +197,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
                     luminance_cd_m2=luminance,
                     illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
                     exposure_s=exposure_s,
-                    frame=frame,
+                    frame=replace(frame, sensor=sensor),
                     made_by=made_by,
                     colours=colours[imaged, name],
                     white_cd_m2=frame.white_cd_m2 * luminance,

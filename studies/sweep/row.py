@@ -15,6 +15,8 @@ class Row:
         Where the cell lies in its study; scene and sensor files by their names.
     luminance_cd_m2, illuminance_lux, exposure_s : float
         The level in both units (lux where the scene states a plane), and the time of one frame.
+    gain_factor, iso : float
+        Gain that the frame was read with, and the speed that it gives; no speed of a mosaic without green.
     spp : float
         Samples a pixel of the render, in the mean.
     bands : int
@@ -71,11 +73,14 @@ class Row:
     sensor: str
     white_balance: str
     frames: int
+    gain: str
     processor: str
     seed: int
     luminance_cd_m2: float
     illuminance_lux: float | None
     exposure_s: float
+    gain_factor: float
+    iso: float | None
     spp: float
     bands: int
     render: str
@@ -117,4 +122,4 @@ class Row:
     worker: int
 
 
-AXES = ("scene", "spectrum", "level", "exposure", "sensor", "white_balance", "frames", "processor")
+AXES = ("scene", "spectrum", "level", "exposure", "sensor", "white_balance", "frames", "gain", "processor")

@@ -30,6 +30,7 @@ from studies.photograph.camera import balance_delta_e, develop_to_scale
 from studies.photograph.clock import machine, timed
 from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
+from studies.study.gain import iso_speed
 from studies.study.render_noise import charged_share
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text, shake_stream
@@ -107,6 +108,8 @@ def run_cell(cell: Cell) -> Row:
         luminance_cd_m2=cell.luminance_cd_m2,
         illuminance_lux=cell.illuminance_lux,
         exposure_s=cell.exposure_s,
+        gain_factor=sensor.gain,
+        iso=iso_speed(sensor),
         spp=cell.render.facts.spp,
         bands=cell.render.facts.bands,
         render=render_text(cell.render),

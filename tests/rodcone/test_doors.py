@@ -43,6 +43,8 @@ RIGHT: dict[str, Any] = {
     "frames": [RAW, RAW],
     "light": "D65",
     "ratio": 10.0,
+    "gain": 2.0,
+    "iso": 400.0,
     "expected_e": np.ones((16, 16)),
     "electrons": np.ones(4),
     "linear": np.ones((4, 4, 3)),

@@ -14,7 +14,7 @@ from sensor.config import LONGEST_S
 from sensor.exposure import (
     at_level_s,
     auto_exposure_s,
-    best_exposure_s,
+    best_exposure,
     exposure_by_rule_s,
     exposure_of_electrons_s,
     picture_error,
@@ -155,8 +155,8 @@ def test_a_pixel_that_the_chosen_gain_cannot_hold_tells_nothing():
 
 def test_where_nothing_is_full_the_longest_time_wins_and_a_flat_field_fills_no_channel():
     sensor = ideal()
-    assert best_exposure_s(tiles(1.0), sensor, 12_000.0, longest_s=5.0) == 5.0
-    time_s = best_exposure_s(tiles(3500.0), sensor, 12_000.0 / 3500.0, 1e6)
+    assert best_exposure(tiles(1.0), sensor, 12_000.0, longest_s=5.0)[0] == 5.0
+    time_s = best_exposure(tiles(3500.0), sensor, 12_000.0 / 3500.0, 1e6)[0]
     assert 0.4 < 5 * 3500.0 * time_s / 15_000.0 < 1.0  # of white's well
 
 
@@ -181,7 +181,7 @@ def test_the_time_is_the_rung_of_least_error():
     for spread in (0.3, 1.0, 2.0):
         frame = tiles(*np.exp(rng.normal(5.0, spread, 300)))
         green_s = 12_000.0 / np.percentile(frame, 99)
-        found = best_exposure_s(frame, sensor, green_s, 1e6)
+        found = best_exposure(frame, sensor, green_s, 1e6)[0]
         rungs = green_s * 2.0 ** (-np.arange(-6, 19) / 3)
         errors = [picture_error(frame * time_s, sensor, time_s) for time_s in rungs]
         assert found == pytest.approx(rungs[np.argmin(errors)], rel=1e-12)

@@ -2,7 +2,7 @@
 // time, the next with the newest values as soon as the answer is painted, so that pictures follow a slider that moves.
 // `render` is what a notebook's widget calls, and the page too.
 
-const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "processor", "settings",
+const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "gain", "processor", "settings",
   "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
 const TITLES = {
   picture: "Picture", truth: "Reference", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
@@ -47,6 +47,7 @@ const TERMS = {
   veiling_glare: "Share of the light that scatters evenly over the picture (about ISO 9358's index).",
   sensor: "Pixel, lens and converter to begin with. A .toml file, with the .csv files that it names, can be dropped on the page.",
   mosaic: "Colour filters in front of the pixels; W is none.",
+  gain: "Between pixel and converter: at 1 a full well reads the converter's top, at 8 an eighth of it. What the converter adds falls by it.",
   bits: "Of the analogue-to-digital converter: 2 to that power are its steps.",
   shot_noise: "Light and dark current come as Poisson counts. No camera is without.",
   read_noise_e: "Standard deviation of what reading a dark pixel adds, anew at every exposure.",
@@ -351,7 +352,7 @@ function render({ model, el }) {
       group("Sensor",
         choice("Preset", [...Object.keys(hello.sensors).map(each => [each, each.split(/[\\/]/).pop()]), ["file", "from a file …"]], camera.sensor, value => {
           if (value === "file") { buildControls(); return sensorFile.click(); }
-          Object.assign(camera, { lens: {}, pixel: {}, bits: null });
+          Object.assign(camera, { lens: {}, pixel: {}, bits: null, gain: null });
           set("sensor", value, true);
         }, "sensor"),
         sensorFile,
@@ -362,6 +363,7 @@ function render({ model, el }) {
           }
           set("mosaic", value, true);
         }, "mosaic"),
+        slider(["Gain", 1, 64, "log", "×"], camera.gain ?? preset.gain, value => set("gain", value === preset.gain ? null : value), "gain"),
         slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
         checkbox("Shot noise", camera.shot_noise, value => set("shot_noise", value), "shot_noise"),
         ...terms("pixel", PIXEL, preset.pixel)),
@@ -388,7 +390,7 @@ function render({ model, el }) {
     const text = Object.fromEntries(await Promise.all([...files].map(async file => [file.name, await file.text()])));
     ask("sensor", () => ({ files: text }), ({ sensor, terms }) => {
       hello.sensors[sensor] = terms;
-      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null });
+      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null, gain: null });
       buildControls();
       change();
     });

@@ -35,8 +35,9 @@ from sensor.raw import RawImage
 from sensor.raw_files.raw_file import write_raw
 from sensor.response import expected_electrons
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
-from studies.photograph.camera import balance_delta_e, calibrate, colour_fit, develop_to_scale, iso_speed
+from studies.photograph.camera import balance_delta_e, calibrate, colour_fit, develop_to_scale
 from studies.photograph.develop import develop, develop_file, mosaic_processor
+from studies.study.gain import iso_speed
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)

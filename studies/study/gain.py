@@ -1,0 +1,77 @@
+"""Gain and speed of a camera: the saturation-based speed, and the gain that a study or a command asks for."""
+
+from render.illuminants import illuminant
+from render.spectrum import fine_bands
+from rodcone.errors import InputError
+from sensor.cfa import OWN
+from sensor.config import MOST_GAIN, SensorConfig
+from sensor.optics import camera_equation
+from sensor.photodiodes import with_gain
+from studies.metrics.truth import light_in_bands, neutral_electrons
+
+ISO = "ISO"
+ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
+_ROUNDING = 0.015  # a base speed of 51.56 is asked for as 51
+
+
+def iso_speed(sensor: SensorConfig) -> float | None:
+    """Saturation-based speed of green under D65; None where the mosaic has no G or it collects nothing.
+
+    Of the exposure in which green's mean reads the converter's top; no half stop of headroom is taken off. It is in
+    proportion to the gain.
+    """
+    if "G" not in sensor.channels:
+        return None
+    d65 = illuminant("D65")
+    neutral = neutral_electrons(sensor, light_in_bands(d65, *fine_bands([d65])), 1.0)
+    electrons_per_cd_m2 = float(neutral[sensor.channels.index("G")])
+    if electrons_per_cd_m2 <= 0:
+        return None
+    per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
+    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(sensor.unit_channel)
+
+
+def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:
+    """Camera at a gain as a study writes it: ``own``, a factor such as ``8``, or a speed such as ``ISO 400``.
+
+    Raises
+    ------
+    InputError
+        For another text, a gain that the camera doesn't have, or a speed under its base speed.
+    """
+    if text == OWN:
+        return sensor
+    word, _, number = text.rpartition(" ")
+    try:
+        value = float(number)
+    except ValueError:
+        value = float("nan")
+    if word not in ("", ISO) or not value > 0:
+        raise InputError(f"gain: {text!r} is not known; allowed: {OWN!r}, a factor such as 8, or 'ISO 400'; write so")
+    return with_gain(sensor, value if word != ISO else gain_for_iso(sensor, value))
+
+
+def gain_text(gain: float | None, iso: float | None) -> str:
+    """Text for `at_gain` of a gain or a speed, at most one of which is given."""
+    if gain is not None and iso is not None:
+        raise InputError(f"gain: {gain:g} beside iso {iso:g}; allowed: one of the two; leave one out")
+    return OWN if gain is None and iso is None else f"{gain:.12g}" if gain is not None else f"{ISO} {iso:.12g}"
+
+
+def gain_for_iso(sensor: SensorConfig, iso: float) -> float:
+    """Gain at which a camera has a saturation-based speed.
+
+    Raises
+    ------
+    InputError
+        For a speed under that at gain 1, or a camera that has none.
+    """
+    base = iso_speed(with_gain(sensor, 1.0))
+    if base is None:
+        raise InputError(f"iso: {iso:g} for the mosaic {sensor.cfa}, which has no G to state a speed by; give a gain")
+    if not base * (1 - _ROUNDING) <= iso <= base * MOST_GAIN:
+        raise InputError(
+            f"iso: {iso:g} is outside {base:.4g}, this camera's speed at gain 1, to {base * MOST_GAIN:.4g}; give one "
+            "within, or less light"
+        )
+    return max(iso / base, 1.0)
