@@ -132,7 +132,7 @@ def test_the_well_is_the_clipped_mean_with_the_half_normal_taken_off():
     rng = np.random.default_rng(4)
     noise = np.minimum(rng.normal(0, 2.0, (400, 500)), 0.0)  # the top at 20 + 500 DN cuts the upper half
     full = Stack(520 + noise, 0.0, 2)
-    value, error = emva.well(full, stack(20.0, 4.0, frames=10**9), GAIN, 0.0, 7.0)
+    value, error = emva.well(full, stack(20.0, 4.0, frames=10**9), GAIN, 0.0, 7.0, 0.0)
     # mean of the half normal within 4 standard errors, in electrons: false-alarm rate 6.3e-5
     assert abs(value - (1000 + 7)) < 4 * 2 * 0.58 / np.sqrt(200_000) / 0.5
     assert error == pytest.approx(value * 0.002, rel=1e-9)

@@ -42,7 +42,7 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(study: Path, tmp_pa
     assert call(["export", str(out), "-o", str(tmp_path / "t.csv")]) == (0, f"{tmp_path / 't.csv'}\n", "")
     header, *table = (tmp_path / "t.csv").read_text("utf-8").splitlines()
     assert header.startswith(
-        "key,scene,spectrum,level,exposure,sensor,white_balance,frames,processor,seed,luminance_cd_m2,illuminance"
+        "key,scene,spectrum,level,exposure,sensor,white_balance,frames,gain,processor,seed,luminance_cd_m2,illuminance"
     )
     assert [line.split(",")[3] for line in table] == ["1cd/m2", "25cd/m2"]
 
