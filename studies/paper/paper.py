@@ -1,13 +1,15 @@
 """The paper's figures and claims, all of them: computed, written as files, and as one page."""
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from importlib import metadata
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 from rodcone.csv_file import csv_text
+from rodcone.errors import require_keys
 from rodcone.files import finite, write_files
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
@@ -34,26 +36,51 @@ class Paper:
     facts: dict[str, Any]
 
 
-def make(setup: Setup) -> Paper:
-    """Compute every figure and every claim; scenes are rendered once and kept in the folder.
+_MAKERS: Mapping[str, Callable[[Setup], Made]] = MappingProxyType(
+    {
+        "1a": figure_1a,
+        "1b": figure_1b,
+        "2": lambda _: figure_2(),
+        "3": figure_3,
+        "4": figure_4,
+        "5": figure_5,
+        "6": figure_6,
+        "A": figure_a,
+        "B": figure_b,
+    }
+)
+
+
+def makers_of(figures: Sequence[str]) -> dict[str, Callable[[Setup], Made]]:
+    """Functions that make figures of these names, in the paper's order; all where none is named.
 
     Raises
     ------
+    InputError
+        For a name that no figure has.
+    """
+    require_keys("figure", figures, _MAKERS)
+    return {f"Figure {name}": maker for name, maker in _MAKERS.items() if name in figures or not figures}
+
+
+def make(setup: Setup, figures: Sequence[str] = ()) -> Paper:
+    """Compute figures and their claims; scenes are rendered once and kept in the folder.
+
+    Parameters
+    ----------
+    setup : Setup
+    figures : sequence of str
+        Names such as ``6`` or ``1a``; where none is given all are made, and the claims that belong to none of them.
+
+    Raises
+    ------
+    InputError
+        For a name that no figure has.
     OSError
         Where the folder can't be written.
     """
+    makers = makers_of(figures)
     setup.out.mkdir(parents=True, exist_ok=True)
-    makers: dict[str, Callable[[Setup], Made]] = {
-        "Figure 1a": figure_1a,
-        "Figure 1b": figure_1b,
-        "Figure 2": lambda _: figure_2(),
-        "Figure 3": figure_3,
-        "Figure 4": figure_4,
-        "Figure 5": figure_5,
-        "Figure 6": figure_6,
-        "Figure A": figure_a,
-        "Figure B": figure_b,
-    }
     results = []
     for index, (name, maker) in enumerate(makers.items()):
 
@@ -62,8 +89,10 @@ def make(setup: Setup) -> Paper:
 
         step("begins", 0.0)
         results.append(maker(replace(setup, step=step)))
-    numbers = number_claims(view(setup, "still_life", 1.0))
-    claims = (*numbers, *(claim for _, of_figure in results for claim in of_figure), *section_2(setup), *section_3_1())
+    claims = tuple(claim for _, of_figure in results for claim in of_figure)
+    if not figures:
+        numbers = number_claims(view(setup, "still_life", 1.0))
+        claims = (*numbers, *claims, *section_2(setup), *section_3_1())
     facts = {"size": setup.size, "spp": setup.spp, "seeds": setup.seeds, "rodcone": metadata.version("rodcone")}
     return Paper(tuple(figure for figure, _ in results), claims, facts | {"environment": environment()})
 

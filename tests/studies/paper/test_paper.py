@@ -16,6 +16,7 @@ from sensor.curves import rgbw
 from studies.metrics.truth import light_of
 from studies.paper import figures_1_b, levels
 from studies.paper.claims import at_least, value_text, within
+from studies.paper.figure2 import figure_2
 from studies.paper.figures_1_b import gain_db
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, make, write
@@ -242,3 +243,13 @@ def test_full_command_judges_every_claim(tmp_path: Path) -> None:
     assert verdicts["Interleaved is less noisy than Bayer at 5, 10 and 20 ms"] == "reproduced"
     assert verdicts["W replaces the luminance at 5 ms, and not at 10 and 20 ms"] == "reproduced"
     assert verdicts["The voltage swing is what a full well gives"] == "not reproduced"
+
+
+def test_one_figure_alone_has_its_own_claims_and_no_other(tmp_path: Path) -> None:
+    code, out, _ = call(["paper", "--figure", "2", "-o", str(tmp_path)])
+    assert (code, out) == (0, f"{tmp_path / 'paper.html'}\n")
+    assert sorted(path.name for path in tmp_path.glob("*.svg")) == ["figure_2.svg"]
+    claims = json.loads((tmp_path / "paper.json").read_text("utf-8"))["claims"]
+    assert [claim["claim"] for claim in claims] == [claim.text for claim in figure_2()[1]]
+    assert 'href="#figure-2"' in (tmp_path / "paper.html").read_text("utf-8")
+    check_refusals("paper", [("--figure 7 -o new", "figure: ... allowed: 1a, 1b, 2, 3, 4, 5, 6, A, B")], tmp_path)
