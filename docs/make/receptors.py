@@ -1,4 +1,4 @@
-"""Sensitivities of human rods and cones for docs/eye/eye.toml: `docs/make/receptors.py` writes docs/eye/receptors.csv.
+"""Sensitivities of human rods and cones: `docs/make/receptors.py` writes studies/configs/sensors/receptors.csv.
 
 Cones by Stockman & Sharpe (2000), which became CIE 170-1:2006, 2 degrees; rods (V) by CIE 1951, scotopic. Both are
 published by energy at the cornea, relative; here they are isomerisations per photon with peaks of our choice: 0.3 for
@@ -23,7 +23,7 @@ def main() -> None:
     by_photon = by_energy / NM[:, None]
     curves = by_photon / by_photon.max(axis=0) * list(PEAKS.values())
     rows = [[f"{nm:g}", *(f"{value:.3g}" for value in row)] for nm, row in zip(NM, curves, strict=True)]
-    place = Path(__file__).resolve().parents[1] / "eye" / "receptors.csv"
+    place = Path(__file__).resolve().parents[2] / "studies" / "configs" / "sensors" / "receptors.csv"
     place.write_text(csv_text(["wavelength_nm", *PEAKS], rows))
 
 

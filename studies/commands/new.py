@@ -29,6 +29,7 @@ from studies.commands.console import require_new, say
 
 app = App(name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
+_EYE = _STUDIES / "sensors" / "eye.toml"  # its receptors make no colour matrix, so it is no preset of `sensor.presets`
 _CLUSTER = Path(__file__).parent.parent / "data" / "dask.yaml"
 
 
@@ -51,7 +52,7 @@ def preset(
     ----------
     name
         Preset by name: low_noise, table1_pixel, table1_output, or table1_output_6um, _3um and _2um for the paper's
-        Figures 1 and 5.
+        Figures 1 and 5; or eye, a retina's rods and L, M, S cones, whose curves come with it as receptors.csv.
     out
         File to write, ending in .toml; one that exists is left alone. Its path can replace any preset name. Responses
         go into NAME_curves.csv beside it.
@@ -68,7 +69,10 @@ def preset(
         if name is None:
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
         require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor)
-        _copy(preset_file(name), out, ".toml")
+        if name == _EYE.stem:
+            _copy(_EYE, out, ".toml", _beside({out.parent / "receptors.csv": _EYE.with_name("receptors.csv")}))
+        else:
+            _copy(preset_file(name), out, ".toml")
         return
     require_new(out, ".toml")
     curves_file = out.parent / f"{out.stem}_curves.csv"
@@ -115,8 +119,8 @@ def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
         that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
         exposures (exposure times and fixed patterns on Table 1's pixel), opponents (every processor), white_pixel
         (one method with and without W), white_pixel_lights (the same under four lights), real_cameras (five cameras
-        that exist beside the paper's pixel), benchmark (the frozen list of rodcone judge), demo (what rodcone demo
-        makes), or paper_1b and paper_6 (of the paper's figures).
+        that exist beside the paper's pixel), eye (rods and cones, interleaved and in blocks), benchmark (the frozen
+        list of rodcone judge), demo (what rodcone demo makes), or paper_1b and paper_6 (of the paper's figures).
     out
         File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
         sensors beside it, where files of the same content are kept.
@@ -128,13 +132,7 @@ def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
     examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
     require_keys("study", [name], examples)
     beside = {out.parent / file_name: _STUDIES / file_name for file_name in _named(examples[name])}
-    for target, source in beside.items():
-        if target.exists() and target.read_bytes() != source.read_bytes():
-            raise InputError(
-                f"out: {str(target)!r} exists and differs from the example's; allowed: no such file, or the same; "
-                "choose another folder"
-            )
-    _copy(examples[name], out, ".toml", beside)
+    _copy(examples[name], out, ".toml", _beside(beside))
 
 
 @app.command
@@ -158,6 +156,17 @@ def _named(study_file: Path) -> list[str]:
             curves = [value for value in responses if isinstance(value, str) and is_curve_file(value)]
             files += [name, *(str(Path(name).parent / curve) for curve in curves)]
     return list(dict.fromkeys(files))
+
+
+def _beside(files: Mapping[Path, Path]) -> Mapping[Path, Path]:
+    """Files to copy by their new paths, or `InputError` where another file has one of these."""
+    for target, source in files.items():
+        if target.exists() and target.read_bytes() != source.read_bytes():
+            raise InputError(
+                f"out: {str(target)!r} exists and differs from the example's; allowed: no such file, or the same; "
+                "choose another folder"
+            )
+    return files
 
 
 def _numbers(noise: Path | None) -> PixelNumbers:

@@ -25,6 +25,16 @@ def test_the_copy_is_the_preset_with_its_comments_and_reads_as_it(tmp_path):
     assert len(list(tmp_path.iterdir())) == len(names())
 
 
+def test_an_eye_comes_with_its_receptors_and_is_read_as_a_sensor(tmp_path):
+    path = tmp_path / "mine.toml"
+    assert call(["new", "preset", "eye", "-o", path]) == (0, f"{path}\n", "")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["mine.toml", "receptors.csv"]
+    assert read_sensor(path).channels == ("V", "L", "M", "S")
+    (tmp_path / "receptors.csv").write_text("another's", "utf-8")
+    told = f"'{tmp_path / 'receptors.csv'}' exists and differs from the example's"
+    check_refusals("new preset", [(f"eye -o {tmp_path / 'other.toml'}", told)], tmp_path)
+
+
 def test_a_file_that_exists_is_left_alone(tmp_path):
     path = tmp_path / "mine.toml"
     path.write_text("mine", "utf-8")

@@ -210,7 +210,7 @@ def test_no_mosaic_is_given_a_patchs_brightness() -> None:
 
 
 def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
-    cameras = [read_sensor(Path(file)) for file in read_study(ROOT / "docs/eye/study.toml").sensors]
+    cameras = [read_sensor(Path(file)) for file in read_study(ROOT / "studies/configs/eye.toml").sensors]
     cameras = [vary(cameras[0], "V/V"), *cameras]
     rods, interleaved, clumped, cones = (
         [row.psnr_db for row in expect(x, [0.01, 10.0], exposure=0.1)] for x in cameras
