@@ -7,6 +7,7 @@ import pytest
 from loop import loop
 from refusal import refusal
 
+from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.capture import expose
@@ -16,9 +17,11 @@ from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import built_in
 from sensor.device import draw_device
+from sensor.optics import form_image
 from sensor.photodiodes import binned, binned_tile
 from sensor.presets import vary
 from sensor.readout import noise_sources, noise_variance
+from sensor.shake import shaken
 
 QUIET = PixelConfig(1.0, 0.9, full_well_e=8000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
 BOTH = loop("binning", ["charge", "digital"])
@@ -232,3 +235,20 @@ def test_a_wrong_sensor_file_is_refused_by_name(tmp_path, cfa, binning):
     path = tmp_path / "quad.toml"
     path.write_text(PRESET.format(cfa=cfa, binning=binning))
     refusal(read_sensor, path, match=r"sensor file '.*quad.toml': binning: ")
+
+
+@BOTH
+def test_the_lens_blurs_a_binned_cameras_photodiodes_not_its_pixels(binning):
+    """Point images have their size on the sensor: in photodiodes as behind the same chip read without binning."""
+    lens = LensConfig(4.0, diffraction=1.0, defocus_um=6.0, veiling_glare=0.02)
+    nm, point = np.arange(405.0, 700.0, 50.0), np.zeros((32, 32, 6))
+    point[15, 16] = 1.0
+    radiance = SpectralRadiance(point, nm)
+    plain = replace(camera(""), lens=lens)
+    summed = replace(camera(binning), lens=lens)
+    np.testing.assert_allclose(form_image(radiance, summed).values, form_image(radiance, plain).values, rtol=1e-12)
+    held = replace(lens, shake_um=3.0)
+    light = np.zeros((32, 32, 3))
+    light[15, 16] = 1e4
+    moved = [shaken(light, replace(x, lens=held), 0.1, np.random.default_rng(3)) for x in (plain, summed)]
+    np.testing.assert_allclose(moved[0], moved[1], atol=1e-9)

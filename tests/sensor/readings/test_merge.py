@@ -473,3 +473,13 @@ def test_binning_and_several_readings_are_refused_beside_channels():
     quad = with_channel_readings(low_noise("quad_rgbw"), [reading])
     refusal(binned, quad, "charge", match="channels: .'W'. with binning; allowed: one of the two")
     refusal(noise_sources, 100.0, camera(reading), EXPOSURE_S, match="channel: none given for a camera that reads")
+
+
+@pytest.mark.parametrize("light_share", [1.0, 0.25])
+def test_a_metered_channels_time_counts_what_its_density_lets_through(light_share):
+    """White of 80 000 e- in the whole time: the share of it that puts them at 80 % of 15 000, in 16ths of an octave."""
+    sensor = with_channel_readings(low_noise(), [ChannelReading("W", metered=True, light_share=light_share)])
+    white = np.full((8, 8), 80_000.0)
+    (reading,) = resolve(sensor, white, 1.0, "W")
+    held = 80_000.0 * light_share * reading.time_share
+    assert 0.8 * 15_000 * 2 ** (-1 / 16) < held <= 0.8 * 15_000 * (1 + 1e-9)

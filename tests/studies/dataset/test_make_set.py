@@ -257,7 +257,8 @@ def test_another_set_and_foreign_files_are_refused_before_any_render_and_left_al
     before = content(folder)
     monkeypatch.setattr(make_set_module, "scene_cells", lambda *_: pytest.fail("a scene is rendered"))
     other_scene = (SceneChoice(str(SAMPLE.picture(tmp_path / "scene.exr", (16, 24))), "E"),)
-    for changes in ({"seeds": (0, 1, 2)}, {"order": SetOrder(shards=2, crop=16)}, {"scenes": other_scene}):
+    orders = [SetOrder(shards=2, crop=16), SetOrder(shards=3, crop=16, truth="rgb")]
+    for changes in ({"seeds": (0, 1, 2)}, *({"order": order} for order in orders), {"scenes": other_scene}):
         refusal(made, tmp_path, **changes, match="holds another set, 'rodcone dataset'")
     SAMPLE.picture(tmp_path / "scene.exr")
     (folder / "thesis.tar").write_bytes(b"mine")
@@ -267,6 +268,12 @@ def test_another_set_and_foreign_files_are_refused_before_any_render_and_left_al
     strange.mkdir()
     (strange / "letter.txt").write_text("mine")
     refusal(made, tmp_path, out="strange", match=r"holds other files, such as 'letter.txt'")
+
+
+def test_a_set_of_other_parts_is_another_set(tmp_path: Path) -> None:
+    SAMPLE.picture(tmp_path / "scene.exr", (32, 32))
+    made(tmp_path, order=SetOrder(shards=3, crop=32))
+    refusal(made, tmp_path, order=SetOrder(shards=3, crop=16), match="holds another set, 'rodcone dataset'")
 
 
 def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -312,6 +319,22 @@ def test_manifest_and_card_count_what_is_there(stored: Path) -> None:
     assert "| 1cd/m2 | 4 |" in text
     noisy = sum(line["render_noise"]["of_95_percent"] >= 1 for line in samples)
     assert f"| 1 and more | {noisy} |" in text
+
+
+def test_a_samples_snr_is_counted_from_what_its_shard_holds(stored: Path) -> None:
+    """Ten times the logarithm of a ratio of powers: mean square of the light over that of its stated noise."""
+    for line in read_manifest(stored):
+        if line["kind"] != "shard":
+            continue
+        for arrays, facts in read_shard(stored / line["name"]):
+            variance = np.zeros(arrays["mosaic_e"].shape)
+            tile, gain = facts["tile"], facts["gain_e_per_dn"]
+            for row, column in np.ndindex(len(tile), len(tile[0])):
+                at, noise = np.s_[row :: len(tile), column :: len(tile[0])], facts["noise"][tile[row][column]]
+                dn = arrays["mosaic_e"][at] / gain
+                variance[at] = (noise["a"] * dn + noise["b"] + noise["c"] * dn**2) * gain**2
+            power = float((arrays["mosaic_e"].astype(float) ** 2).mean() / variance.mean())
+            assert facts["snr_db"] == pytest.approx(10 * np.log10(power), abs=0.01)
 
 
 def test_a_manifest_that_lacks_what_is_read_is_refused(stored: Path, tmp_path: Path) -> None:

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from isp.design.expected_error import Noise, expected_error, sampled
+from isp.design.expected_error import Noise, expected_error, pooled, sampled
 from isp.design.spectral_prior import PRIORS, load_prior
 from isp.ple.prior import mixture, own_prior
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from rodcone.colour_spaces import encode_srgb
+from render.spectrum import Spectrum, tristimulus
+from rodcone.colour_spaces import adapt_to_d65, encode_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig
@@ -20,7 +21,18 @@ from sensor.config_file import read_sensor
 from sensor.noise_law import NoiseLaw
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset, vary
-from studies.design.expect import MIDDLE, drawn_pixels, expect, lens_of, metric_rows, responses_e, sampling_of, view_of
+from sensor.readings.resolve import chip_readings
+from studies.design.expect import (
+    MIDDLE,
+    drawn_pixels,
+    expect,
+    lens_of,
+    metric_rows,
+    noise_of,
+    responses_e,
+    sampling_of,
+    view_of,
+)
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import calibrate
 from studies.study.study_file import read_study
@@ -245,3 +257,58 @@ def test_more_light_never_costs_and_the_ladders_time_is_the_forecasts_own_best(c
     chosen = rows[-1]
     others = [expect(sensor, [1000.0], exposure=chosen.exposure_s * 2.0 ** (k / 3))[0].psnr_db for k in (-3, -1, 1, 3)]
     assert max(others) - chosen.psnr_db < 0.05
+
+
+@pytest.mark.parametrize("name", list(PRIORS))
+def test_a_coefficients_reflectance_stands_in_the_band_that_its_edges_name(name: str) -> None:
+    """Colours of surfaces with an edge, by the prior's basis, beside those by the reflectance itself in 1 nm."""
+    prior, seen = load_prior(name), view_of(name, "D65")
+    middles_nm = (prior.edges_nm[:-1] + prior.edges_nm[1:]) / 2
+    for row, nm in zip(prior.spectra, middles_nm, strict=True):
+        index = int(np.argmin(abs(seen.light.wavelength_nm - nm)))
+        assert_allclose(seen.basis[index], row, rtol=1e-12)
+    for edge_nm in (500.0, 590.0):
+        smooth = 1 / (1 + np.exp(-(middles_nm - edge_nm) / 20.0))
+        coefficients = np.linalg.lstsq(prior.spectra, smooth, rcond=None)[0]
+        fitted = prior.spectra @ coefficients
+        nm = seen.light.wavelength_nm
+        exact = fitted[np.clip(np.searchsorted(prior.edges_nm, nm, side="left") - 1, 0, len(fitted) - 1)]
+        white = tristimulus(seen.light.spectrum, nm, seen.light.width_nm)
+        xyz = adapt_to_d65(tristimulus(seen.light.spectrum * exact, nm, seen.light.width_nm), white)
+        assert_allclose(seen.xyz @ coefficients, xyz, rtol=1e-9)
+        # The edge stands where it was put: half of the basis's own rise lies at its wavelength.
+        rise = np.interp(edge_nm, middles_nm, fitted)
+        assert rise == pytest.approx(0.5, abs=0.15)
+
+
+@pytest.mark.parametrize("name", list(PRIORS))
+def test_the_mean_patch_reflects_as_much_luminance_as_its_file_states(name: str) -> None:
+    """The file's unit is a mean luminous reflectance of 1 under equal energy; a band off, it is 0.94 or 1.06."""
+    prior, light = load_prior(name), view_of(name, "E").light
+    spectrum = prior.spectra @ (prior.patches.weights @ prior.patches.means.mean(axis=1))
+    reflectance = Spectrum((prior.edges_nm[:-1] + prior.edges_nm[1:]) / 2, spectrum).band_average(
+        light.wavelength_nm, np.full(light.wavelength_nm.size, 1.0)
+    )
+    seen = tristimulus(light.spectrum * reflectance, light.wavelength_nm, light.width_nm)
+    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
+    assert seen[1] / white[1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_luminance_is_that_of_the_estimate_whose_component_is_known() -> None:
+    """Counted again from the closed form's parts, beside the linear estimate's, which is worse."""
+    spectral, seen, level = load_prior("drawn"), view_of("drawn", "D65"), 2.0
+    row = expect(BAYER, [level], exposure=0.02)[0]
+    sampling = sampling_of(BAYER, responses_e(BAYER, seen), lens_of(BAYER, False))
+    white, noise = level / spectral.reflectances.mean(), noise_of(chip_readings(BAYER, 0.02))
+    found = []
+    for patches in (spectral.patches, pooled(spectral.patches)):
+        samples, errors = sampled(patches, sampling, MIDDLE, np.eye(len(sampling))), []
+        for mean in spectral.reflectances:
+            rows = metric_rows(spectral, seen, mean)[1]
+            forms = rows.swapaxes(-1, -2) @ rows
+            if len(patches.weights) == 1:
+                forms = np.tensordot(spectral.patches.weights, forms, 1)[None]
+            errors.append(expected_error(samples, mean * white * 0.02, noise, forms[None])[0])
+        found.append(-10 * np.log10(np.mean(errors)))
+    assert row.luminance_db == pytest.approx(found[0], abs=1e-6)
+    assert found[0] > found[1] + 0.3

@@ -1,7 +1,8 @@
 """The staged chain: what is kept changes no bit, stages are the public chain's, sliding compiles no kernel."""
 
+import pickle
 import random
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import numpy as np
@@ -16,8 +17,8 @@ from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.optics import form_image
 from studies.explore.answers import python_of
-from studies.explore.chain import photograph
-from studies.explore.controls import TIME, Controls, Lamp, controls_from, mosaics_of
+from studies.explore.chain import development_of, expose_scene, photograph
+from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, controls_from, mosaics_of
 from studies.explore.memo import Memo, go_on
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.source import GIVEN, RenderOptions, of_transport, open_source
@@ -36,6 +37,60 @@ def test_what_is_kept_changes_no_bit():
         assert np.array_equal(kept.linear, fresh.linear), controls
         assert np.array_equal(kept.true, fresh.true), controls
         assert kept.exposed.exposure_s == fresh.exposed.exposure_s
+
+
+# A value of each control that differs from the default; a table of all, so that a new control has to be named here.
+MOVED = {
+    "lamps": {"sun": Lamp("A", 2.0)}, "level_cd_m2": 3.0, "exposure": "auto:W", "exposure_s": 0.001,
+    "sensor": "table1_output", "mosaic": "rgbw_4x4", "bits": 10, "shot_noise": False, "seed": 3, "exposure_number": 4,
+    "frames": 2, "reference_light": "A", "processor": "ple_rgbw", "white_balance": "gray-world",
+    "settings": {"sigma_s": 2.0}, "pixel": {}, "lens": {},
+}  # fmt: skip
+PIXEL_MOVED = {
+    "read_noise_e": 20.0, "dsnu_e": 30.0, "prnu": 0.1, "dark_current_e_per_s": 3e5, "column_gain_spread": 0.1,
+    "column_offset_e": 30.0, "hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 1e5, "crosstalk": 0.1,
+    "full_well_e": 3000.0,
+}  # fmt: skip
+LENS_MOVED = {"f_number": 8.0, "defocus_um": 10.0, "diffraction": 2.0, "veiling_glare": 0.1}
+
+
+def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
+    """Whatever is kept from the settings before: exposure, chip, light, truth and what develops the raw image."""
+    hot = {"hot_pixel_share": 0.05, "hot_pixel_dark_current_e_per_s": 1e4}  # so that each term of a pair is seen
+    start = Controls(exposure="auto:information", pixel=hot)
+    memo, transport = Memo(), small_transport()
+    first = expose_scene(transport, start, memo)
+    others = {x.name for x in fields(Controls)} - set(MOVED)
+    assert others <= {"gain", "iso"}, "a control without a line in MOVED"
+    moved = [{name: value} for name, value in MOVED.items() if value != {}]
+    moved += [{"pixel": hot | {name: PIXEL_MOVED[name]}} for name in PIXEL]
+    moved += [{"lens": {name: LENS_MOVED[name]}} for name in LENS]
+    for change in moved:
+        controls = replace(start, **change)
+        kept, fresh = expose_scene(transport, controls, memo), expose_scene(transport, controls, Memo())
+        assert kept.exposure_s == fresh.exposure_s, change
+        assert np.array_equal(kept.raw.dn, fresh.raw.dn), change
+        assert np.array_equal(kept.light.spectrum, fresh.light.spectrum), change
+        developed, anew = development_of(kept, controls, memo), development_of(fresh, controls, Memo())
+        assert developed.keywords.keys() == anew.keywords.keys(), change
+        for mine, theirs in zip((*developed.args, *developed.keywords.values()),
+                                (*anew.args, *anew.keywords.values()), strict=True):  # fmt: skip
+            assert pickle.dumps(mine) == pickle.dumps(theirs), change
+        if not {"reference_light", "processor", "white_balance", "settings"} & change.keys():
+            assert kept.raw.dn.shape != first.raw.dn.shape or not np.array_equal(kept.raw.dn, first.raw.dn), change
+
+
+def test_frames_of_a_burst_have_noise_of_their_own():
+    """Four frames of read noise alone have half its deviation: within four standard errors over 1920 pixels."""
+    terms = {"read_noise_e": 20.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0}
+    still = Controls(pixel=terms, shot_noise=False, bits=16, exposure=TIME, exposure_s=0.002)
+    spread_e = []
+    for frames in (1, 4):
+        exposed = photograph(small_transport(), replace(still, frames=frames)).exposed
+        raw, scale = exposed.raw, frames if exposed.raw.exposure_s > 0.003 else 1
+        off_e = raw.electrons / scale - exposed.expected_e
+        spread_e.append(off_e[exposed.expected_e < 0.5 * exposed.sensor.pixel.full_well_e].std())
+    assert spread_e[1] / spread_e[0] == pytest.approx(0.5, rel=0.09)
 
 
 @pytest.mark.sample(2)
