@@ -69,6 +69,12 @@ def _seconds(name: str, value: Any) -> Any:
     return time_s
 
 
+def _some_seconds(name: str, value: Any) -> Any:
+    time_s = _seconds(name, value)
+    require_range(name, time_s, 1e-9, 1e7, "give a time above 0, such as '33ms'")
+    return time_s
+
+
 def _exposure(name: str, value: Any) -> Any:
     return value if isinstance(value, str) and value in at("sensor.exposure:RULES") else _seconds(name, value)
 
@@ -145,6 +151,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
+        "light_for_snr.exposure_s": _some_seconds,
         **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light", "expect.light"), _TEXT),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),

@@ -32,8 +32,10 @@ def cut(text: str) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """Give the words of an error on one line."""
-    return " ".join(str(error).split())
+    """Give the words of an error on one line; of a traceback within, as Mitsuba quotes Python's, the last line."""
+    words, quoted, traceback = str(error).partition("Traceback (most recent call last):")
+    last = (traceback.strip() or " ").splitlines()[-1] if quoted else ""
+    return " ".join(f"{words} {last}".split())
 
 
 @contextmanager

@@ -4,6 +4,7 @@ import errno
 import os
 import re
 import secrets
+import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from math import isfinite
@@ -12,6 +13,7 @@ from typing import Any
 
 from rodcone.errors import InputError
 
+_FULL_BYTES = 1 << 16  # free on a disk that refused a write: less than a file system keeps for itself
 _HALF_WRITTEN = re.compile(r"\.rodcone-[0-9a-f]{16}(\.\w+)?")
 
 
@@ -22,16 +24,28 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
     Raises
     ------
     OSError
-        Where a folder is missing or can't be written; it names the path.
+        Where a folder is missing, can't be written or is full; it names the path.
     """
     places = tuple(_place_beside(path) for path in paths)
     try:
         yield places
         for place, path in zip(places, paths, strict=True):
             os.replace(place, path)
+    except OSError as error:
+        raise _named(error, dict(zip(map(str, places), paths, strict=True))) from error
     finally:
         for place in places:
             place.unlink(missing_ok=True)
+
+
+def _named(error: OSError, paths: Mapping[str, Path]) -> OSError:
+    """Error with the path that was asked for and the cause: libraries leave both out where a disk is full."""
+    path = paths.get(str(error.filename)) or (next(iter(paths.values())) if error.filename is None else None)
+    if path is None:
+        return error
+    full = shutil.disk_usage(path.parent).free < _FULL_BYTES
+    number = errno.ENOSPC if full else error.errno or errno.EIO
+    return OSError(number, os.strerror(number) if full or error.errno else str(error), str(path))
 
 
 def write_files(files: Mapping[Path, str | bytes | memoryview]) -> None:

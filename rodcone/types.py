@@ -12,10 +12,18 @@ Image: TypeAlias = NDArray[np.float64]  # (h, w) or (h, w, channel)
 Planes: TypeAlias = NDArray[np.float32]  # (band, h, w), or (group, band, h, w)
 
 
-def real_array(name: str, value: Any) -> NDArray[Any]:
-    """Array of whole or floating numbers; raises `InputError` for complex ones, masked values, text and the like."""
+def require_unmasked(name: str, value: Any) -> None:
+    """Raise `InputError` for masked values, and for a table with names, which an array would lose without a word."""
     if np.ma.is_masked(value):
         raise InputError(f"{name}: values that are masked are not allowed; fill them, as by values.filled(0)")
+    if hasattr(value, "iloc") and getattr(value, "ndim", 1) != 1:
+        kind = type(value).__name__
+        raise InputError(f"{name}: a {kind} is not allowed; give an array, as by values.to_numpy()")
+
+
+def real_array(name: str, value: Any) -> NDArray[Any]:
+    """Array of whole or floating numbers; raises `InputError` for complex ones, masked values, text and the like."""
+    require_unmasked(name, value)
     try:
         array = np.asarray(value)
     except (ValueError, TypeError, OverflowError):  # rows of unequal length, among others

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.display import brief
 from rodcone.doors import method
-from rodcone.errors import InputError, require_fields, require_keys, require_range, require_whole
+from rodcone.errors import InputError, require_fields, require_keys, require_kind, require_range, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
 from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
@@ -108,6 +108,8 @@ class SensorConfig:
     __repr__ = brief
 
     def __post_init__(self) -> None:
+        for name, kind in (("pixel", PixelConfig), ("lens", LensConfig), ("responses", Responses), ("chip", Chip)):
+            require_kind(name, getattr(self, name), kind, "keep the sensor's own, or change it by dataclasses.replace")
         object.__setattr__(self, "cfa", check_tile(self.cfa))
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         require_range("gain", self.gain, 1.0, MOST_GAIN, "give a factor; at 1 a full well reads the converter's top")

@@ -11,10 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
+from rodcone.types import require_unmasked
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
 from sensor.cfa import Tile, channels, check_covers, check_tile, mask, unit_channel
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
+ISO_RANGE = 1e-6, 1e9
 SATURATION_SIGMAS = 4.0
 LARGEST_DN = 2.0**24  # up to which single precision holds every whole number
 
@@ -79,7 +81,7 @@ class RawImage:
     exposure_s: Annotated[float, (0.0, 1e7, "give seconds, 0 or more")]
     camera: str = "rodcone"
     f_number: Annotated[float | None, (0.1, 1e4, "give focal length over aperture")] = None
-    iso: Annotated[float | None, (1e-6, 1e9, "give a speed above 0")] = None
+    iso: Annotated[float | None, (*ISO_RANGE, "give a speed above 0")] = None
     colour: ColourCalibration | None = None
     engine: str = ""
     column_gain_spread: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
@@ -181,10 +183,10 @@ class RawImage:
 
     def _saturation_e(self, noise: ChannelNoise) -> float:
         """Level from which a channel's sample counts as saturated [e-]: but for dark current's, noise comes after the
-        well clips; columns' gains act on the whole well.
+        well clips; columns' gains act on the whole well. Rounding takes half a DN off at most, whatever its variance.
         """
         last, dark_e = self.noise_steps[-1] if self.noise_steps else noise, noise.dark_current_e
-        before_e2 = last.shot * dark_e + (self.column_gain_spread * dark_e) ** 2
+        before_e2 = last.shot * dark_e + (self.column_gain_spread * dark_e) ** 2 + self.rounding_e2
         after_e = sqrt(max(hypot(last.read_noise_e, last.dsnu_e) ** 2 - before_e2, 0.0))
         spread_e = hypot(after_e, self.column_gain_spread * (noise.full_well_e + dark_e))
         return noise.full_well_e - SATURATION_SIGMAS * spread_e - noise.shot * self.gain_e_per_dn / 2
@@ -255,6 +257,7 @@ def _as_array(values: ArrayLike) -> NDArray[Any]:
 
 def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
     """Samples as an array, or `InputError` where one is no finite real number."""
+    require_unmasked("dn", dn)
     samples = _as_array(dn)
     if samples.dtype.kind not in "uif":
         raise InputError(f"dn: samples of type {samples.dtype} are not allowed; give whole numbers or finite floats")

@@ -9,7 +9,7 @@ from cyclopts import Parameter
 
 from scenes.catalog import names
 from studies.commands.console import say
-from studies.explore.server import listen, make_server
+from studies.explore.server import listen, make_server, require_server
 from studies.explore.session import Session
 from studies.explore.source import RenderOptions, open_source
 
@@ -39,6 +39,7 @@ def explore(
     no_browser
         Print the address, and open no browser.
     """
+    require_server()
     opened = open_source(source, options)
     by_name = replace(options, trust_scene=False, define=())  # a scene of the catalogue takes neither
     scenes = {name: partial(open_source, name, by_name) for name in names()} | {opened.title: lambda: opened}

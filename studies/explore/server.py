@@ -154,10 +154,17 @@ def listen(port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((HOST, port))
+        listener.listen()  # before the address is told: a browser that comes at once waits, and isn't turned away
     except OSError as error:
         listener.close()
         raise InputError(f"port: {port} can't be listened on ({error.strerror}); leave it out for a free one") from None
     return listener
+
+
+def require_server() -> None:
+    """Raise `InputError` where a library of the server isn't installed: before a session's thread has begun."""
+    for name in ("uvicorn", "websockets", "starlette.applications"):
+        optional_library(name, EXTRA)
 
 
 def make_server(session: Session, listener: socket.socket) -> tuple[Any, str]:

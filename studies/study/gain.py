@@ -7,6 +7,7 @@ from sensor.cfa import OWN
 from sensor.config import MOST_GAIN, SensorConfig
 from sensor.optics import camera_equation
 from sensor.photodiodes import with_gain
+from sensor.raw import ISO_RANGE
 from studies.metrics.truth import light_in_bands, neutral_electrons
 
 ISO = "ISO"
@@ -15,7 +16,7 @@ _ROUNDING = 0.015  # a base speed of 51.56 is asked for as 51
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:
-    """Saturation-based speed of green under D65; None where the mosaic has no G or it collects nothing.
+    """Saturation-based speed of green under D65; None without G, where it collects nothing, and beyond what files hold.
 
     Of the exposure in which green's mean reads the converter's top; no half stop of headroom is taken off. It is in
     proportion to the gain.
@@ -28,7 +29,8 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     if electrons_per_cd_m2 <= 0:
         return None
     per_lux_s = electrons_per_cd_m2 / camera_equation(sensor.lens)
-    return ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(sensor.unit_channel)
+    speed = ISO_SATURATION_LUX_S * per_lux_s / sensor.metered_well_e(sensor.unit_channel)
+    return speed if ISO_RANGE[0] <= speed <= ISO_RANGE[1] else None
 
 
 def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:

@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from rodcone.errors import MOST_TOLD, InputError, require_range
+from rodcone.errors import MOST_TOLD, InputError, one_line, require_range
 
 
 def test_a_message_is_one_line_that_a_terminal_only_shows() -> None:
@@ -35,3 +35,9 @@ def test_what_is_no_number_of_the_range_is_refused_and_numbers_within_it_pass() 
             require_range("side", value, 0.0, 5.0, "give less")
     for number in (0, 5, 2.5):
         require_range("side", number, 0.0, 5.0, "give less")
+
+
+def test_of_a_traceback_within_an_error_the_last_line_is_told() -> None:
+    quoted = "plug-in failed: Traceback (most recent call last):\n  File x, line 3\nValueError: no such lamp\n"
+    assert one_line(RuntimeError(quoted)) == "plug-in failed: ValueError: no such lamp"
+    assert one_line(RuntimeError("two\n lines")) == "two lines"

@@ -1,13 +1,17 @@
 """Files appear whole or not at all, and a place that can't be written is named as it was asked for."""
 
+import errno
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import dataclass
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 from any_cpu.configurations import environment
+from loop import loop
 from refusal import refusal
 
 from rodcone.digests import digest, digest_inputs
@@ -41,6 +45,22 @@ def test_a_missing_folder_is_told_by_the_file_s_own_name(tmp_path):
     with pytest.raises(FileNotFoundError) as error, replacing(path):
         pass
     assert error.value.filename == str(path)
+
+
+@loop("error", [OSError("100 requested and 0 written"), OSError(errno.ENOSPC, "No space left on device")])
+def test_a_full_disk_is_told_with_path_and_cause(tmp_path, error, monkeypatch):
+    """As NumPy, which names neither, and libraries that name no file."""
+    monkeypatch.setattr(shutil, "disk_usage", lambda _: SimpleNamespace(free=0))
+    with pytest.raises(OSError, match="No space left") as caught, replacing(tmp_path / "a.dng"):
+        raise error
+    assert (caught.value.filename, caught.value.errno) == (str(tmp_path / "a.dng"), errno.ENOSPC)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_in_writing_names_the_file_that_was_asked_for(tmp_path):
+    with pytest.raises(OSError, match="short write") as caught, replacing(tmp_path / "a.dng"):
+        raise OSError("short write")
+    assert caught.value.filename == str(tmp_path / "a.dng")
 
 
 def test_a_place_is_checked_by_making_its_folder_and_leaves_no_file(tmp_path):

@@ -18,6 +18,15 @@ PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_no
 LENS = LensConfig(f_number=2.8)
 
 
+PARTS = [("pixel", "PixelConfig"), ("lens", "LensConfig"), ("responses", "Responses"), ("chip", "Chip")]
+
+
+@loop(("name", "kind"), PARTS)
+@loop("value", [None, {}])
+def test_a_part_of_another_kind_is_refused_by_name(name, kind, value):
+    refusal(replace, SensorConfig(PIXEL, LENS), **{name: value}, match=f"{name}: a .* is none; allowed: {kind}")
+
+
 @loop(("bits", "black_dn"), [(8, 1), (14, 28), (16, 110)])  # 0.42, 27.3 and 109.04 rounded up
 def test_default_black_level_is_the_whole_dn_from_five_sigmas_of_the_dark_and_the_well_ends_at_the_top(bits, black_dn):
     sensor = SensorConfig(PIXEL, LENS, bits=bits)

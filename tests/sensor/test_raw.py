@@ -13,6 +13,16 @@ from sensor.calibration import ChannelNoise
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels, check_tile, tile_of
 from sensor.raw import SATURATION_SIGMAS, RawImage, noise_at_sites
 
+
+class Table:
+    """As a DataFrame of pandas: an array that has lost its names would pass for a picture."""
+
+    iloc, ndim = None, 2
+
+    def __array__(self, *_: object, **__: object) -> np.ndarray:
+        return np.ones((2, 2))
+
+
 RAW = RawImage(np.full((4, 4), 120, np.uint16), RGBW, 100.0, 1100.0, 2.0, 3.0, 4.0, 0.01, 0.02)
 STATED = 3.2e-5  # of a normal under -4 sigma
 
@@ -28,14 +38,25 @@ def test_dark_spread_is_read_noise_dsnu_and_a_rounding_in_quadrature():
 
 def test_saturation_begins_four_sigmas_of_the_dark_and_half_a_dn_under_the_well():
     assert SATURATION_SIGMAS == 4.0
-    assert RAW.saturation_e == pytest.approx(2000.0 - 4 * np.sqrt(25 + 1 / 3) - 1.0, rel=1e-12)
-    dn = np.array([[1089, 1090], [1091, 1100]], np.uint16)  # 1978.87 e- is DN 1089.43
+    assert RAW.saturation_e == pytest.approx(2000.0 - 4 * np.sqrt(25) - 1.0, rel=1e-12)  # rounding is no more than that
+    dn = np.array([[1089, 1090], [1091, 1100]], np.uint16)  # 1979 e- is DN 1089.5
     np.testing.assert_array_equal(replace(RAW, dn=dn).saturated, [[False, True], [True, True]])
+
+
+def test_a_converter_of_one_bit_calls_its_upper_reading_saturated_and_not_the_dark():
+    raw = replace(RAW, dn=np.array([[0, 1], [1, 0]], np.uint16), black_dn=0.0, white_dn=1.0, gain_e_per_dn=15_000.0)
+    assert raw.saturation_e == pytest.approx(15_000 - 4 * 5 - 7500)
+    np.testing.assert_array_equal(raw.saturated, [[False, True], [True, False]])
+
+
+@loop("table", [np.ma.masked_array(np.ones((2, 2)), mask=[[True, False], [False, False]]), Table()])
+def test_masked_samples_and_tables_with_names_are_refused(table):
+    refusal(replace, RAW, dn=table, match="masked|a Table is not allowed; give an array")
 
 
 def test_dark_current_fills_the_well_and_columns_gains_act_on_both():
     """Its own noise is clipped with the light's: columns and readout alone spread a full pixel."""
-    read_e2, dark_e, spread = 3.0**2 + 4.0**2 + 2.0**2 / 12, 900.0, 0.01
+    read_e2, dark_e, spread = 3.0**2 + 4.0**2, 900.0, 0.01
     dark = {"read_noise_e": np.sqrt(3.0**2 + dark_e), "dsnu_e": np.hypot(4.0, spread * dark_e)}
     raw = replace(RAW, **dark, dark_current_e=dark_e, column_gain_spread=spread)
     expected_e = 2000 - 4 * np.sqrt(read_e2 + (spread * (2000 + dark_e)) ** 2) - 1

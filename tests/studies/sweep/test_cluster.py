@@ -251,3 +251,34 @@ def test_a_worker_that_can_not_leave_is_ended(monkeypatch: pytest.MonkeyPatch) -
     assert isinstance(endless.exception(), BrokenExecutor)
     assert active_children() == []
     assert time.monotonic() - began < 60
+
+
+ORPHANS = """
+import os, signal, held
+from studies.sweep import workers
+if __name__ == "__main__":
+    with workers._pool(2, 1) as pool:
+        pids = {pool.submit(os.getpid).result() for _ in range(40)}
+        for _ in range(2):
+            pool.submit(held.hold)
+        print(*pids, flush=True)
+        signal.pause()
+"""
+
+
+@pytest.mark.thorough
+@pytest.mark.skipif(sys.platform != "linux", reason="the kernel of Linux ends workers with their parent")
+def test_workers_in_native_code_end_with_their_parent(tmp_path: Path) -> None:
+    """Native code that holds Python's lock for ten minutes lets no thread of Python notice that the parent is gone."""
+    (tmp_path / "held.py").write_text("import ctypes\n\ndef hold():\n    ctypes.PyDLL(None).sleep(600)\n")
+    (tmp_path / "main.py").write_text(ORPHANS)
+    paths = {"PYTHONPATH": os.pathsep.join([str(tmp_path), *filter(None, sys.path)])}
+    command = [sys.executable, tmp_path / "main.py"]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=os.environ | paths) as parent:
+        assert parent.stdout is not None
+        pids = [int(pid) for pid in parent.stdout.readline().split()]
+        parent.terminate()
+    assert pids
+    for pid in pids:
+        while Path(f"/proc/{pid}/stat").is_file() and Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z":
+            time.sleep(0.05)  # the test's own time limit ends this
