@@ -75,7 +75,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     max_seconds : float, optional
         Time to keep, earlier calls' included; at least one run is made.
     max_depth : int, optional
-        Longest path in segments; 2 is direct light. The scene's own by default.
+        Longest path in segments; 1 is emission alone, 2 direct light. By default the scene's own.
     seed : int
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
@@ -148,7 +148,7 @@ def _checked_film(
     sides = list(size) if isinstance(size, tuple | list) else []
     if len(sides) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in sides):
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
-    require_whole("max_depth", max_depth, 2, 1 << 16, "2 is direct light")
+    require_whole("max_depth", max_depth, 1, 1 << 16, "1 is emission alone, 2 direct light")
     nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
     check_combinations(scene)

@@ -94,7 +94,7 @@ class Film:
         Height and width in pixels.
     wavelength_nm, width_nm : (band,) float64
     max_depth : int
-        Longest path in segments; 2 is direct light.
+        Longest path in segments; 1 is emission alone, 2 direct light.
     rr_depth : int
         As of `Scene`.
     """

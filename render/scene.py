@@ -78,7 +78,7 @@ class Scene:
         What surfaces do outside their tables (reflectance, transmittance, refractive index): ``"hold"`` continues the
         end values, None refuses bands beyond them.
     max_depth : int
-        Longest path in segments, 2 being direct light, where a render isn't asked for another.
+        Longest path in segments, 1 being emission alone and 2 direct light, where a render isn't asked for another.
     rr_depth : int
         Russian roulette ends paths from this depth on; 5 as in Mitsuba's `path`.
 

@@ -47,15 +47,16 @@ def load_scene_file(
     """Read a Mitsuba XML scene.
 
     A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
-    instantiates nothing; every plug-in has to be one of Mitsuba's own, every file has to lie in the scene's folder.
-    RGB colours are upsampled to spectra by Mitsuba. Films, samplers and integrators are left out: the engine brings
-    its own, and the film gives the size.
+    instantiates nothing; every plug-in has to be one of Mitsuba's own, every file has to lie in the scene's folder, or
+    in one that it names by ``<path>``, from which files are read and no plug-in is loaded. RGB colours are upsampled to
+    spectra by Mitsuba. Films, samplers and integrators are left out: the engine brings its own, and the film gives the
+    size.
 
     Parameters
     ----------
     path : path
     trust : bool
-        Lets the scene name folders, plug-ins of its own and files anywhere. Its native code then runs.
+        Lets the scene name plug-ins of its own and files anywhere. Its native code then runs.
     extend : "hold", optional
         As of `Scene`: surfaces go on at their end values outside their tables. So they do, with a note, where all of
         them are known over 400 to 700 nm at least.
@@ -75,13 +76,12 @@ def load_scene_file(
     file = Path(os.path.realpath(path))
     if not file.is_file():
         raise InputError(f"scene file: {str(path)!r} is missing or no file; give the path of a Mitsuba .xml scene")
-    folder = None if trust else file.parent
-    screen(file, folder, define or {})
+    folders = screen(file, trust, define or {})
     mi = mitsuba_module()
     state = _parse(mi, file, trust, define or {})
     # A trusted scene's <path> folders are on Mitsuba's search path by now.
-    bases = [Path(str(place)) for place in mi.file_resolver()] if trust else [file.parent]
-    opened = assemble(mi, file.stem, _from_xml(mi, state, bases, folder), extend)
+    bases = [Path(str(place)) for place in mi.file_resolver()] if trust else folders
+    opened = assemble(mi, file.stem, _from_xml(mi, state, bases, None if trust else folders), extend)
     return opened if extend else _with_held_ends(opened)
 
 
@@ -97,7 +97,7 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
 
 
 def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
-    """Mitsuba's parser state. The scene's folder is on the search path only while no plug-in is loaded."""
+    """Mitsuba's parser state. The scene's folders are on the search path only while no plug-in is loaded."""
     resolver, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
     mi.set_file_resolver(search_path(mi, file.parent))
     try:
@@ -113,7 +113,7 @@ def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     return state
 
 
-def _from_xml(mi: Any, state: Any, bases: list[Path], folder: Path | None) -> Node:
+def _from_xml(mi: Any, state: Any, bases: list[Path], folders: list[Path] | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
     nodes, index_of = list(state.nodes), state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
@@ -129,8 +129,8 @@ def _from_xml(mi: Any, state: Any, bases: list[Path], folder: Path | None) -> No
     for index, node in enumerate(nodes):
         try:
             name, tag = node.props.id() or keys.get(index, ""), node.type.name.lower()
-            require_allowed(node.props.plugin_name(), tag=tag, name=name, trust=folder is None)
-            parts.append(_xml_part(node, nodes, index_of, bases, folder))
+            require_allowed(node.props.plugin_name(), tag=tag, name=name, trust=folders is None)
+            parts.append(_xml_part(node, nodes, index_of, bases, folders))
         except InputError as error:
             raise InputError(f"{mi.parser.file_location(state, node)}: {error}") from None
     numbers: Counter[str] = Counter()
@@ -143,7 +143,9 @@ def _from_xml(mi: Any, state: Any, bases: list[Path], folder: Path | None) -> No
     return parts[0]
 
 
-def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: list[Path], folder: Path | None) -> Node:
+def _xml_part(
+    node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: list[Path], folders: list[Path] | None
+) -> Node:
     """One node of a parsed scene without its children."""
     properties = node.props
     result: Node = {"type": properties.plugin_name()}
@@ -158,7 +160,7 @@ def _xml_part(node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: l
             target = nodes[index_of[value.id()]]  # an <alias> has no node of its own
             result[key] = {"type": "ref", "id": target.props.id()}
         elif kind == "String" and key == "filename":
-            file = find_file(value, bases, folder)
+            file = find_file(value, bases, folders)
             check_mesh_file(result["type"], file)
             result[key] = str(file)
         elif kind != "ResolvedReference":

@@ -120,7 +120,9 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
         return 2 if direct else Scene.max_depth, Scene.rr_depth
     depth, rr_depth = nodes[0].get("max_depth", _PATHS[nodes[0]["type"]]), nodes[0].get("rr_depth", Scene.rr_depth)
     require_whole(f"scene {name}: rr_depth", rr_depth, 1, 1 << 31, "roulette begins after the first surface")
-    return DEEPEST if depth < 0 else max(2, int(depth)), min(int(rr_depth), DEEPEST)
+    if depth >= 0:
+        require_whole(f"scene {name}: max_depth", depth, 1, 1 << 31, "1 is emission alone, -1 without a limit")
+    return DEEPEST if depth < 0 else min(int(depth), DEEPEST), min(int(rr_depth), DEEPEST)
 
 
 def _kind(mi: Any, part: Any) -> str:
@@ -145,8 +147,12 @@ def _camera(mi: Any, name: str, description: Node, notes: list[str]) -> tuple[No
     size = film.get("height", FILM_SIZE[0]), film.get("width", FILM_SIZE[1])
     for side, pixels in zip(("height", "width"), size, strict=True):
         require_whole(f"scene {name}: film {side}", pixels, 1, 1 << 15, "give pixels")
-    if any(key.startswith("crop") for key in film):
-        notes.append("the film's crop is left out: the whole picture is rendered")
+    whole = {"crop_offset_x": 0, "crop_offset_y": 0, "crop_height": size[0], "crop_width": size[1]}
+    if cut := [f"{key}={film[key]}" for key, uncut in whole.items() if film.get(key, uncut) != uncut]:
+        raise InputError(
+            f"scene {name}: film {', '.join(cut)}: no part of a picture is rendered; allowed: the whole; "
+            "remove crop_*, and cut the picture afterwards"
+        )
     return lens, (int(size[0]), int(size[1]))
 
 

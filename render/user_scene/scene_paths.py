@@ -1,12 +1,13 @@
 """Reading a scene's XML before Mitsuba does, and the files that a scene may name.
 
-Mitsuba's parser acts while it reads: ``<path>`` adds a folder from which plug-ins are loaded, ``<include>`` and
-``<spectrum filename>`` open files, ``$parameters`` multiply text, and deep nesting ends the process. So expat, which
-only reads, goes first.
+Mitsuba's parser acts while it reads: ``<include>`` and ``<spectrum filename>`` open files, ``$parameters`` multiply
+text, and deep nesting ends the process. So expat, which only reads, goes first. ``<path>`` adds a folder in which files
+are looked for, and from which plug-ins would be loaded: the folders are on Mitsuba's search path while it parses, which
+loads none, and off it before anything is instantiated. Files are then named by their whole path.
 """
 
 import os
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
@@ -24,16 +25,16 @@ MOST_SUBSTITUTED = 10_000_000  # characters that $parameters may add
 TRUST = "if you trust the scene, trust=True or --trust-scene"
 
 
-def find_file(name: str, bases: list[Path], folder: Path | None) -> Path:
+def find_file(name: str, bases: Sequence[Path], folders: Sequence[Path] | None) -> Path:
     """Path of a file that a scene names, links not followed: what is named in it is looked for beside the link.
 
     Parameters
     ----------
     name : str
-    bases : list of Path
+    bases : sequence of Path
         Folders in which a relative name is looked for, in this order.
-    folder : Path or None
-        The file has to lie inside it, links followed; None allows any folder.
+    folders : sequence of Path or None
+        The file has to lie inside one of them, links followed; None allows any folder.
 
     Raises
     ------
@@ -44,8 +45,11 @@ def find_file(name: str, bases: list[Path], folder: Path | None) -> Path:
         raise InputError(f"file {name!r} is not allowed; name a file in the scene's folder")
     candidates = [str(base / name) for base in bases]
     chosen = next(filter(os.path.exists, candidates), candidates[0])
-    if folder is not None and not Path(os.path.realpath(chosen)).is_relative_to(os.path.realpath(folder)):
-        raise InputError(f"file {name!r} lies outside the scene's folder; move it there, or, {TRUST}")
+    real = Path(os.path.realpath(chosen))
+    if folders is not None and not any(real.is_relative_to(os.path.realpath(folder)) for folder in folders):
+        raise InputError(
+            f"file {name!r} lies outside the scene's folder and those of its <path>; move it there, or, {TRUST}"
+        )
     if not os.path.exists(chosen):
         places = ", ".join(map(str, bases))
         raise InputError(f"file {name!r} is missing in {places}; put it there or correct the name")
@@ -79,23 +83,30 @@ class _Spent:
     parameters: dict[str, str] = field(default_factory=dict)
 
 
-def screen(path: Path, folder: Path | None, define: Mapping[str, str]) -> None:
+def screen(path: Path, trust: bool, define: Mapping[str, str]) -> list[Path]:
     """Read a scene file and what it includes, and raise `InputError` for what Mitsuba's parser shouldn't see.
+
+    Returns
+    -------
+    list of Path
+        Folders in which the scene's files are looked for: those of its ``<path>`` elements, the latest first, then its
+        own.
 
     Parameters
     ----------
     path : Path
         Scene file, absolute.
-    folder : Path or None
-        Where included files and spectra have to lie; None lets files anywhere and ``<path>`` through, in whose folders
-        they are then looked for.
+    trust : bool
+        Lets files anywhere through; else they have to lie in those folders.
     define : mapping of str to str
         Values of $parameters, before those of <default>.
     """
-    _screen(path, [path.parent], folder, 0, _Spent(parameters=dict(define)))
+    folders = [path.parent]
+    _screen(path, folders, None if trust else folders, 0, _Spent(parameters=dict(define)))
+    return folders
 
 
-def _screen(path: Path, bases: list[Path], folder: Path | None, level: int, spent: _Spent) -> None:
+def _screen(path: Path, bases: list[Path], allowed: list[Path] | None, level: int, spent: _Spent) -> None:
     parser = expat.ParserCreate("utf-8")
     depth = level
 
@@ -110,13 +121,16 @@ def _screen(path: Path, bases: list[Path], folder: Path | None, level: int, spen
         try:
             # As Mitsuba: a file's own folder counts for its includes alone, its includer's for both.
             places = [path.parent, *bases] if tag == "include" else bases
-            named = _checked_element(tag, attributes, depth, places, folder, spent)
-            if tag == "path":  # the latest comes first; one of an included file counts in that file alone
-                bases.insert(0, _named_folder(attributes.get("value", ""), [path.parent, *bases], spent))
+            named = _checked_element(tag, attributes, depth, places, allowed, spent)
+            if tag == "path":  # the latest comes first
+                named_folder = _named_folder(attributes.get("value", ""), [path.parent, *bases], spent)
+                bases.insert(0, named_folder)
+                if allowed is not None and named_folder not in allowed:
+                    allowed.insert(0, named_folder)  # an included file's paths count for the files of all
         except InputError as error:
             refuse(error)
         if named and tag == "include":
-            _screen(named, [path.parent, *bases], folder, depth, spent)
+            _screen(named, [path.parent, *bases], allowed, depth, spent)
 
     def end(_: str) -> None:
         nonlocal depth
@@ -150,13 +164,11 @@ def _content(path: Path, spent: _Spent) -> bytes:
 
 
 def _checked_element(
-    tag: str, attributes: dict[str, str], depth: int, bases: list[Path], folder: Path | None, spent: _Spent
+    tag: str, attributes: dict[str, str], depth: int, bases: list[Path], allowed: list[Path] | None, spent: _Spent
 ) -> Path | None:
     """Check one element; gives the file that Mitsuba's parser would open for it."""
     if depth > MOST_NESTED:
         raise InputError(f"elements are nested over {MOST_NESTED} deep; flatten the scene")
-    if tag == "path" and folder is not None:
-        raise InputError(f"<path> lets a scene load native code and is refused; remove it, or, {TRUST}")
     longest = max(map(len, spent.parameters.values()), default=0)
     # Each parameter may hold earlier ones, so that ten lines of <default> could fill the memory.
     spent.substituted += sum(value.count("$") for value in attributes.values()) * longest
@@ -167,7 +179,7 @@ def _checked_element(
         spent.parameters.setdefault(given.get("name", ""), given.get("value", ""))
     if tag not in ("include", "spectrum") or "filename" not in attributes:
         return None
-    return find_file(_substitute(attributes["filename"], spent.parameters), bases, folder)
+    return find_file(_substitute(attributes["filename"], spent.parameters), bases, allowed)
 
 
 def _named_folder(value: str, bases: list[Path], spent: _Spent) -> Path:

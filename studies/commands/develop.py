@@ -153,7 +153,8 @@ class RenderOrder:
     max_seconds : float, optional
         Time for the render in seconds, at most.
     max_depth : int, optional
-        Longest path in segments; 2 is direct light. By default what the scene's file states, 8 where it states none.
+        Longest path in segments; 1 is emission alone, 2 direct light. By default what the scene's file states, or
+        8.
     seed : int
         Seed of the render.
     cache : Path, optional

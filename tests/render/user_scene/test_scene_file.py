@@ -268,17 +268,22 @@ HIDDEN = '<integrator type="volpath"><boolean name="hide_emitters" value="true"/
 
 def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> None:
     second = CAMERA.replace('id="camera"', 'id="second"').replace('value="8"', 'value="80"')
-    crop = '<integer name="crop_width" value="2"/></film>'
-    opened = load_scene_file(write(tmp_path, HIDDEN, CAMERA.replace("</film>", crop), second, SUN))
+    opened = load_scene_file(write(tmp_path, HIDDEN, CAMERA, second, SUN))
     assert opened.size == (6, 8)
     assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
     assert {value["type"] for value in opened.scene.geometry.values() if isinstance(value, dict)} == {
         *("perspective", "directional")
     }
     notes = " ".join(opened.notes)
-    assert all(
-        word in notes for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "crop", "hide_emitters")
-    )
+    assert all(word in notes for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "hide_emitters"))
+
+
+def test_a_cut_out_of_the_film_is_refused_and_the_whole_is_none(tmp_path: Path) -> None:
+    for key, value, whole in (("crop_width", 2, 8), ("crop_height", 5, 6), ("crop_offset_x", 1, 0)):
+        cut = f'<integer name="{key}" value="{{}}"/></film>'
+        path = CAMERA.replace("</film>", cut.format(value))
+        assert f"film {key}={value}: no part of a picture is rendered" in told(tmp_path, path, SUN, WALL)
+        assert load_scene_file(write(tmp_path, CAMERA.replace("</film>", cut.format(whole)), SUN, WALL)).size == (6, 8)
 
 
 PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></integrator>'
@@ -291,6 +296,7 @@ PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></inte
         ('<integrator type="path"/>', 65536),
         ('<integrator type="path"><integer name="max_depth" value="-1"/></integrator>', 65536),
         ('<integrator type="path"><integer name="max_depth" value="17"/></integrator>', 17),
+        ('<integrator type="path"><integer name="max_depth" value="1"/></integrator>', 1),
         ('<integrator type="direct"/>', 2),
         ('<integrator type="direct_projective"/>', 2),
         ('<integrator type="prb_projective"/>', 6),
@@ -299,6 +305,17 @@ PATH_OF_3 = '<integrator type="path"><integer name="max_depth" value="3"/></inte
 )
 def test_paths_are_as_long_as_the_file_states(integrator: str, depth: int, tmp_path: Path) -> None:
     assert load_scene_file(write(tmp_path, integrator, CAMERA, SUN)).scene.max_depth == depth
+
+
+def test_a_path_of_one_segment_shows_emission_alone(tmp_path: Path) -> None:
+    """A lamp of 3 in front of a wall that it lights: 3 where it is seen, 0 elsewhere."""
+    one = '<integrator type="path"><integer name="max_depth" value="1"/></integrator>'
+    size = '<transform name="to_world"><scale value="0.2"/><translate z="0.5"/></transform>'
+    lamp = f'<shape type="rectangle">{size}<emitter type="area" id="lamp"><spectrum name="radiance" value="3"/>'
+    opened = load_scene_file(write(tmp_path, one, CAMERA, WALL, f"{lamp}</emitter></shape>"))
+    values = render(opened.scene, (9, 9), wavelength_nm=[550.0], width_nm=[10.0], spp=128).relight().values[..., 0]
+    np.testing.assert_allclose(values[[0, -1, 4, 4], [0, -1, 4, 0]], [0, 0, 3, 0], rtol=1e-6)
+    assert "max_depth: 0 is outside 1 to" in told(tmp_path, one.replace('"1"', '"0"'), CAMERA, SUN, WALL)
 
 
 @loop(("stated", "first"), [("", 5), ("2", 2), ("1000000000", 65536)])
@@ -518,12 +535,11 @@ def test_native_code_of_a_scenes_own_is_refused_before_it_is_loaded(tmp_path: Pa
     shutil.copy(stock, tmp_path / "plugins" / "ball.so")  # native code that does load, as the next test shows
     before = repr(mitsuba_module().file_resolver())
     ball = CAMERA, SUN, '<shape type="ball"/>'
-    assert "<path> lets a scene load native code" in (words := told(tmp_path, '<path value="."/>', *ball))
-    assert "--trust-scene" in words
-    assert repr(mitsuba_module().file_resolver()) == before
     write(tmp_path, '<path value="."/>', name="in.xml")
-    assert "<path>" in told(tmp_path, '<include filename="in.xml"/>', CAMERA, SUN)
-    assert "shape type: 'ball' is unknown" in told(tmp_path, *ball)
+    for place in ("", '<path value="."/>', f'<path value="{tmp_path}"/>', '<include filename="in.xml"/>'):
+        assert "shape type: 'ball' is unknown" in (words := told(tmp_path, place, *ball))
+        assert "--trust-scene" in words
+    assert repr(mitsuba_module().file_resolver()) == before
     assert str(tmp_path) not in loaded_libraries()
 
 
@@ -540,7 +556,8 @@ def test_a_trusted_scene_may_load_native_code_and_files_from_anywhere(tmp_path: 
     assert str(tmp_path / "mine") in loaded_libraries()
 
 
-def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp_path: Path) -> None:
+@loop("trust", [False, True])
+def test_files_of_a_scene_are_looked_for_in_the_folders_of_its_paths(trust: bool, tmp_path: Path) -> None:
     """Mesh, bitmap, spectrum, include: each in a folder beside the scene; the last <path> goes first."""
     for name, height in (("models", 1), ("later", 2), ("a", 9)):
         (tmp_path / name).mkdir()
@@ -557,7 +574,7 @@ def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp
         f'<bsdf type="diffuse" id="red">{cloth}</bsdf>',
         '<shape type="obj" id="quad"><string name="filename" value="quad.obj"/><ref id="red"/></shape>',
     )
-    scene = load_scene_file(write(tmp_path / "a", *parts), trust=True).scene
+    scene = load_scene_file(write(tmp_path / "a", *parts), trust=trust).scene
     assert Path(scene.geometry["quad"]["filename"]).resolve() == tmp_path.resolve() / "later" / "quad.obj"
     assert Path(scene.geometry["red"]["reflectance"]["filename"]).resolve() == tmp_path.resolve() / "models" / "p.png"
     assert scene.geometry["grey"]["reflectance"]["values"] == "0.25,0.75"
@@ -565,7 +582,24 @@ def test_files_of_a_trusted_scene_are_looked_for_in_the_folders_of_its_paths(tmp
     ours, stock = mi.load_dict(scene.description), mi.load_file(str(tmp_path / "a" / "scene.xml"))
     assert ours.shapes()[0].bbox().min.z == stock.shapes()[0].bbox().min.z == 2
     absent = '<path value="../none"/>'
-    assert "<path> folder '../none' is missing" in told(tmp_path / "a", absent, CAMERA, SUN, trust=True)
+    assert "<path> folder '../none' is missing" in told(tmp_path / "a", absent, CAMERA, SUN, trust=trust)
+
+
+def test_a_path_lets_files_of_its_folder_in_and_no_others(tmp_path: Path) -> None:
+    for name in ("common", "secret"):
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "quad.obj").write_text(QUAD)
+    (tmp_path / "common" / "link.obj").symlink_to(tmp_path / "secret" / "quad.obj")
+    (tmp_path / "a").mkdir()
+    mesh = '<shape type="obj" id="quad"><string name="filename" value="{}"/></shape>'
+    common = '<path value="../common"/>', CAMERA, SUN
+    for name in ("quad.obj", "../common/quad.obj"):
+        scene = load_scene_file(write(tmp_path / "a", *common, mesh.format(name))).scene
+        assert Path(scene.geometry["quad"]["filename"]).resolve() == (tmp_path / "common" / "quad.obj").resolve()
+    for name in ("link.obj", "../secret/quad.obj", str(tmp_path / "secret" / "quad.obj")):
+        assert "lies outside the scene's folder and those of its <path>" in told(
+            tmp_path / "a", *common, mesh.format(name)
+        )
 
 
 def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -149,13 +149,13 @@ REFUSED = (
     ("scene/room.xml --noise -1", "noise: -1 ... 0.02"),
     ("still_life --trust-scene", "trust-scene: True for 'still_life'"),
     ("scene/room.xml --extend hol", "extend: 'hol' ... did you mean 'hold'?"),
-    ("scene/hostile.xml", "(line 2, col 1) ... <path> lets a scene load native code ... --trust-scene"),
+    ("scene/hostile.xml", "(line 2, col 1) ... '../secret.xml' lies outside the scene's folder ... --trust-scene"),
 )
 
 
 def test_bad_input_is_refused_and_a_bad_place_is_told_before_the_render(scene, tmp_path, monkeypatch):
     (scene.parent / "sky.xml").write_text(SCENE.format("sunsky"))
-    (scene.parent / "hostile.xml").write_text(SCENE.replace("<sensor", '<path value="."/><sensor', 1))
+    (scene.parent / "hostile.xml").write_text(SCENE.replace("<sensor", '<include filename="../secret.xml"/><sensor', 1))
     (tmp_path / "taken.exr").mkdir()
     monkeypatch.chdir(tmp_path)
     check_refusals("render", REFUSED, tmp_path)
