@@ -392,7 +392,7 @@ def test_a_bad_size_is_refused_with_its_value(size):
         ("spp", 2.5, "spp: 2.5 "),
         ("noise", 0.0, "noise: 0.0 is outside 1e-06 to 10"),
         ("max_seconds", 0.0, "max_seconds: 0.0 is outside 0.001 to 1e+07"),
-        ("max_depth", 1, "max_depth: 1 is outside 2 to 65536"),
+        ("max_depth", 0, "max_depth: 0 is outside 1 to 65536"),
         ("max_depth", 2.5, "max_depth: 2.5 "),
         ("seed", -1, "seed: -1 is outside 0 to 9"),
         ("wavelength_nm", [500.0, 400.0], "wavelength_nm"),
