@@ -14,23 +14,34 @@ def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: 
     return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
 
 
-def combine(coefficients: Floats, planes: Planes) -> Planes:
-    """Sum over groups, shape (band, h, w): in float64, rounded once; every value is read once."""
+def combine(maps: Floats, planes: Planes) -> Planes:
+    """Sum over groups and bands, shape (band, h, w): in float64, rounded once.
+
+    Parameters
+    ----------
+    maps : (group, band, band) float64
+        Factors from each group's bands (last axis) to those of the sum; where they are 0 nothing is read.
+    planes : (group, band, h, w) float32
+    """
     groups, bands, height, width = planes.shape
     pixels = height * width
-    flat = planes.reshape(groups, bands, pixels)
+    flat = planes.reshape(groups * bands, pixels)
+    factors = np.moveaxis(maps, 0, 1).reshape(bands, groups * bands)
+    read = [np.flatnonzero(row) for row in factors]
     if backend() == "numpy":
         result = np.empty((bands, pixels), dtype=np.float32)
-        for band in range(bands):
-            result[band] = coefficients[:, band] @ flat[:, band].astype(np.float64)
+        for band, chosen in enumerate(read):
+            result[band] = factors[band, chosen] @ flat[chosen].astype(np.float64)
         return result.reshape(bands, height, width)
     types = arrays()
     sums, index = dr.empty(types.Float, bands * pixels), dr.arange(types.UInt, pixels)
-    for band in range(bands):  # a kernel each, all of one code; arrays of the host are read where they are
+    most = max(groups, *map(len, read))
+    for band, chosen in enumerate(read):  # a kernel each, all of one code; arrays of the host are read where they are
         total = types.Float64(0)
-        for group in range(groups):
-            factor = dr.opaque(types.Float64, float(coefficients[group, band]))
-            total = dr.fma(types.Float64(types.Float(flat[group, band])), factor, total)
+        padded = [*chosen, *[0] * (most - chosen.size)]
+        for number, plane in enumerate(padded):
+            factor = dr.opaque(types.Float64, float(factors[band, plane]) if number < chosen.size else 0.0)
+            total = dr.fma(types.Float64(types.Float(flat[plane])), factor, total)
         dr.scatter(sums, types.Float(total), index + dr.opaque(types.UInt, band * pixels), mode=dr.ReduceMode.Permute)
         dr.eval(sums)
     return np.asarray(sums.numpy()).reshape(bands, height, width)

@@ -1,27 +1,17 @@
-"""How far a render may be off: Monte Carlo noise, and light that varies within a band together with the scene.
+"""How far a render's Monte Carlo noise may put it off, from pixels spread evenly over the picture."""
 
-Both are estimated from pixels spread evenly over the picture, and cost little beside relighting.
-"""
-
-import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.scene import LightGroup
-from render.spectrum import Spectrum, colour_matching_functions
 from rodcone.display import brief
 from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
 LEAST_UNCOVERED = 1e-6  # of a pixel: less is rounding
-MOST_BAND_ERROR = 0.01  # of a band's light: a larger error of wide bands is said
-MOST_LUMINANCE_ERROR = 0.04  # of a picture; 80 nm of daylight miss 2.5 %, a line in 10 nm up to 7 %
-LEAST_LIGHT = 0.01  # of the picture's light, in a band whose error counts
-SUB_BANDS = 64  # of a band, over which a light's moments are summed: 0.16 nm in a band of 10 nm
 
 
 @dataclass(frozen=True)
@@ -177,7 +167,7 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
     shared : SharedPaths, optional
         Groups whose errors are correlated.
     """
-    chosen = _spread(radiance.shape[2:])
+    chosen = spread_pixels(radiance.shape[2:])
     total = (emitted[:, :, None, None] ** 2 * variance[chosen]).sum(axis=0)
     if shared:
         total += replace(shared, correlation=shared.correlation[chosen]).term(emitted, variance[chosen])
@@ -186,114 +176,8 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
     return float(np.median(np.sqrt(np.maximum(total[lit], 0.0)) / values[lit])) if lit.any() else 0.0
 
 
-def within_band_error(
-    lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
-) -> Floats:
-    """Error of the product of band averages over each pixel's radiance, RMS over lit pixels; shape (band,).
-
-    The mean of transport T times emission S over a band is not the product of their means. With T expanded about the
-    band's centre, T + s x + q/2 (x^2 - w^2/12), what is missed is s <S x> + q/2 <S (x^2 - w^2/12)>, x from the centre.
-    Slope s and curvature q come from the neighbouring bands. The two terms are added without their signs; what T does
-    within a band beyond a parabola stays unseen. A coloured emitter is averaged as it is rendered, so a flat
-    factor on it misses nothing.
-
-    Parameters
-    ----------
-    radiance : (group, band, h, w) float32
-        At unit spectral emission.
-    """
-    chosen = _spread(radiance.shape[2:])
-    missed, total = np.zeros((2, *radiance[0][chosen].shape))
-    for light, planes in zip(lights.values(), radiance, strict=True):
-        transport = planes[chosen].astype(np.float64)
-        slope, curvature = _derivatives(transport, wavelength_nm)
-        moments = _moments(light.spectrum, wavelength_nm, width_nm)
-        mean, first, second = (moment[:, None, None] * light.power for moment in moments)
-        missed += np.abs(slope * first) + np.abs(curvature * second) / 2
-        total += transport * mean
-    # a lamp in view doesn't hide the rest
-    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
-    lit = np.maximum((total > 0).sum(axis=(1, 2)), 1)
-    return np.asarray(np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit))
-
-
-def luminance_error(
-    lights: Mapping[str, LightGroup], radiance: Planes, wavelength_nm: Floats, width_nm: Floats
-) -> float:
-    """Relative error of a picture's luminance whose lights are known by their band averages alone, RMS over pixels.
-
-    A sensor's channels, as steep as the eye's sensitivity, see an error of this order or some times it. As
-    `within_band_error`, with the eye's sensitivity in place of the transport, and signs.
-    """
-    eye = colour_matching_functions()[1].band_average(wavelength_nm, width_nm)
-    slope, curvature = (values[:, 0, 0] for values in _derivatives(eye[:, None, None], wavelength_nm))
-    transport = radiance[_spread(radiance.shape[2:])].astype(np.float64)
-    moments = [light.power * np.array(_moments(light.spectrum, wavelength_nm, width_nm)) for light in lights.values()]
-    mean, first, second = np.swapaxes(moments, 0, 1)  # (group, band)
-    weights = slope * first + curvature * second / 2, eye * mean
-    missed, total = (np.tensordot(weight * width_nm, transport, 2) for weight in weights)
-    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
-    return float(np.sqrt(np.square(relative).sum() / max(1, np.count_nonzero(total > 0))))
-
-
-class WideBandsWarning(UserWarning):
-    """Bands within which light and surfaces, or light and eye, vary together by more than band averages tell."""
-
-
-def warn_of_wide_bands(
-    error: Floats, photometric: float, values: Planes, wavelength_nm: Floats, width_nm: Floats
-) -> None:
-    """Warn (`WideBandsWarning`) where `within_band_error` is large in a band of a picture, with what would do.
-
-    For smooth light the error falls with the square of the width. `values` has the shape (band, h, w), `photometric` is
-    the `luminance_error`.
-    """
-    light = values.mean(axis=(1, 2), dtype=np.float64) * width_nm
-    error = np.where(light >= LEAST_LIGHT * light.sum(), error, 0.0)
-    worst = int(error.argmax())
-    if error[worst] > MOST_BAND_ERROR:
-        enough_nm = width_nm[worst] * (MOST_BAND_ERROR / error[worst]) ** 0.5
-        warnings.warn(
-            f"bands: the one at {wavelength_nm[worst]:g} nm is off by about {error[worst]:.1%}, for light and surfaces "
-            f"vary together within its {width_nm[worst]:g} nm; bands of {int(enough_nm) or enough_nm:.3g} nm would do, "
-            "or for a lamp's lines rodcone.line_bands",
-            WideBandsWarning,
-            stacklevel=3,
-        )
-    if photometric > MOST_LUMINANCE_ERROR and light.any():
-        warnings.warn(
-            f"bands: luminance is off by about {photometric:.1%} and a sensor's channels by more, for a light varies "
-            f"within bands of up to {width_nm.max():g} nm; give narrower ones, as --bands of rodcone render, or for a "
-            "lamp's lines rodcone.line_bands",
-            WideBandsWarning,
-            stacklevel=3,
-        )
-
-
-def _spread(shape: tuple[int, ...]) -> tuple[Any, ...]:
+def spread_pixels(shape: tuple[int, ...]) -> tuple[Any, ...]:
     """Index (..., row, column) of at most about `SAMPLE_PIXELS` pixels, evenly spread over a picture."""
     step = max(1, round(np.sqrt(shape[0] * shape[1] / SAMPLE_PIXELS)))
     rows, columns = (np.arange(min(step // 2, length - 1), length, step) for length in shape)
     return ..., rows[:, None], columns
-
-
-def _derivatives(values: Floats, wavelength_nm: Floats) -> tuple[Floats, Floats]:
-    """Slope and curvature over wavelength (axis 0), from the parabola through each band and its two neighbours."""
-    if wavelength_nm.size < 2:
-        return np.zeros_like(values), np.zeros_like(values)
-    slope = np.gradient(values, wavelength_nm, axis=0, edge_order=1 if wavelength_nm.size == 2 else 2)
-    if wavelength_nm.size == 2:
-        return slope, np.zeros_like(values)
-    steps = np.diff(wavelength_nm)[:, None, None]
-    curvature = 2 * np.diff(np.diff(values, axis=0) / steps, axis=0) / (steps[1:] + steps[:-1])
-    return slope, np.pad(curvature, ((1, 1), (0, 0), (0, 0)), mode="edge")
-
-
-def _moments(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> tuple[Floats, Floats, Floats]:
-    """Mean of S, S x and S (x^2 - w^2/12) over each band, x from its centre; shape (band,) each."""
-    places = (np.arange(SUB_BANDS) + 0.5) / SUB_BANDS - 0.5
-    x = places * width_nm[:, None]
-    sub_width = np.repeat(width_nm / SUB_BANDS, SUB_BANDS)
-    values = spectrum.band_average((wavelength_nm[:, None] + x).ravel(), sub_width).reshape(x.shape)
-    even = x**2 - np.mean(x**2, axis=1, keepdims=True)
-    return values.mean(axis=1), (values * x).mean(axis=1), (values * even).mean(axis=1)

@@ -1,6 +1,7 @@
 """Light spectra by name, each scaled to a luminance of 1 cd/m^2 (1 lux for an irradiance)."""
 
 import re
+import warnings
 from functools import cache
 
 import numpy as np
@@ -12,7 +13,7 @@ from render.spectrum import (
     colour_matching_functions,
     flat,
     line_spectrum,
-    luminance,
+    luminous_efficiency,
     published_spectra,
 )
 from rodcone.curve_file import is_curve_file, read_columns
@@ -25,6 +26,8 @@ _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
 # Rise of the full moon's reflectance per nm, over its value at 550 nm: straight line through the 16 bands of 405 to
 # 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
 MOON_SLOPE_PER_NM = 1.48e-3
+# Lamps of lines whose tables hold 5 nm steps: the table is all that is known, and it has none.
+TABULATED_LINES = ("F11", "LED-RGB1", "sodium_high")
 _NUMBER = re.compile(r"\d{4,5}")  # too large for a name's
 # Units of a column that no factor turns into power per wavelength.
 _NOT_POWER = re.compile(r"\b(?:[µμu]?mol\w*|photons?|quanta|dBm?|log\w*|counts?)\b", re.IGNORECASE)
@@ -43,14 +46,23 @@ def names() -> tuple[str, ...]:
 def lines_nm(name: str) -> tuple[float, ...]:
     """Emission lines of a named light, to give `line_bands`; empty where its spectrum is smooth.
 
-    Fluorescent lamps and high-pressure sodium count as smooth: their tables hold 5 nm steps, no lines.
-
     Raises
     ------
     InputError
         Where `name` is unknown.
+
+    Warns
+    -----
+    UserWarning
+        For a lamp of lines whose table has none: plain bands follow the table to its corners.
     """
     illuminant(name)
+    if name in TABULATED_LINES:
+        warnings.warn(
+            f"lines_nm: {name} is a lamp of lines whose table holds steps of 5 nm and no lines: none to give; "
+            "plain bands follow its table, with electrons within 0.2 % at 10 nm and 2 % at 20 nm",
+            stacklevel=2,
+        )
     return _LINES[name][0] if name in _LINES else ()
 
 
@@ -174,4 +186,4 @@ def spectral_luminance(spectrum: Spectrum) -> float:
     """Luminance of a spectrum at power 1, summed in 1 nm bands over 360-830 nm."""
     nm = np.arange(360.5, 830.0)
     width = np.ones_like(nm)
-    return float(luminance(spectrum.band_average(nm, width), nm, width))
+    return float(LUMINOUS_EFFICACY_LM_W * (spectrum.band_average(nm, width) @ luminous_efficiency(nm, width)))

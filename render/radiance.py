@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import band_widths, luminance, tristimulus
+from render.spectrum import Spectrum, band_widths, luminance, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
@@ -32,6 +32,9 @@ class SpectralRadiance:
         for, or there is no estimate.
     signed : bool
         Whether values may be negative: half of a render, whose noise may cross 0.
+    light : Spectrum, optional
+        The lamp behind the values, up to a factor: with it integrals over bands follow its lines and slopes. None where
+        it isn't known, or the values aren't a lamp's on smooth surfaces: they are then taken as smooth themselves.
 
     Raises
     ------
@@ -46,6 +49,7 @@ class SpectralRadiance:
     width_nm: Floats | None = None
     relative_level_error: float | None = None
     signed: bool = False
+    light: Spectrum | None = None
 
     __repr__ = brief
 
@@ -77,7 +81,7 @@ class SpectralRadiance:
 
     def luminance(self) -> NDArray[np.float64]:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
-        return luminance(self.values, self.wavelength_nm, self.widths_nm)
+        return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
 
     @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:
@@ -85,7 +89,9 @@ class SpectralRadiance:
         return draw_line({"": self.luminance()}, row, axes, "luminance, cd/m²")
 
     def _repr_png_(self) -> bytes:
-        return preview_png(tristimulus(self.values, self.wavelength_nm, self.widths_nm) @ XYZ_TO_SRGB_ROUNDED.T)
+        return preview_png(
+            tristimulus(self.values, self.wavelength_nm, self.widths_nm, self.light) @ XYZ_TO_SRGB_ROUNDED.T
+        )
 
 
 def check_values(name: str, values: NDArray[np.floating], signed: bool = False) -> None:

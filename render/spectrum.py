@@ -8,13 +8,14 @@ import json
 import re
 from collections.abc import Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib import metadata
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from render.band_weights import band_weights
 from rodcone.display import Axes, brief, draw_curves, png_of
 from rodcone.doors import method
 from rodcone.errors import InputError
@@ -27,6 +28,7 @@ MOST_OVERLAP = 0.01  # of the narrower of two bands: rounding of stated edges, n
 LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
 LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
 LEAST_LINE = 1e-3  # of a light's power: less is noise of a curve that is measured finely
+OBSERVER_NM: Floats = np.arange(360.0, 831.0)  # corners of the CIE 1931 observer
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
 
 
@@ -280,20 +282,56 @@ def luminous_efficiency(wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats
     return colour_matching_functions()[1].band_average(wavelength_nm, width_nm)
 
 
-def luminance(spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> NDArray[np.float64]:
-    """Photometric value of a spectral radiometric one over its last axis (band): K_m sum L V d_lambda.
+def luminance(
+    spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None
+) -> NDArray[np.float64]:
+    """Photometric value of a spectral radiometric one over its last axis (band): K_m times the integral of L V.
 
     Radiance [W m^-2 sr^-1 nm^-1] gives luminance [cd m^-2]; irradiance [W m^-2 nm^-1] gives illuminance [lux].
+
+    Parameters
+    ----------
+    spectral : (..., band) floating
+        Band means.
+    wavelength_nm, width_nm : (band,) array_like
+    light : Spectrum, optional
+        The lamp that lies behind the band means, up to a factor (`render.band_weights`).
     """
-    weights = luminous_efficiency(wavelength_nm, width_nm) * np.asarray(width_nm)
+    weights = observer_weights(wavelength_nm, width_nm, light)[1]
     return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
 
 
-def tristimulus(spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> NDArray[np.float64]:
-    """XYZ [cd m^-2] of spectral radiance over its last axis (band): shape (..., 3), Y is luminance."""
-    curves = [curve.band_average(wavelength_nm, width_nm) for curve in colour_matching_functions()]
-    weights = np.stack(curves, axis=-1) * np.asarray(width_nm)[:, None]
+def tristimulus(
+    spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None
+) -> NDArray[np.float64]:
+    """XYZ [cd m^-2] of spectral radiance over its last axis (band): shape (..., 3), Y is luminance.
+
+    Parameters as of `luminance`.
+    """
+    weights = observer_weights(wavelength_nm, width_nm, light).T
     return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
+
+
+def observer_weights(wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None) -> Floats:
+    """Weights of band means in the integrals of x, y and z over them, shape (3, band); parameters as of `luminance`."""
+    nm = np.asarray(wavelength_nm, dtype=np.float64)
+    widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape)
+    known = None if light is None else (light.wavelength_nm.tobytes(), light.values.tobytes())
+    return _observer_weights(nm.tobytes(), widths.tobytes(), known)
+
+
+@lru_cache(maxsize=64)
+def _observer_weights(nm: bytes, width_nm: bytes, light: tuple[bytes, bytes] | None) -> Floats:
+    known = None if light is None else Spectrum(np.frombuffer(light[0]), np.frombuffer(light[1]))
+    weights = band_weights(observer, OBSERVER_NM, np.frombuffer(nm), np.frombuffer(width_nm), known)
+    weights.setflags(write=False)
+    return weights
+
+
+def observer(wavelength_nm: Floats) -> Floats:
+    """CIE 1931 x, y and z at wavelengths, shape (3, n)."""
+    curves = colour_matching_functions()
+    return np.array([np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves])
 
 
 def photons_per_joule(wavelength_nm: ArrayLike) -> Floats:

@@ -7,22 +7,17 @@ from typing import Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from render.combine import combine, emission
+from render.bands.error import curve_error, warn_of_wide_bands
+from render.bands.mixed_light import BandLight, band_light
+from render.combine import combine
 from render.denoised.denoise import Denoised
-from render.error_estimates import (
-    Halves,
-    SharedPaths,
-    luminance_error,
-    relative_error,
-    warn_of_wide_bands,
-    within_band_error,
-)
+from render.error_estimates import Halves, SharedPaths, relative_error
 from render.illuminants import illuminant
 from render.level import Irradiance, Level, SceneMeans
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
-from render.spectrum import Spectrum, luminance
+from render.spectrum import Spectrum
 from rodcone.display import brief
 from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes
@@ -141,25 +136,24 @@ class Transport:
         UserWarning
             Where a light's spectrum ends within the bands at a value other than 0: outside it is dark.
         WideBandsWarning
-            Where `band_error` is over 1 % in a band that holds 1 % of the light or more, with the width that would do;
-            where a light's lines put its luminance off by over 4 %.
+            Where `band_error` of the CIE observer is over 1 %.
         """
         if isinstance(spectra, float | int):
             powers = dict.fromkeys(self.groups, spectra)
             spectra = None
         lights = self._lights(spectra, powers)
-        emitted = emission(lights, self.wavelength_nm, self.width_nm)
-        coefficients, level_error = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
-        planes = combine(coefficients, self.radiance)
-        error = within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
-        photometric = luminance_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
-        warn_of_wide_bands(error, photometric, planes, self.wavelength_nm, self.width_nm)
+        light, level_error = self._at_level(self._in_bands(lights), luminance_cd_m2, illuminance_lux)
+        planes = combine(light.maps, self.radiance)
+        if light.mixed:  # beside a line the map of a lamp takes light off its neighbour
+            np.maximum(planes, np.float32(0), out=planes)
+        warn_of_wide_bands(self._curve_error(lights), self.width_nm)
         return SpectralRadiance(
             values=np.moveaxis(planes, 0, -1),
             wavelength_nm=self.wavelength_nm,
-            relative_mc_error=relative_error(coefficients, self.radiance, self.variance, self.shared),
+            relative_mc_error=relative_error(light.emitted, self.radiance, self.variance, self.shared),
             width_nm=self.width_nm,
             relative_level_error=level_error,
+            light=light.spectrum,
         )
 
     def relight_halves(
@@ -176,31 +170,55 @@ class Transport:
         unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
         be under 0: both are `signed`.
         """
-        emitted = self._emission(spectra, powers)
-        coefficients, _ = self._at_level(emitted, luminance_cd_m2, illuminance_lux)
-        values, difference = combine(coefficients, self.radiance), combine(coefficients, self.light.difference)
+        light, _ = self._at_level(self._emission(spectra, powers), luminance_cd_m2, illuminance_lux)
+        values, difference = combine(light.maps, self.radiance), combine(light.maps, self.light.difference)
         even, odd = (
-            SpectralRadiance(np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True)
+            SpectralRadiance(
+                np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True, light=light.spectrum
+            )
             for half in (values + difference, values - difference)
         )
         return even, odd
 
     def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
-        coefficients = self._own_at(luminance_cd_m2)
-        independent = combine(coefficients**2, self.variance)
+        coefficients = self._own_at(luminance_cd_m2).emitted
+        independent = combine(coefficients[:, :, None] ** 2 * np.eye(self.wavelength_nm.size), self.variance)
         if self.shared is None:
             return independent
         return np.asarray(np.maximum(independent + self.shared.term(coefficients, self.variance), np.float32(0)))
 
-    def band_error(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Floats:
-        """Error of `relight` where light and transport both vary within a band, shape (band,).
+    def band_error(
+        self,
+        spectra: Spectra | None = None,
+        *,
+        powers: Powers | None = None,
+        responses: Mapping[str, Spectrum] | None = None,
+    ) -> dict[str, float]:
+        """Relative error of the light that each curve collects, for want of what happens within bands; RMS over pixels.
 
-        Relative, RMS over pixels: the product of band averages misses their covariance
-        (`render.error_estimates.within_band_error`).
+        Expected of surfaces as rough over wavelength as these (`render.bands.error`); lamps count to their lines.
+
+        Parameters
+        ----------
+        spectra, powers
+            As `relight`.
+        responses : mapping of str to Spectrum, optional
+            Electrons per photon of a camera's channels, as ``sensor.responses.curves``; left out, the CIE 1931
+            observer's x, y and z.
+
+        Returns
+        -------
+        dict of str to float
+            By curve.
         """
-        lights = self._lights(spectra, powers)
-        return within_band_error(lights, self.radiance, self.wavelength_nm, self.width_nm)
+        if responses is not None:
+            require_kind("responses", responses, Mapping, "give sensor.responses.curves")
+            for name, curve in responses.items():
+                require_kind(f"responses[{name!r}]", curve, Spectrum, "give sensor.responses.curves")
+            if not responses:
+                raise InputError("responses: none given; allowed: one curve or more; give sensor.responses.curves")
+        return self._curve_error(self._lights(spectra, powers), responses)
 
     def level(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Level:
         """Mean luminance [cd m^-2] of what is no light, under given lights: what a level in cd/m^2 sets.
@@ -222,7 +240,8 @@ class Transport:
 
     def mean_radiance(self, *, luminance_cd_m2: float) -> Floats:
         """Mean radiance of what is no light, at a level of the scene's own lights, shape (band,)."""
-        return np.asarray((self._own_at(luminance_cd_m2) * self.scene_means.mean_radiance()).sum(axis=0))
+        own = self._own_at(luminance_cd_m2)
+        return np.asarray(np.einsum("gab,gb->a", own.maps, self.scene_means.mean_radiance()))
 
     def scattered_luminance(self, *, luminance_cd_m2: float | None = None) -> NDArray[np.float64]:
         """Luminance [cd m^-2] of each pixel without light that is seen directly, shape (h, w).
@@ -260,21 +279,30 @@ class Transport:
             lights[name] = replace(group, spectrum=spectrum, power=float(power))
         return lights
 
-    def _emission(self, spectra: Spectra | None = None, powers: Powers | None = None) -> Floats:
-        """Spectral emission of the lights asked for, shape (group, band)."""
-        return emission(self._lights(spectra, powers), self.wavelength_nm, self.width_nm)
+    def _emission(self, spectra: Spectra | None = None, powers: Powers | None = None) -> BandLight:
+        """Emission of the lights asked for."""
+        return self._in_bands(self._lights(spectra, powers))
 
-    def _own_at(self, luminance_cd_m2: float) -> Floats:
-        """Emission of the scene's own lights brought to a level, shape (group, band)."""
+    def _in_bands(self, lights: Mapping[str, LightGroup]) -> BandLight:
+        means = np.maximum(self.scene_means.radiance, 0.0).mean(axis=1)
+        return band_light(lights, means, self.wavelength_nm, self.width_nm)
+
+    def _curve_error(
+        self, lights: Mapping[str, LightGroup], responses: Mapping[str, Spectrum] | None = None
+    ) -> dict[str, float]:
+        return curve_error(lights, self.radiance, self.wavelength_nm, self.width_nm, responses)
+
+    def _own_at(self, luminance_cd_m2: float) -> BandLight:
+        """Emission of the scene's own lights brought to a level."""
         return self._at_level(self._emission(), luminance_cd_m2, None)[0]
 
     def _at_level(
-        self, emitted: Floats, luminance_cd_m2: float | None, illuminance_lux: float | None
-    ) -> tuple[Floats, float | None]:
-        """Emission brought to the level asked for, shape (group, band), and the relative error of that level."""
+        self, light: BandLight, luminance_cd_m2: float | None, illuminance_lux: float | None
+    ) -> tuple[BandLight, float | None]:
+        """Emission brought to the level asked for, and the relative error of that level."""
         if luminance_cd_m2 is not None and illuminance_lux is not None:
             raise InputError("luminance_cd_m2 and illuminance_lux: both given; allowed: one of them; leave one out")
-        weights = self._luminance_weights(emitted)
+        weights = self._luminance_weights(light)
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
             target, level = luminance_cd_m2, self.scene_means.luminance_level(weights)
@@ -284,11 +312,11 @@ class Transport:
                 raise InputError("illuminance_lux: the scene states no reference plane; give luminance_cd_m2 instead")
             target, level = illuminance_lux, self.meter().level(weights)
         else:
-            return emitted, None
+            return light, None
         if level.value <= 0:
             raise InputError(f"level: {target} can't be reached, the scene gives no light; raise a power or spectrum")
-        return emitted * (target / level.value), level.relative_error
+        return light * (target / level.value), level.relative_error
 
-    def _luminance_weights(self, emitted: Floats) -> Floats:
+    def _luminance_weights(self, light: BandLight) -> Floats:
         """Luminance of a transport of 1 in each group and band, shape (group, band)."""
-        return emitted * luminance(np.eye(self.wavelength_nm.size), self.wavelength_nm, self.width_nm)
+        return light.luminance_weights(self.wavelength_nm, self.width_nm)

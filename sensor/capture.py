@@ -84,7 +84,7 @@ def capture(
         expected_e = expected_electrons(light, sensor, exposure_s)
     else:
         # A lens that only scales light forms no image: its factors go to the weights and to the electrons.
-        weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.widths_nm, exposure_s)
+        weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.widths_nm, exposure_s, light.light)
         weights = weights * camera_equation(sensor.lens) if scaled else weights
         expected_e = expected_electrons_single(light.values, weights, sensor)
         if scaled and sensor.lens.horizontal_view_deg:

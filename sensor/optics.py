@@ -15,7 +15,7 @@ import scipy
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance, check_values
-from render.spectrum import Floats, band_widths, luminance, photons_per_joule
+from render.spectrum import Floats, Spectrum, band_widths, luminance, photons_per_joule
 from rodcone.display import brief
 from rodcone.errors import InputError, require_whole
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
@@ -44,6 +44,7 @@ class SpectralIrradiance:
     pitch_um : float
     width_nm : (band,) float64, optional
     signed : bool
+    light : Spectrum, optional
         As of `SpectralRadiance`.
     """
 
@@ -52,6 +53,7 @@ class SpectralIrradiance:
     pitch_um: float
     width_nm: Floats | None = None
     signed: bool = False
+    light: Spectrum | None = None
 
     __repr__ = brief
 
@@ -71,7 +73,7 @@ class SpectralIrradiance:
 
     def illuminance(self) -> NDArray[np.float64]:
         """Illuminance of each pixel [lux], shape (h, w)."""
-        return luminance(self.values, self.wavelength_nm, self.widths_nm)
+        return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
 
     def photons(self) -> NDArray[np.float64]:
         """Photons of all bands together [um^-2 s^-1], shape (h, w)."""
@@ -138,6 +140,7 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
         pitch_um=sensor.site_pitch_um,
         width_nm=radiance.widths_nm,
         signed=radiance.signed,
+        light=radiance.light,
     )
 
 

@@ -1,11 +1,14 @@
 """From irradiance to expected photo-electrons: the channels' responses, the exposure and the camera's window."""
 
 import warnings
+from collections.abc import Sequence
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import VISIBLE_NM, Floats, photons_per_joule
+from render.band_weights import band_weights
+from render.spectrum import VISIBLE_NM, Floats, Spectrum, photons_per_joule
 from rodcone.errors import InputError
 from sensor.cfa import channels, check_covers, mask
 from sensor.config import SensorConfig
@@ -18,11 +21,20 @@ _STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 
 
 def electrons_per_irradiance(
-    sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float
+    sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float, light: Spectrum | None = None
 ) -> Floats:
     """Electrons of each channel's photodiode per unit irradiance in each band, shape (channel, band).
 
-    Response x photons per joule x band width (its part inside the camera's window) x collecting area x time.
+    Response x photons per joule, integrated over the light inside the camera's window, x collecting area x time. Within
+    a band the light follows the lamp and surfaces that are smooth (`render.band_weights`).
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+    wavelength_nm, width_nm : (band,) float64
+    exposure_s : float
+    light : Spectrum, optional
+        The lamp behind the band means, up to a factor, as `SpectralRadiance.light`.
 
     Raises
     ------
@@ -45,15 +57,25 @@ def electrons_per_irradiance(
             "curves, or a preset that lends them",
             stacklevel=3,
         )
-    seen_nm = _inside_nm(sensor.window_nm, wavelength_nm, width_nm)
-    response = sensor.responses.band_average(sensor.channels, wavelength_nm, width_nm)
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
-    return np.asarray(response * photons_per_joule(wavelength_nm) * seen_nm * area_m2 * exposure_s)
+    curves = [sensor.responses.curves[channel] for channel in sensor.channels]
+    corners = np.concatenate([np.array(sensor.window_nm), *(curve.wavelength_nm for curve in curves)])
+    seen = partial(_electrons_per_joule, curves, sensor.window_nm)
+    return area_m2 * exposure_s * band_weights(seen, corners, wavelength_nm, width_nm, light)
+
+
+def _electrons_per_joule(curves: Sequence[Spectrum], window_nm: tuple[float, float], wavelength_nm: Floats) -> Floats:
+    """Electrons of each curve per joule of light at wavelengths, shape (curve, n)."""
+    inside = (wavelength_nm > window_nm[0]) & (wavelength_nm < window_nm[1])
+    responses = [np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves]
+    return np.asarray(np.array(responses) * photons_per_joule(wavelength_nm) * inside)
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
     """Expected photo-electrons that each photodiode would collect behind every filter, shape (h, w, channel)."""
-    weights = electrons_per_irradiance(sensor, irradiance.wavelength_nm, irradiance.widths_nm, exposure_s)
+    weights = electrons_per_irradiance(
+        sensor, irradiance.wavelength_nm, irradiance.widths_nm, exposure_s, irradiance.light
+    )
     planes = np.moveaxis(irradiance.values, -1, 0)
     flat = planes.reshape(planes.shape[0], -1)  # a view where the memory is band-planar
     electrons = weights.astype(flat.dtype) @ flat

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import rows_at
-from render.spectrum import Floats, band_widths, photons_per_joule, tristimulus
+from render.spectrum import Floats, band_widths, colour_matching_functions, photons_per_joule
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.display import brief
 from rodcone.errors import InputError
@@ -212,8 +212,10 @@ def training(
         raise InputError(f"reflectances: {surfaces.shape[0]} surfaces can't fit {camera.shape[0]} channels; give more")
     photons = light * photons_per_joule(nm) * width
     signals = (surfaces * photons) @ camera.T / (photons @ camera.T)
-    white = tristimulus(light, nm, width)
-    return signals, xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light, nm, width) / white[1], white))
+    # Camera and eye alike by band averages: what both miss within a band is nearly the same.
+    eye = np.stack([curve.band_average(nm, width) for curve in colour_matching_functions()], axis=-1) * width[:, None]
+    white = light @ eye
+    return signals, xyz_to_srgb(adapt_to_d65((surfaces * light) @ eye / white[1], white))
 
 
 def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:

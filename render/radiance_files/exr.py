@@ -203,7 +203,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
 
 def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
     """Linear sRGB (h, w, 3), and the luminance [cd m^-2] that reads 1 in it."""
-    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm)
+    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm, radiance.light)
     white = float(np.percentile(xyz[:, :, 1], PREVIEW_PERCENTILE)) / PREVIEW_AT or 1.0
     white = float(np.clip(white, _FLOAT.tiny, _FLOAT.max))
     return np.clip(xyz / white @ XYZ_TO_SRGB_ROUNDED.T, 0.0, _HALF_MAX).astype(np.float32), white

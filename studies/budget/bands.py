@@ -78,7 +78,9 @@ def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]
     """Radiance averaged over wide bands: what bands that follow light and scene within themselves would hold."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
-    return SpectralRadiance(values, nm, radiance.relative_mc_error, width_nm, signed=radiance.signed)
+    return SpectralRadiance(
+        values, nm, radiance.relative_mc_error, width_nm, signed=radiance.signed, light=radiance.light
+    )
 
 
 def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:

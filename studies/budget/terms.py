@@ -175,9 +175,8 @@ def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator)
     deviation = np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=1.0), 0.0)), 0, -1)
     signs = rng.choice(np.array([-1, 1], np.float32), (DRAWS, *deviation.shape[:2], 1))
     lights = [deviation, *((1 + sign) * deviation for sign in signs)]  # a lens takes no negative light
-    level, *draws = _electrons(
-        [SpectralRadiance(light, transport.wavelength_nm, 0.0, transport.width_nm) for light in lights], sensor
-    )
+    lit = transport.relight_halves(luminance_cd_m2=1.0)[0]
+    level, *draws = _electrons([replace(lit, values=light, signed=False) for light in lights], sensor)
     return np.asarray(np.stack(draws) - level)
 
 
@@ -195,7 +194,10 @@ def _band_errors(
     averaged = [merge_radiance(half, groups) for half in halves]
     # A level is reached by the luminance that the wide bands tell, so their share in that error is counted here.
     mean = SpectralRadiance(
-        transport.mean_radiance(luminance_cd_m2=1.0)[None, None], transport.wavelength_nm, width_nm=transport.width_nm
+        transport.mean_radiance(luminance_cd_m2=1.0)[None, None],
+        transport.wavelength_nm,
+        width_nm=transport.width_nm,
+        light=halves[0].light,
     )
     followed = _electrons(averaged, sensor) / merge_radiance(mean, groups).luminance().item()
     wide = _electrons(merge_transport(transport, groups).relight_halves(luminance_cd_m2=1.0), sensor)
@@ -216,5 +218,5 @@ def _jitter(
         for group in groups:
             index = group[position * len(group) // positions]
             chosen[..., group] = values[..., [index]]
-        radiances.append(SpectralRadiance(chosen, halves[0].wavelength_nm, 0.0, halves[0].width_nm))
+        radiances.append(replace(halves[0], values=chosen))
     return np.asarray(_electrons(radiances, sensor).var(axis=0))

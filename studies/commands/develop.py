@@ -245,7 +245,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     if interrupted:
         say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
     facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
-    facts["largest_band_error"] = float(transport.band_error(spectra).max())
+    facts["largest_band_error"] = max(transport.band_error(spectra).values())
     print_result(order.out, facts, json=json)
     return INTERRUPTED if interrupted else 0
 

@@ -247,7 +247,7 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
     for spectrum in job.study.spectra:
         lit = under(transport, spectrum)
         view = photographed(lit, 1.0)
-        xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm)
+        xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm, view.light)
         of_light = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit).astype(np.float32))
         facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():

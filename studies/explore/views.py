@@ -222,10 +222,17 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
         factor = exposed.transport.groups[name].power * exposed.scale
         return factor * np.asarray(frame.irradiance.values[row, column], dtype=np.float64)
 
-    irradiance = np.sum([light(name, frame) for name, frame in exposed.frames.items()], axis=0)
+    of_groups = {name: light(name, frame) for name, frame in exposed.frames.items()}
+    irradiance = np.sum(list(of_groups.values()), axis=0)
     area_m2 = (sensor.pixel.pitch_um * 1e-6) ** 2
     photons = irradiance * photons_per_joule(nm) * width * area_m2 * time_s
-    electrons = electrons_per_irradiance(sensor, nm, width, time_s) * irradiance
+    electrons = np.sum(
+        [
+            electrons_per_irradiance(sensor, nm, width, time_s, exposed.frames[name].irradiance.light) * values
+            for name, values in of_groups.items()
+        ],
+        axis=0,
+    )
     names, channel = sensor.channels, str(channel_map(sensor.cfa, raw.shape)[row, column])
     return {
         "row": row,

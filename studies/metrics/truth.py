@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM, Floats, Spectrum, tristimulus
+from render.spectrum import VISIBLE_NM, Floats, Spectrum, luminance, tristimulus
 from render.transport import Transport
 from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb
 from rodcone.display import brief
@@ -25,11 +25,14 @@ class Light:
     Attributes
     ----------
     wavelength_nm, width_nm, spectrum : (band,) float64
+    lamp : Spectrum
+        The light within the bands, up to a factor.
     """
 
     wavelength_nm: Floats
     width_nm: Floats
     spectrum: Floats
+    lamp: Spectrum
 
     __repr__ = brief
 
@@ -37,7 +40,9 @@ class Light:
 def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> Light:
     """Average a spectrum over bands and scale it to 1 cd/m^2."""
     values = spectrum.band_average(wavelength_nm, width_nm)
-    return Light(wavelength_nm, width_nm, values / tristimulus(values, wavelength_nm, width_nm)[1])
+    return Light(
+        wavelength_nm, width_nm, values / float(luminance(values, wavelength_nm, width_nm, spectrum)), spectrum
+    )
 
 
 def light_of(name: str) -> Light:
@@ -69,8 +74,8 @@ def white_of(luminance: NDArray[np.float64], coverage: NDArray[np.floating]) -> 
 
 def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> NDArray[np.float64]:
     """Linear sRGB of the scene, Bradford-adapted from its light to D65; `white_cd_m2` reads 1. Shape (h, w, 3)."""
-    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
-    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm)
+    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
+    xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm, radiance.light)
     return xyz_to_srgb(adapt_to_d65(xyz, white) / white_cd_m2)
 
 
@@ -80,5 +85,5 @@ def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> 
     Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
     """
     whole = sensor.undivided
-    weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s)
+    weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s, light.lamp)
     return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))

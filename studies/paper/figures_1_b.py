@@ -12,7 +12,6 @@ from math import log2
 import numpy as np
 from numpy.typing import NDArray
 
-from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb
 from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
 from sensor.config import LONGEST_S, SensorConfig
@@ -59,9 +58,7 @@ def half_snr_db(subject: View, reading: str, dark: bool) -> float:
     sensor = sensor_of(reading, "bayer")
     half = subject.radiance.shape[1] // 2
     columns = slice(0, half) if dark else slice(half, None)
-    part = SpectralRadiance(
-        subject.radiance.values[:, columns], subject.radiance.wavelength_nm, width_nm=subject.radiance.widths_nm
-    )
+    part = replace(subject.radiance, values=subject.radiance.values[:, columns])
     green = channel_electrons(form_image(part, sensor), sensor, LONGEST_S)[..., 1]
     inside = green[green < sensor.pixel.full_well_e]
     return decibels(float(np.median(snr(inside, sensor, LONGEST_S)))) if inside.size else float("nan")

@@ -73,7 +73,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
     light = _in_bands(spectrum)
     nm, width = light.wavelength_nm, light.width_nm
-    electrons = electrons_per_irradiance(sensor, nm, width, 1.0)
+    electrons = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
     names = sensor.channels
     three = list(range(min(len(names), 3)))
@@ -84,7 +84,9 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
             "allowed: a channel that sees light; give another curve, or colours under a broad light, such as D65"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    signals, colours = training(response[three], nm, light.spectrum, surfaces, width)
+    signals, _ = training(response[three], nm, light.spectrum, surfaces, width)
+    white = tristimulus(light.spectrum, nm, width, light.lamp)  # Y = 1
+    colours = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width, light.lamp), white))
     to_srgb = fit_through_neutral(signals, colours if len(three) == 3 else grey_of(colours))
     if len(three) == 3 and not _tells_colours(signals):
         if _tells_colours(training(response[three], nm, np.ones_like(nm), surfaces, width)[0]):
@@ -94,11 +96,9 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
             raise InputError(
                 f"responses: {three_names} can't tell colours apart; allowed: three different curves; correct one"
             )
-    white = tristimulus(light.spectrum, nm, width)  # Y = 1
     from_xyz = _srgb_of_xyz(white)
-    target = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width), white))
     balanced = (surfaces * light.spectrum) @ electrons.T / collected
-    from_srgb = fit_through_neutral(target, balanced)
+    from_srgb = fit_through_neutral(colours, balanced)
     if len(three) == 3:
         from_srgb[three] = np.linalg.inv(to_srgb)
     neutral = collected / collected[names.index(sensor.unit_channel)]

@@ -222,7 +222,7 @@ def _mirrored(bench: Bench, transport: Transport) -> SpectralRadiance:
     times = -(-bench.picture // bench.size)
     wide = np.pad(radiance.values, [(0, (times - 1) * bench.size)] * 2 + [(0, 0)], mode="symmetric")
     planes = np.ascontiguousarray(np.moveaxis(wide[: bench.picture, : bench.picture], -1, 0))
-    return SpectralRadiance(np.moveaxis(planes, 0, -1), radiance.wavelength_nm, 0.0, radiance.width_nm)
+    return replace(radiance, values=np.moveaxis(planes, 0, -1), relative_mc_error=0.0)
 
 
 def _capture(

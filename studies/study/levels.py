@@ -3,8 +3,8 @@
 import re
 from difflib import get_close_matches
 
-from render.illuminants import illuminant, lines_nm
-from render.spectrum import VISIBLE_NM
+from render.illuminants import illuminant
+from render.spectrum import VISIBLE_NM, emission_lines_nm
 from rodcone.errors import InputError, require_name, require_range
 from rodcone.time_text import parse_time
 from scenes.levels import DEMO_LEVELS
@@ -84,7 +84,7 @@ def check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
         return
     ends = zip(light.wavelength_nm[[0, -1]], light.values[[0, -1]], (range_nm[0], -range_nm[1]), (1, -1), strict=True)
     short = [nm for nm, value, edge_nm, sign in ends if sign * nm > edge_nm and value > _RUN_OUT * light.values.max()]
-    if short or lines_nm(spectrum):
+    if short or emission_lines_nm(light).size:
         raise InputError(
             f"spectra: {spectrum!r} is known over {light.wavelength_nm[0]:g}-{light.wavelength_nm[-1]:g} nm, and "
             f"render.range_nm asks for {range_nm[0]:g}-{range_nm[1]:g} nm; allowed: sunlight, moonlight, temperatures "

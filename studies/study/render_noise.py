@@ -125,7 +125,7 @@ def render_share(
     time_s = auto_exposure_s(irradiance, sensor, longest_s) if exposure_s is None else exposure_s
     expected_e = np.moveaxis(channel_electrons(irradiance, sensor, time_s), -1, 0)
     variance = transport.relight_variance(luminance_cd_m2=luminance_cd_m2)
-    weights = electrons_per_irradiance(sensor, transport.wavelength_nm, transport.width_nm, time_s)
+    weights = electrons_per_irradiance(sensor, transport.wavelength_nm, transport.width_nm, time_s, irradiance.light)
     weights = weights * camera_equation(sensor.lens)
     error_e = np.tensordot(weights, np.sqrt(np.maximum(variance, 0.0)), axes=1)
     return monte_carlo_share(error_e, expected_e, sensor, time_s, of_pixels=OF_PIXELS)

@@ -95,7 +95,8 @@ def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None
     files = {name: (folder / facts.pop(name)).resolve() for name in ("truth", "electrons", "errors")}
     if not all(is_whole(path) for path in files.values()):
         return None
-    light = Light(**{name: np.array(values, float) for name, values in facts.pop("light").items()})
+    light_facts = {name: np.array(values, float) for name, values in facts.pop("light").items()}
+    light = Light(**light_facts, lamp=Spectrum(*facts.pop("lamp")))
     return UnitFrame(key=key, sensor=sensor, light=light, **facts, **files)
 
 
@@ -126,7 +127,8 @@ def make_frames(
     white, area = shown_white_cd_m2(transport, 1.0), study.equal_area
     picture = views[0] if area is None else area.view(views[0], area.coarsest_um)
     scene = {
-        "light": {name: value.tolist() for name, value in vars(light).items()},
+        "light": {name: getattr(light, name).tolist() for name in ("wavelength_nm", "width_nm", "spectrum")},
+        "lamp": (light.lamp.wavelength_nm.tolist(), light.lamp.values.tolist()),
         "white_cd_m2": white,
         "lux_per_cd_m2": lux_per_cd_m2(transport, study.levels),
         "truth": keep_array(folder, true_srgb(picture, light, white)),

@@ -12,7 +12,7 @@ import numpy as np
 from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of, user_file
-from render.error_estimates import WideBandsWarning
+from render.bands.error import WideBandsWarning
 from render.transport import Transport
 from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend

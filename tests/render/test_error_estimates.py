@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
 from loop import loop
 
 from render.engine import render
-from render.error_estimates import SAMPLE_PIXELS, Halves, SharedPaths, group_errors, relative_error, within_band_error
-from render.scene import LightGroup
-from render.spectrum import Spectrum, band_widths, flat, line_spectrum
+from render.error_estimates import SAMPLE_PIXELS, Halves, SharedPaths, group_errors, relative_error
+from render.spectrum import band_widths
 from scenes.catalog import load
 
 ONE = np.ones((1, 3))
@@ -125,60 +122,3 @@ def test_pixels_are_judged_all_over_a_picture_of_any_size(size):
     part = relative_error(ONE[:, :1], half_dark, (0.1 * values) ** 2)
     assert part == pytest.approx(0.1, rel=0.2)  # dark ones out, the other half judged
     assert SAMPLE_PIXELS == 1024
-
-
-def missed(transport, spectrum, power=1.0):
-    planes = np.asarray(transport, np.float32)[None, :, None, None] * np.ones((1, 1, 2, 3), np.float32)
-    return within_band_error({"lamp": LightGroup(("lamp",), spectrum, power)}, planes, NM, WIDTH_NM)
-
-
-def test_light_that_is_even_within_each_band_misses_nothing():
-    assert missed(np.linspace(0.1, 0.9, NM.size), flat(3.0)) == pytest.approx(np.zeros(NM.size), abs=1e-6)
-
-
-@loop("power", [1.0, 50.0])
-@loop("offset_nm", [-3.0, 0.5, 4.0])
-def test_a_line_beside_the_centre_of_a_band_misses_slope_times_distance(offset_nm, power):
-    transport = 0.1 + 0.01 * (NM - 500.0)
-    line = missed(transport, line_spectrum([545.0 + offset_nm], [2.0]), power)
-    # The transport at the line, less its mean over the band, over that mean. A sub-band is 0.16 nm wide.
-    assert line[4] == pytest.approx(abs(0.01 * offset_nm) / transport[4], abs=0.01 * 0.09 / transport[4])
-    assert np.delete(line, 4) == pytest.approx(np.zeros(NM.size - 1), abs=1e-12)
-
-
-def test_a_line_at_the_centre_of_a_band_misses_the_parabolas_rise_over_its_mean():
-    curve = lambda nm: 0.2 + 1e-4 * (nm - 500.0) ** 2  # noqa: E731
-    means = curve(NM) + 1e-4 * WIDTH_NM**2 / 12
-    line = missed(means, line_spectrum([545.0], [2.0]))
-    assert line[4] == pytest.approx(1e-4 * 100.0 / 12 / means[4], rel=2e-3)
-
-
-@given(seed=st.integers(0, 10**6))
-@settings(deadline=None, derandomize=True, max_examples=60)
-def test_a_parabola_is_never_missed_by_more_than_is_said(seed):
-    rng = np.random.default_rng(seed)
-    a, b, c = rng.uniform(0.2, 1.0), rng.uniform(-2e-3, 2e-3), rng.uniform(0.0, 3e-5)
-    curve = Spectrum(np.arange(495.0, 606.0, 0.1), a + b * (np.arange(495.0, 606.0, 0.1) - 550.0) + 0 * c)
-    edges = np.sort(rng.uniform(500.0, 600.0, 7))
-    light = Spectrum(np.array([500.0, *edges, 600.0]), rng.uniform(0.0, 1.0, 9))
-    fine = np.arange(500.005, 600.0, 0.01)
-    product = curve.band_average(fine, np.full_like(fine, 0.01)) * light.band_average(fine, np.full_like(fine, 0.01))
-    truth = product.reshape(NM.size, -1).mean(axis=1)
-    transport, emission = curve.band_average(NM, WIDTH_NM), light.band_average(NM, WIDTH_NM)
-    assert np.all(np.abs(truth / (transport * emission) - 1) <= missed(transport, light) * 1.01 + 1e-4)
-
-
-@loop("bands", [1, 2, 3])
-def test_a_few_bands_are_enough_for_an_estimate(bands):
-    nm, width = 500.0 + 100.0 * np.arange(bands), np.full(bands, 100.0)
-    planes = (1.0 + np.arange(bands, dtype=np.float32))[None, :, None, None] * np.ones((1, 1, 1, 1), np.float32)
-    lamp = {"lamp": LightGroup(("lamp",), line_spectrum([525.0], [1.0]))}
-    error = within_band_error(lamp, planes, nm, width)
-    assert error[0] == pytest.approx(0.25 if bands > 1 else 0.0, rel=0.05)  # a slope of 1 per 100 nm, over a mean of 1
-
-
-def test_a_lamp_in_view_does_not_hide_the_error_of_what_it_lights():
-    curve = 0.1 + 0.01 * (NM - 500.0)
-    planes = np.stack([np.full_like(NM, 1e4), curve], axis=1)[None, :, :, None].astype(np.float32)
-    line = within_band_error({"lamp": LightGroup(("lamp",), line_spectrum([548.0], [2.0]))}, planes, NM, WIDTH_NM)
-    assert line[4] == pytest.approx(0.01 * 3.0 / curve[4] / np.sqrt(2), rel=0.05)  # RMS of the two pixels

@@ -9,7 +9,7 @@ from loop import loop
 from outside_truth import colour_science
 from refusal import refusal
 
-from render.illuminants import MOON_SLOPE_PER_NM, daylight, illuminant, lines_nm, names, unit_luminance
+from render.illuminants import MOON_SLOPE_PER_NM, TABULATED_LINES, daylight, illuminant, lines_nm, names, unit_luminance
 from render.spectrum import (
     PUBLISHED,
     Spectrum,
@@ -99,7 +99,11 @@ def test_sodiums_lines_are_the_doublet_and_share_a_band_that_holds_all_their_lig
 
 
 def test_smooth_lights_have_no_lines_and_an_unknown_one_is_refused():
-    assert all(lines_nm(name) == () for name in (*names(), "3000K") if name != "sodium_low")
+    of_lines = ("sodium_low", *TABULATED_LINES)
+    assert all(lines_nm(name) == () for name in (*names(), "3000K") if name not in of_lines)
+    for name in TABULATED_LINES:
+        with pytest.warns(UserWarning, match=f"lines_nm: {name} is a lamp of lines whose table holds steps of 5 nm"):
+            assert lines_nm(name) == ()
     refusal(lines_nm, "sodium_lo", match="did you mean 'sodium_low'")
 
 

@@ -80,11 +80,12 @@ def test_bands_add_up_each_with_its_own_wavelength_and_width():
 def test_the_window_cuts_bands_to_the_part_inside(centre_nm, width_nm, inside):
     sensor = camera(window_nm=(400.0, 700.0))
     scene = uniform(1e-3, centre_nm, width_nm=width_nm)
-    photons = 1e-3 * pi / 17 * width_nm * (centre_nm * 1e-9 / JOULES) * 4.5e-12 * 0.01
-    # `flat` is 1 over 300-1100 nm alone: the widest band's mean response is 550/600
-    response = 550 / 600 if width_nm == 600.0 else 1.0
+    low, high = max(400.0, centre_nm - width_nm / 2), min(700.0, centre_nm + width_nm / 2)
+    assert max(0.0, high - low) == pytest.approx(inside * width_nm)
+    # photons a joule go with the wavelength: their integral over the part inside
+    photons = 1e-3 * pi / 17 * inside * width_nm * ((low + high) / 2 * 1e-9 / JOULES) * 4.5e-12 * 0.01
     white = expected(scene, sensor, 0.01)[1, 1]
-    assert white == pytest.approx(inside * response * photons, rel=1e-12, abs=1e-30)
+    assert white == pytest.approx(photons, rel=1e-12, abs=1e-30)
 
 
 def test_single_precision_radiance_agrees_with_double_to_1e_6():

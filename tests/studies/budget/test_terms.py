@@ -138,7 +138,9 @@ def test_light_within_bands_is_the_covariance_of_light_and_scene() -> None:
     sensor = low_noise()
     groups = groups_of(WIDTH_NM, 20)
     wide = merge_transport(made, groups)
-    weights = electrons_per_irradiance(sensor, wide.wavelength_nm, wide.width_nm, 1.0) * camera_equation(sensor.lens)
+    weights = electrons_per_irradiance(sensor, wide.wavelength_nm, wide.width_nm, 1.0, light) * camera_equation(
+        sensor.lens
+    )
     averaged = merge_radiance(made.relight(luminance_cd_m2=1.0), groups)
     scale = 1 / made.relight().luminance().mean()
     told = averaged.luminance().mean()
@@ -237,7 +239,7 @@ def test_the_kernels_bound_holds_what_single_precision_is_off() -> None:
     made = transport(np.random.default_rng(2).uniform(0.1, 1.0, (40, 64, 64)))
     sensor = low_noise()
     image = form_image(made.relight(luminance_cd_m2=5000.0), sensor)
-    weights = electrons_per_irradiance(sensor, NM, WIDTH_NM, 1e-3)
+    weights = electrons_per_irradiance(sensor, NM, WIDTH_NM, 1e-3, image.light)
     exact = expected_electrons(replace(image, values=image.values.astype(np.float64)), sensor, 1e-3)
     off = np.abs(expected_electrons_single(image.values, weights, sensor) - exact)
     bound = kernel_rms_e(exact, 40)

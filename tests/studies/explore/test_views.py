@@ -58,7 +58,7 @@ def test_the_light_budget_of_a_pixel():
     pitch_m = exposed.sensor.pixel.pitch_um * 1e-6
     irradiance = radiance * np.pi / (1 + 4 * 4.0**2)
     photons = (irradiance * photons_per_joule(nm) * width).sum() * pitch_m**2 * 0.01
-    assert told["photons"] == pytest.approx(photons, rel=1e-5)
+    assert told["photons"] == pytest.approx(photons, rel=1e-3)  # together and apart, as in test_chain
     assert told["electrons"][told["channel"]] == pytest.approx(exposed.expected_e[row, column], rel=1e-6)
     assert np.sum(told["photons_nm"] * width) == pytest.approx(told["photons"], rel=1e-12)
     for channel, by_band in told["electrons_nm"].items():

@@ -26,8 +26,8 @@ WIDTH = band_widths(NM)
 
 def neutral_scene(luminance_cd_m2: float, light: str = "D65", shape: tuple[int, int] = (16, 16)) -> SpectralRadiance:
     values = illuminant(light).band_average(NM, WIDTH)
-    scene = SpectralRadiance(np.broadcast_to(values, (*shape, NM.size)).astype(np.float64), NM)
-    return SpectralRadiance(scene.values * (luminance_cd_m2 / scene.luminance()[0, 0]), NM)
+    scene = SpectralRadiance(np.broadcast_to(values, (*shape, NM.size)).astype(np.float64), NM, light=illuminant(light))
+    return replace(scene, values=scene.values * (luminance_cd_m2 / scene.luminance()[0, 0]))
 
 
 def test_neutral_is_white_in_the_truth_under_any_light() -> None:

@@ -40,6 +40,7 @@ from studies.photograph.develop import develop, develop_file, mosaic_processor
 from studies.study.gain import iso_speed
 
 NM = DEFAULT_WAVELENGTH_NM
+FINE_NM = np.arange(380.5, 780.0)
 WIDTH = band_widths(NM)
 LIGHT = light_in_bands(illuminant("D65"), NM, WIDTH)
 # Mosaics without R, G and B tell other colours, or none: tests/isp/processors/test_catalogue.py
@@ -162,8 +163,8 @@ def test_colour_matrices_take_each_illuminants_white_to_its_neutral() -> None:
     for cfa in ["bayer", "rgbw"]:
         colours = calibrate(low_noise(cfa), illuminant("D50"))
         neutral_d65 = neutral_response("RGBW"[: len(colours.neutral)])
-        assert colours.xyz_to_camera_d65 @ white_xyz("D65") == pytest.approx(neutral_d65 / neutral_d65[1], rel=1e-12), (
-            cfa
+        assert colours.xyz_to_camera_d65 @ white_xyz("D65") == pytest.approx(neutral_d65 / neutral_d65[1], rel=1e-4), (
+            cfa  # that is summed in bands of 1 nm
         )
         under_a = calibrate(low_noise(cfa), illuminant("A")).neutral
         assert colours.xyz_to_camera_a @ white_xyz("A") == pytest.approx(under_a, rel=1e-12), cfa
@@ -181,12 +182,12 @@ def test_forward_matrices_take_a_balanced_neutral_to_d50() -> None:
 
 def test_as_shot_values_are_those_of_the_light_asked_for() -> None:
     sensor = low_noise("bayer")
-    surfaces = np.array([curve.band_average(NM, WIDTH) for _, curve in color_checker()])
+    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker()])
     for name in ("A", "D65", "moonlight"):
         colours = calibrate(sensor, illuminant(name))
-        responses = sensor.responses.band_average(("R", "G", "B"), NM, WIDTH)
-        expected = fit_matrix(responses, NM, illuminant(name).band_average(NM, WIDTH), surfaces)
-        assert colours.to_srgb == pytest.approx(expected, rel=1e-9)
+        responses = sensor.responses.band_average(("R", "G", "B"), FINE_NM, 1.0)
+        expected = fit_matrix(responses, FINE_NM, illuminant(name).band_average(FINE_NM, 1.0), surfaces)
+        assert colours.to_srgb == pytest.approx(expected, abs=2e-3)  # electrons are within 1e-4 of bands of 1 nm
 
 
 def test_a_camera_that_is_the_observer_has_identity_matrices() -> None:
@@ -200,15 +201,16 @@ def test_a_camera_that_is_the_observer_has_identity_matrices() -> None:
 def test_the_row_of_white_is_the_least_squares_fit_that_keeps_a_neutral() -> None:
     """Solved again with a Lagrange multiplier, in XYZ."""
     colours = calibrate(low_noise("rgbw"), illuminant("D65"))
-    surfaces = np.array([curve.band_average(NM, WIDTH) for _, curve in color_checker()])
-    light = illuminant("D65").band_average(NM, WIDTH)
+    ones = np.ones_like(FINE_NM)
+    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker()])
+    light = illuminant("D65").band_average(FINE_NM, 1.0)
     white = white_xyz("D65")
-    xyz = tristimulus(surfaces * light, NM, WIDTH) / tristimulus(light, NM, WIDTH)[1]
-    collected = low_noise("rgbw").responses.band_average(("W",), NM, WIDTH)[0] * NM * light
+    xyz = tristimulus(surfaces * light, FINE_NM, ones) / tristimulus(light, FINE_NM, ones)[1]
+    collected = low_noise("rgbw").responses.band_average(("W",), FINE_NM, 1.0)[0] * FINE_NM * light
     signal = surfaces @ collected / collected.sum()
     system = np.block([[xyz.T @ xyz, white[:, None]], [white[None, :], np.zeros((1, 1))]])
     row = np.linalg.solve(system, np.append(xyz.T @ signal, 1.0))[:3]
-    assert colours.xyz_to_camera_d65[3] / colours.neutral[3] == pytest.approx(row, rel=1e-9)
+    assert colours.xyz_to_camera_d65[3] / colours.neutral[3] == pytest.approx(row, abs=1e-3)
 
 
 def test_the_cameras_window_counts() -> None:

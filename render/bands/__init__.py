@@ -1,0 +1,1 @@
+"""Lamps within bands: several as one, and the error that is left."""

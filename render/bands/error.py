@@ -1,0 +1,168 @@
+"""Error that is left of light in bands: in what the eye and a camera's channels collect of it.
+
+Lamps are followed to their lines (`render.band_weights`); what is lost is how surfaces go within a band, beyond what
+neighbouring bands tell. It is what a Gaussian process leaves open whose variance is that of the scene: the squared
+second differences of its transport over wavelength, over what the process expects of them.
+"""
+
+import warnings
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.band_weights import NARROW_NM, Curves, interpolating, points_of
+from render.error_estimates import spread_pixels
+from render.scene import LightGroup
+from render.spectrum import OBSERVER_NM, Spectrum, observer, photons_per_joule
+from rodcone.types import Floats, Planes
+
+MOST_BAND_ERROR = 0.01  # of what the eye's x, y or z collects: a larger error of wide bands is said
+LEAST_SIGNAL = 0.02  # of x, y and z together: less isn't seen beside them
+
+
+class WideBandsWarning(UserWarning):
+    """Bands within which surfaces vary by more than neighbouring bands tell."""
+
+
+@dataclass(frozen=True)
+class CurveTerms:
+    """What the integral of curves over one lamp's light needs and leaves open.
+
+    Attributes
+    ----------
+    weights : (curve, band) float64
+        Of the transport's band means.
+    deviation : (curve,) float64
+        Expected error for transport of variance 1.
+    differences : (difference, band) float64
+        From band means to what the neighbours of each band don't tell of it.
+    expected : (difference,) float64
+        Their mean square for transport of variance 1.
+    centre : (difference,) int
+        The band of each.
+    """
+
+    weights: Floats
+    deviation: Floats
+    differences: Floats
+    expected: Floats
+    centre: NDArray[np.intp]
+
+
+def curve_error(
+    lights: Mapping[str, LightGroup],
+    radiance: Planes,
+    wavelength_nm: Floats,
+    width_nm: Floats,
+    responses: Mapping[str, Spectrum] | None = None,
+) -> dict[str, float]:
+    """Relative error of the integral of each curve over the light, RMS over lit pixels.
+
+    Parameters
+    ----------
+    lights : mapping of str to LightGroup
+    radiance : (group, band, h, w) float32
+        At unit spectral emission.
+    wavelength_nm, width_nm : (band,) float64
+    responses : mapping of str to Spectrum, optional
+        Electrons per photon; left out, the CIE 1931 observer's x, y and z.
+    """
+    names = ["x", "y", "z"] if responses is None else list(responses)
+    chosen = radiance[spread_pixels(radiance.shape[2:])].astype(np.float64)
+    missed, total = np.zeros((2, len(names), *chosen.shape[2:]))
+    for light, transport in zip(lights.values(), chosen, strict=True):
+        if not light.power:
+            continue
+        if responses is None:
+            shape = light.spectrum.wavelength_nm.tobytes(), light.spectrum.values.tobytes()
+            terms = _observer_terms(wavelength_nm.tobytes(), width_nm.tobytes(), *shape)
+        else:
+            terms = curve_terms(*_of_photons(responses), wavelength_nm, width_nm, light.spectrum)
+        total += light.power * np.tensordot(terms.weights, transport, 1)
+        missed += light.power * _missed(terms, transport)
+    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
+    lit = np.maximum((total > 0).sum(axis=(1, 2)), 1)
+    errors = np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit)
+    if responses is None:  # a curve that nearly nothing reaches isn't seen
+        share = total.sum(axis=(1, 2)) / max(float(total.sum()), np.finfo(float).tiny)
+        errors = np.where(share >= LEAST_SIGNAL, errors, 0.0)
+    return dict(zip(names, errors.tolist(), strict=True))
+
+
+def curve_terms(
+    curves: Curves, knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: Spectrum
+) -> CurveTerms:
+    """Terms of the integral of curves over a lamp's light; parameters as of `render.band_weights.band_weights`."""
+    bands = wavelength_nm.size
+    points = points_of(knots_nm, wavelength_nm, width_nm, light)
+    products = curves(points.nm) * points.light * points.step_nm
+    if not points.lit.any() or width_nm[points.lit].max() <= NARROW_NM:
+        sums = np.array([np.bincount(points.band, row, bands) for row in products])
+        none = np.zeros(0)
+        return CurveTerms(sums * points.mean, np.zeros(len(sums)), none.reshape(0, bands), none, none.astype(np.intp))
+    known = interpolating(points, wavelength_nm, width_nm)
+    of_light = known.weights(products)
+    weights = np.zeros((len(products), bands))
+    weights[:, known.lit] = of_light * known.mean_light
+    differences, centre = _differences(wavelength_nm[known.lit])
+    expected = np.einsum("da,ab,db->d", differences, known.among, differences, optimize=True)
+    everywhere = np.zeros((len(differences), bands))
+    everywhere[:, known.lit] = differences
+    deviation = known.expected_error(products, of_light)
+    return CurveTerms(weights, deviation, everywhere, expected, known.lit[centre])
+
+
+def warn_of_wide_bands(errors: Mapping[str, float], width_nm: Floats) -> None:
+    """Warn (`WideBandsWarning`) where `curve_error` of the observer is large."""
+    worst = max(errors.values())
+    if worst > MOST_BAND_ERROR:
+        warnings.warn(
+            f"bands: colours and a sensor's channels are off by about {worst:.1%}, for surfaces vary within bands of "
+            f"up to {width_nm.max():g} nm more than their neighbours tell; give narrower ones, as --bands of rodcone "
+            "render, or for a lamp's lines rodcone.line_bands",
+            WideBandsWarning,
+            stacklevel=3,
+        )
+
+
+@lru_cache(maxsize=64)
+def _observer_terms(nm: bytes, width_nm: bytes, light_nm: bytes, light: bytes) -> CurveTerms:
+    spectrum = Spectrum(np.frombuffer(light_nm), np.frombuffer(light))
+    return curve_terms(observer, OBSERVER_NM, np.frombuffer(nm), np.frombuffer(width_nm), spectrum)
+
+
+def _of_photons(responses: Mapping[str, Spectrum]) -> tuple[Curves, Floats]:
+    """Curves over energy of responses per photon, and their corners."""
+
+    def curves(nm: Floats) -> Floats:
+        values = [np.interp(nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in responses.values()]
+        return np.asarray(np.array(values) * photons_per_joule(nm))
+
+    return curves, np.concatenate([x.wavelength_nm for x in responses.values()])
+
+
+def _differences(nm: Floats) -> tuple[Floats, NDArray[np.intp]]:
+    """What each inner band differs by from the line through its neighbours; of two bands or one, what there is."""
+    if nm.size < 3:
+        rows = np.array([[1.0]]) if nm.size == 1 else np.array([[-1.0, 1.0]])
+        return rows, np.zeros(1, np.intp)
+    inner = np.arange(1, nm.size - 1)
+    rows = np.zeros((inner.size, nm.size))
+    along = (nm[inner] - nm[inner - 1]) / (nm[inner + 1] - nm[inner - 1])
+    rows[inner - 1, inner], rows[inner - 1, inner - 1], rows[inner - 1, inner + 1] = 1.0, along - 1, -along
+    return rows, inner
+
+
+def _missed(terms: CurveTerms, transport: Floats) -> Floats:
+    """Expected error of each curve's integral in each pixel, shape (curve, h, w)."""
+    if not terms.expected.size:
+        return np.zeros((len(terms.weights), *transport.shape[1:]))
+    squared = np.square(np.tensordot(terms.differences, transport, 1))
+    counts = terms.weights[:, terms.centre] ** 2
+    variance = (
+        np.tensordot(counts, squared, 1) / np.maximum(counts @ terms.expected, np.finfo(float).tiny)[:, None, None]
+    )
+    return np.asarray(terms.deviation[:, None, None] * np.sqrt(variance))

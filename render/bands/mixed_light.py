@@ -1,0 +1,116 @@
+"""Several lamps as light of one spectrum within each band: what `render.band_weights` needs of a scene of many lights.
+
+A picture holds the sum of its light groups, and weights of bands follow one lamp. Where groups differ, all are referred
+to their mixture: the light of a group is brought, band by band and into the neighbours, to the values whose integrals
+over all smooth curves are the same under the mixture as its own are under its own spectrum. That is linear in the
+transport, so that it costs a few more additions in relighting, and nothing afterwards.
+"""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from render.band_weights import NARROW_NM, band_weights
+from render.combine import emission
+from render.scene import LightGroup
+from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, observer_weights
+from rodcone.types import Floats
+
+_ALIKE = 1e-9  # of a spectrum's largest value
+_LEAST_SINGULAR = 1e-2  # of the largest: what curves as wide as a band can't tell apart stays as it is
+_LEAST_SHARE = 1e-5  # of a band's light in another
+
+
+@dataclass(frozen=True)
+class BandLight:
+    """Emission of light groups in bands, referred to one spectrum.
+
+    Attributes
+    ----------
+    spectrum : Spectrum or None
+        That of all lights, or their mixture, up to a factor; None where nothing shines.
+    maps : (group, band, band) float64
+        From each group's transport to what it adds to the picture's bands; diagonal for lights of one spectrum.
+    emitted : (group, band) float64
+        Band means of each group's emission.
+    mixed : bool
+        Whether the maps aren't diagonal.
+    """
+
+    spectrum: Spectrum | None
+    maps: Floats
+    emitted: Floats
+    mixed: bool
+
+    def __mul__(self, factor: float) -> "BandLight":
+        """Return the light times a number."""
+        return BandLight(self.spectrum, self.maps * factor, self.emitted * factor, self.mixed)
+
+    def luminance_weights(self, wavelength_nm: Floats, width_nm: Floats) -> Floats:
+        """Luminance of a transport of 1 in each group and band, shape (group, band)."""
+        luminous = LUMINOUS_EFFICACY_LM_W * observer_weights(wavelength_nm, width_nm, self.spectrum)[1]
+        return np.asarray(luminous @ self.maps)
+
+
+def band_light(
+    lights: Mapping[str, LightGroup], transport: Floats, wavelength_nm: Floats, width_nm: Floats
+) -> BandLight:
+    """Light of several groups, referred to one spectrum.
+
+    Parameters
+    ----------
+    lights : mapping of str to LightGroup
+    transport : (group,) float64
+        Radiance of each group at unit emission, in the mean over the picture: its share in the mixture.
+    wavelength_nm, width_nm : (band,) float64
+    """
+    emitted = emission(lights, wavelength_nm, width_nm)
+    maps = emitted[:, :, None] * np.eye(wavelength_nm.size)
+    groups, shares = list(lights.values()), emitted.sum(axis=1) * transport
+    shining = [index for index in range(len(groups)) if emitted[index].any()]
+    if not shining:
+        return BandLight(None, maps, emitted, mixed=False)
+    spectra = [groups[index].spectrum for index in shining]
+    narrow = width_nm.max() <= NARROW_NM and len(spectra) > 1  # bands within which lamps don't differ
+    if narrow or all(_alike(spectra[0], other) for other in spectra[1:]):
+        return BandLight(None if narrow else spectra[0], maps, emitted, mixed=False)
+    powers = [groups[index].power * (transport[index] if shares.any() else 1.0) for index in shining]
+    mixture = _mixture(spectra, powers)
+
+    # Integrals of curves as wide as a band: what light of 1 in a band gives, (curve, band) in energy
+    edges = wavelength_nm[0] - width_nm[0] / 2, wavelength_nm[-1] + width_nm[-1] / 2
+    centres, wide = np.linspace(*edges, 2 * wavelength_nm.size + 1), float(width_nm.max())
+
+    def integrals(spectrum: Spectrum) -> Floats:
+        def bells(nm: Floats) -> Floats:
+            return np.exp(-(((nm - centres[:, None]) / wide) ** 2) / 2)
+
+        return band_weights(bells, np.zeros(0), wavelength_nm, width_nm, spectrum) / width_nm
+
+    of_mixture = integrals(mixture)
+    left, values, right = np.linalg.svd(of_mixture, full_matrices=False)
+    inverse = (right.T * (values / (values**2 + (_LEAST_SINGULAR * values[0]) ** 2))) @ left.T
+    for index, spectrum in zip(shining, spectra, strict=True):
+        moved = inverse @ (integrals(spectrum) - of_mixture)
+        moved[np.abs(moved) < _LEAST_SHARE] = 0.0
+        shared = (np.eye(wavelength_nm.size) + moved) * width_nm / width_nm[:, None]
+        maps[index] = shared * emitted[index]
+    return BandLight(mixture, maps, emitted, mixed=True)
+
+
+def _alike(one: Spectrum, other: Spectrum) -> bool:
+    """Whether two spectra differ by a factor."""
+    if not np.array_equal(one.wavelength_nm, other.wavelength_nm):
+        return False
+    return bool(np.allclose(one.values * other.values.max(), other.values * one.values.max(), rtol=0.0,
+                            atol=_ALIKE * one.values.max() * other.values.max()))  # fmt: skip
+
+
+def _mixture(spectra: list[Spectrum], powers: list[float]) -> Spectrum:
+    nm = np.unique(np.concatenate([spectrum.wavelength_nm for spectrum in spectra]))
+    values = [
+        power * np.interp(nm, spectrum.wavelength_nm, spectrum.values, left=0.0, right=0.0)
+        for spectrum, power in zip(spectra, powers, strict=True)
+    ]
+    return Spectrum(nm, np.sum(values, axis=0))

@@ -1,0 +1,121 @@
+"""Integrals over bands against closed forms and fine sums: chart patches under every lamp, several lamps at once."""
+
+import numpy as np
+import pytest
+from builders import transport_of
+from loop import loop
+
+from render.band_weights import band_weights
+from render.bands.error import curve_error
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, even_bands, line_spectrum, observer, tristimulus
+from scenes.reflectances import color_checker
+from sensor.presets import low_noise
+from sensor.response import electrons_per_irradiance
+
+STEP_NM = 0.02
+FINE_NM = np.arange(380.0, 780.0, STEP_NM) + STEP_NM / 2
+PATCHES = [spectrum for _, spectrum in color_checker()]
+REFLECTANCES = np.array([np.interp(FINE_NM, x.wavelength_nm, x.values) for x in PATCHES])
+SENSOR = low_noise()
+CURVES = [SENSOR.responses.curves[name] for name in SENSOR.channels]
+PHOTONS = np.array([np.interp(FINE_NM, x.wavelength_nm, x.values) * FINE_NM for x in CURVES])
+# What issue 52 asks for at 20 nm: smooth light, fluorescent tubes and three LEDs, lamps of lines.
+MOST = {"D65": 2e-3, "A": 2e-3, "LED-B3": 2e-3, "F2": 5e-3, "LED-RGB1": 5e-3, "F11": 25e-3, "sodium_high": 25e-3}
+
+
+def fine(name):
+    lamp = illuminant(name)
+    return np.interp(FINE_NM, lamp.wavelength_nm, lamp.values, left=0.0, right=0.0)
+
+
+def means(nm, width):
+    return np.array([patch.band_average(nm, width) for patch in PATCHES])
+
+
+@loop(("name", "most"), list(MOST.items()))
+def test_electrons_of_20_nm_bands_are_those_of_a_fine_integral(name, most):
+    nm, width = even_bands((380.0, 780.0), 20)
+    lamp = illuminant(name)
+    weights = electrons_per_irradiance(SENSOR, nm, width, 1.0, lamp)
+    made = (means(nm, width) * lamp.band_average(nm, width)) @ weights.T
+    exact = np.einsum("px,cx,x->pc", REFLECTANCES, PHOTONS, fine(name), optimize=True)
+    ratio = made / exact
+    assert np.abs(ratio / np.median(ratio) - 1).max() < most
+    assert weights.min() >= 0
+
+
+@loop(("name", "most"), [("D65", 1e-3), ("A", 2e-3), ("LED-B3", 5e-3), ("F11", 6e-2)])
+def test_xyz_of_light_that_is_known_by_its_bands_alone_is_the_smooth_ones(name, most):
+    nm, width = even_bands((380.0, 780.0), 20)
+    lamp = Spectrum(FINE_NM, fine(name))
+    light = np.array([Spectrum(FINE_NM, patch * lamp.values).band_average(nm, width) for patch in REFLECTANCES[:6]])
+    exact = LUMINOUS_EFFICACY_LM_W * np.einsum("px,cx->pc", REFLECTANCES[:6] * lamp.values, observer(FINE_NM)) * STEP_NM
+    made = tristimulus(light, nm, width)
+    assert np.abs(made / exact - 1)[:, :2].max() < most
+
+
+@loop(("names", "most"), [(("D65", "A"), 2e-3), (("A", "LED-B3"), 2e-3), (("F2", "LED-RGB1"), 6e-3),
+                          (("LED-B3", "sodium_high"), 25e-3)])  # fmt: skip
+def test_each_light_group_keeps_its_own_light_within_the_bands(names, most):
+    """Pixels of other patches under other shares of two lamps, relit together."""
+    nm, width = even_bands((380.0, 780.0), 20)
+    rng, shape = np.random.default_rng(4), (4, 6)
+    shares = rng.random((2, *shape)) ** 3
+    patches = [np.arange(24).reshape(shape), np.roll(np.arange(24), 7).reshape(shape)]
+    planes = np.stack(
+        [np.moveaxis(means(nm, width)[patch], -1, 0) * share for patch, share in zip(patches, shares, strict=True)]
+    )
+    groups = {name: LightGroup((name,), illuminant(name)) for name in names}
+    made = transport_of(planes.astype(np.float32), groups, nm, width).relight()
+    exact = sum(
+        share[..., None] * np.einsum("hwx,cx,x->hwc", REFLECTANCES[patch], PHOTONS, fine(name), optimize=True)
+        for name, patch, share in zip(names, patches, shares, strict=True)
+    )
+    ratio = made.values @ electrons_per_irradiance(SENSOR, nm, width, 1.0, made.light).T / exact
+    assert np.abs(ratio / np.median(ratio) - 1).max() < most
+    xyz = sum(
+        share[..., None] * np.einsum("hwx,cx,x->hwc", REFLECTANCES[patch], observer(FINE_NM), fine(name), optimize=True)
+        for name, patch, share in zip(names, patches, shares, strict=True)
+    )
+    seen = tristimulus(made.values, nm, width, made.light) / (xyz * LUMINOUS_EFFICACY_LM_W * STEP_NM)
+    assert np.abs(seen[..., :2].mean(axis=(0, 1)) - 1).max() < most
+
+
+@loop("name", list(MOST))
+@loop("count", [20, 40])
+def test_the_error_that_is_told_is_what_a_fine_integral_finds(name, count):
+    """RMS over patches; told are expectations, for surfaces as rough as these, within a factor of 3."""
+    nm, width = even_bands((380.0, 780.0), count)
+    lamp = illuminant(name)
+    planes = means(nm, width).T.reshape(1, count, 4, 6)
+    told = curve_error({"lamp": LightGroup(("lamp",), lamp)}, planes, nm, width, SENSOR.responses.curves)
+    weights = electrons_per_irradiance(SENSOR, nm, width, 1.0, lamp)
+    exact = np.einsum("px,cx,x->pc", REFLECTANCES, PHOTONS, fine(name), optimize=True)
+    ratio = (means(nm, width) * lamp.band_average(nm, width)) @ weights.T / exact
+    found = np.sqrt(np.mean((ratio / np.median(ratio) - 1) ** 2, axis=0))
+    for channel, off in zip(SENSOR.channels, found, strict=True):
+        assert off / 3 - 2e-5 < told[channel] < 3 * off + 2e-5
+
+
+def test_a_line_is_weighed_where_it_lies_on_surfaces_that_rise_evenly():
+    """A line at 507 nm, transport that rises from band to band: its value there counts, not the band's mean."""
+    nm, width = even_bands((400.0, 700.0), 15)
+    rising = 1.0 + 0.004 * (nm - 550.0)
+    lamp = line_spectrum([507.0], [2.0])
+    together = Spectrum(np.array([300.0, 506.9, 507.0, 507.1, 900.0]), np.array([1e-4, 1e-4, 1.0, 1e-4, 1e-4]))
+    ones = lambda at: np.ones((1, at.size))  # noqa: E731
+    alone = band_weights(ones, np.zeros(0), nm, width, lamp)[0]
+    assert alone @ lamp.band_average(nm, width) == pytest.approx(2.0, rel=1e-9)
+    weights = band_weights(ones, np.zeros(0), nm, width, together)[0]
+    exact = 0.1 * (1 + 0.004 * -43) + 1e-4 * 300.0  # the line, and what is even beside it
+    assert weights @ (rising * together.band_average(nm, width)) == pytest.approx(exact, rel=1e-3)
+
+
+def test_a_narrow_band_of_unknown_light_keeps_to_itself():
+    edges = np.array([380.0, 500.0, 501.0, 780.0])
+    nm, width = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    ramp = lambda at: at[None]  # noqa: E731
+    weights = band_weights(ramp, np.zeros(0), nm, width)[0]
+    assert weights == pytest.approx(nm * width, rel=1e-12)
