@@ -77,7 +77,7 @@ class SceneMeans:
             return Level(value, None)
         # Standard error of a ratio (linearised; Cochran, "Sampling Techniques", 2.11).
         off = np.append(weights.ravel(), -value)
-        return Level(value, float(np.sqrt(max(off @ self.covariance @ off, 0.0))) / self.uncovered / value)
+        return Level(value, float(np.sqrt(max(float(off @ self.covariance @ off), 0.0))) / self.uncovered / value)
 
 
 @dataclass(frozen=True)
@@ -101,4 +101,4 @@ class Irradiance:
         value, flat = float((weights * self.mean).sum()), weights.ravel()
         if value <= 0:
             return Level(value, None)
-        return Level(value, float(np.sqrt(max(flat @ self.covariance @ flat, 0.0))) / value)
+        return Level(value, float(np.sqrt(max(float(flat @ self.covariance @ flat), 0.0))) / value)
