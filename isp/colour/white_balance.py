@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import box_sums, rows_at
 from render.illuminants import illuminant
-from render.spectrum import VISIBLE_NM, Floats, photons_per_joule
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths, photons_per_joule
 from rodcone.display import brief
 from rodcone.errors import InputError
 from sensor.cfa import mask
@@ -143,8 +143,8 @@ class WhiteBalance:
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:
     """Relative electrons of curves, the project's own by default, from a neutral under D65, shape (channel,)."""
-    nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
-    width = np.ones_like(nm)
+    nm = DEFAULT_WAVELENGTH_NM
+    width = band_widths(nm)
     light = illuminant("D65").band_average(nm, width) * photons_per_joule(nm)
     return np.asarray((responses or built_in()).band_average(tuple(names), nm, width) @ light)
 

@@ -163,7 +163,7 @@ def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDA
     image = form_image(photographed(lit, level), sensor)
     if model.exact:
         return expected_electrons(image, sensor, row.exposure_s)
-    weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, row.exposure_s)
+    weights = electrons_per_irradiance(sensor, image.wavelength_nm, image.widths_nm, row.exposure_s, image.light)
     return expected_electrons_single(image.values, weights, sensor).astype(np.float64)
 
 

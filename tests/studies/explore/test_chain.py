@@ -145,8 +145,8 @@ def test_the_stages_are_the_public_chain(level_cd_m2, dark_e_per_s):
     first = next(iter(transport.groups.values()))
     light = light_in_bands(first.spectrum, transport.wavelength_nm, transport.width_nm)
     truth = true_srgb(radiance, light, shown_white_cd_m2(transport, level_cd_m2))
-    # Lamps apart follow each its own light within the bands, together their mixture: in 50 nm 1e-3 of white apart.
-    assert np.allclose(photograph(transport, controls).true, truth, rtol=1e-4, atol=2e-3)
+    # Lamps apart follow each its own light within the bands, together their mixture: in bands of 50 nm 2e-3 apart.
+    assert np.allclose(photograph(transport, controls).true, truth, rtol=2e-3, atol=2e-3)
 
 
 def test_the_level_is_reached_and_powers_are_shares():

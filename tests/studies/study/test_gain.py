@@ -31,7 +31,7 @@ def test_texts_of_gains_and_speeds() -> None:
 @loop(
     ("text", "words"),
     [
-        ("ISO 20", ("iso: 20 is outside 51.56", "gain 1")),
+        ("ISO 20", ("iso: 20 is outside 51.57", "gain 1")),
         ("0.5", ("gain: 0.5 is outside",)),
         ("much", ("gain: 'much' is not known",)),
         ("ISO", ("gain: 'ISO' is not known",)),
