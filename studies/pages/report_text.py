@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from math import floor, isfinite, isinf, isnan, log10
 
+from isp.processors.own import user_file
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
 from sensor.presets import names
 from studies.metrics.metric import Metric
@@ -83,8 +84,13 @@ def substitution_text(share: float | None) -> str:
 
 
 def camera_name(camera: str) -> str:
-    """Return a camera's name as prose writes it."""
-    return CAMERA_NAMES.get(camera, camera)
+    """Return a camera's name as prose writes it: a person's own processor by its file, ``develop`` going unsaid."""
+    own = user_file(camera)
+    if own is None:
+        return CAMERA_NAMES.get(camera, camera)
+    path, function = own
+    plain = path.stem.split("-")[0] if path.suffix == ".whl" else path.stem  # a wheel's name goes on with its version
+    return plain.replace("_", " ") + ("" if function == "develop" else f", {function.replace('_', ' ')}")
 
 
 def plain_name(name: str) -> str:

@@ -13,6 +13,13 @@ WRITTEN = {
     text.substitution_text: {None: "not applicable", True: "on", 0.25: "on for 25 % of the seeds", 0.0: "off"},
     text.with_signs: {"10 photons per um^2, 5 cd/m2, cos^4": "10 photons per µm², 5 cd/m², cos⁴"},
     text.plain_name: {"quiet.toml": "quiet", "low_noise": "low_noise", "low_noise.toml": "low_noise.toml"},
+    text.camera_name: {
+        "ple_bayer": "PLE, Bayer",
+        "bayer_menon": "bayer_menon",
+        "two_by_two.py:develop": "two by two",
+        "two_by_two.py:without_noise": "two by two, without noise",
+        "demosaicnet-0.0.14-py3-none-any.whl:bayer_net": "demosaicnet, bayer net",
+    },
     text.exposure_name: {text.way_name("auto"): "automatic", text.way_name("2ms", 4): "2 ms, 4 frames"},
 }
 
