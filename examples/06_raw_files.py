@@ -30,7 +30,7 @@ radiance = rodcone.render("still_life", (size, size), spp=64).relight(luminance_
 device = rodcone.draw_device(bayer, radiance.shape, np.random.default_rng(1))
 for number in range(1, 5):
     frame = rodcone.capture(radiance, bayer, "10ms", device, np.random.default_rng([2, number]))
-    rodcone.write_raw(frame, f"night_{number}.dng")
+    rodcone.write_raw(frame, f"night_{number}.dng", frame=number)
 frames = [rodcone.read_raw(f"night_{number}.dng") for number in range(1, 5)]
 merged = rodcone.merged_raw(frames)
 print(f"one:    {1000 * frames[0].exposure_s:g} ms, read noise {frames[0].read_noise_e:.2f} e-")
