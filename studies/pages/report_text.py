@@ -90,7 +90,7 @@ def camera_name(camera: str) -> str:
         return CAMERA_NAMES.get(camera, camera)
     path, function = own
     plain = path.stem.split("-")[0] if path.suffix == ".whl" else path.stem  # a wheel's name goes on with its version
-    return plain.replace("_", " ") + ("" if function == "develop" else f", {function.replace('_', ' ')}")
+    return plain.replace("_", " ") + ("" if function == "develop" else f" ({function.replace('_', ' ')})")
 
 
 def plain_name(name: str) -> str:

@@ -139,7 +139,7 @@ def test_the_best_bayer_of_each_level_is_named_with_the_lead_over_it() -> None:
 
     assert times("mine.whl:net", "ple_bayer", "ple_rgbw").endswith(
         "Beside the best Bayer: PLE, Bayer moonlight (PSNR +1.0 dB); "
-        "mine.whl:net from street light on (PSNR −1.5 to −1.0 dB)."
+        "mine (net) from street light on (PSNR −1.5 to −1.0 dB)."
     )
     assert "best Bayer" not in times("ple_bayer", "ple_rgbw")
 

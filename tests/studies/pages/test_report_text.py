@@ -17,8 +17,8 @@ WRITTEN = {
         "ple_bayer": "PLE, Bayer",
         "bayer_menon": "bayer_menon",
         "two_by_two.py:develop": "two by two",
-        "two_by_two.py:without_noise": "two by two, without noise",
-        "demosaicnet-0.0.14-py3-none-any.whl:bayer_net": "demosaicnet, bayer net",
+        "two_by_two.py:without_noise": "two by two (without noise)",
+        "demosaicnet-0.0.14-py3-none-any.whl:bayer_net": "demosaicnet (bayer net)",
     },
     text.exposure_name: {text.way_name("auto"): "automatic", text.way_name("2ms", 4): "2 ms, 4 frames"},
 }
