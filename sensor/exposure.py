@@ -16,7 +16,7 @@ from sensor.optics import SpectralIrradiance
 from sensor.photodiodes import with_gain
 from sensor.raw import RawImage
 from sensor.readings.resolve import at_channel, by_site, chip_readings, resolve
-from sensor.readout import frame_variance
+from sensor.readout import unclipped_variance
 from sensor.response import behind_filters, channel_electrons
 
 MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
@@ -233,7 +233,7 @@ def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposur
         Photo-electrons of a mosaic, as `sensor.response.expected_electrons`.
     """
     readings = resolve(sensor, expected_e, exposure_s)
-    variance_e2 = frame_variance(expected_e, readings)
+    variance_e2 = unclipped_variance(expected_e, readings)
     full_e = (
         max(x.headroom_e for x in readings)
         if readings[0].sites is None

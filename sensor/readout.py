@@ -14,6 +14,7 @@ from sensor.device import Device
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 from sensor.readings.channels import join
+from sensor.readings.clipping import Moments, clipped_frame
 from sensor.readings.merge import merge
 from sensor.readings.noise import merged_variance, merged_variances
 from sensor.readings.resolve import PlainReading, at_channel, by_site, law_by_site, light_of, resolve, several
@@ -25,6 +26,7 @@ DrawFrame: TypeAlias = Callable[[NDArray[np.floating], SensorConfig, Device, flo
 # Far above any well, and inside 64-bit integers. One bound for all: what a pixel takes from its row's stream depends on
 # its mean, so readings of one charge, whose wells differ, draw the same electrons only from the same means.
 _MOST_E = 1e15
+LEAST_SLOPE = 1e-3  # of a clipped sample's mean by the light: beyond it the sample tells nothing
 
 
 def draw_frame(
@@ -185,11 +187,13 @@ def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[
 def noise_variance(
     expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> NDArray[np.float64]:
-    """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`; clipping left out.
+    """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`, clipped as its samples are.
 
     Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
-    and column offsets, read noise and quantisation (gain^2 / 12). Of several readings, that of the merge over the share
-    of the pixel that all hold together; a camera that switches its gain looks at `expected_e` as one frame.
+    and column offsets, read noise and quantisation (a DN^2 / 12); beside the well, the converter's top and its 0 what
+    they leave of these (`sensor.readings.clipping`). Of several readings, that of the merge over the share of the pixel
+    that all hold together, in which clipping is left out; a camera that switches its gain looks at `expected_e` as one
+    frame.
 
     Parameters
     ----------
@@ -208,11 +212,38 @@ def noise_variance(
 
 def frame_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
     """`noise_variance` of a frame whose camera is resolved."""
-    crosstalk = readings[0].pixel.crosstalk
+    return frame_moments(expected_e, readings).variance_e2
+
+
+def frame_moments(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> Moments:
+    """Mean and variance of a frame's clipped samples, and the slope of the mean; of several readings unclipped."""
+    light_e = collected_e(expected_e, readings)
     if several(readings):
-        return merged_variance(spread_charge(expected_e, crosstalk), readings)
-    density = by_site([x.light_share for x in readings], readings, expected_e.shape)
-    return law_by_site(readings, expected_e.shape).variance(spread_charge(expected_e * density, crosstalk) / density)
+        return Moments(light_e, merged_variance(light_e, readings), np.ones_like(light_e))
+    return clipped_frame(light_e, readings)
+
+
+def light_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
+    """Variance of the light that each sample tells [e-^2]: of the clipped sample, over the square of its mean's slope.
+
+    An error of the light reaches a sample beside the well by that slope; from there on it grows without end.
+    """
+    moments = frame_moments(expected_e, readings)
+    return np.asarray(moments.variance_e2 / np.maximum(moments.slope, LEAST_SLOPE) ** 2)
+
+
+def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
+    """Variance of a frame's samples as if nothing clipped [e-^2]: what tells how far a mean is from the well."""
+    light_e = collected_e(expected_e, readings)
+    if several(readings):
+        return merged_variance(light_e, readings)
+    return law_by_site(readings, expected_e.shape).variance(light_e)
+
+
+def collected_e(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
+    """Expected photo-electrons of each pixel in the raw image's electrons, its neighbours' crosstalk among them."""
+    density = by_site([1.0 if several(readings) else x.light_share for x in readings], readings, expected_e.shape)
+    return np.asarray(spread_charge(expected_e * density, readings[0].pixel.crosstalk) / density)
 
 
 def noise_sources(
@@ -220,7 +251,7 @@ def noise_sources(
 ) -> dict[str, float]:
     """Standard deviation of each source of a pixel's noise in an even field [e-], by name.
 
-    Their squares sum to `noise_variance`, which says what each of them is.
+    Their squares sum to `noise_variance` where nothing clips, which says what each of them is.
     """
     return sources_of(expected_e, at_channel(resolve(sensor, np.array([expected_e]), exposure_s, channel), channel))
 

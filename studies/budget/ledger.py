@@ -13,7 +13,7 @@ from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.readings.resolve import resolve, unsaturated
-from sensor.readout import frame_variance
+from sensor.readout import light_variance
 from studies.budget.terms import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.model import ImageModel, RenderModel, in_bands
 from studies.study.study import OWN, Condition, SceneChoice, Study, conditions, label, most_spp
@@ -144,7 +144,7 @@ def weigh(
     readings = resolve(sensor, expected_e, exposure_s)
     below = unsaturated(expected_e, readings)
     # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
-    noise_e2 = _mean(frame_variance(expected_e, readings)[below]) or 1.0
+    noise_e2 = _mean(light_variance(expected_e, readings)[below]) or 1.0
     blurred, sharp = sensor_effects.blurred**2 * pilot.spp, sensor_effects.sharp**2 * pilot.spp
     # Wavelengths are stratified within a half; what light a path carries is independent of its wavelength. Both are of
     # light before diffraction, and a pixel without light has neither noise nor jitter.

@@ -24,7 +24,7 @@ from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readings.resolve import PlainReading, at_channel, resolve
-from sensor.readout import frame_variance, read, sources_of
+from sensor.readout import frame_variance, light_variance, read, sources_of
 from sensor.response import channel_electrons
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, charged_share
@@ -120,9 +120,9 @@ def _facts(
     errors_e: NDArray[Any],
 ) -> dict[str, Any]:
     cell, sensor = sample.cell, sample.cell.frame.sensor
-    variance_e2 = frame_variance(expected_e, readings)
+    variance_e2, light_e2 = frame_variance(expected_e, readings), light_variance(expected_e, readings)
     # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
-    shares = uniform_filter(errors_e[0] * errors_e[-1] / variance_e2, 3)
+    shares = uniform_filter(errors_e[0] * errors_e[-1] / light_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     by_channel = {name: at_channel(readings, name) for name in mean_e}
     return {

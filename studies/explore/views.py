@@ -17,8 +17,8 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_name, require_whole
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
-from sensor.readings.resolve import PlainReading, at_channel, behind_densities, by_site, resolve
-from sensor.readout import frame_variance, sources_of, spread_charge
+from sensor.readings.resolve import PlainReading, at_channel, resolve
+from sensor.readout import collected_e, sources_of, unclipped_variance
 from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
@@ -141,15 +141,13 @@ def _readings(exposed: Exposed) -> tuple[PlainReading, ...]:
 
 
 def _variance_e2(exposed: Exposed) -> Image:
-    """Variance of each pixel of one frame [e-^2]."""
-    return frame_variance(exposed.expected_e, _readings(exposed))
+    """Variance of each pixel of one frame as if nothing clipped [e-^2]."""
+    return unclipped_variance(exposed.expected_e, _readings(exposed))
 
 
 def _collected_e(exposed: Exposed) -> Image:
     """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
-    readings = _readings(exposed)
-    lit_e = spread_charge(behind_densities(exposed.expected_e, readings), exposed.sensor.pixel.crosstalk)
-    return np.asarray(lit_e / by_site([x.light_share for x in readings], readings, lit_e.shape))
+    return collected_e(exposed.expected_e, _readings(exposed))
 
 
 def _grey(share: Image) -> Bytes:
@@ -203,7 +201,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     dict
         ``photons`` on the pixel's area; ``electrons`` by channel, as if the pixel had its filter; ``channel``, its own;
         ``read_e``, what the raw image (of a burst all of it) reads there, and ``well_e``, the most that it can;
-        ``noise_e``, the standard deviation of each source [e-], and ``total`` of `sensor.readout.noise_variance`.
+        ``noise_e``, the standard deviation of each source [e-], and their ``total``, as if nothing clipped.
         ``wavelength_nm``, ``photons_nm`` (by band, a nanometre) and
         ``electrons_nm`` (by channel and band, a nanometre) are its spectrum, and what the filters make of it.
 

@@ -11,7 +11,7 @@ from rodcone.errors import require_name
 from sensor.config import SensorConfig
 from sensor.readings.noise import dark_electrons, merged_variance
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
-from sensor.readout import noise_variance
+from sensor.readout import frame_moments
 from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
 
 
@@ -42,8 +42,9 @@ def channel_e(sensor: SensorConfig, light: Light, luminance_cd_m2: float, exposu
 
 
 def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> Floats:
-    """Expected electrons over the noise of one pixel of one chip, fixed patterns included, shape of `electrons`.
+    """Mean over noise of a pixel's samples, of one pixel of one chip, fixed patterns included, shape of `electrons`.
 
+    Both are of clipped samples, as EMVA 1288 has them: beside the well the ratio rises, for full pixels are alike.
     Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
     """
     at_channel(chip_readings(sensor, exposure_s), channel)  # which asks for one
@@ -53,8 +54,9 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
     # each is a frame of its own, for which a camera may switch its gain or meter a channel
     chosen = sensor.chip.switched or any(x.metered for x in sensor.chip.channels)
     fields = electrons.ravel()[:, None] if chosen else electrons[None]
-    variance = np.reshape([noise_variance(field, even, exposure_s, channel) for field in fields], electrons.shape)
-    return np.asarray(electrons / np.sqrt(variance))
+    moments = [frame_moments(field, resolve(even, field, exposure_s, channel)) for field in fields]
+    ratios = [x.mean_e / np.sqrt(x.variance_e2) for x in moments]
+    return np.reshape(ratios, electrons.shape)
 
 
 def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: float) -> list[LightForSnr]:
@@ -88,6 +90,8 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
 
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> float:
     """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
+
+    Clipping is left out: the light is less than the well holds.
 
     A metered channel is seen in its longest time, for light that a shorter one is needed for has more SNR than a full
     well. Of several readings it is the least light with this SNR; beyond a seam it may be less again for a while.

@@ -15,7 +15,7 @@ from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import camera_equation, form_image
 from sensor.readings.resolve import PlainReading, resolve, unsaturated
-from sensor.readout import frame_variance
+from sensor.readout import light_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
 # What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result, and for how
@@ -68,8 +68,11 @@ def monte_carlo_share(
 def _noise_and_room(
     expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Variance of a frame's samples, and which of them are under the well; of a mosaic, or of one channel's."""
-    return frame_variance(expected_e, readings), unsaturated(expected_e, readings)
+    """Variance of the light that a frame's samples tell, and which of them are under the well.
+
+    Of a mosaic, or of one channel's.
+    """
+    return light_variance(expected_e, readings), unsaturated(expected_e, readings)
 
 
 def _mean_share(error_e: NDArray[np.floating], variance_e2: NDArray[np.float64], inside: NDArray[np.bool_]) -> float:

@@ -10,7 +10,8 @@ from matplotlib import colormaps
 from refusal import refusal
 
 from render.spectrum import photons_per_joule
-from sensor.readout import noise_variance, spread_charge
+from sensor.readings.resolve import resolve
+from sensor.readout import noise_variance, spread_charge, unclipped_variance
 from studies.explore.chain import photograph
 from studies.explore.controls import TIME, Controls
 from studies.explore.views import MOST_SIGMAS, MOST_SNR_DB, VIEWS, histogram, noise_scale_e, noise_sources_e, pixel
@@ -102,7 +103,8 @@ def test_snr_is_of_what_a_pixel_collects():
     controls = Controls(pixel=quiet, exposure=TIME, exposure_s=0.01, level_cd_m2=3.0, bits=16)
     shot = photograph(small_transport(), controls)
     quantised = shot.exposed.sensor.gain_e_per_dn**2 / 12
-    collected_e = noise_variance(shot.exposed.expected_e, shot.exposed.sensor, 0.01) - quantised
+    light_e = shot.exposed.expected_e
+    collected_e = unclipped_variance(light_e, resolve(shot.exposed.sensor, light_e, 0.01)) - quantised
     share = 10 * np.log10(collected_e**2 / (collected_e + quantised)) / MOST_SNR_DB
     wanted = np.rint(255 * colormaps["viridis"](np.clip(share, 0.0, 1.0))[..., :3])
     assert np.abs(VIEWS["snr"](shot) - wanted).max() <= 1

@@ -1,0 +1,123 @@
+"""Mean and variance of samples that the well and the converter clip, in closed form.
+
+Counted electrons n are taken as Gaussian. They clip at the well, noise e of reading comes on top, and the converter
+clips the sum: min(min(n, well) + e, top). For a given e that is min(n, c) + e with c = min(well, top - e), a Gaussian
+censored at c, whose moments are
+
+    z = (c - mean) / sigma,    E[min(n, c)] = mean + sigma (z (1 - P(z)) - p(z)),
+    E[(min(n, c) - mean)^2] = sigma^2 (P(z) - z p(z) + z^2 (1 - P(z))),
+
+P and p the normal distribution and density (Tobin 1958). Over e they are integrated by Gauss and Legendre, on either
+side of the e at which converter and well change places. Poisson's skewness is left out: of a well of 6000 e- it takes
+1 % from the variance at the well, 6 % where the mean is three deviations over it. Under black, where the converter ends
+at 0 DN, counted electrons and noise of reading are one Gaussian censored from below. Photodiodes that bin are taken for
+one pixel of their sum.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import ndtr
+
+from sensor.cfa import mask
+from sensor.noise_law import total
+from sensor.readings.resolve import PlainReading
+
+Floats = NDArray[np.float64]
+FAR = 7.0  # standard deviations from a bound, beyond which a sample is never clipped
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+_COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources before the well clips
+
+
+@dataclass(frozen=True)
+class Moments:
+    """Moments of clipped samples, arrays of one shape.
+
+    Attributes
+    ----------
+    mean_e : array
+        Above the mean of dark current and hot pixels [e-]: the light where nothing clips.
+    variance_e2 : array
+        Over chips and exposures [e-^2].
+    slope : array
+        Of the mean by the light: 1 where nothing clips, 0 where all does.
+    """
+
+    mean_e: Floats
+    variance_e2: Floats
+    slope: Floats
+
+
+def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floats, Floats, Floats]:
+    """Mean and mean square, both less `mean`, of min(n, most) for a Gaussian n, and the share that isn't clipped."""
+    sigma = np.sqrt(variance)
+    z = np.clip((most - mean) / np.maximum(sigma, 1e-300), -1e8, 1e8)
+    below, density = ndtr(z), np.exp(-np.square(np.clip(z, -40, 40)) / 2) / np.sqrt(2 * np.pi)
+    first = sigma * (z * ndtr(-z) - density)
+    second = variance * (below - z * density + z**2 * ndtr(-z))
+    return first, second, below
+
+
+def clipped(light_e: Floats, reading: PlainReading) -> Moments:
+    """Moments of one reading's samples, in the raw image's electrons; `light_e` are their expected photo-electrons."""
+    shape, light = np.shape(light_e), np.ravel(np.asarray(light_e, dtype=np.float64))
+    sensor, share = reading.sensor, reading.share
+    law = reading.law
+    dark_e = sensor.pixel.dark_current_e_per_s * reading.exposure_s / share
+    hot_e = reading.dark_e - dark_e
+    mean, variance, slope = light + hot_e, law.variance(light), np.ones_like(light)
+    well_e, top_e = sensor.pixel.full_well_e / share - dark_e, reading.headroom_e
+
+    # Beside the well, and the converter's top
+    near = mean + FAR * np.sqrt(variance) > top_e
+    if near.any():
+        counted = total(reading.sources[name] for name in _COUNTED).variance(light[near])
+        after_e = np.sqrt(np.maximum(variance[near] - counted, 0.0))
+        first, second, open_ = _over_reading(mean[near], counted, after_e, well_e, top_e)
+        mean[near] += first
+        variance[near], slope[near] = second - first**2, open_
+
+    # Under black: counted electrons never are, the noise of reading takes samples there; rounding clips nothing
+    bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - dark_e
+    rounding_e2 = reading.sources["quantisation"].dark_e ** 2
+    after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))
+    low = ~near & (mean - FAR * np.sqrt(np.maximum(after_e2 - rounding_e2, 0.0)) < bottom_e)
+    if low.any():
+        first, second, open_ = censored(-mean[low], variance[low] - rounding_e2, -bottom_e)
+        mean[low] -= first
+        variance[low], slope[low] = second - first**2 + rounding_e2 * open_, open_
+    return Moments(*(np.reshape(x, shape) for x in (mean - hot_e, np.maximum(variance, 0.0), slope)))
+
+
+def _over_reading(
+    mean: Floats, counted: Floats, after_e: Floats, well_e: float, top_e: float
+) -> tuple[Floats, Floats, Floats]:
+    """Moments of min(min(n, well) + e, top), less `mean`, over e of standard deviation `after_e`; the open share."""
+    first, second, open_ = (np.zeros_like(mean) for _ in range(3))
+    reach = np.maximum(FAR * after_e, 1e-9)
+    change = np.clip(top_e - well_e, -reach, reach)  # under it the well clips first, over it the converter
+    for start, end in ((-reach, change), (change, reach)):
+        half, middle = (end - start) / 2, (end + start) / 2
+        for node, weight in zip(_NODES, _WEIGHTS, strict=True):
+            e = middle + half * node
+            scale = np.maximum(after_e, 1e-9 / FAR)
+            probability = weight * half * np.exp(-((e / scale) ** 2) / 2) / (scale * np.sqrt(2 * np.pi))
+            m, s, below = censored(mean, counted, np.minimum(well_e, top_e - e))
+            first += probability * (m + e)
+            second += probability * (s + 2 * m * e + e**2)
+            open_ += probability * below
+    return first, second, open_
+
+
+def clipped_frame(mean_e: Floats, readings: Sequence[PlainReading]) -> Moments:
+    """Moments of a frame of which each reading has the sites that it reads; of a reading of every pixel, all."""
+    if readings[0].sites is None:
+        return clipped(mean_e, readings[0])
+    parts = np.empty((3, *mean_e.shape))
+    for reading in readings:
+        at = mask(reading.sensor.cfa, str(reading.sites), (mean_e.shape[0], mean_e.shape[1]))
+        moments = clipped(mean_e[at], reading)
+        parts[:, at] = moments.mean_e, moments.variance_e2, moments.slope
+    return Moments(*parts)
