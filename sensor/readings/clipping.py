@@ -27,6 +27,7 @@ from sensor.readings.resolve import PlainReading
 
 Floats = NDArray[np.float64]
 FAR = 7.0  # standard deviations from a bound, beyond which a sample is never clipped
+LOW = 4.9  # the same of black: five deviations, which a black level has by default, clip nothing
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
 _COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources before the well clips
 
@@ -83,7 +84,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - dark_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
     after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))
-    low = ~near & (mean - FAR * np.sqrt(np.maximum(after_e2 - rounding_e2, 0.0)) < bottom_e)
+    low = ~near & (mean - LOW * np.sqrt(np.maximum(after_e2 - rounding_e2, 0.0)) < bottom_e)
     if low.any():
         first, second, open_ = censored(-mean[low], variance[low] - rounding_e2, -bottom_e)
         mean[low] -= first

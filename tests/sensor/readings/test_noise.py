@@ -19,7 +19,7 @@ from sensor.presets import low_noise, preset, preset_file
 from sensor.readings.merge import noise_of_merged
 from sensor.readings.noise import best_weights, covariances, merged_variance, merged_variances, seams, whole_share
 from sensor.readings.resolve import chip_readings, resolve
-from sensor.readout import noise_sources, noise_variance
+from sensor.readout import noise_sources, noise_variance, unclipped_variance
 from studies.photograph.snr import electrons_at_snr, snr
 
 HDR = ("dual_gain", "split_pixel", "staggered")
@@ -48,7 +48,8 @@ def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
     light = np.array([0.0, 0.3, 40.0, 5000.0])
     total = sum(covariances(light, chip_readings(sensor, 0.02)).values())
     for index, reading in enumerate(sensor.chip.readings):
-        alone = noise_variance(light * reading.share, chip_readings(sensor, 0.02)[index].sensor, 0.02)
+        own = chip_readings(sensor, 0.02)[index].sensor
+        alone = unclipped_variance(light * reading.share, chip_readings(own, 0.02))
         np.testing.assert_allclose(total[:, index, index] * reading.share**2, alone, rtol=1e-12)
 
 
