@@ -169,9 +169,19 @@ class SensorConfig:
         return unit_channel(self.cfa)
 
     @property
+    def sites(self) -> int:
+        """Photodiodes along either side of a pixel of the raw image: 2 of a camera that bins."""
+        return self.chip.sites
+
+    @property
+    def in_charge(self) -> bool:
+        """Whether photodiodes are summed before they are read."""
+        return self.chip.in_charge
+
+    @property
     def site_pitch_um(self) -> float:
         """Pitch of the photodiodes [um], onto each of which light is imaged."""
-        return self.pixel.pitch_um / self.chip.sites
+        return self.pixel.pitch_um / self.sites
 
     @property
     def undivided(self) -> "SensorConfig":
@@ -205,7 +215,7 @@ class SensorConfig:
             For an odd height or width of a camera that bins: a picture from a file may have any size.
         """
         _check_even(self, values.shape[-2:])
-        return values if self.chip.sites == 1 else block_sums(values)
+        return values if self.sites == 1 else block_sums(values)
 
     @property
     def white_dn(self) -> int:

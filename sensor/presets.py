@@ -122,7 +122,7 @@ def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
         responses = change(sensor.responses)
     else:
         tile = tile_of(mosaic)
-        if sensor.chip.sites > 1 and plain(tile) != tile:
+        if sensor.sites > 1 and plain(tile) != tile:
             raise InputError(
                 f"cfa: {mosaic!r} for a sensor that bins, whose raw images hold no quad; allowed: what they hold, such "
                 f"as {mosaic.removeprefix('quad_')}; give that, or a sensor that doesn't bin"

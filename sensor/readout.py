@@ -67,7 +67,7 @@ def convert(
     rounds and clips; readings that bin in digital numbers are summed.
     """
     converter = sensor
-    if sensor.chip.in_charge:
+    if sensor.in_charge:
         collected_e = np.minimum(block_sums(collected_e), sensor.pixel.full_well_e)
     else:
         converter = sensor.photosites
@@ -77,7 +77,7 @@ def convert(
         read_e += converter.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
-    return dn if sensor.chip.in_charge else sensor.pixel_sums(dn)
+    return dn if sensor.in_charge else sensor.pixel_sums(dn)
 
 
 def draw_mean_frame(

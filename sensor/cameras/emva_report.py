@@ -6,7 +6,7 @@ Equations are numbered as in release 4.0 Linear of the standard.
 import tomllib
 import warnings
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 from pathlib import Path
 from typing import Any
@@ -136,6 +136,47 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
     if "eta" in figures:
         efficiency = (figures["eta"] / 100, figures["lambda_nm"])
     return PixelNumbers(f"{report.camera}: {source_note}", pixel, settings, left_out, efficiency)
+
+
+def numbers_at_gains(low: EmvaReport, high: EmvaReport) -> PixelNumbers:
+    """Pixel of a camera whose reports state two gains: noise before and after the amplifier, and the gain between.
+
+    In electrons what comes after the amplifier falls as the gain rises: sigma^2 = read^2 + (converter / K)^2 at both
+    gains. DSNU is the higher gain's, for the amplifier's own offsets fall as well; all else is the lower gain's.
+
+    Raises
+    ------
+    InputError
+        Without K and sigma_d in both, for K that doesn't rise, noise that doesn't fall, or other bits or black levels.
+    """
+    for report in (low, high):
+        if lacking := [name for name in ("K", "sigma_d") if name not in report.figures]:
+            raise InputError(f"{report.camera}: no {' and '.join(lacking)}; allowed: reports with both; give another")
+    if (low.bits, low.black_level_dn) != (high.bits, high.black_level_dn):
+        raise InputError(
+            f"{high.camera}: bits and black level {high.bits}, {high.black_level_dn}, at the lower gain {low.bits}, "
+            f"{low.black_level_dn}; allowed: those of one converter; give reports of one camera"
+        )
+    numbers, (k, k_high) = numbers_of(low), (low.figures["K"], high.figures["K"])
+    sigma_e, sigma_high_e = (_read_noise(x.figures, x.source_note)[0].value for x in (low, high))
+    if k_high <= k or sigma_high_e >= sigma_e:
+        raise InputError(
+            f"{high.camera}: K = {k_high:g} DN/e- with a dark noise of {sigma_high_e:.4g} e-, at the lower gain {k:g} "
+            f"and {sigma_e:.4g}; allowed: a higher K with less noise; swap the reports, or give one alone"
+        )
+    converter_dn = min(sqrt((sigma_e**2 - sigma_high_e**2) / (k**-2 - k_high**-2)), sigma_high_e * k_high)
+    read_e = sqrt(max(sigma_high_e**2 - (converter_dn / k_high) ** 2, 0.0))
+    told = f"sigma_d = {sigma_e:.4g} e- at K = {k:g} DN/e- and {sigma_high_e:.4g} e- at {k_high:g}"
+    both = f"of {told}; {low.source_note}"
+    pixel = {**numbers.pixel, "read_noise_e": Sourced(read_e, f"before the amplifier, {both}")}
+    if "DSNU1288" in high.figures:
+        pixel["dsnu_e"] = Sourced(high.figures["DSNU1288"], f"DSNU1288 at the higher gain; {high.source_note}")
+    settings = {
+        **numbers.settings,
+        "converter_noise_dn": Sourced(converter_dn, f"after the amplifier, {both}"),
+        "gain_limit": Sourced(k_high / k, f"K of the higher gain over that of the lower; {high.source_note}"),
+    }
+    return replace(numbers, pixel=pixel, settings=settings)
 
 
 def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> float:

@@ -25,7 +25,7 @@ def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool =
     """
     device = draw_device(sensor, shape, np.random.default_rng([seed, 0]))
     rng = np.random.default_rng([seed, 1])
-    share = 1 / sensor.chip.sites**2
+    share = 1 / sensor.sites**2
 
     def frame(light_e: float, exposure_s: float) -> NDArray[np.uint16]:
         return expose(np.full(shape, share * light_e), sensor, exposure_s, device, rng, exact=exact).dn

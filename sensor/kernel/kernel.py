@@ -156,7 +156,7 @@ def read_frame(
     collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
 
     collected_e = dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))
-    if sensor.chip.in_charge:
+    if sensor.in_charge:
         return convert(collected_e.numpy().astype(np.float64).reshape(expected_e.shape), sensor, device, key)
 
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.

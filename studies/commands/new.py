@@ -11,7 +11,7 @@ from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_absent, require_keys, require_range
 from rodcone.files import check_place, require_ending, write_files
 from rodcone.toml_file import read_toml
-from sensor.cameras.emva_report import numbers_of, read_report
+from sensor.cameras.emva_report import numbers_at_gains, numbers_of, read_report
 from sensor.cameras.library import measured_camera
 from sensor.cameras.noise_files import dng_numbers
 from sensor.cameras.numbers import (
@@ -41,6 +41,7 @@ def preset(
     out: Path,
     camera: str | None = None,
     noise: Path | None = None,
+    more_gain: Path | None = None,
     anchor: str | None = None,
 ) -> None:
     """Write a sensor as a TOML file to change: pixel, lens, mosaic, responses, every number with its source.
@@ -61,6 +62,9 @@ def preset(
     noise
         Source of its noise: an EMVA 1288 report as .toml, or a .dng with a NoiseProfile. For raw frames of your own
         use rodcone characterise --from.
+    more_gain
+        EMVA 1288 report of the same camera at a higher gain, beside --noise at the lowest: the file then states the
+        noise before and after the amplifier, and how far an automatic exposure may raise the gain.
     anchor
         Published quantum efficiency at a wavelength, such as 0.5@530, which turns a relative response, or the curves of
         the preset that is named, into electrons.
@@ -68,7 +72,7 @@ def preset(
     if camera is None and noise is None:
         if name is None:
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
-        require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor)
+        require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor, more_gain=more_gain)
         if name == _EYE.stem:
             _copy(_EYE, out, ".toml", _beside({out.parent / "receptors.csv": _EYE.with_name("receptors.csv")}))
         else:
@@ -80,7 +84,7 @@ def preset(
     lender = None if name is None else read_preset(name)
     # what the sources tell
     measured = None if camera is None else measured_camera(camera)
-    numbers = _numbers(noise)
+    numbers = _numbers(noise, more_gain)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
     # what a preset lends
@@ -169,7 +173,14 @@ def _beside(files: Mapping[Path, Path]) -> Mapping[Path, Path]:
     return files
 
 
-def _numbers(noise: Path | None) -> PixelNumbers:
+def _numbers(noise: Path | None, more_gain: Path | None) -> PixelNumbers:
+    if more_gain is not None:
+        if noise is None or noise.suffix.lower() != ".toml":
+            raise InputError(
+                f"more_gain: {more_gain.name!r} without a report of the lowest gain; allowed: with --noise; give both "
+                "as .toml"
+            )
+        return numbers_at_gains(read_report(noise), read_report(more_gain))
     if noise is None:
         return PixelNumbers("no source of noise is given")
     require_ending(noise, ".toml", ".dng", what="noise")

@@ -12,6 +12,7 @@ from rodcone.digests import digest
 from rodcone.errors import InputError, require_absent, require_fields, require_keys
 from sensor.config import SensorConfig
 from sensor.presets import preset, vary
+from sensor.readings.resolve import chip_readings, several
 from studies.budget.ledger import Plan
 from studies.dataset.sample import TRUTH
 from studies.study.lit_scene import OpenedScene
@@ -77,7 +78,8 @@ def check_cameras(study: Study, order: SetOrder) -> None:
         shake=study.lens.shake,
     )
     for name in study.sensors:
-        if preset(name).chip.sites > 1 or preset(name).chip.readings:
+        sensor = preset(name)
+        if sensor.sites > 1 or several(chip_readings(sensor, exposure_s=0.0)):
             raise InputError(
                 f"sensors: {name!r} bins or merges readings; allowed in a data set: pixels read once; leave it out"
             )

@@ -20,7 +20,7 @@ from sensor.diffraction import sampled_otf
 from sensor.exposure import AUTO_INFORMATION, exposure_of_electrons_s
 from sensor.noise_law import NoiseLaw
 from sensor.optics import WAVELENGTH_NM, camera_equation
-from sensor.readings.resolve import PlainReading, at_channel, resolve
+from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, light_of
@@ -176,7 +176,8 @@ def expect(
         For an unknown light, prior or rule of exposure, a pixel of several readings, or a tile too large.
     """
     require_name("prior", prior, PRIORS)
-    if count := len(sensor.chip.readings):
+    if several(readings := chip_readings(sensor, exposure_s=0.0)):
+        count = len(readings)
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
     if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # else a patch's middle lacks sites
         raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")

@@ -49,7 +49,7 @@ def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, i
 
 def grid(sensor: SensorConfig) -> tuple[float, int]:
     """Pitch of a sensor's pixels [um], and along either side how many of them are a pixel of its raw image."""
-    return sensor.site_pitch_um, sensor.chip.sites
+    return sensor.site_pitch_um, sensor.sites
 
 
 def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> None:

@@ -305,7 +305,7 @@ def _check_cameras(study: Study) -> None:
     for name in study.sensors:
         sensor = preset(name)
         # sensors of one size are compared at the coarsest's pixels
-        if study.sensor_side_um is None and sensor.chip.sites != preset(study.sensors[0]).chip.sites:
+        if study.sensor_side_um is None and sensor.sites != preset(study.sensors[0]).sites:
             raise InputError(
                 f"sensors: of {name!r} and {study.sensors[0]!r} one bins, so that its pictures are half as large; "
                 "allowed: all bin, or none; give each a study of its own"

@@ -61,7 +61,7 @@ def run_cell(cell: Cell) -> Row:
     unmoved_e = np.asarray(_array(frame.electrons), dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
     # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
-    bins_truth = sensor.chip.sites > 1 and _array(frame.truth).shape[:2] == expected_e.shape
+    bins_truth = sensor.sites > 1 and _array(frame.truth).shape[:2] == expected_e.shape
     truth, truth_png = _truth(frame.truth, bins_truth)
     pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(frame.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])

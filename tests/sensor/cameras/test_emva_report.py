@@ -1,7 +1,10 @@
 """EMVA 1288 reports as TOML: each symbol's conversion, what is left out, the shipped ones, and what is refused."""
 
 import tomllib
+from dataclasses import replace
+from math import hypot
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +13,7 @@ from file_samples import REPORT_HEAD as HEAD
 from loop import loop
 from refusal import refusal
 
-from sensor.cameras.emva_report import clip_over_saturation, numbers_of, read_report
+from sensor.cameras.emva_report import EmvaReport, clip_over_saturation, numbers_at_gains, numbers_of, read_report
 from sensor.cameras.numbers import curves_csv, missing, preset_text
 from sensor.config_file import read_sensor
 
@@ -142,3 +145,36 @@ def test_figures_that_contradict_others_or_look_like_another_unit_are_told(old, 
 
 def test_figures_that_agree_are_read_without_a_word(tmp_path):
     read_report(write(tmp_path, HEAD + WHOLE.replace("SNR_max_dB = 39.8", "SNR_max_dB = 40.5\nDR_dB = 64")))
+
+
+# Two reports of one camera at two gains.
+
+
+def at_gain(k: float, sigma_d: float, **more: Any) -> EmvaReport:
+    figures = {"K": k, "sigma_d": sigma_d, "DSNU1288": 2.0 / k, "pixel_pitch_um": 2.0}
+    return replace(EmvaReport(f"K {k:g}", "maker", "a source", "2026", 10, 64, figures), **more)
+
+
+def test_two_gains_part_the_noise_before_the_amplifier_from_that_after_it() -> None:
+    read_e, converter_dn = 1.5, 0.8
+    low, high = (at_gain(k, hypot(read_e, converter_dn / k)) for k in (0.2, 1.6))
+    numbers = numbers_at_gains(low, high)
+    pixel, settings = numbers.pixel, numbers.settings
+    assert pixel["read_noise_e"].value == pytest.approx(read_e)
+    assert settings["converter_noise_dn"].value == pytest.approx(converter_dn)
+    assert settings["gain_limit"].value == pytest.approx(8.0)
+    assert pixel["dsnu_e"].value == pytest.approx(2.0 / 1.6)
+    assert pixel["full_well_e"].value == pytest.approx((1023 - 64) / 0.2)
+    # Noise that falls faster than the gain rises is after the amplifier, all of it.
+    steep = numbers_at_gains(at_gain(0.2, 9.0), at_gain(0.4, 2.0))
+    assert steep.pixel["read_noise_e"].value == pytest.approx(0.0, abs=1e-6)
+    assert steep.settings["converter_noise_dn"].value == pytest.approx(0.8)
+
+
+def test_reports_that_are_no_two_gains_of_one_camera_are_refused() -> None:
+    low, high = at_gain(0.2, 4.0), at_gain(1.6, 1.5)
+    refusal(numbers_at_gains, high, low, words=("K = 0.2 DN/e-", "swap the reports"))
+    refusal(
+        numbers_at_gains, low, replace(high, bits=12), match="bits and black level 12, 64, at the lower gain 10, 64"
+    )
+    refusal(numbers_at_gains, low, replace(high, figures={"K": 1.6}), match="no sigma_d; allowed: reports with both")
