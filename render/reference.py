@@ -23,12 +23,14 @@ from render.denoised.relight import sums_over_blocks
 from render.error_estimates import Halves
 from render.level import SceneMeans
 from render.loader import Film
+from render.meter import Meter
 from render.runs import Means, fields_of
 from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_inputs
 from rodcone.errors import InputError
+from rodcone.jit import backend
 from rodcone.types import Planes
 
 SHIPPED = Path(__file__).parent / "data" / "references"
@@ -36,6 +38,7 @@ FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
 BLOCK = 16  # pixels a side, within which errors are pooled: a variance from 256 differences is right to 9 %
 FALSE_ALARM = 1e-3  # chance, at most, that an agreeing render is called another
 MOST_PACKED = 32  # times that a file unpacks into; half floats of light come to 2 or 3
+_MULTIPLES = (1, 2, 3, 4, 8)  # of a film's sides, at which a reference is sought to average
 _LEVELS = ("radiance", "uncovered", "covariance")
 
 
@@ -87,6 +90,48 @@ def find_reference(scene: Scene, film: Film) -> Reference | None:
         if (arrays := read_arrays(path)) is not None:
             return _unpacked(path, arrays, scene.groups)
     return None
+
+
+def ready_light(scene: Scene, film: Film) -> Reference | None:
+    """Reference of a scene and film, or one of whole multiples of the film's sides, averaged down to it.
+
+    None where there is neither. The scene's illuminance meter goes along, which measures where it is asked.
+    """
+    height, width = film.size
+    for times in _MULTIPLES:
+        larger = replace(film, size=(height * times, width * times))
+        for folder in reference_folders():
+            path = reference_path(folder, scene, larger)
+            if (arrays := read_arrays(path)) is None:
+                continue
+            found = _unpacked(path, averaged(arrays, times), scene.groups)
+            meter = Meter(scene, film, 0, None) if scene.reference_plane and backend() != "numpy" else None
+            return replace(found, transport=replace(found.transport, meter=meter))
+    return None
+
+
+def averaged(arrays: Mapping[str, Any], times: int) -> dict[str, Any]:
+    """Arrays of a reference's file over blocks of `times` pixels a side: their mean, and their samples together."""
+
+    def blocks(planes: Any) -> Any:
+        *rest, height, width = planes.shape
+        return planes.reshape(*rest, height // times, times, width // times, times)
+
+    if times == 1:
+        return dict(arrays)
+    light = (arrays["light"] * arrays["scale"]).astype(np.float32)
+    mean = blocks(light).mean(axis=(-3, -1), dtype=np.float32)
+    # The error's plane is relative to the light of all bands: weighed by it, it gives that of the block.
+    total = light.sum(axis=1)
+    weights = np.maximum(mean.sum(axis=1) * times**2, np.float32(1e-30))
+    return {
+        **arrays,
+        "light": mean,
+        "scale": np.float32(1.0),
+        "error": blocks(arrays["error"] * total).sum(axis=(-3, -1)) / weights,
+        "rates": blocks(arrays["rates"]).sum(axis=(-3, -1), dtype=np.uint32),
+        **{name: blocks(arrays[name]).mean(axis=(-3, -1)) for name in arrays if name.startswith(("coverage", "seen_"))},
+    }
 
 
 def open_reference(path: str | Path) -> Reference:

@@ -13,9 +13,12 @@ GB = 1e9
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
 _DENOISER_BYTES = 1300  # a pixel, of Open Image Denoise
-_VIEW_ARRAYS = 4  # pooling the variance; later relit radiance, its halves, and an image forming
+# What follows a render beside its transport, by band: relit light, its image, both halves' light, an image forming of
+# one of them with its copy for the lens, and what the transport keeps beside its arrays. Pooling the variance takes
+# less.
+_VIEW_ARRAYS = 7.5
 _RUN_BYTES = 2 * 4 * (1 << 24)  # of a light group: what a launch gives of both halves (`render.runs.MOST_FLOATS`)
-_RENDER_BYTES = 120  # for any number of bands: masks of the render, a preview
+_RENDER_BYTES = 200  # for any number of bands: masks of the render, a preview
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 PROCESS_BYTES = 350e6  # libraries and compiled kernels
 _FILE_BANDS = 40  # of a picture file

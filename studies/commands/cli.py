@@ -105,6 +105,9 @@ def main(arguments: list[str] | None = None) -> Any:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except InputError as error:
         fail(str(error), BAD_INPUT)
+    except MemoryError as error:
+        what = " ".join(str(error).split()) or "the system gave no more"
+        fail(f"memory: it ran out ({what}); take a smaller picture (--size), fewer bands or fewer workers", BAD_INPUT)
     except BrokenPipeError:  # the reader, such as head, has enough
         sys.stdout = None  # which Python would flush at its end, to nobody
         sys.exit(0)

@@ -1,5 +1,6 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -14,6 +15,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import film_size
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, fine_bands
+from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
@@ -29,6 +31,7 @@ from sensor.raw_files.raw_file import check_ending
 from sensor.response import channel_electrons, expected_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
+from studies.photograph.ready_light import Ready, find_ready
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
@@ -87,13 +90,16 @@ class Order:
         Illuminant, such as D65, under which grey is shown as grey; as-shot for the scene's first light, which is known
         here, and that of --light, or D65, for a file of radiance.
     size : int, optional
-        Longer side of the render in pixels; 256 by default; a .xml scene's film and a file of radiance have their own.
+        Longer side of the render in pixels; by default that of the scene's light if it is there already, such as 512
+        of still_life, or 256; a .xml scene's film and a file of radiance have their own.
     height : int, optional
         Pixels; with one of height and width the other keeps the proportions.
     width : int, optional
         Pixels; as height.
     spp : int, optional
-        Samples a pixel of the render; 64 by default.
+        Samples a pixel of the render; 64 by default, where the scene's light isn't there already.
+    render : bool
+        Render the scene here, even if its light is there already; --spp does so too.
     frames : int
         Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
     shake : str, optional
@@ -125,6 +131,7 @@ class Order:
     height: int | None = None
     width: int | None = None
     spp: Annotated[int | None, (1, 1 << 16, "give samples per pixel")] = None
+    render: bool = False
     frames: Annotated[int, (1, MOST_FRAMES, "give exposures of a burst")] = 1
     shake: str | None = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
@@ -162,7 +169,7 @@ def take(order: Order, step: Step | None = None) -> Taken:
     OSError
         Where the folder can't be written.
     """
-    sensor, opened, asked_s = _check(order)
+    sensor, opened, asked_s, ready = _check(order)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
     # what is looked at, and the light that the camera's colours are set to
@@ -188,18 +195,10 @@ def take(order: Order, step: Step | None = None) -> Taken:
     colour = calibrate(sensor, balance or light)
     check_place(out)  # before the render: it may take minutes
     if opened is not None:
-        if step:
-            step(render_words(np.inf), 0.0)
-        bands = fine_bands(spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items())
-        transport = render(
-            opened.scene,
-            _size(order, opened),
-            wavelength_nm=bands[0],
-            width_nm=bands[1],
-            spp=order.spp or _SPP,
-            seed=order.seed,
-            progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
-        )
+        if ready:
+            transport, notes = ready.transport, [*notes, ready.line]
+        else:
+            transport = _rendered(order, opened, spectra, step)
 
     # The exposure.
     if step:
@@ -265,13 +264,41 @@ def _exposure(
     return exposed_by_rule(order.exposure, channel_electrons(image, sensor, 1.0), sensor)
 
 
+def _rendered(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None) -> Transport:
+    """Light of a scene, rendered here."""
+    if step:
+        step(render_words(np.inf), 0.0)
+    bands = fine_bands(spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items())
+    return render(
+        opened.scene,
+        _size(order, opened),
+        wavelength_nm=bands[0],
+        width_nm=bands[1],
+        spp=order.spp or _SPP,
+        seed=order.seed,
+        progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
+    )
+
+
+def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> Ready | None:
+    """Light that is there already, where no number asks for a render."""
+    if order.render or order.spp is not None:
+        return None
+    asked = None if (order.size, order.height, order.width) == (None, None, None) else _size(order, opened)
+    lights = (spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items())
+    return find_ready(opened.scene, opened.size, asked, lights)
+
+
 def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
     """Expected electrons of the raw image's pixels, shape (h, w)."""
     return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s))
 
 
-def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
-    """Sensor, scene (None: a stored radiance) and exposure time (None: by a rule), or `InputError`."""
+def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, Ready | None]:
+    """Sensor, scene (None: a stored radiance), exposure time (None: by a rule) and light that is there already.
+
+    Raises `InputError` for what can't be photographed.
+    """
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
     check_ending(Path(order.out), sensor.cfa)
@@ -289,7 +316,7 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             f"give {AUTO}, or a time such as 20ms"
         )
     if is_radiance_file(order.source):
-        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width", "spp")
+        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width", "spp", "render")
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
         require_absent(place, **{name: getattr(order, name) for name in scene_options})
         if len(order.light) > 1 or "=" in "".join(order.light):
@@ -299,13 +326,14 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None]:
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         require_memory(memory(*extent_of(order.source)), order.force)
-        return sensor, None, exposure_s
+        return sensor, None, exposure_s, None
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
-    height, width = _size(order, opened)
+    ready = _ready(order, opened, asked_spectra(opened.scene, order.light))
+    height, width = ready.size if ready else _size(order, opened)
     check_frame(sensor, (height, width))
     require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
-    return sensor, opened, exposure_s
+    return sensor, opened, exposure_s, ready
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

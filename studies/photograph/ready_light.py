@@ -1,0 +1,64 @@
+"""Light of a scene that was rendered before, where a command would render the same: quiet, and at once.
+
+A scene that the project ships light of is photographed by it at the light's own size, unless samples are asked for, or
+a size that it doesn't fit. Studies have a rule of their own (`render.reference`), which tests the file by a render too.
+"""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from render.loader import Film
+from render.reference import Reference, ready_light
+from render.scene import OWN_SIDE, Scene, film_size
+from render.spectrum import VISIBLE_NM, Spectrum, emission_lines_nm, even_bands
+from render.transport import Transport
+from rodcone.types import Floats
+
+BANDS = even_bands(VISIBLE_NM, 20)  # of 20 nm, as `rodcone reference` renders
+SIDE = 512  # longer side of the pictures that are shipped
+
+
+@dataclass(frozen=True)
+class Ready:
+    """Light that is there, its size, and a line that says what it is."""
+
+    transport: Transport
+    size: tuple[int, int]
+    line: str
+
+
+def find_ready(
+    scene: Scene,
+    own: tuple[int, int],
+    asked: tuple[int, int] | None,
+    spectra: Iterable[Spectrum],
+    bands: tuple[Floats, Floats] = BANDS,
+) -> Ready | None:
+    """Light of a scene at the size asked for; without one at the light's own. None where none fits.
+
+    Parameters
+    ----------
+    scene : Scene
+    own : (int, int)
+        Height and width that the scene has by itself.
+    asked : (int, int) or None
+    spectra : iterable of Spectrum
+        Of the lights; a lamp of lines needs bands of its own, so nothing fits it.
+    bands : (array, array)
+        Centres and widths [nm].
+    """
+    if any(emission_lines_nm(spectrum).size for spectrum in spectra):
+        return None
+    larger = [film_size(own, SIDE)] if max(own) == OWN_SIDE else []  # a file's film states its size
+    for size in [asked] if asked else [*larger, own]:
+        film = Film(size, *bands, max_depth=scene.max_depth, rr_depth=scene.rr_depth)
+        if reference := ready_light(scene, film):
+            return Ready(reference.transport, size, _line(reference))
+    return None
+
+
+def _line(reference: Reference) -> str:
+    share = reference.certificate.get("shares", {}).get("low_noise", {}).get("classroom")
+    beside = "" if share is None else f", its noise {share:.2g} of the sensor's variance at 25 cd/m2"
+    samples = f"{reference.certificate['samples']:.0f} samples per pixel"
+    return f"light: {reference.path.name}, rendered before with {samples}{beside}; --render renders it anew"

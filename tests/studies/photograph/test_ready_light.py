@@ -1,0 +1,90 @@
+"""Light that the project ships: what is taken by default, its averages over blocks, and what asks for a render."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import call
+
+from render.illuminants import illuminant
+from render.loader import Film
+from render.reference import SHIPPED, find_reference, ready_light
+from scenes.catalog import load
+from studies.commands import cli
+from studies.photograph import shot
+from studies.photograph.ready_light import BANDS, find_ready
+
+SHIPPED_AT = {"color_checker": (340, 512), "siemens_star": (512, 512), "still_life": (512, 512)}
+
+
+def film(size: tuple[int, int]) -> Film:
+    scene = load("color_checker")
+    return Film(size, *BANDS, max_depth=scene.max_depth, rr_depth=scene.rr_depth)
+
+
+@pytest.mark.sample(2)
+@pytest.mark.parametrize("name", SHIPPED_AT)
+def test_a_scene_with_light_of_its_own_is_found_at_its_size_without_one_asked_for(name: str) -> None:
+    scene = load(name)
+    ready = find_ready(scene, scene.size, None, [group.spectrum for group in scene.groups.values()])
+    assert ready is not None
+    assert ready.size == SHIPPED_AT[name]
+    assert ready.transport.light.mean.shape[1:] == (20, *ready.size)
+    assert "rendered before with" in ready.line
+
+
+def test_the_package_stays_small() -> None:
+    assert sum(path.stat().st_size for path in SHIPPED.glob("*.npz")) < 25e6
+
+
+def test_a_smaller_size_is_the_mean_over_blocks_with_the_samples_of_all() -> None:
+    scene = load("color_checker")
+    whole, half = (ready_light(scene, film(size)).transport for size in ((340, 512), (170, 256)))
+    assert find_reference(scene, film((170, 256))) is None  # no file of that size
+
+    def blocks(planes: np.ndarray) -> np.ndarray:
+        return planes.reshape(*planes.shape[:-2], 170, 2, 256, 2)
+
+    np.testing.assert_allclose(half.light.mean, blocks(whole.light.mean).mean(axis=(-3, -1)), rtol=1e-5)
+    assert np.array_equal(half.counts, blocks(whole.counts).sum(axis=(-3, -1)))
+    # The mean of four pixels' errors, of independent paths: a quarter of the mean variance, in all 20 bands together.
+    error = blocks(whole.light.difference.sum(axis=1)).mean(axis=(-3, -1))
+    most = float(np.abs(error).max())
+    np.testing.assert_allclose(half.light.difference.sum(axis=1), error, rtol=1e-3, atol=1e-5 * most)
+    ratio = half.variance.mean(dtype=np.float64) / whole.variance.mean(dtype=np.float64)
+    assert ratio == pytest.approx(0.25, rel=0.2)
+    assert half.relight().luminance().mean() == pytest.approx(whole.relight().luminance().mean(), rel=1e-5)
+
+
+def test_a_size_that_no_file_is_a_multiple_of_and_a_lamp_of_lines_ask_for_a_render() -> None:
+    scene = load("color_checker")
+    own = [group.spectrum for group in scene.groups.values()]
+    assert find_ready(scene, scene.size, (100, 151), own) is None
+    assert find_ready(scene, scene.size, None, [illuminant("sodium_low")]) is None
+
+
+def test_capture_takes_it_and_says_so_and_numbers_or_render_ask_for_a_render(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(shot, "render", lambda *_, **__: pytest.fail("rendered"))
+    code, out, err = call(["capture", "color_checker", "-o", "shot.tif", "--json"])
+    assert (code, json.loads(out)["size"]) == (0, [340, 512])
+    assert "light: color_checker-340x512x20-" in err
+    small = json.loads(call(["capture", "color_checker", "-o", "s.tif", "--size", "256", "--json"])[1])
+    assert small["size"] == [170, 256]
+    for numbers in (["--spp", "4"], ["--render"], ["--size", "33"]):
+        with pytest.raises(pytest.fail.Exception, match="rendered"):
+            call(["capture", "color_checker", "-o", "shot.tif", *numbers])
+
+
+def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    def full(*_: object, **__: object) -> None:
+        raise MemoryError("Unable to allocate 3.00 GiB")
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(shot, "form_image", full)
+    code, _, err = call(["capture", "color_checker", "-o", "shot.tif", "--size", "256"])
+    assert code == cli.BAD_INPUT
+    assert err.splitlines()[-1].startswith("rodcone: memory: it ran out (Unable to allocate 3.00 GiB); take a smaller")
