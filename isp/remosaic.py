@@ -65,4 +65,5 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     order = [raw.channels.index(channel) for channel in channels(tile)]
     colour = None if raw.colour is None else raw.colour.part(order)
     apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))
-    return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart)
+    # The estimates are of the old tile's channels, which `colour` knows as they read.
+    return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart, crosstalk=0.0)

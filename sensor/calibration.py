@@ -128,6 +128,8 @@ class ChannelNoise:
         As `NoiseStep` has them; ``shot`` is 1 over the share of time and light that the sites take.
     dark_current_e : float
         As `RawImage` has it.
+    light_share : float
+        What a neutral density in front of its sites lets through.
     """
 
     channel: str
@@ -137,6 +139,7 @@ class ChannelNoise:
     dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
     prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
     dark_current_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")] = 0.0
+    light_share: Annotated[float, (1e-6, 1.0, "give what the density lets through, 1 for none")] = 1.0
 
     __repr__ = brief
 

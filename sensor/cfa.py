@@ -1,4 +1,11 @@
-"""Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor."""
+"""Colour filter arrays: a tile of channels, one letter each, that repeats over the sensor.
+
+Crosstalk mixes a tile's channels: a pixel hands the share c of its electrons to each of its four neighbours
+(`sensor.readout.spread_charge`). So a site reads (1 - 4 c) of the light behind its own filter, and c of that behind
+each neighbour's. What a channel reads of an even field is the mean over its sites, K e, where e are the electrons
+behind each filter alone and K the matrix `channel_mixing`. A camera's maker calibrates neutral, colour matrices and the
+prior over pictures for the channels K e.
+"""
 
 import tomllib
 from collections.abc import Mapping, Sequence
@@ -9,6 +16,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from render.spectrum import Floats
 from rodcone.errors import InputError, unknown
 
 Tile: TypeAlias = tuple[str, ...]
@@ -120,3 +128,44 @@ def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
             f"mosaic: shape {tuple(shape)} doesn't fit the tile {tile}; allowed: (h, w) of at least {height}x{width}; "
             "pass one raw frame that holds a whole tile"
         )
+
+
+def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
+    """Electrons that each site of a tile reads, over those behind each channel's filter, in an even field.
+
+    Parameters
+    ----------
+    tile : tuple of str
+    crosstalk : float
+        Share of a pixel's electrons that goes to each of its four neighbours, 0 to 0.25.
+    light_shares : mapping of str to float, optional
+        What the neutral density of a channel's sites lets through, where there is one. What such a site reads is
+        divided by its own share, as a raw image's electrons are.
+
+    Returns
+    -------
+    (row, column, channel) float64
+        Channels in the order of `sensor.cfa.channels`. Without densities they sum to 1 for each site.
+    """
+    names = channels(tile)
+    sites = np.array([list(row) for row in tile])[..., None] == np.array(names)
+    behind = sites * np.array([(light_shares or {}).get(name, 1.0) for name in names])
+    neighbours = sum(np.roll(behind, step, axis) for step in (1, -1) for axis in (0, 1))
+    return np.asarray(((1 - 4 * crosstalk) * behind + crosstalk * neighbours) / behind.sum(axis=2, keepdims=True))
+
+
+def channel_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
+    """Mean of `site_mixing` over the sites of each channel: K, shape (channel that reads, channel of the light)."""
+    at_sites, names = site_mixing(tile, crosstalk, light_shares), channels(tile)
+    sites = np.array([list(row) for row in tile])
+    return np.stack([at_sites[sites == name].mean(axis=0) for name in names])
+
+
+def unmixed(mixing: Floats, electrons: Sequence[float] | Floats) -> Floats:
+    """Electrons behind each filter alone, of an even field that the channels read; not under a ten-thousandth of those.
+
+    Where all of the charge goes to the neighbours two channels may read the same, and K has no inverse: of all fields
+    that fit, this is the one with the least squares.
+    """
+    read_e = np.asarray(electrons, dtype=np.float64)
+    return np.asarray(np.maximum(np.linalg.lstsq(mixing, read_e, rcond=1e-9)[0], 1e-4 * read_e))

@@ -2,6 +2,7 @@
 
 import warnings
 from collections.abc import Mapping
+from dataclasses import replace
 from math import ceil, floor, log2
 from types import MappingProxyType
 
@@ -16,8 +17,8 @@ from sensor.optics import SpectralIrradiance
 from sensor.photodiodes import with_gain
 from sensor.raw import RawImage
 from sensor.readings.resolve import at_channel, by_site, chip_readings, resolve
-from sensor.readout import unclipped_variance
-from sensor.response import behind_filters, channel_electrons
+from sensor.readout import spread_charge, unclipped_variance
+from sensor.response import behind_filters, channel_electrons, mixing_of
 
 MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
 DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3  # noise alone takes 3e-5 of the dark pixels so far above their mean
@@ -51,7 +52,8 @@ def auto_exposure_s(
 ) -> float:
     """Exposure in which a percentile of one channel's light and the dark current fill a share of the well [s].
 
-    Crosstalk and hot pixels are left out. The well is `SensorConfig.metered_well_e`.
+    Neighbours, whose charge crosstalk brings, count as if they showed what a pixel shows itself; hot pixels are left
+    out. The well is `SensorConfig.metered_well_e`.
 
     Parameters
     ----------
@@ -76,8 +78,8 @@ def auto_exposure_s(
     require_range("well_share", well_share, 1e-6, 1.0, "give a fraction of the well")
     channel = channel or sensor.unit_channel
     require_name("exposure: channel", channel, sensor.channels)
-    per_second_e = channel_electrons(irradiance, sensor, 1.0)[..., sensor.channels.index(channel)]
-    return _share_of_well_s(per_second_e, sensor, channel, longest_s, percentile, well_share)
+    read_e = channel_electrons(irradiance, sensor, 1.0) @ mixing_of(sensor)[sensor.channels.index(channel)]
+    return _share_of_well_s(read_e, sensor, channel, longest_s, percentile, well_share)
 
 
 def _share_of_well_s(
@@ -153,8 +155,10 @@ def exposed_by_rule(
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     names = sensor.channels
     unit = sensor.unit_channel
+    # Neighbours count as if they showed what a pixel shows itself.
+    read_e = per_second_e @ mixing_of(sensor).T if sensor.pixel.crosstalk else per_second_e
     metered = "W" if rule == AUTO_W and "W" in names else unit
-    wish_s = _share_of_well_s(per_second_e[..., names.index(metered)], sensor, metered, np.inf)
+    wish_s = _share_of_well_s(read_e[..., names.index(metered)], sensor, metered, np.inf)
     if rule != AUTO_INFORMATION:
         return amplified(sensor, wish_s, longest_s)
     return best_exposure(behind_filters(per_second_e, sensor), sensor, wish_s, longest_s)
@@ -194,11 +198,18 @@ def best_exposure(
         Time by the rule ``auto``, without a longest one.
     longest_s : float
     """
-    few_e = _few_tiles(sensor.pixel_sums(per_second_e), len(sensor.cfa), len(sensor.cfa[0]))
+    read_e = sensor.pixel_sums(spread_charge(per_second_e, sensor.photosites.pixel.crosstalk))
+    few_e = _few_tiles(read_e, len(sensor.cfa), len(sensor.cfa[0]))
     wishes_s: list[float] = (green_s * 2.0 ** (np.arange(*_LADDER_THIRDS) / -3.0)).tolist()
     rungs = [amplified(sensor, wish_s, longest_s) for wish_s in wishes_s]
     apart = {(time_s, camera.gain): (time_s, camera) for time_s, camera in rungs}.values()
-    return min(apart, key=lambda rung: picture_error(few_e * rung[0], rung[1], rung[0]))
+
+    def error(rung: tuple[float, SensorConfig]) -> float:
+        time_s, camera = rung
+        spread = replace(camera, pixel=replace(camera.pixel, crosstalk=0.0))  # which `read_e` already is
+        return picture_error(few_e * time_s, spread, time_s)
+
+    return min(apart, key=error)
 
 
 def _few_tiles(mosaic: NDArray[np.float64], height: int, width: int) -> NDArray[np.float64]:

@@ -8,12 +8,13 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from render.spectrum import Floats
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
 from rodcone.types import require_unmasked
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
-from sensor.cfa import Tile, channels, check_covers, check_tile, mask, unit_channel
+from sensor.cfa import Tile, channel_mixing, channels, check_covers, check_tile, mask, site_mixing, unit_channel
 
 # A saturated pixel reads white - 4 sigma_dark or more, give or take half a DN, with probability 1 - 3.2e-5.
 ISO_RANGE = 1e-6, 1e9
@@ -62,6 +63,9 @@ class RawImage:
         read more than `white_dn`.
     dark_current_e : float
         Mean of the dark current in `black_dn` [e-], on which the columns' gains act as on light.
+    crosstalk : float
+        Share of a pixel's electrons that goes to each of its four neighbours; `colour` is that of the channels as
+        they read for it (`sensor.cfa`).
 
     Raises
     ------
@@ -89,6 +93,7 @@ class RawImage:
     noise_steps: tuple[NoiseStep, ...] = ()
     channel_noise: tuple[ChannelNoise, ...] = ()
     dark_current_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")] = 0.0
+    crosstalk: Annotated[float, (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none")] = 0.0
 
     __repr__ = brief
 
@@ -175,6 +180,20 @@ class RawImage:
 
     def _plain(self, channel: str) -> ChannelNoise:
         return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu, self.dark_current_e)
+
+    @property
+    def site_mixing(self) -> Floats:
+        """What the tile's sites read of each channel's light in an even field (`sensor.cfa.site_mixing`)."""
+        return site_mixing(self.cfa, self.crosstalk, self._light_shares)
+
+    @property
+    def channel_mixing(self) -> Floats:
+        """What the channels read of each channel's light in an even field (`sensor.cfa.channel_mixing`)."""
+        return channel_mixing(self.cfa, self.crosstalk, self._light_shares)
+
+    @property
+    def _light_shares(self) -> dict[str, float]:
+        return {noise.channel: noise.light_share for noise in self.channel_noise}
 
     @property
     def saturation_e(self) -> float:

@@ -291,4 +291,5 @@ def as_raw(
         engine=engine,
         defects=None if hot is None else np.argwhere(hot),
         dark_current_e=dark_e,
+        crosstalk=pixel.crosstalk,
     )

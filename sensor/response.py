@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from render.band_weights import band_weights
 from render.spectrum import VISIBLE_NM, Floats, Spectrum, photons_per_joule
 from rodcone.errors import InputError
-from sensor.cfa import channels, check_covers, mask
+from sensor.cfa import channel_mixing, channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance
 
@@ -99,6 +99,15 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
         For a negative exposure, a frame smaller than the mosaic's tile, and as `electrons_per_irradiance`.
     """
     return behind_filters(channel_electrons(irradiance, sensor, exposure_s), sensor)
+
+
+def mixing_of(sensor: SensorConfig) -> Floats:
+    """Electrons that each channel of a camera's raw image reads of an even field, over those behind each filter alone.
+
+    As `sensor.cfa.channel_mixing`: a maker's calibration sees the channels as crosstalk mixes them.
+    """
+    shares = {reading.channel: reading.light_share for reading in sensor.chip.channels}
+    return channel_mixing(sensor.cfa, sensor.pixel.crosstalk, shares)
 
 
 def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:

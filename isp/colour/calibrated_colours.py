@@ -7,6 +7,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
 from render.spectrum import Floats, Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
 from sensor.calibration import ColourCalibration
+from sensor.cfa import unmixed
 
 WIDTH = band_widths(NM)
 
@@ -18,7 +19,7 @@ MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.
 UNEXPLAINED = 0.05
 
 
-def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> ColourFit:
+def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing: Floats | None = None) -> ColourFit:
     """Colours of a camera that is known by matrices alone.
 
     R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
@@ -29,9 +30,16 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
     ----------
     names : tuple of str
         The channels, as `sensor.cfa.channels` gives them: R, G and B first, or others in their place.
+    mixing : (channel, channel) float64, optional
+        Of pixels that exchange charge, `RawImage.channel_mixing`. With more than three channels all then go by their
+        rows, and what W sees beyond three colours is in its neighbours too.
     """
-    three = len(names) >= 3
-    rows = np.linalg.inv(colour.to_srgb) if three else np.zeros((0, 3))
+    three, share = len(names) >= 3, np.eye(len(names))
+    by_rows = mixing is not None and len(names) > 3
+    if mixing is not None and by_rows:
+        share = mixing * unmixed(mixing, colour.neutral)
+        share /= share.sum(axis=1, keepdims=True)
+    rows = np.linalg.inv(colour.to_srgb) if three and not by_rows else np.zeros((0, 3))
     if len(names) != 3:
         green = names.index("G") if "G" in names else 0
         # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
@@ -45,7 +53,7 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...]) -> Col
         rows = np.vstack([rows, min(candidates, key=lambda pair: pair[0])[1][len(rows) :]])
     unexplained = np.diag([0.0 if three and index < 3 else UNEXPLAINED**2 for index in range(len(names))])
     cross = rows @ MOMENTS_SRGB
-    moments = cross @ rows.T + unexplained
+    moments = cross @ rows.T + share @ unexplained @ share.T
     return ColourFit(names, mean=rows @ MEAN_SRGB, moments=moments, cross=cross if three else grey_of(cross))
 
 

@@ -9,7 +9,7 @@ with the least noise, W, and the paler the colours get.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -106,6 +106,24 @@ class ColourFit:
         target = difference @ (self.cross[index] - moments[:, -1:])
         free = np.linalg.solve(difference @ moments @ difference.T, target)
         return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
+
+
+def mixed_fit(fit: ColourFit, mixing: Floats, neutral: Floats) -> ColourFit:
+    """Fit of channels that exchange charge, from that of the light behind each filter alone.
+
+    What W sees beyond the colours is then in its neighbours too, so that W tells how much of it to take off them.
+
+    Parameters
+    ----------
+    fit : ColourFit
+    mixing : (channel, channel) float64
+        Electrons that the fit's channels read of an even field, over those behind each filter (`sensor.cfa`).
+    neutral : (channel,) float64
+        Electrons behind each filter from a neutral, in any unit.
+    """
+    share = mixing * neutral
+    share /= share.sum(axis=1, keepdims=True)
+    return replace(fit, mean=share @ fit.mean, moments=share @ fit.moments @ share.T, cross=share @ fit.cross)
 
 
 def fit_colours(

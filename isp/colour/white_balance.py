@@ -95,7 +95,7 @@ class WhiteBalance:
 
     def response(self, raw: RawImage) -> Floats:
         """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
-        return neutral_response(raw.channels) if self.neutral is None else self.neutral
+        return raw.channel_mixing @ neutral_response(raw.channels) if self.neutral is None else self.neutral
 
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.

@@ -13,6 +13,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import mend
+from isp.levelling import levelled
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
 from isp.processors.any_mosaic import picture_any_mosaic
@@ -76,7 +77,7 @@ class Processor:
         balance: ArrayLike | WhiteBalance | None = None,
         **options: Any,
     ) -> Picture:
-        """Develop a raw image; no processor sees defective pixels: they are replaced first.
+        """Develop a raw image. First defective pixels are replaced, and a channel's sites levelled.
 
         Parameters
         ----------
@@ -94,6 +95,8 @@ class Processor:
         """
         raw = mend(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
+        if raw.crosstalk:
+            raw = levelled(raw, white_balance.response(raw) if white_balance.given is None else white_balance.given)
         colours = ColourFit.of(matrix)
         if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # others are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)

@@ -56,7 +56,7 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
     require_letters(raw, CHANNELS)
     if balance.neutral is None:
         behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
-        balance = replace(balance, neutral=neutral_response(CHANNELS) * behind_density)
+        balance = replace(balance, neutral=raw.channel_mixing @ (neutral_response(CHANNELS) * behind_density))
     mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     planes = np.stack([combine(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
     rgb = to_rgb(raw, planes, level, colours, MATCHED_RADIUS)
@@ -74,7 +74,9 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
     named = renamed(raw, _STANDS_FOR)
     true = {stand_in: channel for channel, stand_in in _STANDS_FOR.items()}
     order = [names.index(true[stand_in]) for stand_in in channels(named.cfa)]
-    neutral = neutral_response(names, complementary(rgbw())) if balance.neutral is None else balance.neutral
+    neutral = balance.neutral
+    if neutral is None:
+        neutral = raw.channel_mixing @ neutral_response(names, complementary(rgbw()))
     reordered = WhiteBalance(neutral[order], None if balance.given is None else balance.given[order])
     picture = picture_yamagami(named, colours, balance=reordered)
     return replace(picture, balance={true[stand_in]: source for stand_in, source in picture.balance.items()})

@@ -17,7 +17,7 @@ from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_le
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
 from isp.ple.overlap import STRIDE
-from isp.ple.prior import LETTERS, Prior, own_prior
+from isp.ple.prior import LETTERS, Prior, mixed_prior, own_prior
 from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
@@ -83,6 +83,7 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
 def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
     names, unit = raw.channels, raw.unit_channel
     index = [LETTERS.index(name) for name in names]
+    prior = _as_it_reads(raw, prior, balance.neutral)
     white_e = prior.neutral_e.copy()
     if balance.neutral is not None:
         if curves_differ(prior, balance.neutral, index):
@@ -100,10 +101,26 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
     noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)
     level = highlight_level(raw, gains)
     if {"R", "G", "B"} <= set(names):
-        rgb = clip_highlights(raw, planes[..., :3] * gains[:3], level) @ colours.matrix(noise=noise[:3]).T
+        # Where pixels exchange charge, W tells how much of it is in the colours.
+        used = len(names) if raw.crosstalk and colours.plain is None else 3
+        matrix = colours.matrix(names[:used], noise[:used])
+        rgb = clip_highlights(raw, planes[..., :used] * gains[:used], level) @ matrix.T
     else:
         rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, level), colours, noise)
     return Picture(rgb, sources)
+
+
+def _as_it_reads(raw: RawImage, prior: Prior, neutral: Floats | None) -> Prior:
+    """Prior of the channels as crosstalk mixes them, under the light of the calibrated neutral."""
+    if not raw.crosstalk:
+        return prior
+    index = [LETTERS.index(name) for name in raw.channels]
+    mixing = np.eye(len(LETTERS))
+    mixing[np.ix_(index, index)] = raw.channel_mixing
+    white_e = mixing @ prior.neutral_e
+    if neutral is not None:
+        white_e[index] = neutral / neutral[raw.channels.index(raw.unit_channel)]
+    return mixed_prior(prior, mixing, white_e)
 
 
 def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:

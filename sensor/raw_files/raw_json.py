@@ -14,7 +14,7 @@ from sensor.raw import RawImage
 FORMAT = "rodcone raw image"
 VERSION = 1
 KEYS = tuple(field.name for field in fields(RawImage) if field.name != "dn")
-_OPTIONAL = ("defects", "noise_steps", "channel_noise", "dark_current_e")  # left out where there are none
+_OPTIONAL = ("defects", "noise_steps", "channel_noise", "dark_current_e", "crosstalk")  # left out where there are none
 _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file may hold a mebibyte there
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 

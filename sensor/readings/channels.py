@@ -35,6 +35,7 @@ def join(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage
                 dsnu_e=raw.dsnu_e / share,
                 prnu=raw.prnu,
                 dark_current_e=raw.dark_current_e / share,
+                light_share=reading.light_share,
             )
         )
     read_noise_e = hypot(plain.read_noise_e, sqrt(plain.rounding_e2))

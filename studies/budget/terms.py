@@ -86,6 +86,8 @@ def effects(
 ) -> Effects:
     """Find all effects for a sensor under the transport's own spectra.
 
+    They are those of the light: crosstalk, which spreads an effect as it spreads charge, makes no mean square larger.
+
     Parameters
     ----------
     transport : Transport

@@ -181,7 +181,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     if controls.exposure != TIME:
         rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
         # The rule looks at a percentile, which goes with the level.
-        metered = (lit_so, rule, sensor.top_e, sensor.pixel.dark_current_e_per_s)
+        metered = (lit_so, rule, sensor.top_e, sensor.pixel.dark_current_e_per_s, sensor.pixel.crosstalk)
         unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
         time_s = at_level_s(unit_s, scale, rule, sensor)
         if controls.exposure == AUTO_INFORMATION:
@@ -210,7 +210,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
 def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
     """What the processor is to do with an exposure, in this process or, pickled, in another."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
-    fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes())
+    fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes(), sensor.pixel.crosstalk)
     processor = PROCESSORS[controls.processor]
     colours = memo.of("colours", fitted, colour_fit, sensor, processor, light)
     neutral, options = neutral_electrons(sensor, light, raw.exposure_s), options_of(controls)

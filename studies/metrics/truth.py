@@ -13,7 +13,7 @@ from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_
 from rodcone.display import brief
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
-from sensor.response import electrons_per_irradiance
+from sensor.response import electrons_per_irradiance, mixing_of
 
 GREY = 0.18  # reflectance of a grey card
 
@@ -82,8 +82,10 @@ def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> N
 def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> Floats:
     """Expected electrons of each channel's raw pixel from a neutral of 1 cd/m^2 under the light, shape (channel,).
 
+    Crosstalk is in them: they are the means that an even neutral field reads.
+
     Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
     """
     whole = sensor.undivided
     weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s, light.lamp)
-    return np.asarray(weights @ light.spectrum * camera_equation(sensor.lens))
+    return np.asarray(mixing_of(sensor) @ weights @ light.spectrum * camera_equation(sensor.lens))

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.color import deltaE_ciede2000, xyz2lab
 
-from isp.colour.colour_fit import ColourFit, fit_colours, fit_through_neutral, grey_of, training
+from isp.colour.colour_fit import ColourFit, fit_colours, fit_through_neutral, grey_of, mixed_fit, training
 from isp.colour.white_balance import WhiteBalance
+from isp.levelling import levelled
 from isp.picture import Picture
 from isp.planes import bilinear
 from isp.processors.catalogue import Processor
@@ -21,15 +22,17 @@ from rodcone.errors import InputError
 from scenes.reflectances import color_checker, held
 from sensor.calibration import ColourCalibration
 from sensor.capture import capture as frame_of
+from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
-from sensor.optics import SpectralIrradiance, falloff, form_image, spreads
+from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
-from sensor.response import channel_electrons, electrons_per_irradiance
+from sensor.readout import spread_charge
+from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, mixing_of
 from sensor.shake import held_lens
-from studies.metrics.truth import GREY, Light, light_in_bands
+from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
 from studies.study.gain import at_gain, gain_text, iso_speed
 
 LEAST_COLOUR = 1e-5  # of the signals, in the weaker of two directions: less is the rounding of a light of a line or two
@@ -73,7 +76,8 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
     light = _in_bands(spectrum)
     nm, width = light.wavelength_nm, light.width_nm
-    electrons = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
+    behind_filters_e, mixing = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp), mixing_of(sensor)
+    electrons = mixing @ behind_filters_e
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
     names = sensor.channels
     three = list(range(min(len(names), 3)))
@@ -97,10 +101,20 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
                 f"responses: {three_names} can't tell colours apart; allowed: three different curves; correct one"
             )
     from_xyz = _srgb_of_xyz(white)
-    balanced = (surfaces * light.spectrum) @ electrons.T / collected
-    from_srgb = fit_through_neutral(colours, balanced)
-    if len(three) == 3:
-        from_srgb[three] = np.linalg.inv(to_srgb)
+
+    def rows_from_srgb(weights: Floats, of_three: Floats) -> Floats:
+        """Balanced channels from linear sRGB: the inverse of three, and the others fitted."""
+        rows = fit_through_neutral(colours, (surfaces * light.spectrum) @ weights.T / (weights @ light.spectrum))
+        if len(three) == 3:
+            rows[three] = np.linalg.inv(of_three)
+        return rows
+
+    from_srgb = rows_from_srgb(electrons, to_srgb)
+    if sensor.pixel.crosstalk and len(names) > 3:
+        # Rows of the light behind each filter, mixed as the channels are: they tell what to take off W's neighbours.
+        plain = (surfaces * light.spectrum) @ behind_filters_e[three].T / (behind_filters_e[three] @ light.spectrum)
+        from_srgb = mixing * (behind_filters_e @ light.spectrum) / collected[:, None]
+        from_srgb = from_srgb @ rows_from_srgb(behind_filters_e, fit_through_neutral(plain, colours))
     neutral = collected / collected[names.index(sensor.unit_channel)]
     to_xyz = np.zeros((3, len(names)))
     to_xyz[:, three] = (
@@ -131,8 +145,10 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
     colours = processor.colours or sensor.channels
     names = (*colours, *(x for x in sensor.channels if x not in colours))
-    responses = sensor.responses.band_average(names, nm, width)
-    return fit_colours(names, responses, nm, light.spectrum, surfaces, width)
+    responses, index = sensor.responses.band_average(names, nm, width), [sensor.channels.index(x) for x in names]
+    fit = fit_colours(names, responses, nm, light.spectrum, surfaces, width)
+    behind_filters_e = responses @ (light.spectrum * photons_per_joule(nm) * width)
+    return mixed_fit(fit, mixing_of(sensor)[np.ix_(index, index)], behind_filters_e)
 
 
 def develop_to_scale(
@@ -185,30 +201,55 @@ def develop_to_scale(
     return linear, picture
 
 
-def balance_delta_e(raw: RawImage, colours: ColourFit, neutral: Floats, balance: ArrayLike | None = None) -> float:
-    """CIEDE2000 of a neutral grey of `GREY` under the scene's light, after the white balance of an exposure.
+def balance_delta_e(
+    raw: RawImage, colours: ColourFit, sensor: SensorConfig, light: Light, balance: ArrayLike | None = None
+) -> float:
+    """CIEDE2000 of a developed grey card that fills a noise-free frame, after the white balance of an exposure.
 
-    The balance is that of the bilinear planes, and the colour matrix the one for no noise, whatever the processor: the
-    figure tells a balance, not a picture.
+    The frame is taken by the sensor under the scene's light, with the charge that neighbours exchange, and developed
+    with the exposure's gains. Its planes are bilinear, and the colour matrix the one for no noise, whatever the
+    processor: the figure tells a balance, not a picture.
 
     Parameters
     ----------
     raw : RawImage
+        The exposure.
     colours : ColourFit
         Of the processor's balanced colours.
-    neutral : (channel,) float64
-        What a neutral reads under the scene's light.
+    sensor : SensorConfig
+        That took it.
+    light : Light
+        The scene's.
     balance : (channel,) array_like, optional
         Response to what should come out neutral; left out, Gray World finds it in the exposure.
     """
-    white_balance = WhiteBalance.of(raw, neutral, balance)
-    gains, _ = white_balance.gains(raw, bilinear(raw))
-    balanced = dict(zip(raw.channels, gains * neutral, strict=True))
-    unit = balanced[raw.unit_channel]
+    neutral = neutral_electrons(sensor, light, 1.0)
+    raw = levelled(raw, neutral)
+    gains, _ = WhiteBalance.of(raw, neutral, balance).gains(raw, bilinear(raw))
+    card, scale = _even_field(raw, sensor, light)
+    down, across = len(raw.cfa), len(raw.cfa[0])
+    tiles = bilinear(levelled(card, neutral))[2 * down : 4 * down, 2 * across : 4 * across]
+    read = dict(zip(raw.channels, tiles.mean(axis=(0, 1)) * gains, strict=True))
+    unit_e = scale * neutral[raw.channels.index(raw.unit_channel)]
     names = colours.channels[:3]
-    card = GREY * colours.matrix(names) @ [balanced[name] / unit for name in names]
-    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (card, np.full(3, GREY)))
+    developed = GREY * colours.matrix(names) @ [read[name] / unit_e for name in names]
+    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (developed, np.full(3, GREY)))
     return float(deltaE_ciede2000(lab, grey))
+
+
+def _even_field(raw: RawImage, sensor: SensorConfig, light: Light) -> tuple[RawImage, float]:
+    """Raw image of an even neutral field without noise, six tiles a side; over what it reads at 1 cd/m^2 in 1 s."""
+    weights = electrons_per_irradiance(sensor.undivided, light.wavelength_nm, light.width_nm, 1.0, light.lamp)
+    shape = 6 * len(raw.cfa), 6 * len(raw.cfa[0])
+    field = np.broadcast_to(weights @ light.spectrum * camera_equation(sensor.lens), (*shape, len(raw.channels)))
+    through = np.ones(shape)
+    for reading in sensor.chip.channels:
+        through[mask(raw.cfa, reading.channel, shape)] = reading.light_share
+    light_e = behind_filters(field, sensor.undivided) * through
+    electrons = spread_charge(light_e, sensor.pixel.crosstalk) / through
+    scale = 0.5 * max(raw.saturation_e, raw.gain_e_per_dn) / electrons.max()
+    dn = electrons * scale / raw.gain_e_per_dn + raw.black_dn
+    return replace(raw, dn=dn, defects=None), scale
 
 
 def capture(  # noqa: PLR0913  its calls in README and tutorials go on

@@ -89,7 +89,7 @@ def develop(
         raise InputError(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
-    colours = fit_of_calibration(colour, raw.channels)
+    colours = fit_of_calibration(colour, raw.channels, raw.channel_mixing if raw.crosstalk else None)
     software, response = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
     return software.develop(raw, colours, neutral=colour.neutral, balance=response)
 

@@ -42,8 +42,9 @@ class Row:
     saturated : float
         Share of the pixels.
     balance_delta_e : float or None
-        CIEDE2000 between a neutral grey of 18 % under the scene's light and the same after the white balance: 0 as
-        shot, what Gray World misses the light by else; None of a processor that tells no balance.
+        CIEDE2000 between a neutral grey of 18 % under the scene's light and a noise-free frame of it, developed with
+        the exposure's white balance: 0 as shot, what Gray World misses the light by else; None of a processor that
+        tells no balance.
     balance, mean_electrons : str
         By channel, as JSON.
     variant, readout_engine, development_engine, versions : str

@@ -124,7 +124,9 @@ def run_cell(cell: Cell) -> Row:
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),
-        balance_delta_e=balance_delta_e(raw, cell.colours, neutral, **options) if picture.balance else None,
+        balance_delta_e=(
+            balance_delta_e(raw, cell.colours, sensor, frame.light, **options) if picture.balance else None
+        ),
         balance=json.dumps(dict(picture.balance)),
         mean_electrons=json.dumps(
             {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}

@@ -130,10 +130,10 @@ def test_the_balances_error_is_the_cast_that_it_gives_a_grey_card() -> None:
         white = colour.CCS_ILLUMINANTS["CIE 1931 2 Degree Standard Observer"]["D65"]
         lab = colour.XYZ_to_Lab(colour.RGB_to_XYZ([card, np.full(3, 0.18)], "sRGB"), white)
         # 1024 samples a channel of 1000 e- and more are known to 0.1 %, some 0.1 of CIEDE2000
-        assert balance_delta_e(raw, colours, neutral) == pytest.approx(
+        assert balance_delta_e(raw, colours, quiet, LIGHT) == pytest.approx(
             colour.delta_E(*lab, method="CIE 2000"), abs=0.2
         ), tint
-        assert balance_delta_e(raw, colours, neutral, neutral) == pytest.approx(0.0, abs=1e-3), tint
+        assert balance_delta_e(raw, colours, quiet, LIGHT, neutral) == pytest.approx(0.0, abs=1e-3), tint
 
 
 # Colour calibration: identities of DNG's matrices, a camera whose matrices are known on paper, the speed.

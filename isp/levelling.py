@@ -1,0 +1,49 @@
+"""Sites of one channel with other neighbours, levelled by what a flat field says, before anything else is developed.
+
+In Bayer and in 2x2 RGBW all sites of a channel have the same neighbours. In larger tiles they may not: crosstalk then
+makes some read more of an even field than others, which shows as a pattern of the tile. In the project's mosaics that
+is up to 6 % in RCCC at a crosstalk of 5 %, and 0.1 % in the others.
+"""
+
+from dataclasses import replace
+from math import hypot, sqrt
+
+import numpy as np
+
+from render.spectrum import Floats
+from sensor.cfa import unmixed
+from sensor.raw import RawImage, full_at_sites
+
+LEAST_GAIN = 1e-9  # by which a site has to differ from its channel's mean
+
+
+def levelled(raw: RawImage, neutral: Floats) -> RawImage:
+    """Raw image in which all sites of a channel read the same of an even neutral field.
+
+    A sample whose gain would take it over or under the level of saturation stays as it is. The noise profile stays that
+    of the channel's mean site: a sample's own standard deviation differs from it by the gain.
+
+    Parameters
+    ----------
+    raw : RawImage
+    neutral : (channel,) float64
+        What the channels read of a neutral, in any unit.
+    """
+    if not raw.crosstalk:
+        return raw
+    gains = site_gains(raw, neutral)
+    if np.abs(gains - 1).max() < LEAST_GAIN:
+        return raw
+    (height, width), (down, across) = raw.shape, gains.shape
+    at_sites = np.tile(gains, (-(-height // down), -(-width // across)))[:height, :width]
+    dn = (raw.dn - raw.black_dn) * at_sites + raw.black_dn
+    dn = np.where(full_at_sites(raw, dn) == raw.saturated, dn, raw.dn)
+    read_noise_e = hypot(raw.read_noise_e, sqrt(raw.rounding_e2))
+    return replace(raw, dn=dn, read_noise_e=read_noise_e)  # type: ignore[arg-type]  # finite floats are taken as they are
+
+
+def site_gains(raw: RawImage, neutral: Floats) -> Floats:
+    """Factor on the electrons of each site of the tile, (row, column): the channel's mean over what the site reads."""
+    mixing = raw.site_mixing
+    mean = np.array([[neutral[raw.channels.index(name)] for name in row] for row in raw.cfa])
+    return np.asarray(mean / (mixing @ unmixed(raw.channel_mixing, neutral)))
