@@ -31,3 +31,7 @@ print(f"raw image {raw.dn.dtype}, mean {raw.electrons.mean():.1f} electrons")
 picture = rodcone.develop(raw)
 print(f"SNR of green {picture.snr:.1f}; W gives {picture.substitution:.0%} of the luminance")
 rodcone.write_picture(picture, "picture.png")
+
+# How far it is from the scene without noise: a study's metrics.
+told = rodcone.measure(picture, rodcone.reference_picture(radiance))
+print(f"PSNR {told['psnr_db']:.1f} dB, median CIEDE2000 {told['delta_e_median']:.1f}")

@@ -22,7 +22,7 @@ from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import INTEGRATOR, Film, as_guest, load_groups, variant
 from render.meter import Meter
 from render.runs import add_run, fields_of, let_go, means_of, no_means, pilot_rates, scene_means_of
-from render.scene import Scene
+from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
@@ -35,7 +35,7 @@ Progress = Callable[[float, float], None]  # share of the work done (0..1), rela
 @as_guest()
 def render(  # noqa: PLR0913  its calls in README and tutorials go on
     scene: Scene,
-    size: tuple[int, int],
+    size: tuple[int, int] | int,
     *,
     wavelength_nm: ArrayLike | None = None,
     width_nm: ArrayLike | None = None,
@@ -58,8 +58,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     Parameters
     ----------
     scene : Scene
-    size : (int, int)
-        Height and width in pixels.
+    size : (int, int) or int
+        Height and width in pixels, or the longer side, of which the other follows from the scene's own proportions.
     wavelength_nm, width_nm : (band,) array_like, optional
         Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
@@ -107,7 +107,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         Where data of a coloured light end within the bands: outside it is dark.
     """
     # What is asked for
-    film = _checked_film(scene, size, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)
+    sides = film_size(scene.size, size) if isinstance(size, int) and size > 0 else size
+    film = _checked_film(scene, sides, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
     if denoise:
         denoiser()
@@ -141,7 +142,11 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
 
 
 def _checked_film(
-    scene: Scene, size: tuple[int, int], wavelength_nm: ArrayLike | None, width_nm: ArrayLike | None, max_depth: int
+    scene: Scene,
+    size: tuple[int, int] | int,
+    wavelength_nm: ArrayLike | None,
+    width_nm: ArrayLike | None,
+    max_depth: int,
 ) -> Film:
     if not scene.groups:
         raise InputError(f"scene {scene.name}: it has no light; allowed: one light group or more; add one")
@@ -154,7 +159,7 @@ def _checked_film(
     check_combinations(scene)
     check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))
     return Film(
-        size=(int(size[0]), int(size[1])),
+        size=(int(sides[0]), int(sides[1])),
         wavelength_nm=nm,
         width_nm=widths,
         max_depth=int(max_depth),

@@ -1,10 +1,11 @@
 """Spectral radiance of an image: what a camera looks at."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.illuminants import unit_luminance
 from render.spectrum import Spectrum, band_widths, luminance, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.display import Axes, brief, draw_line, preview_png
@@ -35,6 +36,8 @@ class SpectralRadiance:
     light : Spectrum, optional
         The lamp behind the values, up to a factor: with it integrals over bands follow its lines and slopes. None where
         it isn't known, or the values aren't a lamp's on smooth surfaces: they are then taken as smooth themselves.
+    horizontal_view_deg : float, optional
+        Field of view across the picture [degrees], as an ISETCam scene states it.
 
     Raises
     ------
@@ -50,6 +53,7 @@ class SpectralRadiance:
     relative_level_error: float | None = None
     signed: bool = False
     light: Spectrum | None = None
+    horizontal_view_deg: float | None = None
 
     __repr__ = brief
 
@@ -82,6 +86,39 @@ class SpectralRadiance:
     def luminance(self) -> NDArray[np.float64]:
         """Luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
+
+    @method
+    def relight(self, light: Spectrum) -> "SpectralRadiance":
+        """Radiance under another lamp of the same luminance in the place of the one that is behind the values.
+
+        Each value is divided by the lamp's mean in its band and multiplied by the other's: what surfaces reflect stays.
+
+        Parameters
+        ----------
+        light : Spectrum
+            Or an illuminant's name.
+
+        Raises
+        ------
+        InputError
+            Where the lamp isn't known, or gives nothing in a band in which there is light.
+        """
+        if self.light is None:
+            raise InputError(
+                "light: it isn't known which lamp is behind these values; allowed: radiance that states it, such as an "
+                "ISETCam scene; give light=, or a cube of reflectances"
+            )
+        own, other = (
+            unit_luminance(lamp).band_average(self.wavelength_nm, self.widths_nm) for lamp in (self.light, light)
+        )
+        dark = np.flatnonzero((own <= 0) & (self.values.max(axis=(0, 1)) > 0))
+        if dark.size:
+            raise InputError(
+                f"light: the lamp behind the values gives nothing at {self.wavelength_nm[dark[0]]:g} nm, where they "
+                "hold light; allowed: a lamp that explains it; correct the lamp"
+            )
+        ratio = np.divide(other, own, out=np.zeros_like(own), where=own > 0)
+        return replace(self, values=(self.values * ratio).astype(self.values.dtype), light=unit_luminance(light))
 
     @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:

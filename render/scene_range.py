@@ -29,8 +29,8 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
     low, high = SUNSKY_NM
     if "sunsky" in paths.values() and (shortest_nm < low or longest_nm > high):
         raise InputError(
-            f"{prefix} a sunsky is known over {low:g}-{high:g} nm alone; give bands within, such as --bands "
-            f"{VISIBLE_NM[0]:g}:{high:g}:10 of rodcone render, or light by area, constant and directional"
+            f"{prefix} a sunsky is known over {low:g}-{high:g} nm alone; render it first by rodcone render --bands "
+            f"{VISIBLE_NM[0]:g}:{high:g}:10 and give the .exr, or light it by area, constant and directional"
         )
     for path, (low, high), extends in _surfaces(scene.geometry, paths):
         if shortest_nm < low - _SLACK_NM or longest_nm > high + _SLACK_NM:

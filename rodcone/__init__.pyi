@@ -58,6 +58,8 @@ from studies.design.expect import ExpectedError
 from studies.explore.server import explore as explore
 from studies.explore.source import load_transport as load_transport
 from studies.explore.views import explorer_view as explorer_view
+from studies.metrics.compare import ReferencePicture
+from studies.metrics.compare import measure as measure
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
 from studies.photograph.develop import develop_file as develop_file
@@ -120,6 +122,7 @@ __all__ = [
     "low_noise",
     "mask",
     "matte",
+    "measure",
     "merged_raw",
     "mosaics",
     "panel",
@@ -129,6 +132,7 @@ __all__ = [
     "read_raw",
     "read_rows",
     "read_study",
+    "reference_picture",
     "reference_plan",
     "relight_denoised",
     "remosaic",
@@ -208,9 +212,10 @@ def expect(
 def light_for_snr(ratio: float, sensor: _Sensor, light: str, exposure_s: _Seconds) -> list[LightForSnr]: ...
 def plan(study: _Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan: ...
 def reference_plan(study: _Study) -> Plan: ...
+def reference_picture(radiance: SpectralRadiance, light: _Light | None = None) -> ReferencePicture: ...
 def render(
     scene: Scene | str,
-    size: tuple[int, int],
+    size: tuple[int, int] | int,
     *,
     wavelength_nm: ArrayLike | None = None,
     width_nm: ArrayLike | None = None,

@@ -107,6 +107,11 @@ def _size(name: str, value: Any) -> Any:
     return int(sides[0]), int(sides[1])
 
 
+def _size_or_side(name: str, value: Any) -> Any:
+    """Height and width, or the longer side."""
+    return int(value) if _passes(_WHOLE, value) and value > 0 else _size(name, value)
+
+
 def _paths(name: str, value: Any) -> Any:
     return [_PATH(name, one) for one in (value if isinstance(value, list | tuple) else [value])]
 
@@ -161,6 +166,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "picture": _array(or_kind="isp.picture:Picture"),
         "matrix": _array(or_kind="isp.colour.colour_fit:ColourFit"),
         "balance": _array(or_kind="isp.colour.white_balance:WhiteBalance"),
+        "reference": _value("studies.metrics.compare:ReferencePicture", "give rodcone.reference_picture(radiance)"),
         "order": _value("studies.photograph.shot:Order", "give rodcone.Order(...)"),
         "study": _value("studies.study.study:Study", "give a study's file", "studies.study.study_file:read_study"),
         "plan": _value("studies.budget.ledger:Plan", "give rodcone.plan(study)"),
@@ -183,6 +189,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "exposure_s": _seconds,
         **dict.fromkeys(("spp", "max_spp", "max_depth", "seed", "samples_per_pixel", "bits", "height"), _WHOLE),
         **dict.fromkeys(("width", "workers", "pictures", "frame"), _WHOLE),
+        "render.size": _size_or_side,
         **dict.fromkeys(("size", "shape"), _size),
         **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
         **dict.fromkeys(("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view"), _TEXT),

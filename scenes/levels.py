@@ -26,7 +26,11 @@ class LightLevel:
 
 # Seven levels, five decades, from moonlight to daylight.
 DEMO_LEVELS = (
-    LightLevel("moonlight", 0.036, "Parmar & Wandell 2009: 10 photons per um^2 and second through f/5.6"),
+    LightLevel(
+        "moonlight",
+        0.036,
+        "Parmar & Wandell 2009: 10 photons per um^2 and second through f/5.6; 0.63 lux, twice the brightest moon",
+    ),
     LightLevel("street", 10 * _CD_M2_PER_LUX, "EN 13201-2 class P2: 10 lux on the ground, reflectance 0.18"),
     LightLevel("corridor", 100 * _CD_M2_PER_LUX, "EN 12464-1: 100 lux in corridors, reflectance 0.18"),
     LightLevel("classroom", 25.0, "Parmar & Wandell 2009, Table 1; 440 lux, EN 12464-1: 300 to 500 in schools"),

@@ -53,7 +53,8 @@ def picture_ple_rgbw(
     """
     if not is_rgbw(raw.cfa):
         raise InputError(
-            f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2; allowed here: {RGBW} in any order; use another camera"
+            f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2; allowed here: {RGBW} in any order; use ple_bayer for "
+            "Bayer, ple for any mosaic"
         )
     return _developed(raw, colours, balance, prior or own_prior())
 

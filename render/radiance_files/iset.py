@@ -17,7 +17,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
 from render.spectrum import Spectrum, photons_per_joule
-from rodcone.errors import InputError, in_place
+from rodcone.errors import InputError, in_place, require_range
 from rodcone.types import Floats
 
 MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
@@ -27,6 +27,8 @@ _KEYS = (
 )
 _PHOTONS = ("illuminant/data/photons", "illuminant/spectrum/wave")
 _ENERGY = ("illuminant/data", "illuminant/wavelength")  # of files before illuminants were structs
+_OF_LAMP = tuple(place + key for place in ("scene/", "") for key in (*_PHOTONS, *_ENERGY))
+_VIEWS_DEG = ("scene/wAngular", "scene/fov", "fov")  # across the picture; the last by ieSaveMultiSpectralImage
 Numbers = Mapping[str, NDArray[Any]]  # by the keys above
 
 
@@ -55,7 +57,8 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
-    numbers = read_numbers(path, _KEYS)
+    numbers = read_numbers(path, (*_KEYS, *_OF_LAMP, *_VIEWS_DEG))
+    lamp, view_deg = _lamp(numbers, path), _view_deg(numbers, path)
     with in_place(str(path)):
         from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
         nm, shape, photons = _from_basis(numbers) if from_basis else _stored(numbers)
@@ -66,7 +69,8 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
         _clip_negative(planes, 1.0 if from_basis else MOST_NEGATIVE)
-        return SpectralRadiance(np.moveaxis(planes, 0, -1), centres, width_nm=widths)
+        values = np.moveaxis(planes, 0, -1)
+        return SpectralRadiance(values, centres, width_nm=widths, light=lamp, horizontal_view_deg=view_deg)
 
 
 def read_iset_illuminant(path: str | Path) -> Spectrum | None:
@@ -77,14 +81,28 @@ def read_iset_illuminant(path: str | Path) -> Spectrum | None:
     InputError
         For a file that can't be read, or an illuminant that is no spectrum.
     """
-    keys = [place + key for place in ("scene/", "") for key in (*_PHOTONS, *_ENERGY)]
-    numbers = read_numbers(Path(path), keys)
-    for values_key, nm_key in zip(keys[::2], keys[1::2], strict=True):
+    return _lamp(read_numbers(Path(path), _OF_LAMP), path)
+
+
+def _lamp(numbers: Numbers, path: str | Path) -> Spectrum | None:
+    """Illuminant among a file's numbers, scaled to 1 cd/m^2."""
+    for values_key, nm_key in zip(_OF_LAMP[::2], _OF_LAMP[1::2], strict=True):
         values, nm = (numbers.get(key, np.empty(0)).ravel().astype(np.float64) for key in (values_key, nm_key))
         if nm.size and values.size == nm.size and values.any():
             with in_place(f"{path}: illuminant"):
                 per_joule = photons_per_joule(nm) if values_key.endswith("photons") else 1.0
                 return unit_luminance(Spectrum(nm, values / per_joule))
+    return None
+
+
+def _view_deg(numbers: Numbers, path: str | Path) -> float | None:
+    """Field of view across the picture [degrees]; None where the file states none, as NaN or nothing."""
+    for key in _VIEWS_DEG:
+        value = numbers.get(key, np.empty(0)).ravel()
+        if value.size == 1 and np.isfinite(value[0]):
+            with in_place(str(path)):
+                require_range(key.replace("/", "."), float(value[0]), 1e-3, 175.0, "give degrees across the picture")
+            return float(value[0])
     return None
 
 

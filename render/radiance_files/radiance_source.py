@@ -103,17 +103,20 @@ def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
     return load_picture(path, illuminant(light)).relight() if lit else _read(path)
 
 
-def load_picture(path: str | Path, light: Spectrum) -> Transport:
+def load_picture(path: str | Path, light: Spectrum, *, relit: bool = False) -> Transport:
     """Read a file as `load_radiance` does, as light transport: reflectances can be lit by another light afterwards.
 
     Parameters
     ----------
     light : Spectrum
-        Of 1 cd/m^2; for reflectances alone. Reference light has lights of its own.
+        Of 1 cd/m^2; for reflectances, and for radiance that is `relit`. Reference light has lights of its own.
+    relit : bool
+        Whether the light takes the place of the lamp that a file of radiance states.
     """
     if is_reference(path):
         return open_reference(path).transport
-    transport = as_transport(_read(path))
+    radiance = _read(path)
+    transport = as_transport(radiance.relight(light) if relit else radiance)
     if not is_reflectance(path):
         return transport
     return replace(transport, groups={"light": LightGroup((), light, WHITE_CD_M2)})

@@ -19,7 +19,7 @@ BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
 _FRACTION = re.compile(r"^[-+]?\d*\.\d+$")
-_UNITS = {"us", "ms", "s", "lux", "cd/m2", "cd/m²", "K"}
+_UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
 def _converted(kind: Any, tokens: Sequence[Token]) -> Any:

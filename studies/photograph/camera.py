@@ -271,14 +271,14 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     Parameters
     ----------
     radiance : SpectralRadiance
-    sensor : SensorConfig, optional
-        Left out, the preset ``low_noise``.
-    exposure_s : float, optional
-        0 or more [s]; left out, by the rule ``auto:information`` of `sensor.exposure.exposed_by_rule`, which may raise
-        the gain of a camera that states a `SensorConfig.gain_limit`.
+    sensor : SensorConfig or str, optional
+        Or a preset's name or file, such as ``"low_noise"`` or ``"mine.toml"``; left out, the preset ``low_noise``.
+    exposure_s : float or str, optional
+        0 or more [s], or a time such as ``"66ms"``; left out, by the rule ``auto:information`` of
+        `sensor.exposure.exposed_by_rule`, which may raise the gain of a camera that states a `SensorConfig.gain_limit`.
     device, rng, exact, samples_per_pixel
         As `sensor.capture.capture` takes them.
-    light : Spectrum, optional
+    light : Spectrum or str, optional
         That the camera's neutral and colour matrix are set to; left out, D65. Where the mosaic tells no colours under
         it the raw image holds none, and `calibrate` says why.
     shake : str, optional

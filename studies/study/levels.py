@@ -11,6 +11,7 @@ from scenes.levels import DEMO_LEVELS
 from sensor.exposure import RULES
 
 UNITS = ("cd/m2", "lux")
+SYMBOLS = {"lx": "lux", "cd/m^2": "cd/m2"}  # other spellings of the two
 NAMED = {level.name: level for level in DEMO_LEVELS}
 _FORM = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$")
 
@@ -33,6 +34,7 @@ def parse_level(text: str) -> tuple[float, str]:
         )
     value = float(match[1])
     unit = match[2].replace("²", "2")
+    unit = SYMBOLS.get(unit, unit)
     if not unit:
         raise InputError(f"level: {text.strip()!r} has no unit; allowed: {' or '.join(UNITS)}; write {text.strip()}lux")
     require_name("level: unit", unit, UNITS)

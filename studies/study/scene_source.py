@@ -115,10 +115,11 @@ LIGHT = "D65"  # what sRGB takes for white, where nothing tells the light of the
 
 @dataclass(frozen=True)
 class AdoptedWhite:
-    """Light that colours are judged under, and what had to be assumed for it."""
+    """Light that colours are judged under, what had to be assumed for it, and whether it replaces the file's own."""
 
     spectrum: Spectrum
     notes: tuple[str, ...] = ()
+    relit: bool = False
 
 
 def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum:
@@ -137,14 +138,18 @@ def default_white(path: str | Path) -> AdoptedWhite:
 def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
     """Light of a picture file: the one that was given, else the file's own, else D65.
 
+    One that is given takes the place of the lamp that an ISETCam scene holds.
+
     Raises
     ------
     InputError
         For an unknown light, or a ``.mat`` that can't be read.
     """
-    if light is not None:
-        return AdoptedWhite(illuminant(light))
+    given = None if light is None else illuminant(light)
     stored = stored_illuminant(path)
+    if given is not None:
+        note = f"{Path(path).name}: lit by {light} in place of the illuminant that it holds"
+        return AdoptedWhite(given) if stored is None else AdoptedWhite(given, (note,), relit=True)
     if stored is None:
         return default_white(path)
     return AdoptedWhite(stored, (f"{Path(path).name}: its colours are judged under the illuminant that it holds",))
@@ -183,10 +188,10 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport
     """
     with warnings.catch_warnings(record=True) as file_warnings:
         warnings.simplefilter("always")
-        transport = load_picture(path, white.spectrum)
+        transport = load_picture(path, white.spectrum, relit=white.relit)
     name = Path(path).name
     for side in transport.counts.shape:
-        require_range(f"{name}: side", side, 16, 4096, "a study takes such sides in pixels; crop or scale it")
+        require_range(f"{name}: side", side, 16, 4096, "a picture needs so many pixels a side; crop or scale it")
     assumed = [*(f"{name}: {warning.message}" for warning in file_warnings), *white.notes]
     if is_reference(path):
         assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")

@@ -19,7 +19,7 @@ from worker import input_files, keep, work
 
 START = "spawn"  # a forked process would share locks of Dr.Jit's threads
 HANGS_S = 60.0  # after which a child is ended
-START_S = 120.0  # that a child may take to load its libraries and read the samples
+START_S = 240.0  # that a child may take to load its libraries and read the samples
 NAMES = ("tried", "refused", "accepted", "findings")
 
 

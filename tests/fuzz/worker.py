@@ -124,6 +124,9 @@ def _memory_mib(name: str) -> float:
 def work(plan: Sequence[tuple[str, int, float]], seed: int, messages: Any, out: Path, place: Path) -> None:
     """Feed targets one after the other, and tell the parent of each input, so that it knows of which one this died.
 
+    Each gets time in proportion to what an input costs it, so that readers in a process of their own and large files
+    are reached as often as the others.
+
     Parameters
     ----------
     plan : sequence of (str, int, float)
@@ -140,8 +143,10 @@ def work(plan: Sequence[tuple[str, int, float]], seed: int, messages: Any, out: 
     for name, *_ in plan:
         for sample in samples[name]:  # loads what is loaded at first use
             judge(TARGETS[name], sample, folder)
-    for name, first, seconds in plan:
-        end, number = time.monotonic() + seconds, first
+    costs_s = {name: _cost_s(TARGETS[name], samples[name], folder) for name, *_ in plan}
+    per_input = sum(seconds for *_, seconds in plan) / sum(costs_s.values())
+    for name, first, _ in plan:
+        end, number = time.monotonic() + per_input * costs_s[name], first
         messages.send((name, ""))
         while time.monotonic() < end:
             if number % 1000 == 0:
@@ -152,6 +157,14 @@ def work(plan: Sequence[tuple[str, int, float]], seed: int, messages: Any, out: 
                 keep(out / "findings" / f"{name}-{told}-{seed}-{number}", made, words)
             messages.send((name, told))
             number += 1
+
+
+def _cost_s(target: Target, samples: Sequence[Sample], folder: Path) -> float:
+    """Mean time that a valid input takes: no changed one may end this process before the first is counted."""
+    began = time.monotonic()
+    for sample in samples:
+        judge(target, sample, folder)
+    return (time.monotonic() - began) / len(samples)
 
 
 def quiet() -> None:

@@ -67,6 +67,10 @@ def wall():
     return render(noisy_wall(), SIZE, wavelength_nm=BANDS_NM, spp=128, seed=1)
 
 
+def test_one_number_of_pixels_is_the_longer_side_of_the_scenes_own_proportions():
+    assert render(load("color_checker"), 24, spp=1).counts.shape == (16, 24)  # the chart's film is 170 x 256
+
+
 def test_a_wall_under_a_constant_environment_is_exact():
     made = render(load("flat_field"), SIZE, wavelength_nm=BANDS_NM, spp=8, seed=1)
     assert made.radiance == pytest.approx(np.full((1, 8, *SIZE), 0.5), rel=1e-6)
@@ -378,7 +382,7 @@ def test_bands_of_any_number_and_width_are_rendered():
     assert ratio == pytest.approx(expected, rel=5e-3)
 
 
-@loop("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), 5])
+@loop("size", [(0, 5), (5, -1), (5,), (5, 5, 3), (2.0, 3.0), (40_000, 2), -5, 2.5])
 def test_a_bad_size_is_refused_with_its_value(size):
     text = refusal(render, load("flat_field"), size)
     assert text == f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768"

@@ -49,6 +49,8 @@ RIGHT: dict[str, Any] = {
     "electrons": np.ones(4),
     "linear": np.ones((4, 4, 3)),
     "picture": np.full((4, 4, 3), 0.5),
+    "measure.picture": np.full((16, 16, 3), 0.5),
+    "reference": public.reference_picture(RADIANCE),
     "planes": np.ones((16, 16, 3)),
     "matrix": np.eye(3),
     "balance": np.ones(3),

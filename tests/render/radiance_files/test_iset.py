@@ -3,6 +3,7 @@
 import resource
 import struct
 import zlib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,10 +13,12 @@ import scipy.io
 from loop import loop
 from refusal import refusal
 
+from render.illuminants import illuminant, spectral_luminance
 from render.radiance_files import mat_file, mat_reader
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.radiance_files.mat_file import read_numbers
-from render.spectrum import luminance
+from render.radiance_files.radiance_source import load_picture
+from render.spectrum import Spectrum, luminance, photons_per_joule
 from rodcone.errors import InputError
 
 NM = np.arange(400.0, 701.0, 10.0)
@@ -35,10 +38,8 @@ def basis_file(tmp_path: Path, **changes: Any) -> tuple[Path, np.ndarray]:
     rng = np.random.default_rng(8)
     functions, coefficients = rng.random((NM.size, 3)), 1e15 * rng.random((5, 6, 3))
     parts: dict[str, Any] = {"mcCOEF": coefficients, "basis": {"basis": functions, "wave": NM}, "comment": "a"}
-    illuminant = {"data": np.ones(NM.size), "wavelength": NM}
-    return save(tmp_path, **{**parts, "illuminant": illuminant, **changes}), np.einsum(
-        "hwk,nk->hwn", coefficients, functions
-    )
+    lamp = {"data": np.ones(NM.size), "wavelength": NM}
+    return save(tmp_path, **{**parts, "illuminant": lamp, **changes}), np.einsum("hwk,nk->hwn", coefficients, functions)
 
 
 def test_photons_become_watts_by_planck_constant_and_frequency(tmp_path: Path) -> None:
@@ -302,3 +303,27 @@ def test_other_forms_are_named_with_the_way_out(tmp_path: Path) -> None:
         path.write_bytes(content)
         refusal(read_numbers, path, ["x"], match="level 5")
     refusal(read_numbers, tmp_path / "missing.mat", ["x"], match="no such file")
+
+
+@pytest.mark.thorough
+def test_the_illuminant_that_a_scene_holds_is_exchanged_and_its_view_is_read(tmp_path: Path) -> None:
+    """A grey of 0.4 under A, relit by D65, is a grey of 0.4 under D65 of the same luminance."""
+    nm = np.arange(400.0, 701.0, 10.0)
+    lamp, other = illuminant("A"), illuminant("D65")
+    watts = 250.0 * lamp.band_average(nm, np.full(nm.size, 10.0))
+    photons = 0.4 * watts * photons_per_joule(nm)
+    held = {"data": watts, "wavelength": nm}
+    path = save(tmp_path, photons=np.tile(photons, (3, 4, 1)), wave=nm, illuminant=held, fov=12.5)
+    scene = read_iset_scene(path)
+    assert scene.horizontal_view_deg == 12.5
+    again = scene.relight(scene.light)
+    assert again.values == pytest.approx(scene.values, rel=1e-6)
+    lit = scene.relight(other)
+    of_file = Spectrum(nm, watts)
+    scale = spectral_luminance(of_file) * 0.4
+    expected = scale * other.band_average(nm, np.full(nm.size, 10.0))
+    inner = slice(1, -1)  # half of the outermost bands lies beyond the file's illuminant
+    assert lit.values[0, 0, inner] == pytest.approx(expected[inner], rel=4e-3)  # straight lines between 10 nm
+    assert lit.luminance() == pytest.approx(scene.luminance(), rel=5e-3)
+    assert load_picture(path, other, relit=True).relight().values == pytest.approx(lit.values, rel=1e-6)
+    refusal(replace(scene, light=None).relight, other, match="it isn't known which lamp is behind these values")

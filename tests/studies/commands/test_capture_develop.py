@@ -173,6 +173,14 @@ def test_an_isetcam_scene_is_judged_under_the_illuminant_that_it_holds(tmp_path:
     white = white_spectrum(open_choice(study.scenes[0], study), OWN)
     inner = nm[1:-1], np.full(nm.size - 2, 10.0)  # outside its samples the illuminant is 0
     assert white.band_average(*inner) == pytest.approx(lamp.band_average(*inner), rel=0.02)
+    code, _, err = call(["capture", path, "--cfa", "bayer", "-o", out, "--light", "D65"])
+    assert (code, "grey.mat: lit by D65 in place of the illuminant that it holds" in err) == (0, True)
+    photo, sensor = read_raw(out), preset("low_noise", "bayer")
+    means = {c: photo.electrons[mask(photo.cfa, c, photo.shape)].mean() for c in "RGB"}
+    ratio = calibrate(sensor, illuminant("D65")).neutral
+    # the file's bands end at 385 and 715 nm, the calibration's at 380 and 780; under A red would be twice as much
+    assert means["R"] / means["G"] == pytest.approx(ratio[0] / ratio[1], rel=0.03)
+    assert means["B"] / means["G"] == pytest.approx(ratio[2] / ratio[1], rel=0.03)
 
 
 def test_the_file_carries_the_calibration_for_the_light_or_the_white_balance_asked_for(exr, tmp_path):

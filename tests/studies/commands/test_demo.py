@@ -75,6 +75,8 @@ def test_levels_are_read_with_their_unit_and_bad_ones_refused() -> None:
         (" 0.5 lux ", 0.5, "lux"),
         ("1e-3 cd/m²", 1e-3, "cd/m2"),
         (".25lux", 0.25, "lux"),
+        ("5lx", 5.0, "lux"),
+        ("5 cd/m^2", 5.0, "cd/m2"),
     ):
         assert parse_level(text) == (value, unit)
     for text in ("25nits", "25", "bright", "-3lux", "0cd/m2", "1e99lux", ""):

@@ -1,0 +1,113 @@
+"""A developed picture measured against the scene without noise, for one's own script: the metrics of a study."""
+
+from dataclasses import asdict, dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from isp.picture import Picture
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.spectrum import Spectrum
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from rodcone.display import brief, preview_png
+from rodcone.errors import InputError
+from rodcone.types import Image, real_array
+from studies.metrics.quality import TruePicture, appearance, true_picture
+from studies.metrics.quality import measure as quality_of
+from studies.metrics.truth import light_in_bands, true_srgb, white_of
+
+
+@dataclass(frozen=True)
+class ReferencePicture:
+    """The scene as a camera without noise, blur or mosaic would show it.
+
+    Attributes
+    ----------
+    linear : (h, w, 3) float64
+        Linear sRGB, adapted to D65; white is 1.
+    white_cd_m2 : float
+        Luminance that is shown as white.
+    """
+
+    linear: Image
+    white_cd_m2: float
+
+    __repr__ = brief
+
+    @cached_property
+    def truth(self) -> TruePicture:
+        """What comparisons need of the picture, computed once."""
+        return true_picture(self.linear)
+
+    def _repr_png_(self) -> bytes:
+        return preview_png(self.linear)
+
+
+def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None) -> ReferencePicture:
+    """Show radiance without a camera: the picture that a developed one is measured against.
+
+    Parameters
+    ----------
+    radiance : SpectralRadiance
+        What `capture` was given.
+    light : Spectrum, optional
+        Lamp whose colour is shown as white, or an illuminant's name; left out, the one that the radiance states, else
+        D65, which `capture` takes too.
+
+    Returns
+    -------
+    ReferencePicture
+        White is the luminance of which the 99th percentile of pixels has 90 %.
+    """
+    lamp = light or radiance.light or illuminant("D65")
+    white_cd_m2 = white_of(radiance.luminance(), np.zeros(radiance.shape))
+    if not white_cd_m2 > 0:
+        raise InputError("radiance: it is dark; allowed: light in a hundredth of its pixels; give a level above 0")
+    in_bands = light_in_bands(lamp, radiance.wavelength_nm, radiance.widths_nm)
+    return ReferencePicture(true_srgb(radiance, in_bands, white_cd_m2), white_cd_m2)
+
+
+def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[str, float]:
+    """Measure a developed picture against the scene without noise, by the metrics of a study.
+
+    The picture is brought to the reference's mean luminance: one factor, so that its brightness isn't judged. A study
+    takes that factor from the camera instead; where both are to agree within 0.1 dB, the noise's mean has to be under
+    1 % of the light's.
+
+    Parameters
+    ----------
+    picture : Picture or (h, w, 3) array
+        As `develop` gives it; or linear sRGB of any scale.
+    reference : ReferencePicture
+        Of the same size, from `reference_picture`.
+
+    Returns
+    -------
+    dict of str to float
+        ``psnr_db``: peak signal over the mean square difference of encoded sRGB [dB]; 3 dB are half the light.
+        ``ssim``: structural similarity, 1 for the same picture. ``delta_e_median``, ``delta_e_p95``: CIEDE2000 over
+        pixels; 1 is about what is just seen on even patches. ``s_cielab_median``, ``s_cielab_p95``: CIELAB difference
+        after the eye's blur. ``flip_mean``: LDR-FLIP, 0 to 1, of alternating pictures. ``pu21_psnr_db``: PSNR on a
+        scale of equally visible steps of absolute luminance.
+
+    Raises
+    ------
+    InputError
+        For another size, values that aren't finite, or a picture that is dark.
+    """
+    linear = np.asarray(picture.rgb if isinstance(picture, Picture) else real_array("picture", picture), np.float64)
+    if linear.shape != reference.linear.shape:
+        raise InputError(
+            f"picture: shape {linear.shape} is not the reference's {reference.linear.shape}; give pictures of one size"
+        )
+    mean = float(luminance_of_srgb(linear).mean())
+    if not 0 < mean < np.inf:
+        raise InputError(
+            f"picture: its mean luminance is {mean:g}; allowed: above 0, finite; give linear sRGB of a scene"
+        )
+    scaled = linear * (float(luminance_of_srgb(reference.linear).mean()) / mean)
+    encoded = encode_srgb(scaled)
+    quality = quality_of(encoded, reference.truth.encoded, reference.truth.lab)
+    return asdict(quality) | asdict(appearance(scaled, encoded, reference.truth, reference.white_cd_m2))

@@ -1,0 +1,113 @@
+"""51 mistakes as people type them: one line each, exit status 2, and the line names the remedy."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from command_line import check_refusals
+
+PIXEL = "[pixel]\npitch_um=2\nfill_factor=1\nfull_well_e=5000\nread_noise_e=2\ndsnu_e=0\nprnu=0.01\n"
+LENS = "[lens]\nf_number=2\n"
+FILES = {
+    "thz.csv": "frequency_thz,R\n400,1\n500,2\n",
+    "two.csv": "nm,R\n400,1\n500,2\nlamp 2\n400,1\n500,2\n",
+    "broken.csv": "nm,R\n400,1\n500,x\n600,1\n",
+    "dbm.csv": "nm,dBm\n400,1\n500,1\n",
+    "bgr.csv": "nm,blue,green,red\n400,.1,.2,.3\n700,.1,.2,.3\n",
+    "bgr.toml": 'cfa="bayer"\n'
+    + PIXEL
+    + LENS
+    + '[responses]\ncsv="bgr.csv"\nrange_nm=[400,700]\nquantum_efficiency="included"\n',
+    "b.toml": 'holds="reflectance"\nwavelength_nm=[400,700]\n',
+    "c.toml": 'holds="reflectance"\nwavelength_nm=[400,700]\n',
+    "e.hdr": "ENVI\nsamples=2\nlines=2\nbands=2\ndata type=4\ninterleave=bsq\n"
+    "wavelength units=Wavenumber\nwavelength={4,5}\n",
+    "e.img": 32 * " ",
+    "e.toml": 'holds="radiance"\n',
+    "r.toml": 'camera="x"\n',
+}
+MISTAKES = {
+    "capture": (
+        ("flat_field --light thz.csv", "has header ['frequency_thz', 'R'] ... allowed: wavelength_nm"),
+        ("flat_field --light two.csv", "begin in lines 2 and 5; allowed: one ... put # before"),
+        ("flat_field --light broken.csv", "line 3 ('500,x') ... mend it"),
+        ("flat_field --light dbm.csv", "is in dBm; allowed: power per wavelength ... convert it"),
+        ("flat_field --light none.spd", "No such file ... give a table"),
+        ("color_checker --chart broken.csv", "chart: 'broken.csv': line 3 ... mend it"),
+        ("flat_field --sensor bgr.toml", "has the columns blue, green, red ... R, G, B; rename them"),
+        ("a.npy", 'nothing says what it holds ... write there holds = "reflectance"'),
+        ("b.npy", "100% of its reflectances exceed 1 ... such as 0.01 for per cent"),
+        ("c.npy", "side: 6 is outside 16 to 4096 ... crop or scale it"),
+        ("m.mat", "-v7.3 ... pip install mat73 scipy; python -c"),
+        ("e.hdr", "wavelength units: 'wavenumber' is not allowed; give Nanometers or Micrometers"),
+        ("flat_field --level 5 foo", "'foo' has another ending; allowed: .dng, .tif, .tiff"),
+        ("flat_field --level 5kd", "level: unit: 'kd' is unknown; allowed: cd/m2, lux"),
+        ("flat_field --levl 5lux", "Did you mean --level?"),
+        ("flat_field --exposure 20", "exposure: '20' is not a time ... write 20ms or 20s"),
+        ("flat_field --size 96.5", "--size ... is not a whole number"),
+        ("flat_field --frames 0", "frames: 0"),
+        ("", "--source requires an argument"),
+    ),
+    "capturee": (("flat_field", 'Did you mean "capture"?'),),
+    "render": (
+        ("flat_field -o a.png", "allowed: .exr"),
+        ("flat_field -o a.exr --bands 400-700", "give FIRST_EDGE:LAST_EDGE:WIDTH ... such as 380:780:10"),
+        ("flat_field -o a.exr --height 0", "height: 0 ... give pixels"),
+        ("flat_field -o a.exr --noise -1", "noise: -1.0 ... such as 0.02"),
+        ("flat_field -o a.exr --spp x", 'unable to convert "x" into int'),
+    ),
+    "develop": (
+        ("none.dng", "there is no such file; give the path of a raw file"),
+        ("none.dng --bits 12", "bits: 12 is not allowed; give 8 or 16"),
+        ("none.dng -o a.jpg", "allowed: .png, .tif, .tiff"),
+    ),
+    "snr": (
+        ("low_nois", "did you mean 'low_noise'?"),
+        ("low_noise --at 0", "give signal over noise, such as 10"),
+        ("low_noise --light D66", "illuminant: 'D66' is unknown ... temperature such as 3000K"),
+        ("low_noise --exposure 0s", "give a time such as 33ms"),
+    ),
+    "sweep": (
+        ("none.toml", "start from one of: rodcone new study -o FILE"),
+        ("r.toml", "key: 'camera' is unknown; allowed: budget"),
+    ),
+    "report": (("none", "run rodcone sweep first"),),
+    "export": (("none -o a.csv", "run rodcone sweep first"),),
+    "demo": (
+        ("--level 5", "'5' has no unit ... write 5lux"),
+        ("--processor bayr", "did you mean 'bayer'?"),
+        ("--scene still_lif", "did you mean 'still_life'?"),
+    ),
+    "list": (("scene", 'Did you mean "scenes"?'),),
+    "new": (("preset r --noise r.toml", "--out requires an argument"), ("preset low_noise -o a.txt", "allowed: .toml")),
+    "characterise": (
+        ("", "allowed: PRESET, or raw files by --from and --dark"),
+        ("low_nois", "did you mean 'low_noise'?"),
+    ),
+    "expect": (("low_noise --over street", "write moonlight:sunlit day"),),
+    "explore": (("flat_fild", "did you mean 'flat_field'?"),),
+    "plan": (("none.toml", "start from one of: rodcone new study -o FILE"),),
+    "dataset": (("none.toml", "start from one of: rodcone new study -o FILE"),),
+    "judge": (("none", "--of requires an argument"),),
+    "paper": (("-o", "--out requires an argument"),),
+    "reference": (("flat_fild", "did you mean 'flat_field'?"),),
+}
+
+
+@pytest.mark.thorough
+def test_51_mistakes_are_refused_in_one_line_that_names_the_remedy(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, text in FILES.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    for name, cube in (
+        ("a", np.full((4, 4, 3), 0.5)),
+        ("b", np.full((20, 20, 3), 50.0)),
+        ("c", np.full((6, 20, 3), 0.5)),
+    ):
+        np.save(tmp_path / f"{name}.npy", cube)
+    (tmp_path / "m.mat").write_bytes(b"MATLAB 7.3 MAT-file".ljust(124) + b"\0\2IM" + bytes(384) + b"\x89HDF\r\n\x1a\n")
+    assert sum(map(len, MISTAKES.values())) == 51
+    for command, rows in MISTAKES.items():
+        check_refusals(command, rows, tmp_path)

@@ -1,0 +1,67 @@
+"""A picture beside the scene without noise: the metrics of a study, and what their one factor does."""
+
+from dataclasses import asdict
+
+import numpy as np
+import pytest
+from refusal import refusal
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from rodcone.colour_spaces import encode_srgb
+from studies.metrics.compare import ReferencePicture, measure, reference_picture
+from studies.metrics.quality import measure as quality_of
+from studies.photograph.camera import capture
+from studies.photograph.develop import develop
+
+NM = np.arange(385.0, 780.0, 10.0)
+
+
+def grey_field(lamp: str, luminance_cd_m2: float) -> SpectralRadiance:
+    """Steps of grey under a lamp, the brightest at a luminance."""
+    steps = np.linspace(0.2, 1.0, 24)[None, :, None] * np.ones((24, 1, 1))
+    return SpectralRadiance(steps * luminance_cd_m2 * illuminant(lamp).band_average(NM, np.full(NM.size, 10.0)), NM)
+
+
+def test_a_neutral_under_its_own_lamp_is_grey_and_white_is_known() -> None:
+    reference = reference_picture(grey_field("A", 50.0), illuminant("A"))
+    assert reference.white_cd_m2 == pytest.approx(50 / 0.9, rel=0.01)  # the 99th percentile shows at 90 %
+    assert reference.linear[0, -1] == pytest.approx([0.9] * 3, rel=0.01)
+    assert np.ptp(reference.linear, axis=2).max() < 1e-3
+    assert np.ptp(reference_picture(grey_field("A", 50.0)).linear[0, -1]) > 0.1  # by D65, A is orange
+
+
+def test_the_same_picture_of_another_scale_has_no_difference_and_a_known_one_has_the_studys_figures() -> None:
+    rng = np.random.default_rng(3)
+    reference = ReferencePicture(rng.uniform(0.05, 0.9, (32, 32, 3)), 100.0)
+    same = measure(reference.linear * 1234.5, reference)
+    assert same["psnr_db"] > 200
+    assert (same["ssim"], same["delta_e_p95"], same["flip_mean"]) == pytest.approx((1.0, 0.0, 0.0), abs=1e-6)
+    other = reference.linear[:, ::-1]
+    told = measure(other, reference)
+    assert {name: told[name] for name in ("psnr_db", "ssim")} == pytest.approx(
+        {
+            name: asdict(quality_of(encode_srgb(other), encode_srgb(reference.linear)))[name]
+            for name in ("psnr_db", "ssim")
+        },
+        rel=1e-9,
+    )
+    assert set(told) == set(same)
+    assert len(told) == 8
+
+
+@pytest.mark.thorough
+def test_four_lines_measure_a_photograph_and_more_light_is_better() -> None:
+    radiances = [grey_field("D65", level) for level in (2.0, 200.0)]
+    figures = []
+    for radiance in radiances:
+        picture = develop(capture(radiance, exposure_s=0.01, rng=np.random.default_rng(1)))
+        figures.append(measure(picture, reference_picture(radiance)))
+    assert figures[1]["psnr_db"] > figures[0]["psnr_db"] + 10
+
+
+def test_what_is_no_picture_of_the_reference_is_refused() -> None:
+    reference = reference_picture(grey_field("D65", 50.0))
+    refusal(measure, np.ones((3, 3, 3)), reference, match="is not the reference's")
+    refusal(measure, np.zeros(reference.linear.shape), reference, match="its mean luminance is 0")
+    refusal(reference_picture, SpectralRadiance(np.zeros((4, 4, NM.size)), NM), match="it is dark")
