@@ -32,6 +32,12 @@ def pytest_unconfigure() -> None:
     gc.unfreeze()
 
 
+@pytest.fixture(autouse=True)
+def no_progress_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Print no line of progress, which a busy machine would add to what a command says every few seconds."""
+    monkeypatch.setattr("rodcone.progress.LINE_EVERY_S", 1e6)
+
+
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
     """One Chromium for a module's tests."""

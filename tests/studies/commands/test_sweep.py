@@ -20,8 +20,7 @@ processors = ["bayer"]
 
 
 @pytest.fixture
-def study(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setattr("rodcone.progress.LINE_EVERY_S", 1e6)  # of a busy machine, stderr would have lines more
+def study(tmp_path: Path) -> Path:
     SAMPLE.picture(tmp_path / "scene.exr")
     path = tmp_path / "study.toml"
     path.write_text(TEXT, "utf-8")
