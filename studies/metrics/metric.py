@@ -48,8 +48,9 @@ SEEN_BY: str = _TEXTS["seen_by"]
 MEANINGS: dict[str, str] = _TEXTS["meanings"]
 ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
-# Metrics that say much the same: the largest of each family is named, and none is a vote.
-FAMILIES = ((PSNR, PU21, PATCHES), (SSIM, MTF50), (DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, CHART), (FLIP,))
+# Metrics that a report speaks of and draws at first: no other one makes a verdict in words, which a reader would look
+# for in the charts in vain.
+HEADLINE = (PSNR, DELTA_E, FLIP)
 # One of each family, known on every scene: an undecided one leaves a level so, and two levels whose pictures are alike
 # by all of them give one picture. PU21 weighs errors by the light.
 DECIDING = (PSNR, SSIM, DELTA_E, FLIP)

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.metrics.metric import DECIDING, DELTA_E, FAMILIES, METRICS, PSNR, Metric
+from studies.metrics.metric import DELTA_E, HEADLINE, METRICS, PSNR, Metric
 from studies.pages.report_data import ReportCell
 from studies.pages.report_text import NBSP, camera_name, duration, fixed, lead_text, significant
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
@@ -49,7 +49,7 @@ class Pair:
 def answer(pair: Pair) -> str:
     """Say in words how the first of a pair does beside the second: a sentence for each run of levels of one verdict.
 
-    Every difference as large as a person sees is in it, losses as well as gains; of each family of metrics the largest.
+    Every difference in `HEADLINE` as large as a person sees is in it, losses as well as gains.
     """
     by_metric, levels = pair.leads, pair.levels
     if pair.ours[PSNR.key].shape[-1] == 1:
@@ -66,36 +66,25 @@ def answer(pair: Pair) -> str:
 
 
 def _word(outcomes: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
-    """Verdict of one level from each metric's outcome and lead; where it is mixed, with families gained and lost."""
+    """Verdict of one level from each metric's outcome and lead; where it is mixed, with metrics gained and lost."""
     gained, lost = (
-        tuple(i for i, family in enumerate(FAMILIES) if any(outcomes[metric.key][0] == outcome for metric in family))
+        tuple(i for i, metric in enumerate(HEADLINE) if outcomes[metric.key][0] == outcome)
         for outcome in (AHEAD, BEHIND)
     )
     if gained and lost:
         return "mixed", gained, lost
     if not gained and not lost:
-        undecided = any(outcomes[metric.key][0] == UNKNOWN for metric in DECIDING)
+        undecided = any(outcomes[metric.key][0] == UNKNOWN for metric in HEADLINE)
         return "undecided" if undecided else "level", (), ()
-    cases = [(metric, *outcomes[metric.key]) for metric in METRICS]
+    cases = [(metric, *outcomes[metric.key]) for metric in HEADLINE]
     largest = max(abs(lead) / metric.threshold for metric, outcome, lead in cases if outcome in (AHEAD, BEHIND))
     return f"{'clearly' if largest >= CLEARLY else 'a little'} {'better' if gained else 'worse'}", (), ()
 
 
 def _seen(run: dict[str, Leads], outcome: str) -> str:
-    """Write what a run of levels has gained or lost: of each family PSNR, or else the metric with the largest lead."""
-    named = []
-    for family in FAMILIES:
-        sizes = {
-            metric: float("inf")
-            if metric == PSNR
-            else float(np.abs(run[metric.key].mean[here]).max()) / metric.threshold
-            for metric in family
-            if (here := run[metric.key].outcome == outcome).any()
-        }
-        if sizes:
-            metric = max(sizes, key=lambda metric: sizes[metric])
-            named.append(_span(metric, run[metric.key].mean[run[metric.key].outcome == outcome]))
-    return ", ".join(named)
+    """Write what a run of levels has gained or lost, metric by metric."""
+    here = {metric: run[metric.key].outcome == outcome for metric in HEADLINE}
+    return ", ".join(_span(metric, run[metric.key].mean[at]) for metric, at in here.items() if at.any())
 
 
 def _said(word: str, run: dict[str, Leads]) -> str:
@@ -143,7 +132,7 @@ def _where(levels: Sequence[str], first: int, last: int) -> str:
 
 
 def in_light(pair: Pair) -> str:
-    """Say with how much less light the better one gives the other's PSNR, and in which light with as much.
+    """Say how much less light the better one needs for the other's PSNR, and in which light nobody sees a difference.
 
     Nothing is said where nothing is seen at any level, nor where the sweep can't tell, its levels don't rise or one
     isn't known.
@@ -153,23 +142,26 @@ def in_light(pair: Pair) -> str:
         return ""
     outcomes = pair.leads[PSNR.key].outcome.tolist()
     ours, theirs = pair.ours[PSNR.key], pair.theirs[PSNR.key]
-    parts = []
-    for outcome, (better, worse), curves in (
-        (AHEAD, pair.names, (ours, theirs)),
-        (BEHIND, pair.names[::-1], (theirs, ours)),
-    ):
-        times = []
+    sentences = []
+    for outcome, better, curves in ((AHEAD, pair.names[0], (ours, theirs)), (BEHIND, pair.names[1], (theirs, ours))):
+        shares = []
         for name, here, ratio in zip(pair.levels, outcomes, light_ratio(lights, *curves).tolist(), strict=True):
             if here == outcome and ratio[0] > 1:
-                mean, *ends = (significant(value, digits=2) for value in ratio)
-                interval = f" ({' to '.join(ends)})" if len(set(ends)) > 1 else ""
-                times.append(f"{mean} times at {name}{interval}")
-        if times:
-            parts.append(f"{better} gives the PSNR of {worse} with less light: {', '.join(times)}")
-    if not parts:
+                mean, *ends = (significant(1 / value, digits=2) for value in ratio)
+                interval = f" ({' to '.join(reversed(ends))})" if len(set(ends)) > 1 else ""
+                shares.append(f"{_SHARES.get(mean, f'{mean} times')} the light{interval} at {name}")
+        if shares:
+            sentences.append(f"For the same PSNR {better} needs {', '.join(shares)}.")
+    if not sentences:
         return ""
     alike = [_where(pair.levels, *run) for run in _runs(outcomes) if outcomes[run[0]] == LEVEL]
-    return "; ".join([*parts, *([f"with as much: {', '.join(alike)}"] if alike else [])]) + "."
+    if alike:
+        where = ", ".join(alike)
+        sentences.append(f"{where[0].upper()}{where[1:]}: nobody sees a difference in it.")
+    return " ".join(sentences)
+
+
+_SHARES = {"0.5": "half", "0.33": "a third", "0.25": "a quarter"}
 
 
 # Words of pairs in their places
@@ -197,7 +189,7 @@ def pair_words(group: Group) -> str:
             differ.append(f"{group.pair.levels[ours.level]} {duration(times[0])} against {duration(times[1])}")
     cameras = tuple(cells[0].camera for cells in (group.ours, group.theirs))
     reference = "bayer" in cameras and _balances(*group.ours, *group.theirs) == {GRAY_WORLD}
-    sentences = ["Bayer, bilinear + Gray World, is the paper's reference."] if reference else []
+    sentences = ["Bayer (bilinear) with Gray World is the paper's reference."] if reference else []
     if cameras == WHITE_PIXEL:
         alone = "" if differ else ", and the same exposure times: they differ by the mosaic alone"
         sentences.append(f"One method, prior and colour rule on both mosaics{alone}.")
@@ -253,25 +245,3 @@ def balance_words(group: Group) -> str:
         f"Gray World misses this scene's light by ΔE {fixed(miss, 1)} ({camera}, {level_name}); the lead is "
         f"{fixed(abs(lead_there), 1)}. It misses by more than the lead at {len(cases)} of {len(lead)} light levels."
     )
-
-
-def over_groups(groups: Sequence[Group]) -> str:
-    """Say in how many of several conditions one is better and worse in some light, with the largest of each."""
-    if len(groups) < 2 or groups[0].pair.ours[PSNR.key].shape[-1] == 1:
-        return ""
-    parts = []
-    for outcome, word in ((AHEAD, "better"), (BEHIND, "worse")):
-        cases = [
-            (abs(size) / metric.threshold, metric, float(size), group.title, level)
-            for group in groups
-            for metric in METRICS
-            for lead in [group.pair.leads[metric.key]]
-            for size, here, level in zip(lead.mean, lead.outcome, group.pair.levels, strict=True)
-            if here == outcome
-        ]
-        if cases:
-            _, metric, size, title, level = max(cases, key=lambda case: case[0])
-            lead_words = lead_text(metric, size) + (f"{NBSP}{metric.unit}" if metric.unit else "")
-            places = len({title for *_, title, _ in cases})
-            parts.append(f"{word} in some light in {places} (most: {metric.name} {lead_words}, {title}, {level})")
-    return f"Of {len(groups)} conditions: {'; '.join(parts) or 'in none a difference that is seen'}."

@@ -18,7 +18,7 @@ import numpy as np
 from markupsafe import Markup
 
 from render.spectrum import VISIBLE_NM
-from studies.metrics.metric import MEANINGS, METRICS, SEEN_BY, Metric
+from studies.metrics.metric import HEADLINE, MEANINGS, METRICS, SEEN_BY, Metric
 from studies.pages import report_text as text
 from studies.pages.page import address, own_file, svg_address, write_out
 from studies.pages.plots import SNR, snr_svg
@@ -37,6 +37,7 @@ from studies.study.render_noise import MOST_SHARE, noise_note
 
 # One script, in this order.
 SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")
+IN_LUX, IN_CD_M2 = ("lux", "illuminance, lux"), ("x", "scene luminance, cd/m²")  # of the charts' axis of light
 SEEN_DB = 22.0  # PSNR from which on a picture shows what is in it
 
 
@@ -54,6 +55,7 @@ def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any
     electrons = json.loads(row.mean_electrons) if row else {}
     return {
         "x": cell.luminance_cd_m2,
+        "lux": cell.illuminance_lux,
         "figures": {
             metric.key: [float(f"{mean:.7g}"), float(f"{half:.4g}") if isfinite(half) else None]
             for metric in METRICS
@@ -122,7 +124,9 @@ def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, An
     for index in range(len(report.truths)):
         first = report.cells[index * per_view :: len(report.cameras)]
         levels.append([level_view(*pair) for pair in zip(report.levels, first, strict=False)])
+    in_lux = all(level.name.endswith("lux") for level in report.levels)
     return {
+        "light": dict(zip(("key", "name"), IN_LUX if in_lux else IN_CD_M2, strict=True)),
         "axes": [vars(axis) for axis in axes_of(report)],
         "first": vars(of) | {"level": seen_level(report), "look": report.looked_at},
         "references": [reference_name(render) for render in report.renders],
@@ -234,11 +238,11 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         groups=groups,
         varying=sum(len(axis.values) > 1 for axis in axes_of(report)),
         metrics=shown_metrics(report.cells),
+        headline=HEADLINE,
         said_by=MEANINGS,
         seen_by=SEEN_BY,
         alone=alone(report),
         answer=data["comparisons"][of.compared]["answers"].get(f"{of.a} {of.b}", [None])[0],
-        over=data["comparisons"][of.compared]["over"].get(f"{of.a} {of.b}", ""),
         warning=render_warning(report, groups),
         sources=[addresses[cell.picture] if cell.picture else "" for cell in report.cells],
         truths=[addresses[name] if name else "" for name in report.truths],

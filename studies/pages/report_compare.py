@@ -12,17 +12,7 @@ from numpy.typing import NDArray
 from scenes.catalog import DRAWN
 from studies.metrics.metric import METRICS, Metric
 from studies.pages import report_text as text
-from studies.pages.headline import (
-    WHITE_PIXEL,
-    Group,
-    Pair,
-    answer,
-    balance_words,
-    best_words,
-    in_light,
-    over_groups,
-    pair_words,
-)
+from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, best_words, in_light, pair_words
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
 from studies.study.study import OWN
@@ -77,7 +67,8 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
 def first_comparison(report: ReportData) -> Comparison:
     """Choose what is compared before the reader does: cameras where there are several, else the next of `RIVALS`.
 
-    The same method on both mosaics comes first where the study holds it. Where nothing competes it is the one camera.
+    The pair that the study names comes first, else the same method on both mosaics where the study
+    holds it. Where nothing competes it is the one camera.
     """
     several = [index for index, axis in enumerate(axes_of(report)) if len(axis.values) > 1]
 
@@ -88,8 +79,9 @@ def first_comparison(report: ReportData) -> Comparison:
     compared = chosen(RIVALS)
     along = chosen(ALONG_FIRST, compared)
     a, b = 0, min(1, len(axes_of(report)[compared].values) - 1)
-    if compared == CAMERA and set(WHITE_PIXEL) <= set(report.cameras):
-        a, b = (report.cameras.index(camera) for camera in WHITE_PIXEL)
+    pair = report.compare or WHITE_PIXEL
+    if compared == CAMERA and set(pair) <= set(report.cameras):
+        a, b = (report.cameras.index(camera) for camera in pair)
     return Comparison(compared, along, chosen(ROWS_FIRST, compared, along), a, b)
 
 
@@ -177,12 +169,12 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
         By "i j", i < j: ``leads``, by metric outcomes (their first letters), leads and half widths in all places but
         for this axis. Of axes in `RIVALS`, by "i j": ``counts``, by metric ahead, level and behind over the groups,
         equal light once; ``means``, for each mean over scenes its title and by metric what ``leads`` has, by light. And
-        by "a b": ``answers``, for each group the words; ``over``, those over all groups.
+        by "a b": ``answers``, for each group the words.
     """
     cells, metrics = grid(report), shown_metrics(report.cells)
     by_axis = []
     for axis, length in enumerate(cells.shape):
-        across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}, "over": {}}
+        across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}}
         sides = [_figures(tuple(part.ravel())) for part in np.moveaxis(cells, axis, 0)]
         for i, j in combinations(range(length), 2):
             across["leads"][f"{i} {j}"] = {
@@ -195,7 +187,6 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
                 {"said": said, "light": light, "balance": balance, "times": " ".join(filter(None, further))}
                 for _, (said, light, balance, *further) in compared
             ]
-            across["over"][key] = over_groups(groups)
             if a < b:
                 counted = [counts(x.pair.ours, x.pair.theirs) for x in groups]
                 across["counts"][key] = {

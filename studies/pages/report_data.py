@@ -119,6 +119,8 @@ class ReportData:
     ----------
     rodcone, name, title : str
         Version of rodcone, the study's name, and the report's title.
+    compare : tuple of str
+        The two cameras that are compared at first; empty where the study names none.
     scenes ... seeds
         Axes of the study.
     cells : tuple of ReportCell
@@ -163,6 +165,7 @@ class ReportData:
     notes: tuple[str, ...] = ()
     pictures_left_out: str = ""
     looked_at: tuple[int, int] = (0, 0)
+    compare: tuple[str, ...] = ()
     denoised: bool = False
 
     @property

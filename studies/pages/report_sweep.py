@@ -66,14 +66,13 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         rodcone=metadata.version("rodcone"),
         name=study["name"],
         title=study.get("title") or study["name"],
+        compare=tuple(study.get("compare", ())),
         scenes=tuple(ReportScene(name, *size) for name, size in zip(names, sizes, strict=True)),
         spectra=tuple(study["spectra"]),
         sensors=tuple(sensor_of(name) for name in study["sensors"]),
         exposures=tuple(way_name(*way) for way in _ways(study)),
         balances=tuple(study["white_balances"]),
-        levels=tuple(
-            NAMED.get(level) or ReportLevel(level_text(level), "asked for by the study") for level in study["levels"]
-        ),
+        levels=tuple(NAMED.get(level) or ReportLevel(level_text(level), "") for level in study["levels"]),
         cameras=tuple(study["processors"]),
         seeds=tuple(study["seeds"]),
         cells=tuple(cells),

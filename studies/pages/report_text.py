@@ -16,10 +16,10 @@ MISSING = "—"
 NBSP = "\N{NO-BREAK SPACE}"
 AUTOMATIC = {AUTO: "automatic", AUTO_W: "automatic for W", AUTO_INFORMATION: "automatic by information"}
 CAMERA_NAMES = {
-    "interleaved": "Interleaved",
-    "bayer": "Bayer, bilinear",
-    "ple_rgbw": "PLE, RGBW",
-    "ple_bayer": "PLE, Bayer",
+    "interleaved": "RGBW (interleaved)",
+    "bayer": "Bayer (bilinear)",
+    "ple_rgbw": "RGBW (PLE)",
+    "ple_bayer": "Bayer (PLE)",
 }
 BALANCE_NAMES = {AS_SHOT: "balanced as shot", GRAY_WORLD: "balanced by Gray World"}
 BALANCE_MEANINGS = {AS_SHOT: "the scene's light is known", GRAY_WORLD: "the picture's mean is taken for grey"}

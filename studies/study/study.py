@@ -161,7 +161,8 @@ class Study:
     `gains` are fixed gains between pixel and converter, `isos` saturation-based speeds in their place; without either
     each sensor has its own.
     `white_balances` left out are those that `default_balance` has for the processors.
-    `title` heads the report; where it is empty, `name` does.
+    `title` heads the report; where it is empty, `name` does. `compare` names the two processors that the report sets
+    beside each other at first; left out, the same method on both mosaics where the study holds it.
 
     Raises
     ------
@@ -182,6 +183,7 @@ class Study:
     isos: tuple[float, ...] = ()
     name: str = "study"
     title: str = ""
+    compare: tuple[str, ...] = ()
     longest_exposure_s: Annotated[float, (1e-9, 1e6, "give seconds above 0")] = LONGEST_S
     sensor_side_um: Annotated[float | None, (1.0, 1e6, "give micrometres, or leave it out")] = None
     render: RenderLimits = field(default_factory=RenderLimits)
@@ -192,7 +194,7 @@ class Study:
     __repr__ = brief
 
     def __post_init__(self) -> None:
-        for name in (*_LISTS, *_GAINS):  # from Python they may be lists, and files Paths
+        for name in (*_LISTS, *_GAINS, "compare"):  # from Python they may be lists, and files Paths
             if isinstance(values := getattr(self, name), list | tuple):
                 object.__setattr__(self, name, tuple(str(x) if isinstance(x, Path) else x for x in values))
         for place in ("", "render.", "lens.", "budget."):
@@ -201,6 +203,11 @@ class Study:
         object.__setattr__(self, "white_balances", balances)
         _check_axes(self)
         _check_cameras(self)
+        if self.compare and (len(set(self.compare)) != 2 or not set(self.compare) <= set(self.processors)):
+            raise InputError(
+                f"compare: {list(self.compare)} is no pair of the study's processors; allowed: two of "
+                f"{', '.join(self.processors)}"
+            )
         _check_gains(self)
         _check_shares_and_sizes(self)
 

@@ -75,12 +75,33 @@ document.addEventListener("keydown", (event) => {
   wipeTo(state.wipe < 50 ? 100 : 0);
 });
 
-// The pointer: it carries the loupe, and pressed the wipe.
+// Zoom: the wheel and a double click enlarge the pictures about the place that they point at.
 const stage = byId("stage");
-const point = (event) => {
+const zoom = { factor: 1, x: 0.5, y: 0.5 };
+const inPicture = (event) => {
   const box = stage.getBoundingClientRect();
-  const [height, width] = size();
   const [x, y] = [(event.clientX - box.left) / box.width, (event.clientY - box.top) / box.height];
+  return [zoom.x + (x - zoom.x) / zoom.factor, zoom.y + (y - zoom.y) / zoom.factor];
+};
+function zoomTo(factor, event) {
+  if (zoom.factor === 1) [zoom.x, zoom.y] = inPicture(event);
+  zoom.factor = Math.min(Math.max(factor, 1), 16);
+  stage.style.setProperty("--zoom", zoom.factor);
+  stage.style.setProperty("--zoom-at", `${100 * zoom.x}% ${100 * zoom.y}%`);
+  stage.style.setProperty("--zoom-x", `${100 * zoom.x}%`);
+  stage.toggleAttribute("data-zoomed", zoom.factor > 1);
+  drawWipe();
+}
+stage.addEventListener("wheel", (event) => {
+  event.preventDefault();
+  zoomTo(zoom.factor * (event.deltaY < 0 ? 1.25 : 0.8), event);
+}, { passive: false });
+stage.addEventListener("dblclick", (event) => zoomTo(zoom.factor > 1 ? 1 : 4, event));
+
+// The pointer: it carries the loupe, and pressed the wipe.
+const point = (event) => {
+  const [height, width] = size();
+  const [x, y] = inPicture(event);
   byId("column").value = clamp(Math.floor(x * width), 0, width - 1);
   byId("row").value = clamp(Math.floor(y * height), 0, height - 1);
   drawing = drawLoupe();
@@ -109,7 +130,34 @@ for (const link of all("[data-cell]")) {
   });
 }
 
+// Downloads: all numbers as CSV, and A and B as they are seen, side by side, as PNG.
+const save = (name, address) => make("a", { download: name, href: address }).click();
+const quoted = (value) => `"${String(value ?? "").replaceAll('"', '""')}"`;
+byId("save-csv")?.addEventListener("click", () => {
+  const keys = data.metrics.map((metric) => metric.key);
+  const head = [...data.axes.map((axis) => axis.name), "luminance_cd_m2", "illuminance_lux", ...keys.flatMap((key) => [key, `${key}_half_interval`])];
+  const lines = data.cells.map((cell, index) => {
+    let rest = index;
+    const place = [...lengths].reverse().map((length) => {
+      const at = rest % length;
+      rest = Math.floor(rest / length);
+      return at;
+    }).reverse();
+    return [...place.map((at, axis) => data.axes[axis].values[at]), cell.x, cell.lux, ...keys.flatMap((key) => cell.figures[key] ?? ["", ""])];
+  });
+  const text = [head, ...lines].map((line) => line.map(quoted).join(",")).join("\r\n");
+  save("numbers.csv", `data:text/csv;charset=utf-8,${encodeURIComponent(text)}`);
+});
+byId("save-png")?.addEventListener("click", () => {
+  const sides = [byId("over"), byId("under")];
+  const [height, width] = [sides[0].height, sides[0].width];
+  const canvas = Object.assign(document.createElement("canvas"), { width: 2 * width, height });
+  sides.forEach((side, index) => canvas.getContext("2d").drawImage(side, index * width, 0, width, height));
+  save("a_and_b.png", canvas.toDataURL("image/png"));
+});
+
 for (const part of all("[data-script]")) part.hidden = false;
+viewOfAddress();
 [byId("column").value, byId("row").value] = look;
 fillChoices();
 show();

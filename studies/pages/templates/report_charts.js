@@ -83,9 +83,7 @@ function drawLead(of, place, metric) {
   const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step].lead)}`;
   chart.prepend(make("rect", band));
   chart.append(make("line", { class: "axis", x1: LEFT, x2: RIGHT, y1: up(0), y2: up(0) }),
-    make("text", { class: "tick", x: RIGHT, y: up(metric.threshold) - 4, "text-anchor": "end" }, "A better"),
-    make("text", { class: "tick", x: RIGHT, y: up(-metric.threshold) + 12, "text-anchor": "end" }, "B better"),
-    make("text", { class: "tick", x: LEFT + 4, y: up(-metric.threshold) - 4 }, "grey: not seen"),
+    make("text", { class: "tick", x: LEFT, y: HEIGHT - 5 }, "above 0 A is better; grey: not seen"),
     drawLine(0, xs, found.map((one) => (one.lead === null ? null : [one.lead, one.half])), words, up));
   return chart;
 }
@@ -110,7 +108,7 @@ function markOf(slot, x, y) {
 // Positions along the axis: light on a scale of factors where it is known, else evenly.
 function positions(of, place) {
   const steps = range(lengths[of.along]);
-  const light = steps.map((step) => data.cells[cellAt(moved(place, of.along, step))].x);
+  const light = steps.map((step) => data.cells[cellAt(moved(place, of.along, step))][data.light.key]);
   const known = of.along === LEVEL_AXIS && light.every((x) => x > 0);
   const values = known ? light.map(Math.log10) : steps;
   const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -121,7 +119,7 @@ function positions(of, place) {
   const ticks = known
     ? powers.map((power) => [across(power), String(Number((10 ** power).toPrecision(2)))])
     : steps.map((step) => [across(step), data.axes[of.along].values[step].slice(0, 11)]);
-  return { xs: values.map(across), ticks, name: known ? "scene luminance, cd/m²" : data.axes[of.along].name };
+  return { xs: values.map(across), ticks, name: known ? data.light.name : data.axes[of.along].name };
 }
 
 // A chart without its lines: ticks of both axes, and where values lie.
@@ -177,7 +175,9 @@ function drawLine(slot, xs, found, words, up) {
   line.append(make("path", { class: "line", d: path }));
   found.forEach((one, step) => {
     if (!one) return;
-    line.append(make("g", { class: "mark" }, make("title", {}, words(step)), markOf(slot, xs[step], up(one[0]))));
+    const mark = make("g", { class: "mark" }, make("title", {}, words(step)), markOf(slot, xs[step], up(one[0])));
+    mark.addEventListener("click", () => moveTo(of.along, step)); // a click on a point shows its pictures
+    line.append(mark);
   });
   return line;
 }

@@ -201,6 +201,36 @@ function show() {
   drawWipe();
   drawNumbers();
   drawing = drawPictures();
+  keepAddress();
+}
+
+// The address holds the view, so that it can be sent: what is compared, where, and how it is looked at.
+function keepAddress() {
+  const view = new URLSearchParams({ axis: of.compared, a: of.a, b: of.b, place: state.place.join("."), view: state.view, show: state.show });
+  try {
+    history.replaceState(null, "", `#${view}`);
+  } catch { /* a page without an address of its own, as in a preview, goes on without */ }
+}
+
+function viewOfAddress() {
+  const asked = new URLSearchParams(location.hash.slice(1));
+  if (!asked.has("place")) return;
+  const place = asked.get("place").split(".").map(Number);
+  const axis = Number(asked.get("axis"));
+  const valueOf = (name) => (asked.get(name) === TRUTH ? TRUTH : Number(asked.get(name)));
+  const allowed = (value) => value === TRUTH || (Number.isInteger(value) && value >= 0 && value < lengths[axis]);
+  const inside = place.length === lengths.length && place.every((at, index) => Number.isInteger(at) && at >= 0 && at < lengths[index]);
+  if (!inside || !(axis in lengths) || ![valueOf("a"), valueOf("b")].every(allowed)) return;
+  state.place = place;
+  const free = range(lengths.length).filter((other) => other !== axis).sort((one, other) =>
+    (lengths[other] > 1) - (lengths[one] > 1) || (other === LEVEL_AXIS) - (one === LEVEL_AXIS));
+  if (axis !== of.compared) [of.along, of.rows] = free;
+  Object.assign(of, { compared: axis, a: valueOf("a"), b: valueOf("b") });
+  for (const name of ["view", "show"]) {
+    const input = document.querySelector(`[name="${name}"][value="${CSS.escape(asked.get(name) ?? "")}"]`);
+    if (input) [input.checked, state[name]] = [true, input.value];
+  }
+  if (byId("compared")) byId("compared").value = axis;
 }
 
 function showComparison() {
@@ -220,14 +250,13 @@ function showComparison() {
 function showAnswer() {
   if (!byId("said")) return;
   const group = indexBut(state.place, of.compared, LEVEL_AXIS);
-  const { answers, over } = data.comparisons[of.compared];
+  const { answers } = data.comparisons[of.compared];
   const answer = answers[`${of.a} ${of.b}`]?.[group];
   byId("place").textContent = data.groups[of.compared][group] ?? "";
   byId("said").textContent = answer?.said ?? "";
   byId("light").textContent = answer?.light ?? "";
   byId("balance").textContent = answer?.balance ?? "";
   byId("times").textContent = answer?.times ?? "";
-  byId("elsewhere").textContent = over[`${of.a} ${of.b}`] ?? "";
 }
 
 // Whole multiples keep pixels crisp; a picture wider than its place shrinks to fit.

@@ -16,7 +16,8 @@ import report_sample as SAMPLE
 
 from studies.metrics import metric as figures
 from studies.pages import report_text as text
-from studies.pages.report import render_report, speed_rows
+from studies.pages.report import group_views, render_report, speed_rows, viewer_data
+from studies.pages.report_compare import first_comparison
 from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.report_pictures import ReportPictures
 from studies.study.study_file import read_study
@@ -151,7 +152,7 @@ def test_unknown_numbers_become_dashes() -> None:
     of = SAMPLE.sample_report(some_unknown, notes=())
     page = page_of(of)
     row = rows_of(page)[1 + 14 + 1 + 1]
-    assert row[2] == "Bayer, bilinear"
+    assert row[2] == "Bayer (bilinear)"
     assert set(row[3:16]) == {"—"}
     assert "NaN" not in scripts(page)[0]
     assert "Infinity" not in scripts(page)[0]
@@ -167,7 +168,7 @@ def test_error_budget_holds_each_picture_s_share_and_what_is_left_out() -> None:
     cells = "<t[hd][^>]*>([^<]*)</t[hd]>"
     rows = [re.findall(cells, row) for row in re.findall(r"<tr>(.*?)</tr>", budget, re.DOTALL)]
     for sensor, start in zip(of.sensors, (0, 8), strict=True):
-        assert rows[start] == ["Level", "Interleaved", "Bayer, bilinear"]
+        assert rows[start] == ["Level", "RGBW (interleaved)", "Bayer (bilinear)"]
         for row, level in zip(rows[start + 1 : start + 8], range(7), strict=True):
             shares = [text.percent(cell_at(of, level, sensor.name, camera).mean("mc_share")) for camera in of.cameras]
             assert row == [of.levels[level].name, *shares]
@@ -192,7 +193,7 @@ def test_every_number_of_a_row_stands_in_the_table_with_its_factor_and_unit() ->
     head, *rows = rows_of(page_of(of))
     plain = [cell.replace("\N{NO-BREAK SPACE}", " ").replace("\N{NARROW NO-BREAK SPACE}", " ") for cell in rows[4]]
     assert list(zip(head, plain, strict=True)) == [
-        ("Level", "living room"), ("Luminance", "8 cd/m²"), ("Camera", "Interleaved"), ("PSNR dB", "21.3"),
+        ("Level", "living room"), ("Luminance", "8 cd/m²"), ("Camera", "RGBW (interleaved)"), ("PSNR dB", "21.3"),
         ("SSIM", "0.716"), ("ΔE2000, median", "3.1"), ("ΔE2000, 95 %", "14.2"), ("S-CIELAB, median", "2.7"),
         ("S-CIELAB, 95 %", "12.2"), ("FLIP", "0.123"), ("PU21-PSNR dB", "31.1"), ("MTF50 cy/px", "0.235"),
         ("ΔE2000 of the chart", "6.8"), ("SNR of the patches dB", "18.2"), ("Green SNR", "12.3 dB"),
@@ -258,7 +259,7 @@ def test_the_same_method_on_both_mosaics_leads_the_page_under_the_studys_own_tit
     four = ("interleaved", "bayer", "ple_rgbw", "ple_bayer")
     page = page_of(SAMPLE.sample_report(cameras=four, seeds=(0, 1)))
     assert "<h1>What is seen?</h1>" in page
-    assert '<b data-name="A">PLE, RGBW</b> beside <b data-name="B">PLE, Bayer</b>' in page
+    assert '<b data-name="A">RGBW (PLE)</b> beside <b data-name="B">Bayer (PLE)</b>' in page
     assert read_study(CONFIGS / "demo.toml").title == "What does the white pixel bring?"
 
 
@@ -284,7 +285,7 @@ def test_every_metric_is_explained() -> None:
 def test_the_largest_share_of_the_renders_noise_is_told_once() -> None:
     of = SAMPLE.sample_report(lambda row: replace(row, mc_share=0.052 if row.level == "office" else 0.03))
     page = unescape(page_of(of)).replace("\N{NO-BREAK SPACE}", " ")
-    assert page.count("at most 5.2 % (office, table1_output, Interleaved)") == 1
+    assert page.count("at most 5.2 % (office, table1_output, RGBW (interleaved))") == 1
     assert "Up to 3 % it doesn't show" in page
 
 
@@ -325,7 +326,9 @@ def test_seconds_are_means_over_the_pictures_of_a_camera_and_a_sensor() -> None:
 
     rows = speed_rows(SAMPLE.sample_report(slower, seeds=(0, 1)))
     assert [row[:2] for row in rows] == [
-        (camera, sensor) for sensor in ("table1_output", "low_noise") for camera in ("Interleaved", "Bayer, bilinear")
+        (camera, sensor)
+        for sensor in ("table1_output", "low_noise")
+        for camera in ("RGBW (interleaved)", "Bayer (bilinear)")
     ]
     assert [row[3] for row in rows[::2]] == pytest.approx([0.11, 0.21])
     assert rows[0][2] == pytest.approx(0.021)
@@ -389,3 +392,19 @@ def test_decisions_of_all_seeds_count() -> None:
     assert cell_of(*rows).substitution == 0.75
     assert cell_of(*rows).balance == {"R": "gray world", "G": "gray world", "B": "calibrated"}
     assert cell_of(rows[0], None).substitution is None
+
+
+def test_a_study_names_the_pair_that_its_report_opens_on() -> None:
+    report = SAMPLE.sample_report(cameras=("interleaved_paper", "ple_rgbw", "ple_bayer", "bayer"))
+    assert (first_comparison(report).a, first_comparison(report).b) == (1, 2)
+    named = replace(report, compare=("interleaved_paper", "bayer"))
+    assert (first_comparison(named).a, first_comparison(named).b) == (0, 3)
+
+
+def test_light_has_the_unit_that_the_studys_levels_have() -> None:
+    report = SAMPLE.sample_report()
+    assert viewer_data(report, group_views(report))["light"] == {"key": "x", "name": "scene luminance, cd/m²"}
+    in_lux = replace(report, levels=tuple(replace(level, name=f"{at} lux") for at, level in enumerate(report.levels)))
+    data = viewer_data(in_lux, group_views(in_lux))
+    assert data["light"] == {"key": "lux", "name": "illuminance, lux"}
+    assert [cell["lux"] for cell in data["cells"]] == [cell.illuminance_lux for cell in in_lux.cells]

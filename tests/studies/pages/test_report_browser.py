@@ -1,5 +1,6 @@
 """The report in headless Chromium: what the browser refuses, what the controls change, what is on the screen."""
 
+import csv
 import json
 import re
 from dataclasses import replace
@@ -108,7 +109,7 @@ def test_any_two_are_compared_and_the_truth(browser: Any, report: Path) -> None:
     pick(page, "byId('level')", 0)
     pick(page, "byId('b')", "truth")
     found = shown(page)
-    assert found["names"] == ["A: Interleaved", "B: Reference, 256 samples"]
+    assert found["names"] == ["A: RGBW (interleaved)", "B: Reference, 256 samples"]
     assert found["a"] == row_of(results, 14)
     truth = opened(standard()[1].files["truth"])[5]
     assert found["b"] == [int(value) for pixel in truth for value in (*pixel, 255)]
@@ -265,7 +266,7 @@ def test_a_beside_every_other_has_the_leads_of_every_place_and_counts(browser: A
 @pytest.mark.thorough
 def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Path) -> None:
     page, answers = CHROME.open_page(browser, four), comparisons(compared())
-    said = "['place', 'said', 'light', 'elsewhere', 'times'].map((id) => byId(id).textContent)"
+    said = "['place', 'said', 'light', 'times'].map((id) => byId(id).textContent)"
     mark = "document.querySelector('#lead-chart .mark title').textContent"
     for a, b, sensor in ((2, 3, 0), (2, 3, 1), (0, 1, 1), (3, 0, 0)):
         pick(page, "byId('a')", a)
@@ -274,7 +275,7 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
         of = answers[CAMERA]
         words = of["answers"][f"{a} {b}"][sensor]
         place = ["table1_output", "low_noise"][sensor]
-        assert page.evaluate(said) == [place, words["said"], words["light"], of["over"][f"{a} {b}"], words["times"]]
+        assert page.evaluate(said) == [place, words["said"], words["light"], words["times"]]
         names = [text.camera_name(compared().cameras[value]) for value in (a, b)]
         assert page.evaluate("document.querySelector('.question').textContent").startswith(" beside ".join(names))
         lead = groups_of(compared(), CAMERA, a, b)[sensor].pair.leads["psnr_db"]
@@ -287,7 +288,7 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
     height = page.evaluate("Number(document.querySelector('#lead-chart .unseen').getAttribute('height'))")
     assert height * page.evaluate(scale) == pytest.approx(2 * 0.5, rel=1e-6)
     pick(page, "byId('b')", "truth")
-    assert page.evaluate(said)[1:4] == ["", "", ""]
+    assert page.evaluate(said)[1:3] == ["", ""]
     pick(page, "byId('compared')", 5)
     assert page.evaluate("byId('level-name').textContent") == "moonlight beside street light"
     assert page.evaluate(said)[1] == "", "light levels are no rivals"
@@ -317,24 +318,84 @@ def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows
     assert rows["Exposure"][:2] == times
     assert rows["Saturated"][:2] == [text.percent(cell.mean("saturated")) for cell in (ours, theirs)]
     said = page.evaluate("byId('status').textContent")
-    for cell, name in ((ours, "PLE, Bayer"), (theirs, "Interleaved")):
+    for cell, name in ((ours, "Bayer (PLE)"), (theirs, "RGBW (interleaved)")):
         assert f"{name} PSNR {cell.mean('psnr_db'):.1f} ± " in said
     better = "[...document.querySelectorAll('#drawn figure')].map((one) => [one.dataset.metric, one.querySelector('small').textContent])"  # noqa: E501
     for key, words in page.evaluate(better):
         assert words == ("lower is better" if key in LOWER else "higher is better"), key
-    heights = page.evaluate(
-        "['A better', 'B better'].map((words) => Number([...document.querySelectorAll('#lead-chart text')].find("
-        "(one) => one.textContent === words).getAttribute('y')))"
-    )
-    assert heights[0] < heights[1], "a lead of A is higher"
+    said = "[...document.querySelectorAll('#lead-chart text')].map((one) => one.textContent)"
+    assert "above 0 A is better; grey: not seen" in page.evaluate(said)
     for percent, words in ((100, "Show B"), (0, "Show A")):
         pick(page, "byId('wiper')", percent)
         assert page.evaluate("byId('flip').textContent").startswith(words)
         told = page.evaluate("byId('wiper').getAttribute('aria-valuetext')")
-        assert told == f"{percent} % PLE, Bayer, {100 - percent} % Interleaved"
+        assert told == f"{percent} % Bayer (PLE), {100 - percent} % RGBW (interleaved)"
     for kind, words in (("delta_e", "20 and more"), ("flip", "0.5 and more")):
         page.evaluate(f"document.querySelector('[name=show][value={kind}]').click()")
         assert page.evaluate("byId('key-top').textContent") == words
+
+
+def test_the_address_holds_the_view_and_a_point_of_a_chart_its_level(browser: Any, report: Path) -> None:
+    page = CHROME.open_page(browser, report)
+    page.evaluate("document.querySelectorAll('#lead-chart .mark')[0].dispatchEvent(new Event('click'))")
+    assert shown(page)["level"] == SAMPLE.sample_report().levels[0].name
+    pick(page, "document.querySelector('[data-axis=\"2\"]')", 1)
+    pick(page, "byId('b')", "truth")
+    page.evaluate("document.querySelector('[name=show][value=delta_e]').click()")
+    sent = page.evaluate("location.href")
+    assert "#axis=6&a=0&b=truth&place=" in sent
+    other = CHROME.open_page(browser, sent)
+    assert shown(other) == shown(page)
+    assert other.evaluate("document.querySelector('[name=show]:checked').value") == "delta_e"
+    # An address that names what isn't there opens the page as it would be without one.
+    plain, strange = (
+        shown(CHROME.open_page(browser, report.resolve().as_uri() + end)) for end in ("", "#axis=6&a=9&b=0&place=7.7")
+    )
+    assert strange == plain
+
+
+def test_wheel_and_double_click_enlarge_about_the_pointer_and_the_wipe_follows(browser: Any, report: Path) -> None:
+    page = CHROME.open_page(browser, report)
+    shown(page)
+    box = page.evaluate(
+        "(({left, top, width, height}) => [left, top, width, height])(byId('stage').getBoundingClientRect())"
+    )
+    x, y = box[0] + 0.25 * box[2], box[1] + 0.5 * box[3]
+    page.mouse.dblclick(x, y)
+    assert page.evaluate("getComputedStyle(byId('under')).transform") == "matrix(4, 0, 0, 4, 0, 0)"
+    columns = []
+    for at in (x, x + 0.25 * box[2]):  # a quarter of the window is a sixteenth of the picture now
+        page.mouse.move(at, y)
+        columns.append(int(page.evaluate("byId('column').value")))
+    width = page.evaluate("byId('under').width")
+    assert abs(columns[0] - 0.25 * width) <= 1
+    assert abs(columns[1] - columns[0] - width / 16) <= 1
+    CHROME.drag(page, (x, y), (x + 0.25 * box[2], y))
+    assert abs(page.evaluate("state.wipe") - 31) <= 1
+    page.mouse.wheel(0, 500)
+    page.mouse.dblclick(x, y)
+    page.mouse.wheel(0, -100)
+    page.wait_for_function("zoom.factor > 1")
+    assert CHROME.complaints(page) == []
+
+
+def test_what_is_shown_can_be_saved_as_numbers_and_as_a_picture(browser: Any, report: Path) -> None:
+    page = CHROME.open_page(browser, report)
+    shown(page)
+    with page.expect_download() as saved:
+        page.click("#save-csv")
+    rows = list(csv.DictReader(Path(saved.value.path()).read_text("utf-8").splitlines()))
+    results = SAMPLE.sample_report()
+    assert len(rows) == len(results.cells)
+    for row, cell in zip(rows, results.cells, strict=True):
+        assert row["Camera"] == text.camera_name(cell.camera)
+        assert row["Light level"] == results.levels[cell.level].name
+        mean = cell.mean("psnr_db")
+        assert row["psnr_db"] == "" if np.isnan(mean) else abs(float(row["psnr_db"]) - mean) < 1e-4
+    with page.expect_download() as saved:
+        page.click("#save-png")
+    with Image.open(saved.value.path()) as picture:
+        assert picture.size == (2 * results.scenes[0].width, results.scenes[0].height)
 
 
 CHART = """(chart => ({
@@ -386,7 +447,7 @@ def test_a_study_in_which_nothing_competes_shows_its_camera_beside_the_reference
     for levels in (3, 1):
         results = SAMPLE.sample_report(levels=levels, cameras=("bayer",), sensors=SAMPLE.SENSORS[:1])
         page = CHROME.open_page(browser, written(tmp_path, results))
-        assert shown(page)["names"] == ["A: Bayer, bilinear", "B: Reference, 256 samples"]
+        assert shown(page)["names"] == ["A: Bayer (bilinear)", "B: Reference, 256 samples"]
         assert page.evaluate("document.querySelectorAll('#drawn [data-metric=psnr_db] .mark').length") == levels
         assert page.evaluate("document.querySelector('#lead')") is None
         assert CHROME.complaints(page) == []
@@ -465,7 +526,7 @@ def test_every_control_has_a_name_for_a_screen_reader(browser: Any, axes: Path) 
     page.evaluate("for (const fold of document.querySelectorAll('details')) fold.open = true")
     nodes = page.context.new_cdp_session(page).send("Accessibility.getFullAXTree")["nodes"]
     # Level, wipe; views and what is shown; compared, A, B, exposure, rows and across; the metrics; column and row.
-    wanted = {"slider": 2, "radio": 6, "checkbox": 8, "spinbutton": 2, "button": 1}
+    wanted = {"slider": 2, "radio": 6, "checkbox": 8, "spinbutton": 2, "button": 3}
     for role, count in wanted.items():
         names = [node["name"]["value"] for node in nodes if node.get("role", {}).get("value") == role]
         assert len(names) == count, (role, names)

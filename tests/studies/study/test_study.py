@@ -82,6 +82,8 @@ def test_faults_are_told_in_one_line() -> None:
         ({"levels": ("25nits",)}, "'nits' is unknown"),
         ({"exposures": ("10",)}, "write 10ms or 10s"),
         ({"exposures": ("0s",)}, "give a time above 0"),
+        ({"compare": ("bayer",)}, "compare: ['bayer'] is no pair of the study's processors; allowed: two of "),
+        ({"compare": ("bayer", "ple")}, "is no pair of the study's processors"),
         ({"exposures": ("auto:V",)}, "allowed: auto, auto:W, auto:information, or a number"),
         ({"white_balances": ("grey-world",)}, "did you mean 'gray-world'"),
         ({"spectra": ("D66",)}, "did you mean 'D65'"),
@@ -179,7 +181,7 @@ def test_a_number_of_seeds_counts_from_0_and_a_list_names_them(tmp_path: Path) -
 
 def test_wrong_keys_and_values_are_told_in_one_line(tmp_path: Path) -> None:
     for change, words in (
-        ("lvels=3", "key: 'lvels' is unknown; allowed: budget, exposures"),
+        ("lvels=3", "key: 'lvels' is unknown; allowed: budget, compare, exposures"),
         ("lvels=3", "did you mean 'levels'?"),
         ("render.ssp=3", "render key: 'ssp' is unknown; allowed: band_nm, denoise, max_seconds, noise_share, range_nm"),
         ('scenes=[{sorce="x"}]', "did you mean 'source'?"),
