@@ -14,7 +14,7 @@ WRITTEN = {
     text.with_signs: {"10 photons per um^2, 5 cd/m2, cos^4": "10 photons per µm², 5 cd/m², cos⁴"},
     text.plain_name: {"quiet.toml": "quiet", "low_noise": "low_noise", "low_noise.toml": "low_noise.toml"},
     text.camera_name: {
-        "ple_bayer": "PLE, Bayer",
+        "ple_bayer": "Bayer (PLE)",
         "bayer_menon": "bayer_menon",
         "two_by_two.py:develop": "two by two",
         "two_by_two.py:without_noise": "two by two (without noise)",
