@@ -38,9 +38,9 @@ def on_the_curve(
     """
     taper, dark_e = at.taper, at.sampling.dark_e
     average, (slope, start) = at.average.T.astype(np.float32), (part[component] for part in at.roots)
-    sure = (1.0 / (noise[:, None] + at.spread[component])).astype(np.float32)
     bounds = np.flatnonzero(np.diff(component, prepend=-1, append=-1)).tolist()
     parts = [(slice(*ends), int(component[ends[0]])) for ends in pairwise(bounds)]
+    sure = np.concatenate([1.0 / (noise[part, None] + at.whitening(k).spread) for part, k in parts]).astype(np.float32)
     for _ in range(ROUNDS):
         bend = straight / taper
         bend -= over_black(straight * slope + start, dark_e)
@@ -48,7 +48,7 @@ def on_the_curve(
         rows[:, : len(at.rows)] += bend[:, at.rows]
         rows[:, -4:] += bend @ average
         for part, k in parts:
-            rows[part, -4:] = rows[part] @ at.reads[k][:, -4:] * sure[part]
+            rows[part, -4:] = rows[part] @ at.whitening(k).reads[:, -4:] * sure[part]
             np.matmul(rows[part], at.estimator(k).linear, out=straight[part])
     return over_black(straight * slope + start, dark_e) * taper
 

@@ -137,6 +137,8 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     cells, noise = np.zeros(variance.shape[:2], np.float32), []
     # BLAS's own threads would wait for each other.
     with _blas().limit(limits=1), ThreadPoolExecutor(cpu_count()) as threads:
+        # Tables first, each once: strips would make the same ones at the same time.
+        list(threads.map(lambda key: table(prior, *key), _table_keys(scale.samplings, steps)))
         for first, (values, weights, inner, count, patch_noise) in zip(
             range(0, ny, rows), threads.map(strip, range(0, ny, rows)), strict=True
         ):
@@ -179,6 +181,17 @@ def _by_sampling(
     numbers = np.array([[distinct.index(sampling) for sampling in line] for line in samplings])
     order = numbers[np.array(rows)[:, None] % len(samplings), np.arange(nx) % len(samplings[0])].ravel()
     return [(sampling, np.flatnonzero(order == number)) for number, sampling in enumerate(distinct)]
+
+
+def _table_keys(samplings: tuple[tuple[Sampling, ...], ...], steps: NDArray[np.int16]) -> list[tuple[Sampling, int]]:
+    """Every sampling with each step of light that its patches have."""
+    down, across = len(samplings), len(samplings[0])
+    keys = (
+        (samplings[i][j], step)
+        for i, j in np.ndindex(down, across)
+        for step in np.unique(steps[i::down, j::across]).tolist()
+    )
+    return list(dict.fromkeys(keys))
 
 
 def _solve(
@@ -249,16 +262,16 @@ def _solve_one_light(
     bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
     for first, last in pairwise(bounds.tolist()):
         k = int(component[order[first]])
-        by = at.estimator(k)
+        by, whitening = at.estimator(k), at.whitening(k)
         linear = by.linear[: evidence.shape[1]]
         for group in blocks(order[first:last]):
             variance, inner = by.variance, by.inner
             rows = np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
             if noise is not None:
-                precision = 1.0 / (noise[group, None] + at.spread[k])
+                precision = 1.0 / (noise[group, None] + whitening.spread)
                 variance, inner = by.variance - precision @ by.pilot_variance, by.inner - precision @ by.pilot_inner
                 # The pilot's means give way to their innovation times its precision.
-                rows[:, -4:] = rows @ at.reads[k][:, -4:] * precision
+                rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
             # A patch that no component explains has a larger posterior variance, by `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT
             place, weight = (

@@ -37,14 +37,16 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
     # Without a pilot patches are few.
     candidates = np.ones((len(at.quick), count), bool) if noise is None else _candidates(at, evidence)
+    at.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
+        by = at.whitening(k)
         np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
-        read = np.matmul(block[: group.size], at.reads[k][: evidence.shape[1], :width], out=reads[: group.size])
+        read = np.matmul(block[: group.size], by.reads[: evidence.shape[1], :width], out=reads[: group.size])
         square = np.vecdot(read[:, :size], read[:, :size])
-        likelihood = at.log_scale[k] - 0.5 * square
+        likelihood = by.log_scale - 0.5 * square
         if noise is not None:
             # A row a direction, for sums along them.
-            news, spread = read[:, size:].T.copy(), noise[group] + at.spread[k, :, None].astype(np.float32)
+            news, spread = read[:, size:].T.copy(), noise[group] + by.spread[:, None].astype(np.float32)
             likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (news * news / spread).sum(axis=0))
         wins = likelihood > best[group]
         winners = group[wins]

@@ -6,6 +6,7 @@ straight in u, so each component is a Gaussian over t as well. Its estimate from
 one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
@@ -96,76 +97,115 @@ def window(size: int) -> Singles:
     return np.outer(taper(size), taper(size))
 
 
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """What takes a patch's evidence to numbers of variance 1, if the patch is of one component.
+
+    Attributes
+    ----------
+    reads : (sample + 5, sample + 4) float32
+        On the samples, 1, and the pilot's means; gives whitened samples, and the pilot's innovations in four directions
+        that are independent given the samples.
+    log_scale : float
+        Log likelihood of samples at the component's mean, its weight included.
+    spread : (4,) float64
+        Variance of the innovations without the pilot's own noise.
+    turn : (4, 4) float64
+        Takes the pilot's means to the four directions.
+    """
+
+    reads: Singles
+    log_scale: float
+    spread: Doubles
+    turn: Doubles
+
+
+@dataclass(frozen=True, eq=False)
+class Among:
+    """A mixture's moments of which a sampling's tables are made, whatever the light.
+
+    Attributes
+    ----------
+    squares : (component, value) float64
+        Mean squares of the roots of signal.
+    samples : (component, sample, sample) float64
+        Covariances of samples.
+    by_channel : (component, channel, pixel, value) float32
+        Covariances of all values, those of a channel together.
+    """
+
+    squares: Doubles
+    samples: Doubles
+    by_channel: Singles
+
+
 class Table:
-    """All components at one light; the estimators are made when they are first asked for."""
+    """All components at one light, and the quick likelihood that picks among them.
+
+    What tells a component exactly, and its estimator, are made when a patch first asks for them: most tables are asked
+    for a quarter of their components.
+    """
 
     def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
         self.mix, self.sampling, self.rows = mix, sampling, np.array(sampling.rows)
-        pixels, count = mix.size**2, len(sampling.rows)
+        pixels, at, among = mix.size**2, self.rows, _among(mix, sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
         self.unit_e = gains * light  # electrons of a signal of 1
         # The components in units of noise: values t, their slope in u, and their slope in the light.
-        variances = np.diagonal(mix.covariances, axis1=1, axis2=2)
-        electrons = gains * light * (mix.means**2 + variances)
+        electrons = self.unit_e * among.squares
         self.values, steep, noise = np.empty((3, *electrons.shape))
         for channel, dark_e in enumerate(sampling.dark_e):
-            places, curve = (slice(None), slice(channel, None, 4)), readings(dark_e)
-            self.values[places] = curve.mean(electrons[places])
-            steep[places], noise[places] = curve.slope(electrons[places]), curve.variance(electrons[places])
+            places = (slice(None), slice(channel, None, 4))
+            self.values[places], steep[places], noise[places] = readings(dark_e).moments(electrons[places])
         self.over_black, self.taper = self.values - np.tile(sampling.black, pixels), np.repeat(window(mix.size), 4)
-        noise += (sampling.prnu * electrons * steep) ** 2
-        self.slopes = 2.0 * gains * light * mix.means * steep
-        information = gains[self.rows] ** 2 / (gains[self.rows] * light + dark[self.rows] ** 2)
-        self.drift = electrons * steep * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(information.sum())))
-        # Samples: whitening, and the log likelihood's constant.
-        at = self.rows
-        scatter = mix.covariances[:, at[:, None], at] * self.slopes[:, at, None] * self.slopes[:, None, at]
-        scatter += self.drift[:, at, None] * self.drift[:, None, at]
         self.unit = 1.0 / (steep**2 * (electrons + dark**2))
-        scatter[:, np.arange(count), np.arange(count)] += noise[:, at]
-        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(scatter)])
-        self.log_scale = mix.log_weights + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
-        # The pilot: the patch's means p by channel, turned so that its directions are independent given the samples.
+        signal = electrons * steep
+        noise += (sampling.prnu * signal) ** 2
+        self.noise = noise[:, at]
+        self.slopes = 2.0 * self.unit_e * mix.means * steep
+        information = gains[at] ** 2 / (self.unit_e[at] + dark[at] ** 2)
+        self.drift = signal * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(information.sum())))
+        # The pilot: the patch's means by channel.
         self.average = np.tile(np.eye(4), pixels) / pixels
-        shown = self.average * self.slopes[:, None]
-        lean = shown.astype(np.float32) @ mix.covariances
-        drift = (self.average @ self.drift.T).T
-        cross = lean[:, :, at] * self.slopes[:, None, at] + drift[:, :, None] * self.drift[:, None, at]
-        whole = lean @ shown.swapaxes(1, 2) + drift[:, :, None] * drift[:, None]
-        half = cross @ factors.swapaxes(1, 2)
-        brightness = (self.average @ (electrons * steep).T).mean(axis=1)
+        brightness = (self.average @ signal.T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
         along = brightness / np.linalg.norm(brightness)
         error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
         white = np.linalg.inv(np.linalg.cholesky(error + np.diag((PILOT_ERROR * brightness) ** 2)))
         self.white = white.astype(np.float32)  # takes the pilot's means to errors of 1, at a noise of 1
-        self.spread, turns = np.linalg.eigh(white @ (whole - half @ half.swapaxes(1, 2)) @ white.T)
-        self.spread = np.maximum(self.spread, 0.0)
-        self.turn = turns.swapaxes(1, 2) @ white  # (component, direction, channel)
-        # One matrix takes samples, 1 and the pilot's means to whitened samples and the pilot's innovations.
-        forecast = self.turn @ (half @ factors)
-        reads = np.concatenate([factors, -forecast], axis=1)
-        offset = -np.einsum("kij,kj->ki", reads, self.values[:, at])
-        offset[:, count:] -= np.einsum("kij,kj->ki", self.turn, self.values @ self.average.T)
-        turn = np.concatenate([np.zeros((len(reads), count, 4)), self.turn], axis=1)
-        reads = np.concatenate([reads, offset[..., None], turn], axis=2).swapaxes(1, 2)
-        self.reads = np.ascontiguousarray(reads, dtype=np.float32)
-        # The quick likelihood is of samples and pilot together.
-        lean = white @ cross
-        pilot = np.concatenate([lean, white @ whole @ white.T + np.eye(4)], axis=2)
-        scatter = np.concatenate([np.concatenate([scatter, lean.swapaxes(1, 2)], axis=2), pilot], axis=1)
-        means = np.concatenate([self.values[:, at], self.values @ self.average.T @ white.T], axis=1)
-        self.centre, self.directions, self.quick, outside = self._quick_likelihood(means, scatter)
+        # Its covariances with samples, and its own.
+        slopes = self.slopes.reshape(len(electrons), pixels, 4).swapaxes(1, 2) / pixels
+        lean = (slopes.astype(np.float32)[:, :, None] @ among.by_channel)[:, :, 0] * self.slopes[:, None]
+        drift = (self.average @ self.drift.T).T
+        self.pilot_samples = lean[:, :, at] + drift[:, :, None] * self.drift[:, None, at]
+        self.pilot_pilot = lean @ self.average.T + drift[:, :, None] * drift[:, None]
+        self.centre, self.directions, self.quick, outside = self._quick_likelihood()
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
-        signal = 1.0 - np.mean(noise[:, at]) / (np.exp(self.mix.log_weights) @ outside)
-        self.margin = float(np.interp(signal, (0.0, 1.0), MARGINS))
-        self.estimators: dict[int, Estimator] = {}
+        share = 1.0 - np.mean(self.noise) / (np.exp(mix.log_weights) @ outside)
+        self.margin = float(np.interp(share, (0.0, 1.0), MARGINS))
+        self._whitenings: dict[int, Whitening] = {}
+        self._estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(self, at: Doubles, covariances: Doubles) -> tuple[Singles, Singles, Singles, Doubles]:
-        """Log likelihood in `DIRECTIONS` directions and the rest's length, as one matrix on products of coordinates."""
+    def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Doubles]:
+        """Log likelihood of samples and pilot in `DIRECTIONS` directions and the rest's length.
+
+        It is one matrix on products of coordinates.
+        """
+        at, own, white = self.rows, len(self.rows), self.white
+        means = np.concatenate([self.values[:, at], self.values @ self.average.T @ white.T], axis=1)
+        covariances = np.empty((*means.shape, means.shape[1]))
+        samples, slopes, drift = covariances[:, :own, :own], self.slopes[:, at], self.drift[:, at]
+        np.multiply(_among(self.mix, self.sampling.rows).samples, slopes[:, :, None], out=samples)
+        samples *= slopes[:, None]
+        samples += drift[:, :, None] * drift[:, None]
+        samples[:, np.arange(own), np.arange(own)] += self.noise
+        covariances[:, own:, :own] = white @ self.pilot_samples
+        covariances[:, :own, own:] = covariances[:, own:, :own].swapaxes(1, 2)
+        covariances[:, own:, own:] = white @ self.pilot_pilot @ white.T + np.eye(4)
+
         weights = np.exp(self.mix.log_weights)
-        centre = weights @ at
-        off = at - centre
+        centre = weights @ means
+        off = means - centre
         pooled = np.tensordot(weights, covariances, 1) + (off.T * weights) @ off
         count = min(DIRECTIONS, covariances.shape[1] - 1)
         directions = np.linalg.eigh(pooled)[1][:, ::-1][:, :count]
@@ -182,6 +222,38 @@ class Table:
         )
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
         return centre.astype(np.float32), directions.astype(np.float32), quick.astype(np.float32), outside
+
+    def whitening(self, k: int) -> Whitening:
+        """Whitening of component k."""
+        if k not in self._whitenings:
+            self.make_whitenings([k])
+        return self._whitenings[k]
+
+    def make_whitenings(self, components: Sequence[int]) -> None:
+        """Make those that aren't made yet: together they take a third of the time."""
+        ks = [k for k in components if k not in self._whitenings]
+        if not ks:
+            return
+        at, own = self.rows, len(self.rows)
+        slopes, drift, values = self.slopes[ks][:, at], self.drift[ks][:, at], self.values[ks]
+        scatter = _among(self.mix, self.sampling.rows).samples[ks] * slopes[:, :, None]
+        scatter *= slopes[:, None]
+        scatter += drift[:, :, None] * drift[:, None]
+        scatter[:, np.arange(own), np.arange(own)] += self.noise[ks]
+        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(scatter)])
+        # The pilot is turned so that its directions are independent given the samples.
+        half = self.pilot_samples[ks] @ factors.swapaxes(1, 2)
+        left = self.white @ (self.pilot_pilot[ks] - half @ half.swapaxes(1, 2)) @ self.white.T
+        spread, turns = np.linalg.eigh(left)
+        turn = turns.swapaxes(1, 2) @ self.white
+        reads = np.zeros((len(ks), own + 5, own + 4))
+        reads[:, :own, :own], reads[:, -4:, own:] = factors.swapaxes(1, 2), turn.swapaxes(1, 2)
+        reads[:, :own, own:] = -(turn @ (half @ factors)).swapaxes(1, 2)
+        reads[:, own] = -(values[:, None, at] @ reads[:, :own])[:, 0]
+        reads[:, own, own:] -= (turn @ (values @ self.average.T)[:, :, None])[:, :, 0]
+        log_scale = self.mix.log_weights[ks] + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
+        parts = zip(ks, reads.astype(np.float32), log_scale.tolist(), np.maximum(spread, 0.0), turn, strict=True)
+        self._whitenings |= {k: Whitening(*made) for k, *made in parts}
 
     @cached_property
     def inner(self) -> Doubles:
@@ -200,13 +272,13 @@ class Table:
 
     def estimator(self, k: int) -> Estimator:
         """Estimator of component k."""
-        if k not in self.estimators:
-            self.estimators[k] = self._make_estimator(k)
-        return self.estimators[k]
+        if k not in self._estimators:
+            self._estimators[k] = self._make_estimator(k)
+        return self._estimators[k]
 
     def _make_estimator(self, k: int) -> Estimator:
-        at = self.rows
-        factor = self.reads[k, : len(at), : len(at)].T.astype(np.float64)
+        at, whitening = self.rows, self.whitening(k)
+        factor = whitening.reads[: len(at), : len(at)].T.astype(np.float64)
         covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
         half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
         linear = half @ factor
@@ -214,7 +286,7 @@ class Table:
         variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
         means = np.concatenate([self.average, self.inner])
         left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T
-        pilot, inner = self.turn[k] @ left[:4], (left[4:] * self.inner).sum(axis=1)
+        pilot, inner = whitening.turn @ left[:4], (left[4:] * self.inner).sum(axis=1)
         offset = self.over_black[k] - linear @ self.values[k, at]
         return Estimator(
             linear=(np.concatenate([linear.T, offset[None], pilot]) * self.taper).astype(np.float32),
@@ -224,6 +296,15 @@ class Table:
             pilot_variance=pilot**2 @ self.average.T,
             pilot_inner=(pilot @ self.inner.T) ** 2,
         )
+
+
+@lru_cache(maxsize=16)
+def _among(mix: Mixture, rows: tuple[int, ...]) -> Among:
+    at, pixels, count = np.array(rows), mix.size**2, len(mix.means)
+    squares = mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)
+    samples = mix.covariances[:, at[:, None], at].astype(np.float64)
+    by_channel = mix.covariances.reshape(count, pixels, 4, -1).swapaxes(1, 2)
+    return Among(squares, samples, by_channel)
 
 
 @lru_cache(maxsize=_TABLES)

@@ -67,6 +67,12 @@ class Readings:
         """Variance of a reading by shot and dark noise."""
         return np.asarray(self.variances[self._step(electrons)] * _straight(electrons, self.dark_e))
 
+    def moments(self, electrons: NDArray[Any]) -> tuple[Doubles, Doubles, Doubles]:
+        """Mean, slope and variance together."""
+        limit, step = _limit(electrons, self.dark_e), self._step(electrons)
+        straight = _straight(electrons, self.dark_e)
+        return 2.0 * limit + self.offset[step], self.steepness[step] / limit, self.variances[step] * straight
+
     def electrons(self, readings: NDArray[Any]) -> Doubles:
         """Electrons whose mean reading this is; under 0 where it is under the mean reading of 0."""
         values = np.maximum(readings, 0.0)

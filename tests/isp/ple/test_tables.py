@@ -73,11 +73,13 @@ def test_with_a_pilot_the_error_varies_as_the_closed_form():
     table = Table(mixture(own_prior()), sampling(), light_e)
     values, y = drawn(table, k, light_e, count, rng)
     by = table.estimator(k)
-    pilot = np.linalg.inv(table.turn[k].T @ table.turn[k])  # its error's covariance, at a noise of 1
+    pilot = np.linalg.inv(
+        table.whitening(k).turn.T @ table.whitening(k).turn
+    )  # its error's covariance, at a noise of 1
     means = values @ table.average.T + rng.multivariate_normal(np.zeros(4), pilot * told, count)
     told_all = np.concatenate([_with_1(y), means], axis=1)
-    news = (told_all @ table.reads[k])[:, len(table.rows) :]
-    spread = told + table.spread[k]
+    news = (told_all @ table.whitening(k).reads)[:, len(table.rows) :]
+    spread = told + table.whitening(k).spread
     assert (news**2).mean(axis=0) == pytest.approx(spread, rel=SIGMAS * (2 / count) ** 0.5)
     error = np.concatenate([_with_1(y), news / spread], axis=1) @ by.linear
     error = error / np.repeat(window(PATCH).ravel(), 4) + np.tile(table.sampling.black, PATCH**2) - values
@@ -127,7 +129,7 @@ def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
         noise = variance(electrons)[:, :, None] * np.eye(16)
         if pilot_noise is not None:
             seen = np.concatenate([seen, table.average])
-            pilot = pilot_noise * np.linalg.inv(table.turn[0].T @ table.turn[0])
+            pilot = pilot_noise * np.linalg.inv(table.whitening(0).turn.T @ table.whitening(0).turn)
             noise = np.stack([block_diag(one, pilot) for one in noise])
         means = table.values @ seen.T
         whole = mix.covariances * table.slopes[:, :, None] * table.slopes[:, None]
