@@ -277,7 +277,12 @@ def main() -> None:
     parser.add_argument("--sensor", nargs="+", default=["low_noise", "table1_output"])
     parser.add_argument("--level", nargs="+", type=float, default=[0.0625, 0.25, 1.0, 4.0, 16.0, 64.0, 256.0])
     parser.add_argument("--snr", nargs="+", type=float, default=SNR_DB)
-    parser.add_argument("--opponent", nargs="*", choices=list(NAMED), default=list(PROCESSORS)[2:])
+    parser.add_argument(
+        "--opponent",
+        nargs="*",
+        choices=list(NAMED),
+        default=[name for name in PROCESSORS if name not in ("interleaved", "bayer")],
+    )
     parser.add_argument("--seeds", type=int, default=3)
     options = parser.parse_args()
     print_environment()

@@ -29,7 +29,7 @@ print(f"raw image {raw.dn.dtype}, mean {raw.electrons.mean():.1f} electrons")
 
 # The camera's software knows the raw image and its calibration, nothing of the truth.
 picture = rodcone.develop(raw)
-print(f"SNR of green {picture.snr:.1f}; W gives {picture.substitution:.0%} of the luminance")
+print(f"picture {picture.rgb.shape}, mean {picture.rgb.mean():.1f} electrons of a green pixel")
 rodcone.write_picture(picture, "picture.png")
 
 # How far it is from the scene without noise: a study's metrics.

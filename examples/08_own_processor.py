@@ -41,7 +41,7 @@ def main(size: int) -> None:
     study = rodcone.Study(
         scenes=(rodcone.SceneChoice("siemens_star"),),
         levels=("0.5cd/m2", "25cd/m2"),
-        processors=(f"{__file__}:develop", "bayer"),
+        processors=(f"{__file__}:develop", "bayer"),  # neither removes noise
         seeds=(0, 1),
         name="cells",
         render=rodcone.RenderLimits(size=size, spp=64),

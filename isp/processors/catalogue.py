@@ -22,12 +22,12 @@ from isp.processors.demosaic import EXTRA as DEMOSAICKING
 from isp.processors.demosaic import malvar, menon, picture_demosaicked
 from isp.processors.fusion import picture_complementary, picture_kijima, picture_sato, picture_yamagami
 from isp.processors.gindele import picture_gindele, picture_rgbw_park
-from isp.processors.piecewise import picture_ple, picture_ple_bayer, picture_ple_rgbw
+from isp.processors.piecewise import picture_ple, picture_ple_bayer, picture_ple_rgbw, takes
 from isp.processors.residual import residual_interpolation
 from isp.processors.sub_images import EXTRA as BM3D
 from isp.processors.sub_images import hadamard, principal_components
 from rodcone.errors import InputError
-from sensor.cfa import OWN
+from sensor.cfa import OWN, Tile
 from sensor.raw import RawImage
 
 _LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
@@ -112,11 +112,18 @@ _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolat
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
 _ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
-# With the matrix as published; the first two are the paper's.
+# With the matrix as published. The first is the default, the next two are the paper's.
 _PLAIN: Mapping[str, Processor] = MappingProxyType(
     {
-        "interleaved": Processor("rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6)", on_backend=True),
-        "bayer": Processor("bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009"),
+        "ple": Processor(
+            OWN, picture_ple, f"any mosaic of R, G, B, W, {_PIECEWISE}; it removes noise", colours=(), unit=""
+        ),
+        "interleaved": Processor(
+            "rgbw", picture_interleaved, "Parmar & Wandell 2009, eqs. (1)-(6); it removes noise", on_backend=True
+        ),
+        "bayer": Processor(
+            "bayer", picture_bayer, "bilinear, the conventional camera of Parmar & Wandell 2009; it removes no noise"
+        ),
         "interleaved_paper": Processor(
             "rgbw", picture_interleaved_paper, "the same to the letter, its own matrix and switch", on_backend=True
         ),
@@ -147,7 +154,6 @@ _PLAIN: Mapping[str, Processor] = MappingProxyType(
         "any_mosaic": Processor(OWN, picture_any_mosaic, _ANY, on_backend=True, colours=(), unit=""),
         "ple_rgbw": Processor("rgbw", picture_ple_rgbw, _PIECEWISE),
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
-        "ple": Processor(OWN, picture_ple, f"any mosaic of R, G, B, W, {_PIECEWISE}", colours=(), unit=""),
     }
 )
 _GAINS = measured()
@@ -161,6 +167,18 @@ NAMED: Mapping[str, Processor] = MappingProxyType(
         **{f"{name}_published": _PLAIN[name] for name in _PLAIN if name in _GAINS and name != "bayer_bilinear"},
     }
 )
+
+
+# What studies compare where they name no processors: both mosaics by one method.
+DEFAULT_PAIR = ("ple_rgbw", "ple_bayer")
+
+
+def default_processor(tile: Tile) -> str:
+    """Processor of a mosaic where none is named: ``ple``, so that all mosaics are developed by one method.
+
+    ``any_mosaic`` for tiles that ``ple`` doesn't take, with channels beside R, G, B and W or another size.
+    """
+    return "ple" if takes(tile) else "any_mosaic"
 
 
 def names() -> tuple[str, ...]:

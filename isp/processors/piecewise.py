@@ -23,7 +23,7 @@ from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
 from render.spectrum import Floats
 from rodcone.errors import InputError
-from sensor.cfa import RGBW, is_rgbw
+from sensor.cfa import RGBW, Tile, channels, is_rgbw
 from sensor.raw import RawImage
 
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
@@ -72,13 +72,17 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
 
     Without R, G and B the matrix takes all channels; of one or two it makes a grey picture.
     """
-    sides = {len(raw.cfa), len(raw.cfa[0])}
-    if not sides <= set(SIDES) or not set(raw.channels) <= set(LETTERS) or min(raw.shape) < STRIDE:
+    if not takes(raw.cfa) or min(raw.shape) < STRIDE:
         raise InputError(
             f"raw: mosaic {raw.cfa} of {raw.shape} pixels; allowed here: R, G, B and W in a tile of 1, 2 or 4 pixels a "
             "side, on 2x2 pixels or more; use any_mosaic"
         )
     return _developed(raw, colours, balance, prior or own_prior())
+
+
+def takes(tile: Tile) -> bool:
+    """Whether `picture_ple` develops a tile: of R, G, B and W, 1, 2 or 4 pixels high and wide."""
+    return {len(tile), len(tile[0])} <= set(SIDES) and set(channels(tile)) <= set(LETTERS)
 
 
 def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:

@@ -51,7 +51,9 @@ class DevelopOrder:
     out : Path, optional
         Picture to write, .png or .tif; the raw file's name with .png by default.
     isp : str, optional
-        Processor: interleaved (RGBW) or bayer by default, by the file's mosaic; rodcone list processors names them all.
+        Processor: ple by default, one method for every mosaic (any_mosaic where the tile has other channels than R, G,
+        B and W, or another size than 1, 2 or 4 pixels). rodcone list processors names them all; of the paper's pair
+        interleaved removes noise, and bayer doesn't.
         Or a function in a Python file of your own, mine.py:develop, with --trust-code; or FILE.whl:bayer_net.
     bits : int
         Bits a channel: 8 or 16.

@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, Processor
+from isp.processors.piecewise import takes
 from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, spectral_luminance
 from render.scene import LightGroup
@@ -148,7 +149,10 @@ class Controls:
 
 
 def mosaics_of(processor: Processor) -> tuple[str, ...]:
-    """Mosaics that a processor develops: its own, and for those that take any tile of R, G, B and W, these."""
+    """Mosaics that a processor develops: its own, and those of R, G, B and W for the ones that take any such tile."""
+    if processor.mosaic == OWN_MOSAIC:
+        any_letters = processor is not PROCESSORS["ple"]
+        return (*(name for name, tile in MOSAICS.items() if any_letters or takes(tile)), OWN_MOSAIC)
     if processor.on_backend and processor.mosaic == "rgbw":
         return tuple(name for name, tile in MOSAICS.items() if set(channels(tile)) == set("RGBW"))
     return (processor.mosaic,)

@@ -12,6 +12,7 @@ from skimage.transform import resize_local_mean
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
 from isp.picture import Picture
+from isp.processors.catalogue import default_processor
 from isp.processors.own import processor_of, require_consent
 from render.illuminants import illuminant
 from rodcone.display import brief
@@ -19,7 +20,6 @@ from rodcone.errors import InputError, require_range, unknown
 from rodcone.types import Floats
 from sensor.burst import merged_raw
 from sensor.calibration import ColourCalibration
-from sensor.cfa import is_bayer, plain
 from sensor.raw import RawImage
 from sensor.raw_files.brightness import stops_to_white
 from sensor.raw_files.raw_file import open_raw
@@ -41,15 +41,6 @@ class Developed:
     __repr__ = brief
 
 
-def mosaic_processor(raw: RawImage) -> str:
-    """Processor that the paper has for a raw image's mosaic; for others ``any_mosaic``, or ``ple`` for a known quad."""
-    if is_bayer(raw.cfa):
-        return "bayer"
-    if plain(raw.cfa) != raw.cfa and set(raw.channels) <= set("RGBW"):
-        return "ple"
-    return "interleaved" if raw.channels == ("R", "G", "B", "W") else "any_mosaic"
-
-
 def develop(
     raw: RawImage,
     calibration: ColourCalibration | None = None,
@@ -66,8 +57,10 @@ def develop(
     calibration : ColourCalibration, optional
         Colours of the camera, as `studies.photograph.camera.calibrate` fits them; the raw image's own by default.
     processor : str, optional
-        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`); ``bayer``,
-        ``interleaved``, ``ple`` or ``any_mosaic``, by the mosaic, where left out.
+        Of `isp.processors.catalogue.PROCESSORS`, or ``mine.py:develop`` (`isp.processors.own.processor_of`). Left out,
+        ``ple`` for every mosaic, so that two cameras are developed by one method; ``any_mosaic`` for a tile that it
+        doesn't take (`isp.processors.catalogue.default_processor`). The paper's pair go by their names:
+        ``interleaved`` removes noise, ``bayer`` doesn't.
     white_balance : str, optional
         ``as-shot``: the calibration's neutral; an illuminant such as ``D65``: its neutral, from the calibration's
         matrices; or ``gray-world`` as in the paper, with the as-shot neutral where the picture is too dark for that.
@@ -81,7 +74,7 @@ def develop(
         For an unknown name, a file of one's own without consent, a raw image without colours, or a mosaic that the
         processor doesn't know.
     """
-    name = processor or mosaic_processor(raw)
+    name = processor or default_processor(raw.cfa)
     require_consent("isp", name, trust_code)
     raw = raw if calibration is None else replace(raw, colour=calibration)
     colour = raw.colour
@@ -162,7 +155,7 @@ def develop_file(
     stops = stops_to_white(raw) if ev is None else ev
     facts = {
         "raw": str(paths[0]) if len(paths) == 1 else [str(file) for file in paths],
-        "isp": isp or mosaic_processor(raw),
+        "isp": isp or default_processor(raw.cfa),
         "engine": picture.engine,
         "ev": stops,
         "balance": dict(picture.balance),

@@ -6,6 +6,7 @@ from itertools import product
 from pathlib import Path
 from typing import Annotated, Any
 
+from isp.processors.catalogue import DEFAULT_PAIR
 from isp.processors.own import processor_of, require_consent, user_file
 from render.illuminants import illuminant
 from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_reflectance
@@ -176,7 +177,7 @@ class Study:
     exposures: tuple[str, ...] = (AUTO_INFORMATION,)
     sensors: tuple[str, ...] = ("low_noise",)
     white_balances: tuple[str, ...] = ()
-    processors: tuple[str, ...] = ("interleaved", "bayer")
+    processors: tuple[str, ...] = DEFAULT_PAIR
     seeds: tuple[int, ...] = (0,)
     frames: tuple[int, ...] = (1,)
     gains: tuple[float, ...] = ()

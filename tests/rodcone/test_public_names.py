@@ -61,7 +61,7 @@ def test_everything_that_has_a_name_can_be_listed() -> None:
     assert "rgbw" in public.mosaics()
     assert "D65" in public.illuminants()
     assert np.array_equal(public.illuminant("3000 K").values, public.illuminant("3000K").values)
-    assert public.processors()[:2] == ("interleaved", "bayer")
+    assert public.processors()[:3] == ("ple", "interleaved", "bayer")
 
 
 def test_the_import_loads_nothing_heavy() -> None:

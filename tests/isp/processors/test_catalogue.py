@@ -148,7 +148,7 @@ def test_without_its_library_a_processor_is_refused_in_one_line(name: str, monke
 
 
 def test_every_processor_says_what_it_is() -> None:
-    assert list(PROCESSORS)[:2] == ["interleaved", "bayer"]
+    assert list(PROCESSORS)[:3] == ["ple", "interleaved", "bayer"]
     assert tile_of("interleaved") == RGBW
     for name, processor in PROCESSORS.items():
         assert processor.source

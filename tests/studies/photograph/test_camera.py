@@ -10,7 +10,7 @@ from builders import require_library
 from refusal import refusal
 
 from isp.colour.colour_fit import ColourFit, fit_matrix
-from isp.processors.catalogue import NAMED
+from isp.processors.catalogue import NAMED, default_processor
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import (
@@ -25,6 +25,7 @@ from render.spectrum import (
 from rodcone.colour_spaces import encode_srgb
 from scenes.reflectances import color_checker
 from sensor.capture import capture, expose
+from sensor.cfa import MOSAICS
 from sensor.config import SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
@@ -35,7 +36,7 @@ from sensor.raw_files.raw_file import write_raw
 from sensor.response import expected_electrons
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
 from studies.photograph.camera import balance_delta_e, calibrate, colour_fit, develop_to_scale
-from studies.photograph.develop import develop, develop_file, mosaic_processor
+from studies.photograph.develop import develop, develop_file
 from studies.study.gain import iso_speed
 
 NM = DEFAULT_WAVELENGTH_NM
@@ -266,19 +267,27 @@ def raw_of(cfa: str) -> RawImage:
     return replace(raw, colour=calibrate(sensor, illuminant("D65")))
 
 
-def test_the_mosaic_chooses_the_processor_and_a_grey_wall_is_grey() -> None:
-    for cfa, processor in [("rgbw", "interleaved"), ("bayer", "bayer")]:
+def test_a_grey_wall_is_grey_by_the_raw_image_s_own_colours_and_by_given_ones() -> None:
+    for cfa in ("rgbw", "bayer"):
         raw = raw_of(cfa)
         picture = develop(raw)
-        assert np.array_equal(picture.rgb, develop(raw, processor=processor).rgb), (cfa, processor)
-        assert np.array_equal(picture.rgb, develop(replace(raw, colour=None), raw.colour).rgb), (cfa, processor)
+        assert np.array_equal(picture.rgb, develop(replace(raw, colour=None), raw.colour).rgb), cfa
         mean = picture.rgb.mean(axis=(0, 1))
-        assert mean == pytest.approx(np.full(3, mean[1]), rel=0.02), (cfa, processor)
+        assert mean == pytest.approx(np.full(3, mean[1]), rel=0.02), cfa
 
 
-def test_a_quad_of_known_colours_goes_to_the_prior_over_patches() -> None:
-    quads = {"quad_rgbw": "ple", "quad_bayer": "ple", "rgbw_4x4": "interleaved", "rccb": "any_mosaic"}
-    assert {cfa: mosaic_processor(raw_of(cfa)) for cfa in quads} == quads
+def test_where_no_processor_is_named_every_mosaic_is_developed_by_the_same_method() -> None:
+    """By `ple`; a tile that it doesn't take still has colours, by `any_mosaic`."""
+    for cfa in ("bayer", "rgbw", "quad_rgbw"):
+        raw = raw_of(cfa)
+        assert np.array_equal(develop(raw).rgb, develop(raw, processor="ple").rgb), cfa
+    raw = raw_of("ryyb")
+    assert np.array_equal(develop(raw).rgb, develop(raw, processor="any_mosaic").rgb)
+    six_wide = ("RGBWRG", "BWRGBW")
+    assert [default_processor(tile) for tile in (*MOSAICS.values(), six_wide)] == [
+        "ple" if set("".join(tile)) <= set("RGBW") and len(tile[0]) in (1, 2, 4) else "any_mosaic"
+        for tile in (*MOSAICS.values(), six_wide)
+    ]
 
 
 def test_what_is_missing_or_unknown_is_said_in_one_line() -> None:
