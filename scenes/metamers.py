@@ -6,7 +6,7 @@ import numpy as np
 
 from render.illuminants import illuminant
 from render.scene import Scene
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, colour_matching_functions
 from scenes.color_checker import chart_scene
 from scenes.reflectances import color_checker, grey
 
@@ -54,8 +54,8 @@ def _pair(nm: Floats, base: Floats, black: Floats) -> tuple[Spectrum, Spectrum]:
 def _black(nm: Floats) -> Floats:
     """Metameric black on a grid of reflectances, its largest value 1."""
     bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
-    # Colours of every bump at fine resolution and in the renderer's bands: a black of both, so that pairs are as equal
-    # in a picture as they are on paper.
+    # Colours of every bump at fine resolution, and by products of averages over 10 nm: a black of both, so that a
+    # program that multiplies averages sees the pairs alike too.
     fine_nm, one_nm = np.arange(380.5, 780.0), np.ones(400)
     bands = (fine_nm, one_nm), (DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
     twin = np.vstack([_colours(nm, bumps, TWINS_UNDER, *at_nm) for at_nm in bands])
@@ -70,4 +70,5 @@ def _colours(nm: Floats, curves: Floats, light: str, at_nm: Floats, width_nm: Fl
     """XYZ of curves (nm, curve) under a light, summed over bands: shape (3, curve)."""
     # A signed curve is no `Spectrum`: take the matrix that averages a grid over the bands instead.
     averages = np.array([Spectrum(nm, row).band_average(at_nm, width_nm) for row in np.eye(nm.size)]).T
-    return tristimulus((averages @ curves).T * illuminant(light).band_average(at_nm, width_nm), at_nm, width_nm).T
+    observer = np.array([x.band_average(at_nm, width_nm) for x in colour_matching_functions()]) * width_nm
+    return np.asarray(observer @ (illuminant(light).band_average(at_nm, width_nm)[:, None] * (averages @ curves)))

@@ -47,11 +47,11 @@ def electrons(surface: Spectrum, responses: Responses, light: str) -> Floats:
     )
 
 
-@loop("width_nm", [1.0, 10.0])
-def test_a_pair_has_one_xyz_under_d65_and_two_under_other_lights(width_nm: float) -> None:
+@loop(("width_nm", "most"), [(1.0, 1e-9), (10.0, 1e-4)])  # of white's Y: an eye sees 5e-4
+def test_a_pair_has_one_xyz_under_d65_and_two_under_other_lights(width_nm: float, most: float) -> None:
     assert len(pairs()) == PAIRS
     for one, other in pairs():
-        np.testing.assert_allclose(xyz(one, TWINS_UNDER, width_nm), xyz(other, TWINS_UNDER, width_nm), atol=1e-9)
+        np.testing.assert_allclose(xyz(one, TWINS_UNDER, width_nm), xyz(other, TWINS_UNDER, width_nm), atol=most)
         for light, least in ((OTHER_LIGHT, 1.0), ("F11", 1.0), ("sodium_high", 3.0)):  # 1 can just be seen
             assert least < delta_e(one, other, light, width_nm) < 30.0, light
 
