@@ -259,8 +259,10 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
 
 def group_shares(lit: Transport) -> NDArray[np.float64]:
     """Share of each light group in the luminance of each pixel, (h, w, group); 0 in pixels without light."""
-    weights = emission(lit.groups, lit.wavelength_nm, lit.width_nm)
-    weights = weights * luminance(np.eye(lit.wavelength_nm.size), lit.wavelength_nm, lit.width_nm)
+    nm, width_nm = lit.wavelength_nm, lit.width_nm
+    weights = emission(lit.groups, nm, width_nm)
+    # The eye's weights of bands follow each group's own lamp.
+    weights = weights * [luminance(np.eye(nm.size), nm, width_nm, group.spectrum) for group in lit.groups.values()]
     planes = np.einsum("gb,gbhw->hwg", weights, (lit.denoised or lit).radiance, dtype=np.float64, optimize=True)
     total = planes.sum(axis=-1, keepdims=True)
     return np.asarray(np.divide(planes, total, out=np.zeros_like(planes), where=total > 0))

@@ -101,7 +101,7 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
             for weight, mean, covariance in zip(np.exp(mix.log_weights), mix.means, mix.covariances, strict=True):
                 alike = covariance * (2 * mean[:, None]) * (2 * mean)  # of roots, about the mean
                 signals = alike + np.outer(mean**2, mean**2) * held.patches.brightness**2
-                read = electrons * np.maximum(mean[at], 0.05) ** 2 + noise.dark_e**2
+                read = electrons * np.maximum(mean[at], 0.05) ** 2 + noise.law.dark_e**2
                 cross = signals[:, at] * electrons
                 left = signals - cross @ np.linalg.solve(electrons[:, None] * cross[at] + np.diag(read), cross.T)
                 for pixel in 4 * MIDDLE:

@@ -206,7 +206,8 @@ def test_the_chart_in_daylight_has_no_error_and_one_colour_alone_has_a_large_one
 
 
 def test_true_pairs_are_one_under_d65_and_two_under_other_lights() -> None:
-    assert true_pair_delta_e("D65") == pytest.approx(np.zeros(12), abs=1e-6)
+    # One XYZ by integrals and by products of averages over 10 nm; in these bands, which follow the lamp, nearly so.
+    assert true_pair_delta_e("D65") == pytest.approx(np.zeros(12), abs=0.05)
     # tests/scenes/test_metamers.py holds each pair's own bounds under these lights
     for light in ("A", "F11", "sodium_high"):
         assert ((true_pair_delta_e(light) > 1.0) & (true_pair_delta_e(light) < 30.0)).all()
