@@ -41,4 +41,5 @@ for name, radiance in lit.items():
 centre_nm, width_nm = rodcone.line_bands(rodcone.lines_nm("sodium_low"))
 lines = rodcone.render(rodcone.load("still_life"), (size, size), wavelength_nm=centre_nm, width_nm=width_nm, spp=16)
 orange = lines.relight({softbox: "sodium_low"}, luminance_cd_m2=10.0)
-rodcone.write_picture(rodcone.develop(rodcone.capture(orange, "low_noise", "20ms", light="sodium_low")), "sodium.png")
+raw = rodcone.capture(orange, "low_noise", "20ms", light="sodium_low")
+rodcone.write_picture(rodcone.develop(raw, processor="interleaved"), "sodium.png")  # `ple` knows no light of one colour

@@ -115,3 +115,11 @@ def test_a_camera_that_switches_its_gain_takes_each_light_as_a_frame_of_its_own(
     for number, (index, together) in enumerate(zip((0, 1), snr(light_e, sensor, EXPOSURE_S)[0], strict=True)):
         alone = chip_readings(sensor, EXPOSURE_S)[index].sensor
         assert together == pytest.approx(float(snr(light_e[:, [number]], alone, EXPOSURE_S)[0, 0]), rel=1e-12)
+
+
+def test_no_light_reaches_an_snr_that_lies_beyond_the_well_beside_dark_current() -> None:
+    """Dark current takes 10 000 of 15 000 e-: 5000 e- of light have an SNR of 38, 8000 would have 51."""
+    sensor = low_noise("bayer")
+    hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=1e5))
+    assert 3000 < electrons_at_snr(33.0, hot, 0.1, "G") < 5000
+    assert electrons_at_snr(45.0, hot, 0.1, "G") == float("inf")
