@@ -120,7 +120,7 @@ def by_rawtherapee(path: Path, folder: Path) -> Image:
     out, profile = folder / f"{path.stem}.rawtherapee.tif", folder / "neutral.pp3"
     profile.write_text("[Version]\nAppVersion=5.9\nVersion=349\n", "utf-8")
     run("rawtherapee-cli", "-q", "-o", out, "-t", "-b32", "-Y", "-p", profile, "-c", path)
-    return decode_srgb(read_tiff(out))
+    return decode_srgb(np.clip(read_tiff(out), 0.0, None))  # its matrix leaves some light under zero
 
 
 def by_dcraw(path: Path, folder: Path) -> Image:
