@@ -279,8 +279,9 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     device, rng, exact, samples_per_pixel
         As `sensor.capture.capture` takes them.
     light : Spectrum or str, optional
-        That the camera's neutral and colour matrix are set to; left out, D65. Where the mosaic tells no colours under
-        it the raw image holds none, and `calibrate` says why.
+        That the camera's neutral and colour matrix are set to; left out, the lamp that the radiance states, else D65,
+        as `reference_picture` has it. Where the mosaic tells no colours under it the raw image holds none, and
+        `calibrate` says why.
     shake : str, optional
         ``hand`` for a camera held in the hand (`sensor.shake`); left out, what the sensor's lens states.
     gain : float, optional
@@ -307,7 +308,7 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
     raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:
-        colour = calibrate(sensor, light or illuminant("D65"))
+        colour = calibrate(sensor, light or radiance.light or illuminant("D65"))
     except InputError:
         colour = None
     return with_notes(raw, sensor, colour)

@@ -1,6 +1,6 @@
 """A picture beside the scene without noise: the metrics of a study, and what their one factor does."""
 
-from dataclasses import asdict
+from dataclasses import asdict, replace
 
 import numpy as np
 import pytest
@@ -65,3 +65,11 @@ def test_what_is_no_picture_of_the_reference_is_refused() -> None:
     refusal(measure, np.ones((3, 3, 3)), reference, match="is not the reference's")
     refusal(measure, np.zeros(reference.linear.shape), reference, match="its mean luminance is 0")
     refusal(reference_picture, SpectralRadiance(np.zeros((4, 4, NM.size)), NM), match="it is dark")
+
+
+@pytest.mark.parametrize("lamp", ["A", "F11"])
+def test_a_camera_and_its_reference_are_balanced_to_the_lamp_that_the_radiance_states(lamp: str) -> None:
+    radiance = replace(grey_field(lamp, 200.0), light=illuminant(lamp))
+    picture = develop(capture(radiance, exposure_s=0.01, rng=np.random.default_rng(1)))
+    told = measure(picture, reference_picture(radiance))
+    assert told["delta_e_median"] < 3  # noise leaves 1.7; by D65, which `capture` took for every lamp, it was 20
