@@ -88,21 +88,43 @@ class SpectralRadiance:
         return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
 
     @method
-    def relight(self, light: Spectrum) -> "SpectralRadiance":
+    def relight(
+        self, light: Spectrum | None = None, *, luminance_cd_m2: float | None = None, lux: float | None = None
+    ) -> "SpectralRadiance":
         """Radiance under another lamp of the same luminance in the place of the one that is behind the values.
 
         Each value is divided by the lamp's mean in its band and multiplied by the other's: what surfaces reflect stays.
 
         Parameters
         ----------
-        light : Spectrum
-            Or an illuminant's name.
+        light : Spectrum, optional
+            Or an illuminant's name; left out, the lamp stays.
+        luminance_cd_m2 : float, optional
+            Mean luminance of the picture to reach; left out, the lamp keeps its luminance.
+        lux : float, optional
+            Refused, with what to give in its place: a picture has no plane on which an illuminance could be measured.
 
         Raises
         ------
         InputError
-            Where the lamp isn't known, or gives nothing in a band in which there is light.
+            Where the lamp isn't known, or gives nothing in a band in which there is light; for a level of a dark
+            picture.
         """
+        if lux is not None:
+            raise InputError(
+                f"lux: {lux:g} needs a reference plane, which a picture hasn't; allowed: luminance_cd_m2, or the "
+                "transport's own relight(lux=...), which knows the scene's plane; give luminance_cd_m2"
+            )
+        lit = self if light is None else self._under(light)
+        if luminance_cd_m2 is None:
+            return lit
+        require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
+        mean = float(lit.luminance().mean())
+        if mean <= 0:
+            raise InputError(f"level: {luminance_cd_m2} can't be reached, the picture is dark; give one that has light")
+        return replace(lit, values=(lit.values * (luminance_cd_m2 / mean)).astype(lit.values.dtype))
+
+    def _under(self, light: Spectrum) -> "SpectralRadiance":
         if self.light is None:
             raise InputError(
                 "light: it isn't known which lamp is behind these values; allowed: radiance that states it, such as an "

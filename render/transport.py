@@ -12,7 +12,7 @@ from render.bands.mixed_light import BandLight, band_light
 from render.combine import combine
 from render.denoised.denoise import Denoised
 from render.error_estimates import Halves, SharedPaths, relative_error
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance, unit_luminance
 from render.level import Irradiance, Level, SceneMeans
 from render.radiance import SpectralRadiance
 from render.scene import LightGroup
@@ -23,7 +23,8 @@ from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
-Spectra: TypeAlias = Mapping[str, Spectrum | str]  # or names of illuminants, by light group
+# By light group, or one in place of all lights; a name is an illuminant's.
+Spectra: TypeAlias = Mapping[str, Spectrum | str] | Spectrum | str
 Powers: TypeAlias = Mapping[str, float]  # by light group
 
 
@@ -105,19 +106,23 @@ class Transport:
         powers: Powers | None = None,
         luminance_cd_m2: float | None = None,
         illuminance_lux: float | None = None,
+        lux: float | None = None,
     ) -> SpectralRadiance:
         """Radiance under given lights: linear in emission, so no new render.
 
         Parameters
         ----------
-        spectra : mapping of group name to Spectrum or illuminant name, or float, optional
-            Replaces the groups' own spectral emission; a number is the power of all groups.
+        spectra : mapping of group name to Spectrum or illuminant name, or one of these alone, or float, optional
+            A mapping replaces the groups' own spectral emission. One lamp alone, such as ``"A"``, takes the place of
+            all lights, each of which keeps its luminance, as ``--light A`` does. A number is the power of all groups.
         powers : mapping of group name to float, optional
             Replaces the groups' own powers.
         luminance_cd_m2 : float, optional
             Mean luminance to reach of what is no light (`level`); all groups are scaled together.
         illuminance_lux : float, optional
             Illuminance to reach on the scene's reference plane; the same. The first call that asks for it traces it.
+        lux : float, optional
+            `illuminance_lux` by a shorter name.
 
         Returns
         -------
@@ -128,8 +133,9 @@ class Transport:
         Raises
         ------
         InputError
-            For an unknown group or illuminant, a negative power or level, both levels at once, a level of a scene
-            that gives no light, or illuminance without a reference plane.
+            For an unknown group or illuminant, a negative power or level, two levels at once, a level of a scene
+            that gives no light, or illuminance without a reference plane; for one lamp in place of a light that is
+            dark or has colours of its own.
 
         Warns
         -----
@@ -142,7 +148,7 @@ class Transport:
             powers = dict.fromkeys(self.groups, spectra)
             spectra = None
         lights = self._lights(spectra, powers)
-        light, level_error = self._at_level(self._in_bands(lights), luminance_cd_m2, illuminance_lux)
+        light, level_error = self._at_level(self._in_bands(lights), luminance_cd_m2, illuminance_lux, lux)
         planes = combine(light.maps, self.radiance)
         if light.mixed:  # beside a line the map of a lamp takes light off its neighbour
             np.maximum(planes, np.float32(0), out=planes)
@@ -163,6 +169,7 @@ class Transport:
         powers: Powers | None = None,
         luminance_cd_m2: float | None = None,
         illuminance_lux: float | None = None,
+        lux: float | None = None,
     ) -> tuple[SpectralRadiance, SpectralRadiance]:
         """Two independent estimates of `relight` with the same arguments, from the two halves of the samples.
 
@@ -170,7 +177,7 @@ class Transport:
         unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
         be under 0: both are `signed`.
         """
-        light, _ = self._at_level(self._emission(spectra, powers), luminance_cd_m2, illuminance_lux)
+        light, _ = self._at_level(self._emission(spectra, powers), luminance_cd_m2, illuminance_lux, lux)
         values, difference = combine(light.maps, self.radiance), combine(light.maps, self.light.difference)
         even, odd = (
             SpectralRadiance(
@@ -249,7 +256,7 @@ class Transport:
         At a level of the scene's own lights; None: at their own powers.
         """
         emitted = self._emission()
-        weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2, None)[0])
+        weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2)[0])
         total = np.zeros(self.coverage.mean.shape)
         for of_group, radiance, seen in zip(weights, self.radiance, self.seen, strict=True):
             for weight, plane in zip(of_group, radiance, strict=True):  # no copy of all planes in double precision
@@ -263,9 +270,13 @@ class Transport:
 
     def _lights(self, spectra: Spectra | None, powers: Powers | None) -> dict[str, LightGroup]:
         """Light groups as asked for."""
+        if isinstance(spectra, str | Spectrum):
+            spectra = self._all_lit_by(illuminant(spectra) if isinstance(spectra, str) else spectra)
         for what, given in (("spectra", spectra), ("powers", powers)):
             if given is not None:
-                require_kind(what, given, Mapping, "give a dict by light group")
+                require_kind(
+                    what, given, Mapping, f"give a dict by light group{', or one illuminant' * (what == 'spectra')}"
+                )
                 require_keys(f"{what}: light group", given, self.groups)
         lights = {}
         for name, group in self.groups.items():
@@ -278,6 +289,14 @@ class Transport:
                 warn_of_dark_ends(f"light group {name!r}", spectrum, self.wavelength_nm, self.width_nm)
             lights[name] = replace(group, spectrum=spectrum, power=float(power))
         return lights
+
+    def _all_lit_by(self, lamp: Spectrum) -> dict[str, Spectrum | str]:
+        """One lamp in the place of every light, at the luminance of that light's own spectrum."""
+        unit = unit_luminance(lamp)
+        return {
+            name: unit * replaceable_luminance(group, f"spectra: one lamp for light group {name!r}, which")
+            for name, group in self.groups.items()
+        }
 
     def _emission(self, spectra: Spectra | None = None, powers: Powers | None = None) -> BandLight:
         """Emission of the lights asked for."""
@@ -294,14 +313,21 @@ class Transport:
 
     def _own_at(self, luminance_cd_m2: float) -> BandLight:
         """Emission of the scene's own lights brought to a level."""
-        return self._at_level(self._emission(), luminance_cd_m2, None)[0]
+        return self._at_level(self._emission(), luminance_cd_m2)[0]
 
     def _at_level(
-        self, light: BandLight, luminance_cd_m2: float | None, illuminance_lux: float | None
+        self,
+        light: BandLight,
+        luminance_cd_m2: float | None,
+        illuminance_lux: float | None = None,
+        lux: float | None = None,
     ) -> tuple[BandLight, float | None]:
         """Emission brought to the level asked for, and the relative error of that level."""
-        if luminance_cd_m2 is not None and illuminance_lux is not None:
-            raise InputError("luminance_cd_m2 and illuminance_lux: both given; allowed: one of them; leave one out")
+        levels = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux, "lux": lux}
+        given = [name for name, value in levels.items() if value is not None]
+        if len(given) > 1:
+            raise InputError(f"{' and '.join(given)}: both given; allowed: one of them; leave one out")
+        illuminance_lux = lux if illuminance_lux is None else illuminance_lux
         weights = self._luminance_weights(light)
         if luminance_cd_m2 is not None:
             require_range("luminance_cd_m2", luminance_cd_m2, 0.0, 1e15, "give a mean luminance of 0 or more")
@@ -320,3 +346,18 @@ class Transport:
     def _luminance_weights(self, light: BandLight) -> Floats:
         """Luminance of a transport of 1 in each group and band, shape (group, band)."""
         return light.luminance_weights(self.wavelength_nm, self.width_nm)
+
+
+def replaceable_luminance(group: LightGroup, place: str) -> float:
+    """Luminance of a light group's spectrum, which another spectrum takes over.
+
+    Raises
+    ------
+    InputError
+        For a group that is dark or has colours of its own.
+    """
+    luminance = spectral_luminance(group.spectrum)
+    if group.coloured or luminance <= 0:
+        why = "has colours of its own" if group.coloured else "is dark"
+        raise InputError(f"{place} {why}; allowed: the light that it has; leave it as it is")
+    return luminance

@@ -100,6 +100,13 @@ def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
     return check
 
 
+def _spectra(name: str, value: Any) -> Any:
+    """Lamps by light group, or one in place of all lights."""
+    if isinstance(value, Mapping):
+        return value
+    return _value("render.spectrum:Spectrum", "give a dict by light group, or an illuminant", _ILLUMINANT)(name, value)
+
+
 def _size(name: str, value: Any) -> Any:
     sides = list(value) if isinstance(value, Iterable) and not isinstance(value, str | bytes | Mapping) else []
     if len(sides) != 2 or not all(_passes(_WHOLE, x) and x > 0 for x in sides):
@@ -133,6 +140,7 @@ def _shown(value: Any) -> str:
     return text if 0 < len(text) <= 80 else f"a {type(value).__name__}"
 
 
+_ILLUMINANT = "render.illuminants:illuminant"
 _WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give a number")
 _METRES = _range(1e-9, 1e9, "give metres")
 _TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
@@ -155,7 +163,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "readings": _each(_value("sensor.chip:Reading", "give rodcone.Reading(...)"), least=1),
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
-        "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", "render.illuminants:illuminant"),
+        "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),
         "light_for_snr.exposure_s": _some_seconds,
         **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light", "expect.light"), _TEXT),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
@@ -200,8 +208,9 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "develop_file.path": _paths,
         "read_study.changes": _each(_TEXT),
         "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),
-        **dict.fromkeys(("spectra", "powers"), _plain(Mapping, "a dict by light group")),
-        **dict.fromkeys(("luminance_cd_m2", "illuminance_lux"), _NUMBER),
+        "spectra": _spectra,
+        "powers": _plain(Mapping, "a dict by light group"),
+        **dict.fromkeys(("luminance_cd_m2", "illuminance_lux", "lux"), _NUMBER),
         "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
         **dict.fromkeys(("self", "options", "more", "controls"), lambda _, value: value),
         **dict.fromkeys(("Picture.encode.white", "row"), lambda _, value: value),  # checked where they are used

@@ -21,6 +21,7 @@ def relight_denoised(
     powers: Powers | None = None,
     luminance_cd_m2: float | None = None,
     illuminance_lux: float | None = None,
+    lux: float | None = None,
 ) -> tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance]:
     """Denoised light under given lights (as `Transport.relight`), and its two folds under the same.
 
@@ -39,9 +40,9 @@ def relight_denoised(
         raise InputError("denoised: the render has none; allowed: a render with denoise=True; render it so")
     folded = replace(transport, light=denoised_light.folds)
     denoised = replace(transport, light=Halves(denoised_light.radiance, transport.light.difference))
-    level: dict[str, Any] = {"powers": powers, "luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux}
-    picture = denoised.relight(spectra, **level)
-    first, second = folded.relight_halves(spectra, **level)
+    level: dict[str, Any] = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux, "lux": lux}
+    picture = denoised.relight(spectra, powers=powers, **level)
+    first, second = folded.relight_halves(spectra, powers=powers, **level)
     luminance = picture.luminance()
     upper = measured_error(luminance - first.luminance(), luminance - second.luminance(), np.ones(picture.shape)).upper
     mean = float(luminance.mean())

@@ -16,7 +16,7 @@ from isp.settings import DEFAULTS, PAPER, Settings
 from render.illuminants import illuminant, spectral_luminance
 from render.scene import LightGroup
 from render.spectrum import Spectrum
-from render.transport import Transport
+from render.transport import Transport, replaceable_luminance
 from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_fields, require_keys, require_name, require_range
 from rodcone.toml_file import strict_converter, structured
@@ -27,7 +27,7 @@ from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.photodiodes import with_gain
 from sensor.presets import VARIATIONS, names
 from studies.metrics.truth import Light, light_in_bands
-from studies.study.scene_source import LIGHT, first_light, replaceable_luminance
+from studies.study.scene_source import LIGHT, first_light
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure: the time that `exposure_s` states

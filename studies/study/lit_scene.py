@@ -20,7 +20,7 @@ from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Spectrum
-from render.transport import Transport
+from render.transport import Transport, replaceable_luminance
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys
 from rodcone.jit import backend
@@ -39,7 +39,6 @@ from studies.study.scene_source import (
     first_light,
     open_radiance_file,
     open_scene,
-    replaceable_luminance,
 )
 from studies.study.study import OWN, SceneChoice, Study
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from render.illuminants import illuminant, spectral_luminance
+from render.illuminants import illuminant
 from render.radiance_files.file_checks import require_file
 from render.radiance_files.photo import EXTENSIONS
 from render.radiance_files.radiance_source import (
@@ -153,21 +153,6 @@ def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
     if stored is None:
         return default_white(path)
     return AdoptedWhite(stored, (f"{Path(path).name}: its colours are judged under the illuminant that it holds",))
-
-
-def replaceable_luminance(group: LightGroup, place: str) -> float:
-    """Luminance of a light group's spectrum, which another spectrum takes over.
-
-    Raises
-    ------
-    InputError
-        For a group that is dark or has colours of its own.
-    """
-    luminance = spectral_luminance(group.spectrum)
-    if group.coloured or luminance <= 0:
-        why = "has colours of its own" if group.coloured else "is dark"
-        raise InputError(f"{place} {why}; allowed: the light that it has; leave it as it is")
-    return luminance
 
 
 def check_radiance_file(path: str | Path, levels: Iterable[str]) -> None:

@@ -1,5 +1,7 @@
 """Spectral radiance: what it accepts, and where it says that a value is wrong."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from loop import loop
@@ -64,3 +66,20 @@ def test_luminance_of_each_pixel_is_its_share_of_a_known_light():
     values = share[..., None] * illuminant("D65").band_average(nm, 10.0)
     # Bands of 10 nm weigh with the band's mean V, a few 1e-4 from the 1 nm sum that the light is scaled by.
     assert SpectralRadiance(values, nm).luminance() == pytest.approx(share, rel=1e-3)
+
+
+def test_a_picture_is_relit_by_name_and_to_a_level():
+    nm, width = np.arange(400.0, 701.0, 10.0), np.full(31, 10.0)
+    share = np.array([[0.2, 0.4], [0.6, 1.2]])
+    lit = SpectralRadiance(share[..., None] * illuminant("D65").band_average(nm, width), nm, light=illuminant("D65"))
+    warm = lit.relight("A", luminance_cd_m2=5.0)
+    assert warm.luminance() == pytest.approx(share * 5.0 / 0.6, rel=1e-6)
+    expected = illuminant("A").band_average(nm, width)
+    assert warm.values[0, 0] / warm.values[0, 0, 15] == pytest.approx(expected / expected[15], rel=1e-6)
+    assert warm.light.values == pytest.approx(illuminant("A").values)
+    level = lit.relight(luminance_cd_m2=5.0)
+    assert level.values == pytest.approx(lit.values * (5.0 / lit.luminance().mean()), rel=1e-12)
+    assert level.light is lit.light
+    refusal(lit.relight, lux=500.0, match=r"lux: 500 needs a reference plane, .*; give luminance_cd_m2")
+    refusal(replace(lit, values=lit.values * 0).relight, luminance_cd_m2=1.0, match="the picture is dark")
+    refusal(lit.relight, luminance_cd_m2=-1.0, match=r"luminance_cd_m2: -1.0 is outside 0")

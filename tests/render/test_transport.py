@@ -1,6 +1,7 @@
 """Relighting, on small transports written by hand: linearity to the bit, levels, errors. Nothing is rendered."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,10 +10,11 @@ from loop import loop
 from refusal import refusal
 
 from render.error_estimates import Halves, SharedPaths
-from render.illuminants import illuminant
+from render.illuminants import illuminant, spectral_luminance
 from render.level import Irradiance, SceneMeans
 from render.scene import LightGroup
 from render.spectrum import Spectrum, flat, luminance
+from studies.study.lit_scene import asked_spectra
 
 NM, WIDTH_NM = np.arange(400.0, 701.0, 50.0), np.full(7, 50.0)
 SIZE = (5, 6)
@@ -179,10 +181,39 @@ UNLIT = {"powers": {"sky": 0.0, "lamp": 0.0}}
             "powers: light group: 'ski' is unknown; allowed: lamp, sky; did you mean 'sky'?",
         ),
         ({}, {"spectra": {"sky": "D66"}}, "illuminant: 'D66' is unknown"),
+        ({}, {"spectra": "D66"}, "illuminant: 'D66' is unknown"),
+        (
+            {},
+            {"spectra": ["A"]},
+            "spectra: a list is none; allowed: Mapping; give a dict by light group, or one illuminant",
+        ),
+        ({}, {"lux": 1.0, "illuminance_lux": 1.0}, "illuminance_lux and lux: both given; allowed: one of them"),
+        (
+            {"groups": {"sky": LightGroup(("sky",), RAMP, 1.0), "lamp": LightGroup(("lamp",), RAMP, 1.0, True)}},
+            {"spectra": "A"},
+            "spectra: one lamp for light group 'lamp', which has colours of its own; allowed: the light that it has",
+        ),
     ],
 )
 def test_what_cannot_be_relit_is_refused(changes, options, words):
     assert words in refusal(transport(**changes).relight, **options)
+
+
+@loop("lamp", ["A", illuminant("A"), illuminant("A") * 7.0])
+def test_one_lamp_in_place_of_all_lights_keeps_the_luminance_of_each(lamp):
+    """As ``--light A`` does; a mapping takes the illuminant's own luminance of 1."""
+    made = transport()
+    scene = SimpleNamespace(name="two", groups=made.groups)
+    for one in (made.relight(lamp), made.relight(asked_spectra(scene, ["A"]))):
+        by_group = {name: illuminant("A") * spectral_luminance(group.spectrum) for name, group in made.groups.items()}
+        assert one.values == pytest.approx(made.relight(by_group).values, rel=1e-6)
+    assert made.level("A").value == pytest.approx(made.level(by_group).value, rel=1e-12)
+
+
+def test_lux_is_illuminance_on_the_reference_plane():
+    made = transport()
+    for relight in (made.relight, lambda **level: made.relight_halves(**level)[1]):
+        assert np.array_equal(relight(lux=500.0).values, relight(illuminance_lux=500.0).values)
 
 
 @loop("value", [-1.0, np.nan, np.inf])
