@@ -1,11 +1,12 @@
 """Placing things and the camera: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from math import radians, tan
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, unknown
 from rodcone.jit import Matrix4
 from rodcone.types import Floats
 
@@ -66,3 +67,38 @@ def camera(fov_deg: float, origin: Point, target: Point, size: tuple[int, int] |
     pose = to_world(look_at(origin, target))
     view = {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}
     return view | ({"film": {"type": "hdrfilm", "height": size[0], "width": size[1]}} if size else {})
+
+
+def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
+    """Angle of view across a picture of a Mitsuba camera.
+
+    It is 0 for an ``orthographic`` camera, whose rays are all parallel.
+    """
+    if camera.get("type") == "orthographic":
+        return 0.0
+    field, axis = camera.get("fov"), camera.get("fov_axis", "x")
+    if not isinstance(field, int | float):
+        field, axis = _field_of_focal_length(camera.get("focal_length", "50mm")), "diagonal"
+    height, width = size
+    spans = {
+        "x": width,
+        "y": height,
+        "smaller": min(size),
+        "larger": max(size),
+        "diagonal": float(np.hypot(height, width)),
+    }
+    if str(axis).lower() not in spans:
+        raise unknown("camera: fov_axis", axis, spans)
+    half = tan(radians(float(field) / 2)) * width / spans[str(axis).lower()]
+    return float(2 * np.degrees(np.arctan(half)))
+
+
+def _field_of_focal_length(focal_length: object) -> float:
+    """Angle of view in degrees across the diagonal of a film of 36 mm x 24 mm, as Mitsuba takes a focal length."""
+    try:
+        focal_length_mm = float(str(focal_length).removesuffix("mm"))
+    except ValueError:
+        focal_length_mm = 0.0
+    if not 0 < focal_length_mm < np.inf:
+        raise InputError(f"camera: focal_length {focal_length!r} is no length; allowed: above 0; give '50mm'")
+    return float(2 * np.degrees(np.arctan(np.hypot(36.0, 24.0) / (2 * focal_length_mm))))

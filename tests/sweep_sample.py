@@ -12,7 +12,8 @@ import numpy as np
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from studies.budget.ledger import Plan, as_stated
+from studies.budget.ledger import Plan
+from studies.budget.starting_points import plan_from_settings
 from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study
 from studies.sweep.cells import Cell
@@ -55,7 +56,7 @@ def small_study(folder: Path, **changes: Any) -> Study:
 
 
 def stated(study: Study) -> Plan:
-    return as_stated(study)
+    return plan_from_settings(study)
 
 
 def here(cells: Sequence[Cell]) -> Iterator[Row]:

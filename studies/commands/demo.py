@@ -15,7 +15,7 @@ from render.transport import Transport
 from rodcone.errors import require_range
 from rodcone.progress import duration, progress, render_words
 from sensor.presets import preset
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.commands.console import INTERRUPTED, Seconds, Time, say
 from studies.commands.sweep import check_memory, make_all
 from studies.photograph.clock import Clock
@@ -127,7 +127,7 @@ def demo(
     study = order.of(read_study(STUDY))
     check_memory(study, out, reference=False, workers=cores(), force=force)
     runner = partial(run_in_processes, workers=cores())
-    _, report = make_all(study, out, lambda step: as_stated(study), runner, clock=clock)
+    _, report = make_all(study, out, lambda step: plan_from_settings(study), runner, clock=clock)
     print(report)
 
 
@@ -170,7 +170,7 @@ def reference(
     study = read_study(STUDY)
     choice = SceneChoice(scene, define=define)
     study = replace(study, scenes=(choice,), render=replace(study.render, size=size or study.render.size))
-    opened, model = open_choice(choice, study), as_stated(study).renders[choice]
+    opened, model = open_choice(choice, study), plan_from_settings(study).renders[choice]
     film, folder = film_of(opened, model), out or next(reference_folders())
     assert opened.scene is not None
     path, most_samples = reference_path(folder, opened.scene, film), STEP_SPP

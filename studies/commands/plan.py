@@ -7,8 +7,8 @@ from rich.console import Console
 
 from rodcone.progress import progress
 from studies.budget.plan import plan as plan_study
-from studies.budget.plan import reference_plan
-from studies.budget.plan_text import plan_json, plan_table, reasons
+from studies.budget.plan_text import TABLE_LEGEND, plan_json, plan_table
+from studies.budget.starting_points import reference_plan
 from studies.commands.console import print_json
 from studies.study.study_file import read_study
 
@@ -22,14 +22,17 @@ def plan(
     trust_code: bool = False,
     json: bool = False,
 ) -> None:
-    """Compute a study's error budget and choose the cheapest model within it.
+    """Show a study's error budget: what its pictures leave out, what that costs and what it saves.
+
+    The model is the cheapest within the budget, or the starting point that the study's `budget.model` names.
 
     Parameters
     ----------
     study
         Study file (.toml), as `rodcone new study` writes one.
     set
-        KEY=VALUE that replaces the file's own, such as budget.total=0.05; may be given several times.
+        KEY=VALUE that replaces the file's own, such as budget.total=0.05 or budget.model="fast"; may be given several
+        times.
     cache
         Folder of renders to use and to fill.
     trust_code
@@ -38,11 +41,12 @@ def plan(
         Print one JSON object.
     """
     task = read_study(study, set or (), trust_code=trust_code)
-    everything = reference_plan(task)
     with progress(sys.stderr) as step:
-        cheapest = plan_study(task, cache=cache, step=step)
+        found = plan_study(task, cache=cache, step=step)
     if json:
-        print_json(plan_json(task, cheapest, everything))
+        print_json(plan_json(task, found, reference_plan(task)))
         return
-    Console(width=None if sys.stdout.isatty() else 100).print(plan_table(cheapest))
-    print("\n".join(reasons(task, cheapest, everything)))
+    console = Console(width=None if sys.stdout.isatty() else 100)
+    console.print(plan_table(found))
+    for paragraph in (TABLE_LEGEND, *found.summary):
+        console.print("\n" + paragraph, markup=False, highlight=False)

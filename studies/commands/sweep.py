@@ -19,15 +19,14 @@ from rodcone.errors import require_absent, require_fields
 from rodcone.memory import Memory, memory, require_memory
 from rodcone.progress import Step, duration, progress
 from studies.budget.ledger import Plan
-from studies.budget.ledger import as_stated as plan_as_stated
 from studies.budget.plan import plan as plan_study
-from studies.budget.plan import reference_plan
+from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.commands.console import INTERRUPTED, print_result, say
 from studies.commands.report import write_results
 from studies.photograph.clock import Clock
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, open_all
-from studies.study.study import SceneChoice, Study, conditions
+from studies.study.study import REFERENCE, SceneChoice, Study, conditions
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.database import FILE
@@ -168,7 +167,7 @@ class SweepOrder:
         if self.reference:
             return reference_plan(study)
         if self.as_stated:
-            return plan_as_stated(study)
+            return plan_from_settings(study)
         return plan_study(study, cache=self.out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
 
 
@@ -247,7 +246,8 @@ def make_all(
 
 def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
     """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
-    plan = reference_plan(study) if reference else plan_as_stated(study)
+    everything = reference or study.budget.model == REFERENCE
+    plan = reference_plan(study) if everything else plan_from_settings(study)
     rows = read_rows(out) if (out / FILE).is_file() else []
     code = code_version()
     kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)

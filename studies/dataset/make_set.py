@@ -17,7 +17,7 @@ from rodcone.errors import InputError
 from rodcone.files import is_half_written, write_files
 from rodcone.progress import Step, progress_bar, render_words
 from scenes.diorama import PICTURES_LICENCE
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.dataset.order import RENDERS, SetOrder, bytes_needed, check_cameras, require_room
 from studies.dataset.sample import TRUTH, VERSION, Facts, Sample, frame_labels, plane_files, scene_facts
 from studies.dataset.shards import MANIFEST, SPLITS, Lines, Runner, into_shards, make_shards, read_manifest, split_of
@@ -82,7 +82,7 @@ def make_set(
     with at_work(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)
         earlier = _earlier(folder, identity)
-        job = Job(study, as_stated(study), out, base)
+        job = Job(study, plan_from_settings(study), out, base)
         require_room(bytes_needed(study, job.plan, scenes.values(), order), out)
         # the files that samples are cut from
         samples, scene_lines = list[Sample](), Lines()

@@ -27,7 +27,7 @@ from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import held_lens, shaken
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.metrics.quality import psnr_db
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
@@ -158,7 +158,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
     spp = max(1, round(setup.spp * _SPP_SHARE.get(scene, 1.0)))
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))
     opened = open_choice(study.scenes[0], study)
-    model = as_stated(study).renders[opened.choice]
+    model = plan_from_settings(study).renders[opened.choice]
     transport, _ = make_transport(
         opened,
         study,

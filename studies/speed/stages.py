@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from isp.interleaved import reconstruct
 from isp.settings import Settings
 from render.engine import render
+from render.geometry import horizontal_view_deg
 from render.radiance import SpectralRadiance
 from render.scene import Scene
 from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
@@ -25,7 +26,6 @@ from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import groups_of, wide_bands
-from studies.budget.terms import horizontal_view_deg
 from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, timed, yardstick
 from studies.study.levels import parse_level
 

@@ -13,7 +13,16 @@ from render.radiance_files.radiance_source import ENDINGS, is_radiance_file, is_
 from render.spectrum import VISIBLE_NM
 from rodcone.curve_file import ENDINGS as CURVES
 from rodcone.display import brief
-from rodcone.errors import InputError, in_place, require_fields, require_keys, require_range, require_whole, unknown
+from rodcone.errors import (
+    InputError,
+    in_place,
+    require_fields,
+    require_keys,
+    require_name,
+    require_range,
+    require_whole,
+    unknown,
+)
 from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
@@ -31,6 +40,9 @@ PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gr
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 _GAINS = ("gains", "isos")
 SPP = 1, 1 << 16, "give samples per pixel"
+# What a study's pictures hold: the cheapest model within the budget, or one of three starting points.
+AUTOMATIC = "automatic"
+STARTING_POINTS = FAST, DEFAULT, REFERENCE = "fast", "default", "reference"
 FILES = (".xml", ".toml", *CURVES, *ENDINGS)  # endings of values that name a file
 
 
@@ -113,10 +125,22 @@ class RenderLimits:
 
 @dataclass(frozen=True)
 class BudgetShares:
-    """Noise variance that a plan's approximations may add, over the sensor's own: together, and Monte Carlo's."""
+    """What a plan may cost in accuracy, or the starting point that is taken in place of a plan's own choice.
+
+    Attributes
+    ----------
+    total : float
+        Noise variance that all approximations together may add, over the sensor's own.
+    monte_carlo : float
+        Part of `total` that the Monte Carlo noise of the render may add.
+    model : str
+        ``automatic``: the cheapest model within these shares. A starting point pays no heed to them: ``fast`` for a
+        first look, ``default`` for the study and its sensors as they are stated, ``reference`` for everything.
+    """
 
     total: Annotated[float, (1e-6, 1e3, "give a share of the noise variance: 10 % is 0.1")] = 0.10
     monte_carlo: float = 0.03
+    model: str = AUTOMATIC
 
 
 @dataclass(frozen=True)
@@ -327,6 +351,7 @@ def _check_shares_and_sizes(study: Study) -> None:
     budget, side_um = study.budget, study.sensor_side_um
     if study.lens.shake is not None and study.lens.shake not in SHAKES:
         raise unknown("lens.shake", study.lens.shake, SHAKES)
+    require_name("budget.model", budget.model, (AUTOMATIC, *STARTING_POINTS))
     require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
     if side_um is None:
         return

@@ -121,8 +121,8 @@ def sweep(
     out : str or Path
         Folder; made where it isn't there.
     plan : Plan, optional
-        Of `studies.budget.ledger.as_stated`, `studies.budget.plan.plan` or `reference_plan`; left out, of `plan`,
-        whose pilots stay in the folder.
+        Of `studies.budget.plan.plan` or of `studies.budget.starting_points`; left out, of `plan`, whose pilots stay in
+        the folder.
     runner : callable, optional
         Takes cells, gives rows as they come; left out, cells are made in this process.
     step : callable, optional

@@ -20,7 +20,7 @@ from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
 from studies.budget.bands import counts, groups_of
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.commands import new as new_command
 from studies.metrics.target_figures import patch_masks
 from studies.study.lit_scene import level_luminance, open_choice, under
@@ -83,17 +83,19 @@ def test_ws_electrons_per_lux_are_the_integral(wall: Transport) -> None:
 
 
 def test_a_study_without_a_plan_gives_a_lamps_lines_a_band_of_their_own() -> None:
-    (model,) = as_stated(Study((SceneChoice("flat_field"),), ("1lux",), spectra=("own", "sodium_low"))).renders.values()
+    (model,) = plan_from_settings(
+        Study((SceneChoice("flat_field"),), ("1lux",), spectra=("own", "sodium_low"))
+    ).renders.values()
     assert min(model.width_nm) == pytest.approx(1.6, abs=0.01)
     scenes = SceneChoice("flat_field", light="sodium_low"), SceneChoice("color_checker")
-    assert [min(x.width_nm) for x in as_stated(Study(scenes, ("1lux",))).renders.values()] == pytest.approx(
+    assert [min(x.width_nm) for x in plan_from_settings(Study(scenes, ("1lux",))).renders.values()] == pytest.approx(
         [1.6, 20.0], abs=0.01
     )
 
 
 def test_a_study_renders_the_range_that_it_asks_for() -> None:
     far = Study((SceneChoice("color_checker"),), ("1lux",), render=RenderLimits(range_nm=(380.0, 1070.0)))
-    (model,) = as_stated(far).renders.values()
+    (model,) = plan_from_settings(far).renders.values()
     edges = np.array(model.wavelength_nm) - np.array(model.width_nm) / 2
     assert edges[0] == 380.0
     assert model.wavelength_nm[-1] + model.width_nm[-1] / 2 == pytest.approx(1070.0)

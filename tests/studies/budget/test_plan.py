@@ -19,9 +19,12 @@ from sensor.optics import form_image
 from sensor.presets import low_noise, preset, vary
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.budget import plan as planning
-from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, Term, as_stated, ledger_html
-from studies.budget.plan import plan, reference_plan
-from studies.budget.plan_text import cost_over_reference, plan_json, plan_table, reasons
+from studies.budget.costs import cost_over_reference
+from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, Term, ledger_html
+from studies.budget.plan import plan
+from studies.budget.plan_text import plan_json, plan_table
+from studies.budget.starting_points import plan_from_settings, reference_plan, starting_point
+from studies.budget.summary import summary
 from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel, LensTerms, RenderModel
 from studies.study.study import BudgetShares, Condition, RenderLimits, SceneChoice, Study, conditions
@@ -102,6 +105,41 @@ def test_the_reference_leaves_nothing_out() -> None:
         assert image.lens.horizontal_view_deg == pytest.approx(20.0)
 
 
+def test_each_starting_point_holds_what_its_name_says_and_its_ledger_states_what_that_costs(cache: Path) -> None:
+    made = {}
+    for name in ("fast", "default", "reference"):
+        made[name] = plan(replace(SMALL, budget=BudgetShares(model=name)), cache=cache)
+        without_pilot = starting_point(SMALL, name)
+        assert (made[name].renders, made[name].images) == (without_pilot.renders, without_pilot.images)
+        assert f"the starting point '{name}' renders" in made[name].summary[0]
+    held = {
+        name: {(len(model.wavelength_nm), model.spp) for model in plan.renders.values()} for name, plan in made.items()
+    }
+    assert held == {"fast": {(8, 32)}, "default": {(20, 32)}, "reference": {(40, 128)}}
+    left_out = {
+        name: {term.name for row in plan.ledgers for term in row.terms[4:] if not term.modelled}
+        for name, plan in made.items()
+    }
+    assert left_out == {
+        "fast": {"diffraction", "veiling glare", "cos^4", "kernel"},
+        "default": {"veiling glare", "cos^4"},  # the sensor states its aperture's diffraction alone
+        "reference": set(),
+    }
+    # in daylight each is nearer to the truth than the one before; the reference's error is its own noise
+    _, bright = zip(*(plan.shares.values() for plan in made.values()), strict=True)
+    assert sorted(bright, reverse=True) == list(bright)
+    reference = made["reference"].ledgers[-1]
+    noise = sum(term.share for term in reference.terms[:2])
+    assert reference.share == pytest.approx(noise, rel=1e-6)
+
+
+def test_a_fast_plan_keeps_what_the_study_itself_states_of_the_lens() -> None:
+    stated = replace(SMALL, lens=LensTerms(veiling_glare=0.05), render=RenderLimits(size=16, spp=4096))
+    fast = starting_point(stated, "fast")
+    assert {(x.lens.diffraction, x.lens.veiling_glare, x.exact) for x in fast.images.values()} == {(0.0, 0.05, False)}
+    assert {model.spp for model in fast.renders.values()} == {128}
+
+
 def test_what_a_study_states_of_the_lens_goes_before_the_sensors_own_and_that_before_what_is_filled_in(tmp_path):
     own = tmp_path / "mine.toml"
     text = planning.preset.__globals__["preset_file"]("low_noise").read_text()
@@ -111,11 +149,11 @@ def test_what_a_study_states_of_the_lens_goes_before_the_sensors_own_and_that_be
     stated = replace(study, lens=LensTerms(diffraction=0.0))
     for made, expected in (
         (reference_plan(study), (2.0, 0.2)),
-        (as_stated(study), (2.0, 0.2)),
+        (plan_from_settings(study), (2.0, 0.2)),
         (reference_plan(stated), (0.0, 0.2)),
-        (as_stated(stated), (0.0, 0.2)),
-        (as_stated(replace(SMALL, sensors=("table1_output",))), (0.0, 0.0)),
-        (as_stated(SMALL), (1.0, 0.0)),  # a pixel of today has a lens
+        (plan_from_settings(stated), (0.0, 0.2)),
+        (plan_from_settings(replace(SMALL, sensors=("table1_output",))), (0.0, 0.0)),
+        (plan_from_settings(SMALL), (1.0, 0.0)),  # a pixel of today has a lens
     ):
         assert {(image.lens.diffraction, image.lens.veiling_glare) for image in made.images.values()} == {expected}
 
@@ -144,14 +182,21 @@ def test_the_command_prints_a_ledger_and_why_and_refuses_a_bad_key(tmp_path, cac
     Path("study.toml").write_text(FILE)
     code, out, _ = call(["plan", "study.toml", "--cache", cache])
     assert code == 0
-    for word in ("Monte Carlo", "diffraction", "veiling glare", "cos^4", "Budget: 10%", "samples a pixel"):
-        assert word in out
+    for word in ("Monte Carlo", "diffraction", "veiling glare", "cos^4", "the budget of 10%", "samples per pixel"):
+        assert word in " ".join(out.split())
     found = json.loads(call(["plan", "study.toml", "--cache", cache, "--json", "--set", "budget.total=0.2"])[1])
     assert found["budget"]["total"] == 0.2
     assert found["conditions"][0]["terms"][0]["name"] == "Monte Carlo"
     assert found["renders"][0]["spp"] == 32
     assert 0 < found["renders"][0]["cost_over_reference"] < 1
-    check_refusals("plan study.toml", [("--set budget.totl=0.2", "did you mean 'total'?")], tmp_path)
+    check_refusals(
+        "plan study.toml",
+        [
+            ("--set budget.totl=0.2", "did you mean 'total'?"),
+            ("--set budget.model=fats", "budget.model: 'fats' is unknown ... did you mean 'fast'?"),
+        ],
+        tmp_path,
+    )
 
 
 def model_electrons(transport: Transport, row: Ledger, model: ImageModel) -> NDArray[np.float64]:
@@ -298,7 +343,20 @@ CONDITION = Condition(SCENE, "own", "1cd/m2", "auto", "low_noise")
 def plan_of(bands: int, spp: int, *, diffraction: float, veiling_glare: float, exact: bool) -> Plan:
     """Two mosaics of one condition, the second with twice the errors."""
     ledgers = tuple(
-        Ledger(CONDITION, mosaic, 0.066, 10.0, (Term("Monte Carlo", 1.0, share),), 2.0, share)
+        Ledger(
+            CONDITION,
+            mosaic,
+            0.066,
+            10.0,
+            (
+                Term("Monte Carlo", 1.0, share),
+                Term("diffraction", 3.0, 0.5, modelled=True),
+                Term("veiling glare", 1.0, 0.04),
+                Term("kernel", 0.0, 0.0),
+            ),
+            2.0,
+            share,
+        )
         for mosaic, share in (("bayer", 0.05), ("rgbw", 0.1))
     )
     lens = replace(low_noise().lens, diffraction=diffraction, veiling_glare=veiling_glare, horizontal_view_deg=0.0)
@@ -307,7 +365,7 @@ def plan_of(bands: int, spp: int, *, diffraction: float, veiling_glare: float, e
     return Plan(renders={SCENE: render}, images={CONDITION: ImageModel(lens, exact)}, ledgers=ledgers)
 
 
-def test_reasons_and_costs_are_counted_once_more() -> None:
+def test_the_summary_and_costs_are_counted_once_more() -> None:
     """Nanoseconds a pixel: 85 for a sample's band and 12 more a sample; a lens 55 a band, glare 4.5, exactness 40."""
     plan = plan_of(8, 64, diffraction=1.0, veiling_glare=0.0, exact=False)
     reference = plan_of(40, 256, diffraction=1.0, veiling_glare=0.01, exact=True)
@@ -315,15 +373,18 @@ def test_reasons_and_costs_are_counted_once_more() -> None:
     assert cost_over_reference(plan, reference, SCENE) == pytest.approx(ratio)
     shares = BudgetShares(total=0.2, monte_carlo=0.02)
     study = Study((SCENE,), ("1cd/m2",), budget=shares, render=RenderLimits(spp=64))
-    budget, chosen, short = reasons(study, plan, reference)
-    assert budget.startswith("Budget: 20% of the sensor's own noise variance, 2% of it for Monte Carlo noise.")
-    assert chosen == (
-        f"still_life: 8 bands of 50 nm, 64 samples a pixel; render and lens cost about {ratio:.2g} of the reference's"
-    )
     # a variance of 10 % at 64 samples is one of 2 % at five times as many
-    assert short == (
-        "still_life: Monte Carlo noise reaches 10% in the worst condition; 3.2e+02 samples would keep the aim, and "
-        "spp allows 64"
+    (paragraph,) = summary(study, plan, reference)
+    assert paragraph == (
+        "still_life: the cheapest model within the budget renders 8 bands of 50 nm with 64 samples per pixel. "
+        "It leaves out veiling glare and exact readout in the one condition. "
+        "This adds at most 10% of the sensor's own noise variance, within the budget of 20%. "
+        "The error is largest under own 1cd/m2 auto low_noise rgbw, "
+        "where the largest parts are Monte Carlo (10%) and veiling glare (4%). "
+        f"Render and lens take about {ratio:.2g} of the time of the reference, "
+        "which has 40 bands of 10 nm and 256 samples per pixel and models every effect. "
+        "Monte Carlo noise exceeds its share of 2%: "
+        "320 samples per pixel would keep it, and the study allows 64."
     )
     found = plan_json(study, plan, reference)
     assert found["renders"][0]["monte_carlo_share"] == 0.1
@@ -331,4 +392,6 @@ def test_reasons_and_costs_are_counted_once_more() -> None:
     text = StringIO()
     Console(file=text, width=100).print(plan_table(plan))
     assert "rgbw" in text.getvalue(), "the worse mosaic"
-    assert text.getvalue().split()[-4:] == ["10", "2", "10%", "10%"]
+    assert [line.split() for line in text.getvalue().splitlines() if line.startswith("1cd/m2")] == [
+        ["1cd/m2", "10", "2", "10%", "10%", "(50%)", "4%"]
+    ]

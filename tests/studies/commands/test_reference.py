@@ -13,7 +13,7 @@ from render.error_estimates import Halves
 from render.reference import FOLDER, SHIPPED, find_reference, require_agreement, save_reference
 from rodcone.progress import duration
 from scenes.catalog import load
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.commands.demo import STUDY
 from studies.study.lit_scene import film_of, open_choice
 from studies.study.render_noise import MARGIN
@@ -27,7 +27,7 @@ def stored(size: int = 32):  # type: ignore[no-untyped-def]
     """Reference of the demo's scene."""
     study = read_study(STUDY)
     study = replace(study, render=replace(study.render, size=size))
-    opened, model = open_choice(study.scenes[0], study), as_stated(study).renders[study.scenes[0]]
+    opened, model = open_choice(study.scenes[0], study), plan_from_settings(study).renders[study.scenes[0]]
     return find_reference(load("still_life"), film_of(opened, model))
 
 

@@ -15,8 +15,8 @@ from render.radiance_files.radiance_source import as_transport
 from render.scene import LightGroup
 from render.transport import Transport
 from scenes.catalog import load
-from studies.budget.ledger import as_stated
 from studies.budget.plan import plan
+from studies.budget.starting_points import plan_from_settings
 from studies.commands.sweep import estimate
 from studies.study.equal_area import EqualArea, area_average
 from studies.study.lit_scene import (
@@ -194,7 +194,7 @@ def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the
     )
     refusal(open_all, asked, match=r"render\.size: 64, and low_noise has 100 pixels on 220 um; allowed: 100")
     need = [
-        estimate(study, as_stated(study), open_all(study), 1, 0).largest_bytes
+        estimate(study, plan_from_settings(study), open_all(study), 1, 0).largest_bytes
         for study in (replace(asked, render=RenderLimits(size=size)) for size in (100, 400))
     ]
     assert need[1] > need[0]

@@ -7,7 +7,7 @@ import pytest
 from refusal import refusal
 
 from sensor.presets import preset_file
-from studies.budget.ledger import as_stated
+from studies.budget.starting_points import plan_from_settings
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import open_all
 from studies.study.study import SceneChoice, Study, conditions, mosaics
@@ -159,7 +159,7 @@ def test_a_scenes_surfaces_may_be_held_beyond_their_tables(tmp_path: Path) -> No
 def test_a_scene_may_have_samples_of_its_own(tmp_path: Path) -> None:
     text = TEXT.replace('"still_life"', '"still_life", {source = "siemens_star", spp = 7}')
     study = read_study(written(tmp_path, text.replace(', {source = "desk.exr", light = "A"}', "")))
-    assert [model.spp for model in as_stated(study).renders.values()] == [16, 7]
+    assert [model.spp for model in plan_from_settings(study).renders.values()] == [16, 7]
     assert "spp: 0 is outside 1 to 65536; give samples per pixel" in told(tmp_path, text.replace("spp = 7", "spp = 0"))
     picture = read_study(written(tmp_path, TEXT.replace('light = "A"', "spp = 7")))
     refusal(open_all, picture, match="^spp: 7 for .*desk.exr, a picture without surfaces; leave it out$")

@@ -10,6 +10,7 @@ from builders import transport_of
 from refusal import refusal
 
 from render.error_estimates import Halves
+from render.geometry import horizontal_view_deg
 from render.illuminants import illuminant
 from render.loader import mitsuba_module
 from render.scene import LightGroup
@@ -23,21 +24,11 @@ from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.shake import held_lens
 from studies.budget.bands import COUNTS, groups_of, merge_radiance, merge_transport
-from studies.budget.choice import choose, image_ns, render_ns
-from studies.budget.ledger import (
-    EFFECT_MARGIN,
-    KERNEL,
-    LEVEL,
-    LIGHT,
-    MONTE_CARLO,
-    NOISE_MARGIN,
-    RESPONSE,
-    PilotNoise,
-    Weighed,
-    ledger,
-    weigh,
-)
-from studies.budget.terms import IMAGING_TERMS, Effects, effects, horizontal_view_deg, kernel_rms_e, shake_effect
+from studies.budget.costs import image_ns, render_ns
+from studies.budget.effects import IMAGING_TERMS, KERNEL, Effects, find_effects, kernel_rms_e, shake_effect
+from studies.budget.how_many_bands import choose
+from studies.budget.ledger import LEVEL, LIGHT, MONTE_CARLO, RESPONSE, ledger
+from studies.budget.scaled_effects import EFFECT_MARGIN, NOISE_MARGIN, PilotNoise, ScaledEffects, scale_effects
 from studies.study.study import BudgetShares, Condition, SceneChoice
 
 NM, WIDTH_NM = np.arange(385.0, 780.0, 10.0), np.full(40, 10.0)
@@ -77,7 +68,7 @@ def found(made: Transport, counts=(40,), **lens) -> Effects:
     sensor = low_noise()
     groups = {count: groups_of(made.width_nm, count) for count in counts}
     stated = replace(sensor.lens, **({"diffraction": 0.0} | lens))
-    return effects(made, sensor, stated, groups, np.random.default_rng(0))
+    return find_effects(made, sensor, stated, groups, np.random.default_rng(0))
 
 
 def rms(pair) -> float:
@@ -251,15 +242,15 @@ def test_the_kernels_bound_holds_what_single_precision_is_off() -> None:
 def test_terms_grow_with_light_and_time_and_noise_falls_with_samples() -> None:
     sensor = low_noise()
     some = found(transport(halved(), noise=0.02), counts=(20, 40), veiling_glare=0.01)
-    once = weigh(CONDITION, "rgbw", sensor, some, 2.0, 0.01, QUIET)
-    more = weigh(CONDITION, "rgbw", sensor, some, 6.0, 0.01, QUIET)
+    once = scale_effects(CONDITION, "rgbw", sensor, some, 2.0, 0.01, QUIET)
+    more = scale_effects(CONDITION, "rgbw", sensor, some, 6.0, 0.01, QUIET)
     assert more.lens["veiling glare"] == pytest.approx(3 * once.lens["veiling glare"])
     assert more.bands[20][0] == pytest.approx(3 * once.bands[20][0])
     assert more.sharp == pytest.approx(9 * once.sharp)
     assert once.monte_carlo(40, 256, frozenset()) == pytest.approx(once.monte_carlo(40, 64, frozenset()) / 4)
     signal = 2.0 * 0.01 * some.full.mean(axis=0)
     assert once.noise_variance == pytest.approx(noise_variance(signal, sensor, 0.01).mean())
-    levelled = weigh(CONDITION, "rgbw", sensor, some, 2.0, 0.01, replace(QUIET, level=1e-4))
+    levelled = scale_effects(CONDITION, "rgbw", sensor, some, 2.0, 0.01, replace(QUIET, level=1e-4))
     assert levelled.level == pytest.approx(((0.01 * signal) ** 2).mean())  # 1 % of each pixel
     # noise of one sample a pixel is the pilot's times its samples; the margin is that of the mean over pixels
     square = (0.02 * signal) ** 2 * 128
@@ -269,13 +260,13 @@ def test_terms_grow_with_light_and_time_and_noise_falls_with_samples() -> None:
 def test_saturated_pixels_are_left_out() -> None:
     sensor = low_noise()
     some = found(transport(halved(0.01, 1.0)), veiling_glare=0.01)
-    bright = weigh(CONDITION, "rgbw", sensor, some, 500.0, 0.01, QUIET)
+    bright = scale_effects(CONDITION, "rgbw", sensor, some, 500.0, 0.01, QUIET)
     below = 5.0 * some.full[0] < sensor.pixel.full_well_e
     assert 0.1 < below.mean() < 0.9
     square = (5.0 * some.lens["veiling glare"][0][below]) ** 2
     margin = EFFECT_MARGIN * square.std() / np.sqrt(square.size)
     assert bright.lens["veiling glare"] ** 2 == pytest.approx(square.mean() + margin, rel=1e-6)
-    all_full = weigh(CONDITION, "rgbw", sensor, some, 1e9, 0.01, QUIET)
+    all_full = scale_effects(CONDITION, "rgbw", sensor, some, 1e9, 0.01, QUIET)
     assert ledger(all_full, 40, 128, frozenset(IMAGING_TERMS)).share == 0.0
 
 
@@ -286,7 +277,7 @@ def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> N
     sensor = low_noise()
     some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0, defocus_um=2.2)
     assert (some.full.mean(axis=0) < 0).any()
-    row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
+    row = scale_effects(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
     kept = 1e-5 * np.maximum(some.full.mean(axis=0), 0.0)
     assert row.noise_variance == pytest.approx(
         noise_variance(kept, sensor, 0.01)[kept < sensor.pixel.full_well_e].mean()
@@ -294,7 +285,7 @@ def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> N
     assert np.isfinite([row.kernel, row.level, *row.jitter.values(), *row.lens.values()]).all()
     some = found(transport(planes, noise=0.02), counts=(20, 40), diffraction=1.0)  # in focus nothing is below 0
     assert (some.full >= 0).all()
-    row = weigh(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
+    row = scale_effects(CONDITION, "rgbw", sensor, some, 1e-3, 0.01, QUIET)
     sharp = 1e-5 * (some.full + some.lens["diffraction"]).mean(axis=0)[12, 12]  # the lamp's electrons, all in one pixel
     relative = 1e-10 * some.sharp[0, 12, 12] ** 2 * 128 / sharp**2 + 1 / 16
     values = np.zeros(planes[0].size)
@@ -302,12 +293,14 @@ def test_a_lens_that_undershoots_beside_a_lamp_leaves_every_term_a_number() -> N
     assert row.jitter[20] == pytest.approx(values.mean() + NOISE_MARGIN * values.std() / values.size**0.5, rel=1e-3)
 
 
-def weighed(condition=CONDITION, mosaic="rgbw", noise_variance=100.0, paths=10.0, **lens) -> Weighed:
+def weighed(condition=CONDITION, mosaic="rgbw", noise_variance=100.0, paths=10.0, **lens) -> ScaledEffects:
     """Errors in electrons beside 10 e- of noise; bands miss 4, 1.5, 0.5 and 0 e-."""
     bands = {4: (3.0, 1.0), 12: (1.0, 0.5), 20: (0.4, 0.1), 40: (0.0, 0.0)}
     errors = {"diffraction": 5.0, "veiling glare": 1.0, "cos^4": 0.5} | lens
     jitter = dict.fromkeys(bands, 0.0)
-    return Weighed(condition, mosaic, 0.01, noise_variance, 2 * paths, paths, jitter, 0.0, bands, errors, kernel=1e-3)
+    return ScaledEffects(
+        condition, mosaic, 0.01, noise_variance, 2 * paths, paths, jitter, 0.0, bands, errors, kernel=1e-3
+    )
 
 
 def test_ledger_adds_effects_by_minkowski_and_noise_in_square() -> None:

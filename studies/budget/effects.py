@@ -7,14 +7,12 @@ Carlo noise. That noise is drawn anew from the variance, and goes through the le
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import radians, tan
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
 from render.transport import Transport
-from rodcone.errors import InputError, unknown
 from sensor.config import LensConfig, SensorConfig
 from sensor.kernel.poisson import LARGEST_ERROR
 from sensor.optics import form_image
@@ -26,6 +24,7 @@ Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e-
 
 DIFFRACTION = "diffraction"
 IMAGING_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
+KERNEL = "kernel"  # the fast readout in place of the exact one
 SHAKE = "camera shake"  # it alone depends on the exposure time
 LENS_TERMS = IMAGING_TERMS | {SHAKE: "shake_um"}
 DRAWS = 2  # of Monte Carlo noise
@@ -77,7 +76,7 @@ class Effects:
     bands: Mapping[int, BandErrors]
 
 
-def effects(
+def find_effects(
     transport: Transport,
     sensor: SensorConfig,
     lens: LensConfig,
@@ -138,38 +137,6 @@ def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.floa
     """
     rounding = (bands + 2) * SINGLE_EPSILON * expected_e
     return np.asarray(rounding + LARGEST_ERROR * 2 * NORMAL_REACH * np.sqrt(expected_e))
-
-
-def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
-    """Angle of view across a picture of a Mitsuba camera; 0 of an ``orthographic`` one, whose rays are all parallel."""
-    if camera.get("type") == "orthographic":
-        return 0.0
-    field, axis = camera.get("fov"), camera.get("fov_axis", "x")
-    if not isinstance(field, int | float):
-        field, axis = _field_of_focal_length(camera.get("focal_length", "50mm")), "diagonal"
-    height, width = size
-    spans = {
-        "x": width,
-        "y": height,
-        "smaller": min(size),
-        "larger": max(size),
-        "diagonal": float(np.hypot(height, width)),
-    }
-    if str(axis).lower() not in spans:
-        raise unknown("camera: fov_axis", axis, spans)
-    half = tan(radians(float(field) / 2)) * width / spans[str(axis).lower()]
-    return float(2 * np.degrees(np.arctan(half)))
-
-
-def _field_of_focal_length(focal_length: object) -> float:
-    """Angle of view in degrees across the diagonal of a film of 36 mm x 24 mm, as Mitsuba takes a focal length."""
-    try:
-        focal_length_mm = float(str(focal_length).removesuffix("mm"))
-    except ValueError:
-        focal_length_mm = 0.0
-    if not 0 < focal_length_mm < np.inf:
-        raise InputError(f"camera: focal_length {focal_length!r} is no length; allowed: above 0; give '50mm'")
-    return float(2 * np.degrees(np.arctan(np.hypot(36.0, 24.0) / (2 * focal_length_mm))))
 
 
 def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator) -> NDArray[np.float64]:

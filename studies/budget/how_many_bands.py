@@ -1,0 +1,65 @@
+"""The third decision: how many bands a render has, each number with the effects and the samples that go with it."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from operator import itemgetter
+
+from studies.budget.costs import render_ns
+from studies.budget.how_many_samples import samples_per_pixel
+from studies.budget.scaled_effects import ScaledEffects
+from studies.budget.which_effects import effects_left_out
+from studies.study.study import BudgetShares, Condition
+
+
+@dataclass(frozen=True)
+class Choice:
+    """What a scene's render and the images of its conditions hold.
+
+    Attributes
+    ----------
+    count : int
+        Number of bands as it is asked for; lines of lamps add some.
+    spp : int
+        Samples per pixel; 0 for a picture file.
+    left_out : dict of Condition to frozenset of str
+        Effects of lens and readout that are not modelled.
+    """
+
+    count: int
+    spp: int
+    left_out: dict[Condition, frozenset[str]]
+
+
+def choose(rows: Sequence[ScaledEffects], sizes: dict[int, int], shares: BudgetShares, most_spp: int) -> Choice:
+    """Choose the cheapest model of one scene: one render for all conditions, and a lens for each.
+
+    Monte Carlo noise has a share of its own; the rest is for all other errors together. Sensors and mosaics that see
+    the same light for the same time are compared, so what one of them needs, all have. The finest bands with every
+    effect modelled are within any share.
+
+    Parameters
+    ----------
+    rows : sequence of ScaledEffects
+    sizes : dict of int to int
+        Real number of bands by the number asked for.
+    shares : BudgetShares
+    most_spp : int
+        Samples per pixel that the study allows; 0 for a picture file.
+    """
+    compared: dict[Condition, list[ScaledEffects]] = {}
+    for row in rows:
+        compared.setdefault(replace(row.condition, sensor=""), []).append(row)
+    candidates: list[tuple[float, Choice]] = []
+    for count, bands in sizes.items():
+        images_ns, left_out = 0.0, {}
+        for alike in compared.values():
+            lens = effects_left_out(alike, count, bands, shares)
+            if lens is None:
+                break
+            for condition in dict.fromkeys(row.condition for row in alike):
+                images_ns += lens[0]
+                left_out[condition] = lens[1]
+        else:
+            spp = samples_per_pixel(rows, count, left_out, shares, most_spp)
+            candidates.append((images_ns + render_ns(bands, spp), Choice(count, spp, left_out)))
+    return min(candidates, key=itemgetter(0))[1]

@@ -1,0 +1,27 @@
+"""The second decision: how many samples per pixel a render takes."""
+
+from collections.abc import Mapping, Sequence
+from math import ceil
+
+from studies.budget.scaled_effects import ScaledEffects
+from studies.study.study import BudgetShares, Condition
+
+FEWEST_SPP = 128  # fewer are less even than the pilot's, which says how noisy they are
+
+
+def samples_per_pixel(
+    rows: Sequence[ScaledEffects],
+    count: int,
+    left_out: Mapping[Condition, frozenset[str]],
+    shares: BudgetShares,
+    most_spp: int,
+) -> int:
+    """Samples per pixel that keep Monte Carlo noise within its share in every condition, as far as the study allows.
+
+    The variance of the noise falls as 1 over the number of samples, so that the variance of one sample tells how many
+    are needed.
+    """
+    needed = max(
+        row.monte_carlo(count, 1, left_out[row.condition]) / (shares.monte_carlo * row.noise_variance) for row in rows
+    )
+    return min(max(ceil(needed), FEWEST_SPP), most_spp)

@@ -1,0 +1,137 @@
+"""A pilot: a scene rendered small, from which the errors of every possible model are found."""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.engine import render
+from render.geometry import horizontal_view_deg
+from render.spectrum import Spectrum, fine_bands
+from render.transport import Transport
+from rodcone.types import Floats
+from sensor.burst import merged_sensor
+from sensor.config import LensConfig
+from sensor.exposure import AUTO, amplified, at_level_s
+from sensor.presets import preset, vary
+from studies.budget.bands import groups_of
+from studies.budget.effects import SHAKE, find_effects, shake_effect
+from studies.budget.scaled_effects import PilotNoise, ScaledEffects, scale_effects
+from studies.study.gain import at_gain
+from studies.study.levels import parse_exposure
+from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, under, white_spectrum
+from studies.study.model import unit_exposure_s
+from studies.study.scene_source import open_radiance_file
+from studies.study.study import OWN, Study, conditions, mosaics, most_spp
+
+PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
+PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
+PILOT_SPP = 128
+
+
+@dataclass(frozen=True)
+class Pilot:
+    """A scene rendered small with few samples, in fine bands. A picture file is its own pilot.
+
+    Attributes
+    ----------
+    opened : OpenedScene
+    transport : Transport
+    groups : mapping of int to sequence of index arrays
+        By each number of bands that a model may have, the fine bands that make each of them.
+    """
+
+    opened: OpenedScene
+    transport: Transport
+    groups: Mapping[int, Sequence[NDArray[np.intp]]]
+
+    @property
+    def rendered(self) -> bool:
+        """Whether it is a render, and no picture file."""
+        return self.opened.scene is not None
+
+
+def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: Path | None = None) -> Pilot:
+    """Render a scene's pilot, and group its fine bands into each of some numbers of wide ones.
+
+    A picture file keeps its own bands.
+    """
+    if opened.scene is None:
+        transport = open_radiance_file(opened.choice.source, opened.white)[0]
+        single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
+        return Pilot(opened, transport, {len(single): single})
+    nm, width_nm = reference_bands(opened, study)
+    scale = min(1.0, PILOT_SIDE / max(opened.size))
+    size = max(1, round(opened.size[0] * scale)), max(1, round(opened.size[1] * scale))
+    transport = render(
+        opened.scene,
+        size,
+        wavelength_nm=nm,
+        width_nm=width_nm,
+        seed=study.render.seed + PILOT_SEED,
+        max_spp=min(most_spp(study, opened.choice), PILOT_SPP),
+        cache=cache,
+    )
+    return Pilot(opened, transport, {count: groups_of(width_nm, count) for count in counts})
+
+
+def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
+    """Centres and widths of the finest bands [nm], with one for each line of a lamp that lights the scene."""
+    own_spectra: list[Spectrum] = []
+    if opened.scene is not None:
+        own_spectra = [group.spectrum for group in opened.scene.groups.values()]
+    given = [white_spectrum(opened, name) for name in study.spectra if name != OWN]
+    return fine_bands([*own_spectra, *given], study.render.range_nm)
+
+
+def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
+    """Lens of the reference: what the study states, then what the sensor's own has, then a good lens in the scene."""
+    view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
+    whole = replace(
+        lens,
+        diffraction=lens.diffraction or 1.0,  # an ideal aperture
+        veiling_glare=lens.veiling_glare or 0.01,  # a good photographic lens by the index of ISO 9358
+        horizontal_view_deg=lens.horizontal_view_deg or view,
+    )
+    return study.lens.on(whole)
+
+
+def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
+    """Yield the errors of every possible model for each condition and mosaic of the pilot's scene."""
+    rng = np.random.default_rng([study.render.seed, PILOT_SEED])
+    for spectrum in study.spectra:
+        lit = under(pilot.transport, spectrum)
+        lux = lux_per_cd_m2(lit, study.levels)
+        noise, radiance = _pilot_noise(pilot, lit), lit.relight(luminance_cd_m2=1.0)
+        for name in study.sensors:
+            auto_s = unit_exposure_s(radiance, preset(name).undivided)
+            for mosaic in mosaics(study):
+                sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
+                lens = full_lens(study, sensor.lens, pilot.opened)
+                sensor = replace(sensor, lens=lens)
+                of_any_time = find_effects(lit, sensor, lens, pilot.groups, rng)
+                for condition in conditions(study, pilot.opened.choice):
+                    if (condition.spectrum, condition.sensor) != (spectrum, name):
+                        continue
+                    level = level_luminance(condition.level, lux)
+                    exposure_s, camera = parse_exposure(condition.exposure), at_gain(sensor, condition.gain)
+                    if exposure_s is None:
+                        wanted_s = at_level_s(auto_s, level, AUTO, sensor) * sensor.gain / camera.gain
+                        exposure_s, camera = amplified(camera, wanted_s, study.longest_exposure_s)
+                    effects = of_any_time
+                    if lens.shake_um:
+                        shake = shake_effect(lit, sensor, lens, exposure_s, rng)
+                        effects = replace(of_any_time, lens={**of_any_time.lens, SHAKE: shake})
+                    burst, burst_s = merged_sensor(camera, condition.frames), exposure_s * condition.frames
+                    yield scale_effects(condition, mosaic, burst, effects, level, burst_s, noise)
+
+
+def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
+    """Monte Carlo noise of the pilot; a picture file states none."""
+    if not pilot.rendered:
+        return PilotNoise(spp=0, half_spp=1, level=0.0)
+    fewer = lit.coverage.mean.size / (pilot.opened.size[0] * pilot.opened.size[1])
+    error = lit.level().relative_error or 0.0
+    return PilotNoise(spp=lit.spp, half_spp=lit.spp / 2, level=error**2 * lit.spp * fewer)

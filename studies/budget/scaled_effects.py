@@ -1,0 +1,146 @@
+"""A sensor's effects at one level and exposure time, in electrons: all that the budget's decisions are made of."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sensor.config import SensorConfig
+from sensor.readings.resolve import resolve, unsaturated
+from sensor.readout import light_variance
+from studies.budget.effects import DIFFRACTION, Effects, Pair, kernel_rms_e
+from studies.study.study import Condition
+
+# Standard errors added to a mean over the pilot's pixels. A few pixels may hold most of the noise, here and in the
+# render that is predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations
+# (Cantelli's inequality).
+EFFECT_MARGIN, NOISE_MARGIN = 2.0, 19.0**0.5
+
+
+@dataclass(frozen=True)
+class PilotNoise:
+    """Noise of a pilot.
+
+    Attributes
+    ----------
+    spp, half_spp : float
+        Samples per pixel of the pilot, and of one of its halves.
+    level : float
+        Variance of the level over its square, of one sample per pixel and for as many pixels as the render has.
+    """
+
+    spp: float
+    half_spp: float
+    level: float
+
+
+@dataclass(frozen=True)
+class ScaledEffects:
+    """Errors that each possible choice makes, for one condition and mosaic [e-].
+
+    Attributes
+    ----------
+    condition : Condition
+    mosaic : str
+    exposure_s : float
+    noise_variance : float
+        The sensor's own, mean over pixels below saturation [e-^2].
+    blurred, sharp : float
+        Monte Carlo variance of one sample per pixel, with diffraction and without [e-^2].
+    jitter : mapping of int to float
+        Variance of one sample per pixel by the wavelengths that it draws within bands, by number of bands [e-^2].
+    level : float
+        Variance by the mean luminance that a level scales the picture by, of one sample per pixel [e-^2].
+    bands : mapping of int to (float, float)
+        Error of the response and of the light within bands, by number of bands.
+    lens : mapping of str to float
+        Error of leaving an effect of the lens out.
+    kernel : float
+        Error of the fast readout.
+    """
+
+    condition: Condition
+    mosaic: str
+    exposure_s: float
+    noise_variance: float
+    blurred: float
+    sharp: float
+    jitter: Mapping[int, float]
+    level: float
+    bands: Mapping[int, tuple[float, float]]
+    lens: Mapping[str, float]
+    kernel: float
+
+    def monte_carlo(self, count: int, spp: int, left_out: frozenset[str]) -> float:
+        """Monte Carlo variance of a model [e-^2]."""
+        return ((self.sharp if DIFFRACTION in left_out else self.blurred) + self.jitter[count]) / spp
+
+
+def scale_effects(
+    condition: Condition,
+    mosaic: str,
+    sensor: SensorConfig,
+    effects: Effects,
+    level_cd_m2: float,
+    exposure_s: float,
+    pilot: PilotNoise,
+) -> ScaledEffects:
+    """Scale a sensor's effects to a level and an exposure time.
+
+    Parameters
+    ----------
+    condition : Condition
+    mosaic : str
+    sensor : SensorConfig
+    effects : Effects
+        At 1 cd/m^2 and 1 s.
+    level_cd_m2, exposure_s : float
+    pilot : PilotNoise
+    """
+    scale = level_cd_m2 * exposure_s
+    # Beside a lamp a lens that is sampled once per pixel undershoots; a picture has no light there (`form_image`).
+    expected_e = scale * np.maximum(effects.full.mean(axis=0), 0.0)
+    readings = resolve(sensor, expected_e, exposure_s)
+    below = unsaturated(expected_e, readings)
+    # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
+    noise_e2 = _mean(light_variance(expected_e, readings)[below]) or 1.0
+    blurred, sharp = effects.blurred**2 * pilot.spp, effects.sharp**2 * pilot.spp
+    # Wavelengths are stratified within a half, and the light that a path carries is independent of its wavelength. Both
+    # are of light before diffraction, and a pixel without light has neither noise nor jitter.
+    signal = (effects.full + effects.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
+    relative = np.divide(sharp.mean(axis=0), signal**2, out=np.zeros_like(signal), where=signal > 0)
+    spread = relative + 1 / pilot.half_spp
+    return ScaledEffects(
+        condition=condition,
+        mosaic=mosaic,
+        exposure_s=exposure_s,
+        noise_variance=noise_e2,
+        blurred=scale**2 * _upper(blurred[:, below], NOISE_MARGIN),
+        sharp=scale**2 * _upper(sharp[:, below], NOISE_MARGIN),
+        jitter={
+            count: scale**2 * _upper((errors.jitter * spread)[below], NOISE_MARGIN)
+            for count, errors in effects.bands.items()
+        },
+        level=_mean(expected_e[below] ** 2) * pilot.level,
+        bands={
+            count: (scale * _rms(errors.response, below), scale * _rms(errors.light, below))
+            for count, errors in effects.bands.items()
+        },
+        lens={name: scale * _rms(pair, below) for name, pair in effects.lens.items()},
+        kernel=float(np.sqrt(_mean(kernel_rms_e(expected_e, max(effects.bands))[below] ** 2))),
+    )
+
+
+def _rms(pair: Pair, below: NDArray[np.bool_]) -> float:
+    """Root of the mean product of an effect's two estimates, with a margin for how few pixels there are."""
+    return float(np.sqrt(max(_upper((pair[0] * pair[1])[below], EFFECT_MARGIN), 0.0)))
+
+
+def _upper(values: NDArray[np.float64], margin: float) -> float:
+    """Mean over pixels (last axis), raised by a number of its standard errors; 0 without pixels."""
+    return float(values.mean() + margin * values.std() / np.sqrt(values.shape[-1])) if values.size else 0.0
+
+
+def _mean(values: NDArray[np.float64]) -> float:
+    return float(values.mean()) if values.size else 0.0
