@@ -85,11 +85,14 @@ def reference_path(folder: Path, scene: Scene, film: Film) -> Path:
 
 def find_reference(scene: Scene, film: Film) -> Reference | None:
     """Reference of a scene and film, the user's own first; None where there is no intact one."""
-    for folder in reference_folders():
-        path = reference_path(folder, scene, film)
-        if (arrays := read_arrays(path)) is not None:
-            return _unpacked(path, arrays, scene.groups)
-    return None
+    paths = (reference_path(folder, scene, film) for folder in reference_folders())
+    return next(filter(None, (read_reference(path, scene) for path in paths)), None)
+
+
+def read_reference(path: Path, scene: Scene) -> Reference | None:
+    """Reference of a scene in a file; None where the file is missing or isn't what was written."""
+    arrays = read_arrays(path)
+    return None if arrays is None else _unpacked(path, arrays, scene.groups)
 
 
 def ready_light(scene: Scene, film: Film) -> Reference | None:

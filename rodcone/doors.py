@@ -197,7 +197,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "exposure_s": _seconds,
         **dict.fromkeys(("spp", "max_spp", "max_depth", "seed", "samples_per_pixel", "bits", "height"), _WHOLE),
         **dict.fromkeys(("width", "workers", "pictures", "frame"), _WHOLE),
-        "render.size": _size_or_side,
+        **dict.fromkeys(("render.size", "load_transport.size"), _size_or_side),
         **dict.fromkeys(("size", "shape"), _size),
         **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
         **dict.fromkeys(("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view"), _TEXT),

@@ -148,5 +148,5 @@ def test_a_public_name_has_an_example_that_runs() -> None:
 def test_the_readmes_python_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (block,) = PYTHON.findall(README)
-    exec(block.replace("(256, 256), spp=64", "(32, 32), spp=16"), {})
+    exec(block.replace('"still_life"', '"still_life", size=32'), {})
     assert sorted(path.name for path in tmp_path.iterdir()) == ["bayer.png", "rgbw.dng", "rgbw.png", "rgbw_bayer.dng"]

@@ -10,7 +10,14 @@ from cyclopts import Parameter
 
 from render.engine import render
 from render.limits import MOST_SPP
-from render.reference import halves_agree, reference_folders, reference_path, save_reference
+from render.reference import (
+    find_reference,
+    halves_agree,
+    read_reference,
+    reference_folders,
+    reference_path,
+    save_reference,
+)
 from render.transport import Transport
 from rodcone.errors import require_range
 from rodcone.progress import duration, progress, render_words
@@ -147,7 +154,8 @@ def reference(
 ) -> int:
     """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
 
-    It may take hours. Whatever ends it, the same command goes on; the file so far is there after every 512 samples.
+    It may take hours. The file so far is there after every 512 samples. Whatever ends the render, the same command goes
+    on from that file, and without --out from the file that comes with rodcone too.
 
     Parameters
     ----------
@@ -173,11 +181,27 @@ def reference(
     opened, model = open_choice(choice, study), plan_from_settings(study).renders[choice]
     film, folder = film_of(opened, model), out or next(reference_folders())
     assert opened.scene is not None
-    path, most_samples = reference_path(folder, opened.scene, film), STEP_SPP
-    transport: Transport | None = None
+    path = reference_path(folder, opened.scene, film)
+    found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)
+    transport = found.transport if found else None  # what is there already is gone on from
     # Go on until the noise is low enough, and keep the file after each step
     with progress(sys.stderr) as step:
         while True:
+            most_samples = STEP_SPP
+            if transport:
+                shares = _shares(transport, study)
+                now = max(share for of_sensor in shares.values() for share in of_sensor.values())
+                save_reference(
+                    path,
+                    transport,
+                    _certificate(transport, shares, now, f"rodcone reference {scene} --size {max(film.size)}"),
+                )
+                left_s = transport.seconds * (MARGIN * now / until - 1)
+                words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
+                say(f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}")
+                if now <= until or transport.stopped_by != "samples":
+                    break
+                most_samples = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
             samples = transport.spp if transport else 0.0
             transport = render(
                 opened.scene,
@@ -187,25 +211,11 @@ def reference(
                 max_spp=most_samples,
                 max_seconds=max_seconds,
                 seed=SEED,
-                cache=folder / "renders",
                 resume=transport,
                 progress=lambda share, error: step(render_words(error), share),
             )
             if transport.spp == samples:  # the time is up
                 break
-            shares = _shares(transport, study)
-            now = max(share for of_sensor in shares.values() for share in of_sensor.values())
-            save_reference(
-                path,
-                transport,
-                _certificate(transport, shares, now, f"rodcone reference {scene} --size {max(film.size)}"),
-            )
-            left_s = transport.seconds * (MARGIN * now / until - 1)
-            words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
-            say(f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}")
-            if now <= until or transport.stopped_by != "samples":
-                break
-            most_samples = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
     print(path)
     return INTERRUPTED if transport.stopped_by == "interrupt" else 0
 

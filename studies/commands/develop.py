@@ -12,6 +12,7 @@ from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
+from render.scene import Scene
 from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
@@ -22,6 +23,7 @@ from rodcone.progress import progress, render_words
 from studies.commands.console import INTERRUPTED, Seconds, print_result, say
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture
+from studies.photograph.ready_light import BANDS, find_ready
 from studies.photograph.shot import Order, take
 from studies.study.lit_scene import asked_spectra
 from studies.study.render_facts import render_facts
@@ -135,11 +137,13 @@ class RenderOrder:
     out : Path
         File to write, ending in .exr.
     height : int, optional
-        Pixels; the scene file's film by default, or 256. With one of height and width the other keeps the proportions.
+        Pixels; by default those of the scene's light if it is there already, such as 512 of still_life, or else 256; a
+        scene file has a film of its own. With one of height and width the other keeps the proportions.
     width : int, optional
         Pixels; as height.
     bands : str, optional
-        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; 380:780:10 by default, and a lamp's lines apart.
+        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; by default those of the light that is there already,
+        380:780:20, or else 380:780:10 and a lamp's lines apart.
     light : tuple of str
         GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
         alone, for all of them; may be given several times. An illuminant is a name or a file: lamp=led.csv.
@@ -159,6 +163,9 @@ class RenderOrder:
         8.
     seed : int
         Seed of the render.
+    render : bool
+        Render the scene here, even if its light is there already; --spp, --noise, --max-seconds, --max-depth, --seed,
+        --cache and --denoise do so too.
     cache : Path, optional
         Folder of finished renders, to use and to add to.
     trust_scene : bool
@@ -187,6 +194,7 @@ class RenderOrder:
     max_seconds: Seconds | None = None
     max_depth: int | None = None
     seed: int = 0
+    render: bool = False
     cache: Path | None = None
     trust_scene: bool = False
     define: tuple[str, ...] = ()
@@ -194,12 +202,19 @@ class RenderOrder:
     denoise: bool = False
     force: bool = False
 
+    @property
+    def renders(self) -> bool:
+        """Whether something asks for a render though the scene's light is there already."""
+        limits = (self.spp, self.noise, self.max_seconds, self.max_depth, self.cache)
+        return self.render or self.denoise or self.seed != 0 or any(limit is not None for limit in limits)
+
 
 def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = False) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
 
-    Stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples a pixel.
-    Ctrl-C keeps what is done and exits with 130.
+    Light of the scene that is there already, such as that of still_life which comes with rodcone, is taken as it is. A
+    render stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples per
+    pixel. Ctrl-C keeps what is done and exits with 130.
 
     Parameters
     ----------
@@ -215,19 +230,45 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
     spectra = asked_spectra(scene, order.light)
     lit_at: dict[str, Any] = asked_level(scene, order.level)
-    wavelength_nm, width_nm = bands or fine_bands(spectra.get(x, own.spectrum) for x, own in scene.groups.items())
+    lamps = [spectra.get(name, group.spectrum) for name, group in scene.groups.items()]
+    stated = None if order.height is None and order.width is None else size
+    ready = None if order.renders else find_ready(scene, opened.size, stated, lamps, bands or BANDS)
+    size = ready.size if ready else size
+    wavelength_nm, width_nm = (
+        (ready.transport.wavelength_nm, ready.transport.width_nm) if ready else (bands or fine_bands(lamps))
+    )
     require_memory(
         memory(size[0] * size[1], wavelength_nm.size, len(scene.groups), denoised=order.denoise), order.force
     )
     check_place(order.out)
     # Render and write
+    if ready:
+        transport, notes = ready.transport, (*opened.notes, ready.line)
+    else:
+        transport, notes = _rendered(order, scene, size, (wavelength_nm, width_nm)), opened.notes
+    radiance = (
+        relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
+    )
+    write_exr(radiance, order.out, scene=scene.name)
+    # Say what was done
+    say(*notes)
+    interrupted = transport.stopped_by == "interrupt"
+    if interrupted:
+        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
+    facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
+    facts["largest_band_error"] = max(transport.band_error(spectra).values())
+    print_result(order.out, facts, json=json)
+    return INTERRUPTED if interrupted else 0
+
+
+def _rendered(order: RenderOrder, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats]) -> Transport:
     with progress(sys.stderr) as step:
         step(render_words(np.inf), 0.0)
-        transport = render_transport(
+        return render_transport(
             scene,
             size,
-            wavelength_nm=wavelength_nm,
-            width_nm=width_nm,
+            wavelength_nm=bands[0],
+            width_nm=bands[1],
             spp=order.spp,
             noise=order.noise,
             max_seconds=order.max_seconds,
@@ -237,19 +278,6 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
             progress=lambda share, error: step(render_words(error), share),
             denoise=order.denoise,
         )
-    radiance = (
-        relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
-    )
-    write_exr(radiance, order.out, scene=scene.name)
-    # Say what was done
-    say(*opened.notes)
-    interrupted = transport.stopped_by == "interrupt"
-    if interrupted:
-        say(f"stopped; {transport.spp:.0f} samples a pixel are kept in {order.out}")
-    facts = {"path": str(order.out), **_facts(opened, transport, radiance)}
-    facts["largest_band_error"] = max(transport.band_error(spectra).values())
-    print_result(order.out, facts, json=json)
-    return INTERRUPTED if interrupted else 0
 
 
 def _bands(text: str | None) -> tuple[Floats, Floats] | None:

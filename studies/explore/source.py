@@ -17,8 +17,10 @@ from render.radiance_files.radiance_source import (
 from render.scene import LightGroup, Scene, film_size
 from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
-from rodcone.errors import require_fields
+from rodcone.errors import require_absent, require_fields
 from rodcone.memory import memory, require_memory
+from scenes.catalog import names
+from studies.photograph.ready_light import Ready, find_ready, load_ready
 from studies.study.scene_source import (
     LIGHT,
     check_radiance_file,
@@ -30,7 +32,7 @@ from studies.study.scene_source import (
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
 FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
-_LEAST_BANDS = 4
+_SPP, _LEAST_BANDS = 64, 4
 
 
 @dataclass(frozen=True)
@@ -71,12 +73,14 @@ class RenderOptions:
     ----------
     size : int, optional
         Longer side of the rendered picture in pixels; 256 by default, a .xml scene's film has its own.
-    spp : int
-        Samples a pixel of the render.
+    spp : int, optional
+        Samples per pixel of the render; 64 by default, where the scene's light isn't there already.
     band_nm : float
         Width of the wavelength bands; 20 nm do for smooth spectra.
     seed : int
         Seed of the render.
+    render : bool
+        Render the scene here, even if its light is there already; --spp and --seed do so too.
     trust_scene : bool
         Let a .xml scene load plug-ins of its own, which are native code, and files from anywhere.
     define : tuple of str
@@ -86,9 +90,10 @@ class RenderOptions:
     """
 
     size: Annotated[int | None, (16, 2048, "give the picture's longer side in pixels")] = None
-    spp: Annotated[int, (1, 1 << 16, "give samples a pixel")] = 64
+    spp: Annotated[int | None, (1, 1 << 16, "give samples a pixel")] = None
     band_nm: Annotated[float, (1.0, 100.0, "give nanometres")] = 20.0
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
+    render: bool = False
     trust_scene: bool = False
     define: tuple[str, ...] = ()
     force: bool = False
@@ -126,6 +131,12 @@ def open_source(source: str, options: RenderOptions) -> Source:
     opened = open_scene(source, options.trust_scene, define=options.define)
     size, bands = film_size(opened.size, options.size), _bands(options)
     require_memory(memory(size[0] * size[1], bands[0].size, len(opened.scene.groups)), options.force)
+    coloured = _coloured(opened.scene.groups)
+    if ready := _ready(source, opened.scene, size, bands, options):
+        code = f"transport = rodcone.load_transport({source!r}, size={size!r})\n"
+        return Source(
+            opened.scene.name, lambda _: iter((Rendered(ready.transport, code, True),)), coloured, notes=(ready.line,)
+        )
     extras = ", trust=True" * options.trust_scene + f", define={defined(options.define)!r}" * bool(options.define)
     file = Path(source).suffix.lower() == ".xml"
     scene = f"rodcone.load_scene_file({source!r}{extras}).scene" if file else f"rodcone.load({source!r})"
@@ -138,25 +149,42 @@ def open_source(source: str, options: RenderOptions) -> Source:
     return Source(
         opened.scene.name,
         lambda between: _states(opened.scene, size, bands, options, code, between),
-        _coloured(opened.scene.groups),
+        coloured,
         notes=tuple(opened.notes),
     )
 
 
-def load_transport(path: str | Path, light: str = LIGHT) -> Transport:
-    """Light transport of a picture file (`rodcone.load_radiance`), which `relight` and the explorer take.
+def _ready(
+    source: str, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], options: RenderOptions
+) -> Ready | None:
+    """Light of a scene of the catalogue that is there already, where nothing asks for a render."""
+    if options.render or options.spp is not None or options.seed or source not in names():
+        return None
+    return find_ready(scene, size, size, [group.spectrum for group in scene.groups.values()], bands)
+
+
+def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int] | int | None = None) -> Transport:
+    """Light transport that is there already, of a picture file or a scene, which `relight` and the explorer take.
 
     Parameters
     ----------
     path : str or Path
+        A picture file (`rodcone.load_radiance`), reference light (.npz of `rodcone reference`), or the name of a scene
+        whose light comes with rodcone, such as still_life: it was rendered with so many samples that no noise of it
+        shows.
     light : str
         Illuminant of reflectances, which other lamps may replace; radiance has its light in it.
+    size : (int, int) or int, optional
+        Of a scene's light: height and width in pixels, or the longer side, to which it is averaged; left out, its own.
 
     Raises
     ------
     InputError
-        As `rodcone.load_radiance`.
+        As `rodcone.load_radiance`, and for a scene or size whose light isn't there.
     """
+    if isinstance(path, str) and not Path(path).suffix:
+        return load_ready(path, size)
+    require_absent(f"for {str(path)!r}, a file that has its own", size=size)
     return _with_its_light(load_picture(path, illuminant(light)), path)
 
 
@@ -177,8 +205,9 @@ def _states(
     between_runs: Callable[[], None],
 ) -> Iterator[Rendered]:
     """Render a few pixels, then all of them, then with all samples."""
-    steps = [(size, options.spp)]
-    if options.spp > FIRST_SPP:
+    full_spp = options.spp or _SPP
+    steps = [(size, full_spp)]
+    if full_spp > FIRST_SPP:
         steps.insert(0, (size, FIRST_SPP))
     if max(size) > 2 * FIRST_SIDE:
         steps.insert(0, (film_size(size, FIRST_SIDE), FIRST_SPP))

@@ -8,11 +8,13 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from render.loader import Film
-from render.reference import Reference, ready_light
+from render.reference import SHIPPED, Reference, ready_light
 from render.scene import OWN_SIDE, Scene, film_size
 from render.spectrum import VISIBLE_NM, Spectrum, emission_lines_nm, even_bands
 from render.transport import Transport
+from rodcone.errors import InputError
 from rodcone.types import Floats
+from scenes.catalog import load
 
 BANDS = even_bands(VISIBLE_NM, 20)  # of 20 nm, as `rodcone reference` renders
 SIDE = 512  # longer side of the pictures that are shipped
@@ -55,6 +57,32 @@ def find_ready(
         if reference := ready_light(scene, film):
             return Ready(reference.transport, size, _line(reference))
     return None
+
+
+def load_ready(name: str, size: tuple[int, int] | int | None = None) -> Transport:
+    """Light of a scene of the catalogue that is there already, at the size asked for or its own.
+
+    Raises
+    ------
+    InputError
+        For an unknown scene, and where no light is there for the scene and size.
+    """
+    scene = load(name)
+    asked = film_size(scene.size, size) if isinstance(size, int) else size
+    spectra = [group.spectrum for group in scene.groups.values()]
+    if ready := find_ready(scene, scene.size, asked, spectra):
+        return ready.transport
+    sides = "" if asked is None else f" at {asked[0]} x {asked[1]} pixels"
+    at = asked or scene.size
+    raise InputError(
+        f"path: no light of {name}{sides} is there already; allowed: {', '.join(shipped_scenes())}, at their own "
+        f"size or a whole part of it; render it: rodcone.render({name!r}, {at!r})"
+    )
+
+
+def shipped_scenes() -> list[str]:
+    """Names of the scenes whose light comes with rodcone."""
+    return sorted({path.name.split("-")[0] for path in SHIPPED.glob("*.npz")})
 
 
 def _line(reference: Reference) -> str:

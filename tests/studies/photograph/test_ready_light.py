@@ -2,16 +2,21 @@
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from command_line import call
+from refusal import refusal
 
+import rodcone
 from render.illuminants import illuminant
 from render.loader import Film
 from render.reference import SHIPPED, find_reference, ready_light
 from scenes.catalog import load
-from studies.commands import cli
+from studies.commands import cli, develop
+from studies.explore.memo import go_on
+from studies.explore.source import RenderOptions, open_source
 from studies.photograph import shot
 from studies.photograph.ready_light import BANDS, find_ready
 
@@ -77,6 +82,44 @@ def test_capture_takes_it_and_says_so_and_numbers_or_render_ask_for_a_render(
     for numbers in (["--spp", "4"], ["--render"], ["--size", "33"]):
         with pytest.raises(pytest.fail.Exception, match="rendered"):
             call(["capture", "color_checker", "-o", "shot.tif", *numbers])
+
+
+def test_render_takes_it_too_and_each_limit_of_a_render_asks_for_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(develop, "render_transport", lambda *_, **__: pytest.fail("rendered"))
+    code, out, err = call(["render", "color_checker", "-o", "small.exr", "--width", "128", "--light", "A", "--json"])
+    facts = json.loads(out)
+    assert (code, facts["size"]) == (0, [85, 128])
+    assert facts["integrator"].startswith("reference light")
+    assert "light: color_checker-340x512x20-" in err
+    limits = ["--spp 4", "--noise 0.1", "--max-seconds 1", "--max-depth 2", "--seed 1", "--cache kept", "--denoise"]
+    for numbers in ("--render", "--bands 380:780:40", "--width 33", "--light sodium_low", *limits):
+        with pytest.raises(pytest.fail.Exception, match="rendered"):
+            call(["render", "color_checker", "-o", "small.exr", *numbers.split()])
+
+
+def test_the_explorer_takes_it_and_its_python_opens_the_same_light() -> None:
+    source = open_source("color_checker", RenderOptions(size=128))
+    (state,) = source.states(go_on)
+    assert state.last
+    assert "--render renders it anew" in source.notes[0]
+    names: dict[str, Any] = {}
+    exec("import rodcone\n" + state.code, names)
+    assert np.array_equal(names["transport"].radiance, state.transport.radiance)
+    for options in ({"spp": 2}, {"seed": 1}, {"render": True}, {"band_nm": 100.0}):
+        states = open_source("color_checker", RenderOptions(size=128, **options))
+        assert "rodcone.render(" in next(states.states(go_on)).code
+
+
+def test_a_scenes_light_goes_by_its_name() -> None:
+    transport = rodcone.load_transport("color_checker", size=128)
+    assert transport.light.mean.shape == (1, 20, 85, 128)
+    assert rodcone.load_transport("siemens_star").light.mean.shape == (1, 20, 512, 512)
+    refusal(rodcone.load_transport, "color_checker", size=100, match=r"100 pixels is there.*rodcone\.render\('color_ch")
+    refusal(rodcone.load_transport, "metamers", match=r"no light of metamers is there already; allowed: color_checker")
+    refusal(rodcone.load_transport, "seen.exr", size=64, match="size: 64 for 'seen.exr'")
 
 
 def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
