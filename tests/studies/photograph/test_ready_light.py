@@ -9,7 +9,7 @@ import pytest
 from command_line import call
 from refusal import refusal
 
-import rodcone
+import rodcone as public
 from render.illuminants import illuminant
 from render.loader import Film
 from render.reference import SHIPPED, find_reference, ready_light
@@ -114,12 +114,12 @@ def test_the_explorer_takes_it_and_its_python_opens_the_same_light() -> None:
 
 
 def test_a_scenes_light_goes_by_its_name() -> None:
-    transport = rodcone.load_transport("color_checker", size=128)
+    transport = public.load_transport("color_checker", size=128)
     assert transport.light.mean.shape == (1, 20, 85, 128)
-    assert rodcone.load_transport("siemens_star").light.mean.shape == (1, 20, 512, 512)
-    refusal(rodcone.load_transport, "color_checker", size=100, match=r"100 pixels is there.*rodcone\.render\('color_ch")
-    refusal(rodcone.load_transport, "metamers", match=r"no light of metamers is there already; allowed: color_checker")
-    refusal(rodcone.load_transport, "seen.exr", size=64, match="size: 64 for 'seen.exr'")
+    assert public.load_transport("siemens_star").light.mean.shape == (1, 20, 512, 512)
+    refusal(public.load_transport, "color_checker", size=100, match=r"100 pixels is there.*rodcone\.render\('color_ch")
+    refusal(public.load_transport, "metamers", match=r"no light of metamers is there already; allowed: color_checker")
+    refusal(public.load_transport, "seen.exr", size=64, match="size: 64 for 'seen.exr'")
 
 
 def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
