@@ -43,8 +43,8 @@ def explore(
     opened = open_source(source, options)
     by_name = replace(options, trust_scene=False, define=())  # a scene of the catalogue takes neither
     scenes = {name: partial(open_source, name, by_name) for name in names()} | {opened.title: lambda: opened}
-    say(*opened.notes)
     with listen(port) as listener:
+        say(*opened.notes)
         session = Session(opened, scenes)
         server, address = make_server(session, listener)
         print(address, flush=True)
