@@ -142,6 +142,7 @@ def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:
     """Return the mosaic's channels, or raise `InputError` where they are others."""
     if raw.channels != names:
         raise InputError(
-            f"raw: mosaic {raw.cfa} holds {raw.channels}; allowed here: {names}; use the other camera's pipeline"
+            f"raw: mosaic {raw.cfa} holds {raw.channels}; allowed here: {names}; use ple, which develops any mosaic of "
+            "R, G, B and W"
         )
     return names
