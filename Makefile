@@ -11,7 +11,7 @@ DEMO_OUT ?= out/demo
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
-.PHONY: help demo test test-all test-any-cpu verify hard-cases faults docs fuzz lint clean FORCE
+.PHONY: help demo test test-all test-any-cpu verify hard-cases results faults docs fuzz lint clean FORCE
 
 help:
 	@echo "make demo    set up $(VENV), render the still life from moonlight to daylight, write $(DEMO_OUT)/report.html"
@@ -20,6 +20,7 @@ help:
 	@echo "make test-any-cpu  the same as other processors add up; CPU=NAME one of them, CPU=by-date today's"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
 	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
+	@echo "make results  every figure and table that README and the pages quote: hours, goes on where it was ended; PART=NAME one"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
 	@echo "make docs    the documentation, with its figures made anew where the code has changed, as out/site"
 	@echo "make lint    ruff, mypy and the import contracts alone"
@@ -64,6 +65,10 @@ out/verify/%: $(CODE) | $(VENV)/installed-dev
 
 hard-cases: $(VENV)/installed-dev
 	@PYTHONPATH=tests $(BIN)/python -m hard.page
+
+# docs/results/parts.toml lists the parts; PART="one two" makes these.
+results: $(VENV)/installed-dev
+	@$(BIN)/python docs/make/make_results.py $(PART)
 
 faults: $(VENV)/installed-dev
 	@$(BIN)/python tests/faults/plant_faults.py

@@ -115,10 +115,13 @@ def decisions_page() -> str:
 
 def results_page(path: Path) -> str:
     """Table of a results file, with a link to the file."""
-    head, *rows = csv.reader(path.read_text("utf-8").splitlines())
+    text = path.read_text("utf-8")
+    origin = text.partition("\n")[0].removeprefix("# ") if text.startswith("# ") else ""
+    head, *rows = csv.reader(text.splitlines()[bool(origin) :])
     lines = [f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in row)}</tr>" for row in rows]
     top = f"<table><thead><tr>{''.join(f'<th>{escape(cell)}</th>' for cell in head)}</tr></thead><tbody>"
     title = f"# Table: {path.stem.replace('_', ' ')}\n\nThe same as a file: [{path.name}]({path.name}).\n\n"
+    title += f"Made by rodcone {origin}.\n\n" if origin else ""
     return title + "\n".join([top, *lines, "</tbody></table>\n"])
 
 

@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import scipy
 from numpy.typing import NDArray
-from page_parts import RESULTS, csv_text, run, write_page
+from page_parts import RESULTS, csv_text, run, unstamped, write_page
 from skimage.color import rgb2lab
 
 from isp.design.expected_error import expected_error, sampled
@@ -259,7 +259,7 @@ def known_order() -> str:
 def main(*commit_and_network: str) -> None:
     """Write all, with gains simulated anew where a commit and a network are given."""
     FOLDER.mkdir(parents=True, exist_ok=True)
-    kept = list(csv.DictReader((RESULTS / "design.csv").read_text().splitlines()))
+    kept = list(csv.DictReader(unstamped((RESULTS / "design.csv").read_text()).splitlines()))
     write(with_expected(gains(simulated(*commit_and_network)) if commit_and_network else kept))
 
 

@@ -1,5 +1,10 @@
-"""Parts of a page that a program writes, between comments in the page's own text; full tables go beside it as CSV."""
+"""What the programs that write pages share: parts of a page, tables beside it, and figures that sentences quote.
 
+A part of a page stands between ``<!-- NAME -->`` and ``<!-- end -->``; the program that makes the page writes it. A
+figure within a sentence stands between ``<!-- =NAME -->`` and ``<!-- / -->``; docs/results/quoted.csv holds its text.
+"""
+
+import csv
 import json
 import re
 import sys
@@ -19,6 +24,65 @@ Parts = tuple[dict[str, str], str, str]  # of a page, by name; its figure as SVG
 
 csv_text = partial(csv_of, line_end="\n")  # as git keeps the results' tables
 RESULTS = Path(__file__).resolve().parents[1] / "results"
+ROOT = RESULTS.parents[1]
+QUOTED = RESULTS / "quoted.csv"
+QUOTE = re.compile(r"(<!-- =(?P<name>[\w.]+) -->)(?P<text>.*?)(<!-- / -->)", re.DOTALL)
+STAMP = "# "  # begins the line of a table that says where it comes from
+
+
+def stamped(table: str, origin: str) -> str:
+    """Return a CSV table with the line that says where it comes from, in place of an older one."""
+    return f"{STAMP}{origin}\n{unstamped(table)}"
+
+
+def unstamped(table: str) -> str:
+    """Return a CSV table without the line that says where it comes from."""
+    return table.partition("\n")[2] if table.startswith(STAMP) else table
+
+
+def quoted_pages() -> list[Path]:
+    """Return the pages that may quote: README and everything in docs."""
+    return [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+
+
+def read_quoted() -> dict[str, str]:
+    """Return the figures that sentences may quote, by name."""
+    if not QUOTED.is_file():
+        return {}
+    return {row["name"]: row["text"] for row in csv.DictReader(QUOTED.read_text("utf-8").splitlines())}
+
+
+def with_quotes(text: str, figures: Mapping[str, str]) -> str:
+    """Return a page's text with each quoted figure as it is now.
+
+    Raises
+    ------
+    InputError
+        For a figure that nothing makes.
+    """
+
+    def quote(place: re.Match[str]) -> str:
+        name = place["name"]
+        if name not in figures:
+            raise InputError(f"{name}: no part of `make results` makes it; allowed: the names in {QUOTED.name}")
+        return f"{place[1]}{figures[name]}{place[4]}"
+
+    return QUOTE.sub(quote, text)
+
+
+def quote_everywhere() -> None:
+    """Write the figures of quoted.csv into every page that quotes them."""
+    figures = read_quoted()
+    texts = {page: page.read_text("utf-8") for page in quoted_pages()}
+    new = {page: with_quotes(text, figures) for page, text in texts.items()}
+    write_files({page: text for page, text in new.items() if text != texts[page]})
+
+
+def write_quoted(prefix: str, figures: Mapping[str, str]) -> None:
+    """Write a part's figures, by name after the prefix and a point, in place of those that it had."""
+    kept = {name: text for name, text in read_quoted().items() if not name.startswith(f"{prefix}.")}
+    now = sorted({**kept, **{f"{prefix}.{name}": text for name, text in figures.items()}}.items())
+    write_files({QUOTED: csv_text(["name", "text"], now)})
 
 
 def fill(text: str, parts: Mapping[str, str]) -> str:

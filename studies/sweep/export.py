@@ -156,7 +156,7 @@ def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str])
     """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
     cells = [[*by, *map(_plain, show)], ["---"] * len(by) + ["---:"] * len(show)]
     for line in table:
-        figures = [_mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
+        figures = [mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
         cells.append([*map(_plain, line.at), *figures])
     return "\n".join(f"| {' | '.join(row)} |" for row in cells)
 
@@ -200,7 +200,8 @@ def _figure(row: Row, name: str, folder: Path) -> float | None:
     return float(measure(picture, patch_masks(load(scene), (picture.shape[0], picture.shape[1]))).mean())
 
 
-def _mean_text(mean: float | None, half: float | None) -> str:
+def mean_text(mean: float | None, half: float | None) -> str:
+    """Return a mean to three digits, `` ± `` and its half width; no half width where the seeds don't differ."""
     if mean is None:
         return "-"
     if abs(mean) < SAME:

@@ -3,7 +3,7 @@
 import csv
 
 import pytest
-from page_parts import RESULTS, fill
+from page_parts import RESULTS, fill, unstamped
 from real_cameras import PAGE, REASONS, REPORTS, rows_of
 
 from sensor.cameras.emva_report import read_report
@@ -35,7 +35,7 @@ def test_the_two_whole_reports_are_recovered_in_figures_that_are_no_input():
 
 def test_the_page_in_docs_holds_every_report_and_the_table_its_numbers():
     text = PAGE.read_text("utf-8")
-    rows = list(csv.DictReader((RESULTS / "real_cameras.csv").read_text("utf-8").splitlines()))
+    rows = list(csv.DictReader(unstamped((RESULTS / "real_cameras.csv").read_text("utf-8")).splitlines()))
     for report in FOUND.values():
         assert f"| {report.camera} |" in text
         assert report.source

@@ -12,6 +12,7 @@ from hard.invariants_raw import allowed_errors, bias
 from hard.invariants_symmetry import mirrored
 from hard.page import PAGE, catalogue, limits, summary
 from loop import loop
+from page_parts import unstamped
 
 from rodcone.jit import backend
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map
@@ -121,8 +122,8 @@ def test_the_tables_tell_shares_limits_and_counts():
 
 def test_the_page_in_the_docs_is_of_this_catalogue_and_its_limits():
     text = PAGE.read_text(encoding="utf-8")
-    with (PAGE.parent / "results" / "hard_cases.csv").open(encoding="utf-8", newline="") as file:
-        setups = {row["case"]: row["how it is set up"] for row in DictReader(file)}
+    table = unstamped((PAGE.parent / "results" / "hard_cases.csv").read_text("utf-8"))
+    setups = {row["case"]: row["how it is set up"] for row in DictReader(table.splitlines())}
     assert setups == {case.name: case.setup for case in CASES}
     part = text.partition("## Limits")[2].partition("##")[0]
     assert sorted(re.findall(r"^\| `([\w.]+)`", part, re.MULTILINE)) == sorted(name for name, _ in LIMITS)
