@@ -165,7 +165,16 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),
         "light_for_snr.exposure_s": _some_seconds,
-        **dict.fromkeys(("load_radiance.light", "load_transport.light", "light_for_snr.light", "expect.light"), _TEXT),
+        **dict.fromkeys(
+            (
+                "load_radiance.light",
+                "load_radiance.spectra",
+                "load_transport.light",
+                "light_for_snr.light",
+                "expect.light",
+            ),
+            _TEXT,
+        ),
         "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
         "raw": _RAW,

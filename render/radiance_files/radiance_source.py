@@ -82,7 +82,7 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
     return sum(pixels), bands[0], groups[0]
 
 
-def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
+def load_radiance(path: str | Path, light: str = "D65", spectra: str = photo.SURFACES) -> SpectralRadiance:
     """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube, a photograph, reference light (``.npz``).
 
     Parameters
@@ -93,6 +93,8 @@ def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
         colours (`render.radiance_files.photo.read_photo`).
     light : str
         Illuminant of reflectances, of which 1 has 100 cd/m^2.
+    spectra : str
+        Of a photograph's colours, ``surfaces`` or ``srgb_basis``, as `read_photo` takes it.
 
     Raises
     ------
@@ -100,22 +102,25 @@ def load_radiance(path: str | Path, light: str = "D65") -> SpectralRadiance:
         For another ending, and as `read_exr`, `read_iset_scene`, `read_cube` and `read_photo`.
     """
     lit = is_reflectance(path) or is_reference(path)
-    return load_picture(path, illuminant(light)).relight() if lit else _read(path)
+    return load_picture(path, illuminant(light), spectra).relight() if lit else _read(path)
 
 
-def load_picture(path: str | Path, light: Spectrum, *, relit: bool = False) -> Transport:
+def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACES, *, relit: bool = False) -> Transport:
     """Read a file as `load_radiance` does, as light transport: reflectances can be lit by another light afterwards.
 
     Parameters
     ----------
     light : Spectrum
         Of 1 cd/m^2; for reflectances, and for radiance that is `relit`. Reference light has lights of its own.
+    spectra : str
+        As of `load_radiance`.
     relit : bool
         Whether the light takes the place of the lamp that a file of radiance states.
     """
     if is_reference(path):
         return open_reference(path).transport
-    radiance = _read(path)
+    is_photo = Path(path).suffix.lower() in photo.EXTENSIONS
+    radiance = photo.read_photo(path, spectra) if is_photo else _read(path)
     transport = as_transport(radiance.relight(light) if relit else radiance)
     if not is_reflectance(path):
         return transport

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from render.engine import render
 from render.geometry import horizontal_view_deg
+from render.radiance_files.photo import SURFACES
 from render.spectrum import Spectrum, fine_bands
 from render.transport import Transport
 from rodcone.types import Floats
@@ -59,7 +60,7 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
     A picture file keeps its own bands.
     """
     if opened.scene is None:
-        transport = open_radiance_file(opened.choice.source, opened.white)[0]
+        transport = open_radiance_file(opened.choice.source, opened.white, opened.choice.spectra or SURFACES)[0]
         single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
         return Pilot(opened, transport, {len(single): single})
     nm, width_nm = reference_bands(opened, study)

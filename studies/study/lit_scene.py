@@ -15,6 +15,7 @@ from render.engine import render
 from render.illuminants import illuminant, spectral_luminance
 from render.loader import Film
 from render.radiance import SpectralRadiance
+from render.radiance_files.photo import EXTENSIONS, SPECTRA, SURFACES
 from render.radiance_files.radiance_source import files_of, is_radiance_file, is_reference
 from render.reference import find_reference, require_agreement
 from render.scene import Scene, film_size
@@ -22,7 +23,7 @@ from render.scene_range import check_range
 from render.spectrum import Spectrum
 from render.transport import Transport, replaceable_luminance
 from rodcone.digests import digest_file, digest_inputs
-from rodcone.errors import InputError, require_absent, require_keys
+from rodcone.errors import InputError, require_absent, require_keys, require_name
 from rodcone.jit import backend
 from sensor.config import check_frame
 from sensor.presets import preset
@@ -94,13 +95,21 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         place = f"for {choice.source}, a picture without surfaces"
         require_absent(place, extend=choice.extend, chart=choice.chart, define=choice.define, spp=choice.spp)
         check_radiance_file(choice.source, study.levels)
+        if choice.spectra is not None:
+            require_name("spectra", choice.spectra, SPECTRA)
+            if Path(choice.source).suffix.lower() not in EXTENSIONS:
+                require_absent(
+                    f"for {choice.source}, which has its own; allowed: with a photograph", spectra=choice.spectra
+                )
         identity = digest_inputs(
             [
                 [digest_file(file) for file in files_of(choice.source)],
                 None if choice.light is None else illuminant(choice.light),
+                choice.spectra,
             ]
         )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
+    require_absent(f"for {choice.source!r}; allowed: with a photograph", spectra=choice.spectra)
     opened = open_scene(
         choice.source, extend=choice.extend, light=choice.light, chart=choice.chart, define=choice.define
     )
@@ -152,7 +161,7 @@ def make_transport(
         Where Ctrl-C ended the render; what was rendered is in `cache`.
     """
     if opened.scene is None or model is None:
-        transport, assumed = open_radiance_file(opened.choice.source, opened.white)
+        transport, assumed = open_radiance_file(opened.choice.source, opened.white, opened.choice.spectra or SURFACES)
         if study.render.size is not None:
             assumed.append(
                 f"{Path(opened.choice.source).name}: a picture keeps its own pixels; render.size is for scenes"

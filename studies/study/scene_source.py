@@ -7,7 +7,7 @@ from pathlib import Path
 
 from render.illuminants import illuminant
 from render.radiance_files.file_checks import require_file
-from render.radiance_files.photo import EXTENSIONS
+from render.radiance_files.photo import EXTENSIONS, SRGB_BASIS, SURFACES
 from render.radiance_files.radiance_source import (
     ENDINGS,
     REFERENCE,
@@ -30,6 +30,11 @@ _OTHER_FILES = {
     **dict.fromkeys(ENDINGS, "a picture, for rodcone capture or a study"),
     REFERENCE: "reference light, for rodcone capture and explore; a study has render.reference = true",
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
+}
+
+_UPSAMPLED = {
+    SURFACES: "reflectance of measured surfaces that looks like it (Otsu et al. 2018)",
+    SRGB_BASIS: "mixture of sRGB's three basis curves (Mallett and Yuksel 2019), which one matrix undoes without error",
 }
 
 
@@ -163,8 +168,15 @@ def check_radiance_file(path: str | Path, levels: Iterable[str]) -> None:
             raise InputError(f"level: {level!r} needs a reference plane, which a picture file hasn't; give it in cd/m2")
 
 
-def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport, list[str]]:
-    """Transport of a picture file, whose reflectances `white` lights, and what had to be assumed.
+def open_radiance_file(path: str | Path, white: AdoptedWhite, spectra: str = SURFACES) -> tuple[Transport, list[str]]:
+    """Load a picture file as a transport, and say what had to be assumed.
+
+    Parameters
+    ----------
+    white : AdoptedWhite
+        Light of the file's reflectances.
+    spectra : str
+        Of a photograph's colours, as `render.radiance_files.photo.read_photo` takes it.
 
     Raises
     ------
@@ -173,7 +185,7 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport
     """
     with warnings.catch_warnings(record=True) as file_warnings:
         warnings.simplefilter("always")
-        transport = load_picture(path, white.spectrum, relit=white.relit)
+        transport = load_picture(path, white.spectrum, spectra, relit=white.relit)
     name = Path(path).name
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a picture needs so many pixels a side; crop or scale it")
@@ -182,10 +194,7 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite) -> tuple[Transport
         assumed.append(f"{name}: reference light, {transport.spp:.0f} samples a pixel")
         return transport, assumed
     if Path(path).suffix.lower() in EXTENSIONS:
-        assumed.append(
-            f"{name}: a photograph doesn't tell spectra; each colour stands for the reflectance that the basis of "
-            "Mallett and Yuksel (2019) gives it"
-        )
+        assumed.append(f"{name}: a photograph doesn't tell spectra; each colour stands for a {_UPSAMPLED[spectra]}")
     if transport.relative_mc_error:
         assumed.append(
             f"{name}: it was rendered with noise of {transport.relative_mc_error:.1%} of the value in a pixel and "

@@ -65,6 +65,9 @@ class SceneChoice:
         ``NAME=VALUE`` of a Mitsuba scene's $parameters.
     spp : int, optional
         Samples a pixel, in place of `RenderLimits.spp`.
+    spectra : str, optional
+        Of a photograph's colours, ``surfaces``, which is the default, or ``srgb_basis``
+        (`render.radiance_files.photo.read_photo`).
     """
 
     source: str
@@ -73,6 +76,7 @@ class SceneChoice:
     chart: str | None = None
     define: tuple[str, ...] = ()
     spp: Annotated[int | None, SPP] = None
+    spectra: str | None = None
 
     @property
     def label(self) -> str:

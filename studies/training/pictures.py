@@ -1,7 +1,8 @@
 """Pictures to train on: full-resolution signals of every channel of a camera, under many lights.
 
 Generated ones (dead leaves, after A. B. Lee, D. Mumford, J. Huang, "Occlusion models for natural images", IJCV 41,
-2001, and gratings), and photographs from scikit-image's wheel, which become spectra by `render.radiance_files.photo`.
+2001, and gratings), and photographs from scikit-image's wheel, which become spectra by
+`render.radiance_files.surface_spectra.srgb_basis`.
 None of the project's scenes is among them: what is judged is never trained on.
 """
 
@@ -15,7 +16,7 @@ from skimage import data
 from skimage.draw import ellipse, polygon
 
 from render.illuminants import illuminant
-from render.radiance_files.photo import srgb_basis
+from render.radiance_files.surface_spectra import srgb_basis
 from render.spectrum import Floats, band_widths, photons_per_joule
 from rodcone.colour_spaces import decode_srgb
 from scenes.reflectances import band, edge, grey

@@ -24,8 +24,8 @@ from render.loader import INTEGRATOR, Film, variant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import read_exr, write_exr
 from render.radiance_files.iset import read_iset_scene
-from render.radiance_files.photo import srgb_basis
 from render.radiance_files.radiance_source import load_radiance
+from render.radiance_files.surface_spectra import srgb_basis
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from render.user_scene.scene_file import load_scene_file
 from scenes.catalog import load

@@ -11,7 +11,7 @@ from refusal import refusal
 
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.radiance_files.photo import MOST_SIDE, read_photo, srgb_basis
+from render.radiance_files.photo import MOST_SIDE, read_photo
 from render.radiance_files.radiance_source import (
     as_transport,
     extent_of,
@@ -19,6 +19,7 @@ from render.radiance_files.radiance_source import (
     is_reflectance,
     load_radiance,
 )
+from render.radiance_files.surface_spectra import srgb_basis
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, tristimulus
 from rodcone.colour_spaces import D65_XY, decode_srgb, xyz_from_xy, xyz_to_srgb
 
@@ -95,7 +96,8 @@ def test_under_d65_the_colours_of_a_photograph_come_back(tmp_path: Path) -> None
     levels = np.linspace(0, 255, 6)
     given = np.stack(np.meshgrid(levels, levels, levels), axis=-1).reshape(12, 18, 3).round().astype(np.uint8)
     Image.fromarray(given).save(tmp_path / "colours.png")
-    radiance = load_radiance(tmp_path / "colours.png")
+    with pytest.warns(UserWarning, match="sRGB's basis"):
+        radiance = load_radiance(tmp_path / "colours.png")
     xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm) / 100.0
     assert xyz[-1, -1] == pytest.approx(xyz_from_xy(D65_XY), abs=2e-3)  # white, of 100 cd/m^2
     assert np.abs(xyz_to_srgb(xyz) - decode_srgb(given / 255)).max() < 0.0125  # of white; in bands of 10 nm
@@ -105,14 +107,16 @@ def test_grey_deep_turned_and_transparent_pictures_are_read(tmp_path: Path) -> N
     ramp = np.linspace(0, 65535, 20).reshape(4, 5).astype(np.uint16)
     Image.fromarray(ramp).save(tmp_path / "deep.png")
     Image.fromarray((ramp >> 8).astype(np.uint8)).save(tmp_path / "grey.png")
-    assert read_photo(tmp_path / "deep.png").values[3, 4] == pytest.approx(np.ones(40), abs=2e-3)
+    white = read_photo(tmp_path / "deep.png", "srgb_basis").values[3, 4]
+    assert white == pytest.approx(np.ones(40), abs=2e-3)
     assert read_photo(tmp_path / "grey.png").values == pytest.approx(read_photo(tmp_path / "deep.png").values, abs=0.01)
     exif = Image.Exif()
     exif[0x0112] = 6  # turned by a quarter
     Image.fromarray((ramp >> 8).astype(np.uint8)).save(tmp_path / "turned.jpg", exif=exif)
     assert read_photo(tmp_path / "turned.jpg").shape == (5, 4)
     Image.new("RGBA", (20, 16), (255, 0, 0, 0)).save(tmp_path / "clear.png")
-    assert read_photo(tmp_path / "clear.png").shape == (16, 20)
+    with pytest.warns(UserWarning, match="sRGB's basis"):
+        assert read_photo(tmp_path / "clear.png").shape == (16, 20)
     assert is_reflectance(tmp_path / "clear.png")
     assert extent_of(tmp_path / "clear.png") == (320, 40, 1)
 

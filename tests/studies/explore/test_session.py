@@ -363,7 +363,7 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
 def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path: Path):
     path = tmp_path / "seen.png"
     rng = np.random.default_rng(1)
-    path.write_bytes(to_png(rng.integers(50, 200, (16, 20, 3), np.uint8)))
+    path.write_bytes(to_png(rng.integers(130, 170, (16, 20, 3), np.uint8)))
     source = open_source(str(path), RenderOptions())
     (state,) = source.states(go_on)
     assert source.groups == {"light": False}

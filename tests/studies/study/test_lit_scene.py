@@ -5,16 +5,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
 from refusal import refusal
 
 from render.error_estimates import Halves
 from render.illuminants import illuminant, spectral_luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
-from render.radiance_files.radiance_source import as_transport
+from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.scene import LightGroup
 from render.transport import Transport
 from scenes.catalog import load
+from studies.budget.pilot import make_pilot
 from studies.budget.plan import plan
 from studies.budget.starting_points import plan_from_settings
 from studies.commands.sweep import estimate
@@ -33,6 +35,7 @@ from studies.study.study import OWN, RenderLimits, SceneChoice, Study
 
 NM = np.arange(385.0, 780.0, 10.0)
 STUDY = Study((SceneChoice("still_life"),), ("25cd/m2",))
+STUDY_OF_FILES = Study((SceneChoice("still_life"),), ("1cd/m2",))
 
 
 def transport(luminances: tuple[float, float] = (100.0, 3.0)) -> Transport:
@@ -142,6 +145,37 @@ def test_what_is_assumed_of_a_file_is_told(tmp_path: Path) -> None:
     assert all(note.startswith("a.exr: ") for note in notes)
     assert white.spectrum.band_average([450.0], [5.0]) > white.spectrum.band_average([650.0], [5.0])
     assert [note for note in open_radiance_file(path, file_white(path, "D65"))[1] if "D65" in note] == []
+
+
+def test_a_photographs_spectra_go_by_name(tmp_path: Path) -> None:
+    Image.new("RGB", (16, 16), (150, 140, 120)).save(tmp_path / "pale.png")
+    lit, said, identity = [], [], []
+    for spectra in (None, "surfaces", "srgb_basis"):
+        choice = SceneChoice(str(tmp_path / "pale.png"), spectra=spectra)
+        study = Study((choice,), ("1cd/m2",))
+        opened = open_choice(choice, study)
+        transport, notes = make_transport(opened, study, None, tmp_path, lambda share, error: None)
+        pilot = make_pilot(opened, study, (7,)).transport
+        assert np.array_equal(pilot.relight().values, transport.relight().values)
+        lit.append(transport.relight().values[0, 0])
+        said.append([note for note in notes if "doesn't tell spectra" in note])
+        identity.append(opened.identity)
+    assert lit[0] == pytest.approx(lit[1], rel=1e-12)
+    assert np.abs(lit[2] / lit[0] - 1).max() > 0.02
+    basis = load_radiance(tmp_path / "pale.png", spectra="srgb_basis")
+    assert lit[2] == pytest.approx(basis.values[0, 0], rel=1e-6)
+    assert said[0] == said[1]
+    assert ["Otsu" in said[0][0], "Mallett" in said[2][0]] == [True, True]
+    assert identity[2] not in identity[:2]
+
+
+def test_spectra_are_a_photographs_alone(tmp_path: Path) -> None:
+    exr = SceneChoice(str(ramp(tmp_path / "a.exr")), spectra="srgb_basis")
+    refusal(open_choice, exr, STUDY_OF_FILES, match="spectra: 'srgb_basis' for .*which has its own")
+    refusal(open_choice, SceneChoice("still_life", spectra="surfaces"), STUDY, match="allowed: with a photograph")
+    Image.new("RGB", (16, 16)).save(tmp_path / "a.png")
+    wrong = SceneChoice(str(tmp_path / "a.png"), spectra="surface")
+    refusal(open_choice, wrong, STUDY_OF_FILES, match="spectra: .*did you mean 'surfaces'")
 
 
 @pytest.mark.parametrize("size", [None, 16])

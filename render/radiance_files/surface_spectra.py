@@ -1,0 +1,137 @@
+"""Reflectances that surfaces have, from colours: the eight clusters of measured spectra of Otsu et al. (2018).
+
+H. Otsu, M. Yamamoto, T. Hachisuka, "Reproducing spectral reflectances from tristimulus colours", Computer Graphics
+Forum 37(6), 2018; the data are colour-science's. A colour's chromaticity under D65 picks a cluster, whose mean m and
+three principal curves B give the reflectance with exactly that colour. Ours: it is that of the cluster's own mean
+luminance Y_m, scaled, so that shade changes no spectrum,
+
+    r(XYZ) = (Y / Y_m) r_0 + B M^-1 XYZ,   r_0 = m - B M^-1 XYZ_m,
+
+with M the colours of B: one matrix for each cluster. Where r leaves 0 to 1 the reflectance of sRGB's basis, which never
+does, takes the least share that brings it back: the colour stays what it is. From 730 nm on, where the data end, curves
+keep their last value.
+"""
+
+from functools import cache
+
+import numpy as np
+from numpy.typing import NDArray
+
+from render.illuminants import illuminant
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, tristimulus
+from rodcone.colour_spaces import SRGB_TO_XYZ
+from rodcone.optional import quietly_imported
+from rodcone.types import Floats
+
+Spectra = NDArray[np.float32]
+STRIP = 1 << 15  # pixels that are worked on together, to stay in a core's cache
+
+
+def srgb_basis(wavelength_nm: Floats) -> Floats:
+    """Reflectances of red, green and blue of sRGB at wavelengths within 380-780 nm, shape (3, band).
+
+    The basis is that of I. Mallett and C. Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance",
+    EGSR 2019: three reflectances that add up to white.
+    """
+    basis = quietly_imported("colour.recovery").MSDS_BASIS_FUNCTIONS_sRGB_MALLETT2019
+    return np.stack([np.interp(wavelength_nm, basis.wavelengths, basis.values[:, index]) for index in range(3)])
+
+
+def surface_reflectances(linear_srgb: Floats) -> tuple[NDArray[np.float32], Floats]:
+    """Reflectances of colours in the bands of `DEFAULT_WAVELENGTH_NM`, and how much of each is of sRGB's basis.
+
+    Parameters
+    ----------
+    linear_srgb : (..., 3) float64
+        0 to 1, under D65.
+
+    Returns
+    -------
+    (..., band) float32
+        0 to 1.
+    (...) float64
+        0 where the clusters hold the colour, up to 1.
+    """
+    colours = np.asarray(linear_srgb, dtype=np.float32).reshape(-1, 3)
+    maps, basis = _maps(), srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
+    result, share = np.empty((len(colours), len(basis)), np.float32), np.zeros(len(colours))
+    for first in range(0, len(colours), STRIP):
+        strip = slice(first, first + STRIP)
+        number = cluster_of(colours[strip] @ SRGB_TO_XYZ.T.astype(np.float32))
+        for cluster in np.flatnonzero(np.bincount(number)):
+            within = np.flatnonzero(number == cluster)
+            of_cluster = colours[strip][within].T
+            spectra = _mixed(maps[cluster], of_cluster)
+            beyond = np.flatnonzero((spectra.min(axis=0) < 0) | (spectra.max(axis=0) > 1))
+            if beyond.size:
+                mixed, taken = _brought_back(spectra[:, beyond], _mixed(basis, of_cluster[:, beyond]))
+                spectra[:, beyond] = mixed
+                share[strip][within[beyond]] = taken
+            result[strip][within] = spectra.T
+    shape = np.shape(linear_srgb)[:-1]
+    return result.reshape(*shape, -1), share.reshape(shape)
+
+
+def _mixed(curves: Spectra, amounts: Spectra) -> Spectra:
+    """Add curves (band, 3) by amounts (3, colour), shape (band, colour); BLAS takes three times as long for three."""
+    return np.asarray(curves[:, :1] * amounts[0] + curves[:, 1:2] * amounts[1] + curves[:, 2:] * amounts[2])
+
+
+def _brought_back(outside: Spectra, inside: Spectra) -> tuple[Spectra, Spectra]:
+    """Mix spectra that leave 0 to 1 with the least share of ones that don't, shapes (band, colour); also the share."""
+    limit = np.clip(outside, 0, 1)
+    needed = np.divide(limit - outside, inside - outside, out=np.zeros_like(outside), where=limit != outside)
+    taken = np.clip(needed.max(axis=0), 0, 1)
+    return np.clip(outside + taken * (inside - outside), 0, 1), taken
+
+
+def cluster_of(xyz: NDArray[np.floating]) -> NDArray[np.intp]:
+    """Number of the cluster that holds each colour's chromaticity, shape (colour,); black goes with white."""
+    x, y, z = xyz.T
+    total = x + y + z
+    lit = total > 0
+    chromaticity = [
+        np.divide(part, total, out=np.full_like(total, at), where=lit) for part, at in ((x, 0.3127), (y, 0.3290))
+    ]
+    lines, cluster = _selector()
+    above = np.zeros(len(xyz), dtype=np.intp)
+    for bit, (value, axis) in enumerate(lines):
+        above += (chromaticity[axis] > value) * (1 << bit)
+    return cluster[above]
+
+
+@cache
+def _selector() -> tuple[list[tuple[float, int]], NDArray[np.intp]]:
+    """Lines that part the clusters, (value, axis: x 0, y 1), and the cluster by which of them a colour is above.
+
+    The data's tree has a row for each line: its value, its axis, and what lies at or below it and above it: a cluster,
+    or less than 0 the row of the next line.
+    """
+    tree = quietly_imported("colour.recovery").SELECTOR_ARRAY_OTSU2018
+    cluster = np.empty(1 << len(tree), dtype=np.intp)
+    for above in range(len(cluster)):
+        row = 0
+        while (following := int(tree[row, 2 + (above >> row & 1)])) < 0:
+            row = -following
+        cluster[above] = following
+    return [(float(value), int(axis)) for value, axis in tree[:, :2]], cluster
+
+
+@cache
+def _maps() -> NDArray[np.float32]:
+    """From linear sRGB to reflectance by cluster, shape (cluster, band, 3)."""
+    recovery = quietly_imported("colour.recovery")
+    nm = DEFAULT_WAVELENGTH_NM
+    width = band_widths(nm)
+    light = illuminant("D65").band_average(nm, width)
+    white_y = tristimulus(light, nm, width)[1]
+    known = recovery.SPECTRAL_SHAPE_OTSU2018.wavelengths
+    maps = []
+    for curves, mean in zip(recovery.BASIS_FUNCTIONS_OTSU2018, recovery.CLUSTER_MEANS_OTSU2018, strict=True):
+        in_bands = np.stack([np.interp(nm, known, row) for row in (*curves, mean)])
+        *_, middle = colours = tristimulus(in_bands * light, nm, width) / white_y
+        of_colour = np.linalg.solve(colours[:3], in_bands[:3])  # (XYZ, band)
+        rest = in_bands[3] - middle @ of_colour
+        of_colour[1] += rest / middle[1]
+        maps.append((SRGB_TO_XYZ.T @ of_colour).T)
+    return np.asarray(maps, dtype=np.float32)
