@@ -17,6 +17,7 @@ import sys
 import threading
 import time
 from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -25,7 +26,9 @@ import numpy as np
 from environment import print_environment
 
 import studies.explore.answers as ANSWERS
+import studies.explore.messages as MESSAGES
 from rodcone.jit import backend, dr
+from studies.explore.controls import Controls
 from studies.explore.source import RenderOptions, open_source
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
@@ -115,6 +118,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     print_environment()
     kernels = CompiledKernels()
     source = open_source(asked.scene, RenderOptions(size=asked.size, spp=asked.spp))
+    MESSAGES.Controls = partial(Controls, processor="interleaved")  # the page opens with it, and it answers at once
     with EXPLORE.served(source) as address, CHROME.chromium() as browser:
         page, rng = CHROME.open_page(browser, address), Random(1)
         EXPLORE.settle(page)

@@ -58,6 +58,7 @@ def random_controls(rng: random.Random) -> Controls:
         {}, {}, {"settings": {"sigma_s": rng.uniform(1, 6)}}, {"settings": {"neighbourhood": 11.0, "sigma_d": 3.0}},
         {"mosaic": "bayer", "processor": "bayer"}, {"processor": "rgbw_gindele"}, {"mosaic": "rgbw_4x4"},
     ]  # fmt: skip
+    camera = {"processor": "interleaved"} | rng.choice(cameras)
     made = Controls(
         lamps=rng.choice(lamps),
         level_cd_m2=10 ** rng.uniform(-4, 5),
@@ -71,6 +72,6 @@ def random_controls(rng: random.Random) -> Controls:
         seed=rng.randrange(50),
         exposure_number=rng.randrange(50),
         frames=rng.choice([1, 1, 1, 3]),
-        **rng.choice(cameras),
+        **camera,
     )
     return replace(made, shot_noise=made.seed % 5 > 0)

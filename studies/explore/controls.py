@@ -121,7 +121,7 @@ class Controls:
     bits: int | None = None
     gain: Annotated[float | None, (1.0, MOST_GAIN, "give a factor, 1 where a full well reads the top")] = None
     shot_noise: bool = True
-    processor: str = "interleaved"
+    processor: str = "ple"
     settings: Mapping[str, float] = field(default_factory=dict)
     white_balance: str = AS_SHOT
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
@@ -139,7 +139,12 @@ class Controls:
             require_fields(lamp, f"lamps[{name!r}].")
         require_keys("lens", self.lens, LENS)
         require_keys("pixel", self.pixel, PIXEL)
-        require_keys("settings", self.settings, SETTINGS if self.processor in ADJUSTABLE else ())
+        if self.settings and self.processor not in ADJUSTABLE:
+            raise InputError(
+                f"settings: {', '.join(self.settings)} with {self.processor!r}, which has none; allowed: those of "
+                f"{', '.join(ADJUSTABLE)}; take one of these, or leave settings out"
+            )
+        require_keys("settings", self.settings, SETTINGS)
         options_of(self)
         if self.mosaic not in mosaics_of(PROCESSORS[self.processor]):
             raise InputError(

@@ -13,7 +13,7 @@ from isp.processors.sub_images import EXTRA as BM3D
 from rodcone.child_process import safe_environment
 from rodcone.errors import InputError
 from studies.explore.chain import Development, Image
-from studies.explore.controls import Controls, mosaics_of, options_of
+from studies.explore.controls import Controls, options_of
 
 MOST_SUMS = 65_536 * 4_000  # pixels x neighbourhood^2 x patch that aren't slow: half a second of processor time
 _RUN = "from studies.explore.slow import work; work()"
@@ -27,15 +27,11 @@ def is_slow(processor: str) -> bool:
 def stand_in(controls: Controls, pixels: int) -> Controls:
     """What the page shows, under its own name, until a slow processor is done; the controls themselves if it is quick.
 
-    In place of a slow processor a quick one that develops the mosaic, in place of wide settings the processor's own.
+    In place of a slow processor ``any_mosaic``, which develops every mosaic: two cameras under one slow method stand in
+    by one quick method. In place of wide settings the processor's own.
     """
     if is_slow(controls.processor):
-        quick = next(
-            name
-            for name, processor in PROCESSORS.items()
-            if controls.mosaic in mosaics_of(processor) and not is_slow(name)
-        )
-        return replace(controls, processor=quick, settings={})
+        return replace(controls, processor="any_mosaic", settings={})
     settings = options_of(controls).get("settings")
     if settings and pixels * settings.neighbourhood**2 * settings.patch > MOST_SUMS:
         return replace(controls, settings={})

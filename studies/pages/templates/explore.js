@@ -221,7 +221,7 @@ function render({ model, el }) {
   function begin(header, before) {
     hello = header;
     const own = structuredClone(header.controls);
-    state = { a: own, b: { ...pick(own, CAMERA), mosaic: "bayer", processor: "bayer", settings: {} },
+    state = { a: own, b: { ...pick(own, CAMERA), mosaic: "bayer", settings: {} },
       views: [["a", "picture"], ["a", "truth"]], ...before };
     if (before) state.a = { ...own, ...pick(before.a, [...CAMERA, "level_cd_m2"]) };
     [underWay, waiting].forEach(kinds => Object.keys(kinds).forEach(kind => delete kinds[kind]));

@@ -12,9 +12,11 @@ from loop import loop
 from refusal import refusal
 
 import rodcone as public
-from isp.processors.catalogue import PROCESSORS, libraries
+from isp.processors.catalogue import PROCESSORS, default_processor, libraries
+from isp.processors.piecewise import takes
 from render.spectrum import luminance
 from rodcone.jit import backend, dr
+from sensor.cfa import MOSAICS
 from sensor.optics import form_image
 from studies.explore.answers import python_of
 from studies.explore.chain import development_of, expose_scene, photograph
@@ -57,7 +59,7 @@ LENS_MOVED = {"f_number": 8.0, "defocus_um": 10.0, "diffraction": 2.0, "veiling_
 def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
     """Whatever is kept from the settings before: exposure, chip, light, truth and what develops the raw image."""
     hot = {"hot_pixel_share": 0.05, "hot_pixel_dark_current_e_per_s": 1e4}  # so that each term of a pair is seen
-    start = Controls(exposure="auto:information", pixel=hot)
+    start = Controls(processor="interleaved", exposure="auto:information", pixel=hot)
     memo, transport = Memo(), small_transport()
     first = expose_scene(transport, start, memo)
     others = {x.name for x in fields(Controls)} - set(MOVED)
@@ -219,6 +221,13 @@ def test_every_view_is_a_picture_of_the_frames_size():
         picture = view(shot)
         assert (picture.shape, picture.dtype) == ((40, 48, 3), np.uint8), name
         assert picture.std() > 1, name
+
+
+def test_the_page_opens_with_one_method_for_every_mosaic():
+    """Camera B is camera A with another mosaic: both have the default processor, and stand-ins of one name."""
+    default = Controls()
+    assert {default_processor(tile) for tile in MOSAICS.values() if takes(tile)} == {default.processor}
+    assert {stand_in(replace(default, mosaic=name), 1000).processor for name in ("rgbw", "bayer")} == {"any_mosaic"}
 
 
 def test_each_slow_processor_has_a_quick_one_of_its_mosaic():

@@ -17,7 +17,9 @@ import explore_browser as EXPLORE
 from explore_sample import ran
 
 import render.engine as ENGINE
+import studies.explore.messages as MESSAGES
 from sensor.presets import preset_file
+from studies.explore.controls import Controls
 from studies.explore.messages import hello
 from studies.explore.source import RenderOptions, open_source
 
@@ -29,8 +31,25 @@ MODES = [(1280, False), (1280, True), (1920, False), (1920, True), (390, False),
 
 @pytest.fixture(scope="module")
 def address() -> Iterator[str]:
-    with EXPLORE.served(SCENES["still_life_outdoor"]()) as address:
+    """Address of an explorer whose page opens with a processor that answers at once: no picture comes later."""
+    with pytest.MonkeyPatch.context() as patch, EXPLORE.served(SCENES["still_life_outdoor"]()) as address:
+        patch.setattr(MESSAGES, "Controls", lambda: Controls(processor="interleaved"))
         yield address
+
+
+@pytest.mark.thorough
+def test_the_page_opens_with_two_mosaics_by_one_method(browser):
+    with EXPLORE.served(SCENES["still_life_outdoor"]()) as address:
+        page = CHROME.open_page(browser, address)
+        EXPLORE.settle(page)
+        caption = "document.querySelector('.explore figcaption').textContent"
+        assert ": any_mosaic," in page.evaluate(caption)
+        page.evaluate(WAIT % "document.querySelector('.said button').hidden")
+        assert ": ple," in page.evaluate(caption)
+        chosen = "['mosaic', 'processor'].map(key => document.querySelector(`[data-key=${key}]`).value)"
+        assert page.evaluate(chosen) == ["rgbw", "ple"]
+        page.evaluate("""document.querySelector("[data-key='camera b']").click()""")
+        assert page.evaluate(chosen) == ["bayer", "ple"]
 
 
 @pytest.fixture
@@ -112,7 +131,8 @@ WAIT = "new Promise(done => (function look() { %s ? done() : setTimeout(look, 20
 @pytest.fixture
 def offered() -> Iterator[str]:
     """Address of an explorer of its own: the scene that a page chooses is its session's."""
-    with EXPLORE.served(SCENES["still_life_outdoor"](), SCENES) as address:
+    with pytest.MonkeyPatch.context() as patch, EXPLORE.served(SCENES["still_life_outdoor"](), SCENES) as address:
+        patch.setattr(MESSAGES, "Controls", lambda: Controls(processor="interleaved"))
         yield address
 
 
@@ -135,7 +155,8 @@ def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered,
     assert np.array_equal(EXPLORE.picture(page), ran(code)["picture"])
     page.evaluate("[...document.querySelectorAll('header button')].find(each => each.textContent === 'Reset').click()")
     EXPLORE.settle(page)
-    assert "explorer_view(transport, 'picture')" in EXPLORE.copied_python(page)
+    changed = "explorer_view(\n    transport,\n    'picture',\n    processor='interleaved',\n)"
+    assert changed in EXPLORE.copied_python(page)
     reference = page.evaluate("document.querySelectorAll('figcaption')[1].textContent")
     assert "Reference, 4 samples, render noise" in reference
 
@@ -344,7 +365,7 @@ def test_a_slow_processor_can_be_cancelled_and_its_picture_comes_when_the_slider
     page.evaluate(choose % "ple_rgbw")
     EXPLORE.settle(page)
     assert page.evaluate(waiting)
-    assert "interleaved" in page.evaluate("document.querySelector('.explore figcaption').textContent")
+    assert "any_mosaic" in page.evaluate("document.querySelector('.explore figcaption').textContent")
     page.evaluate("document.querySelector('.said button').click()")
     assert not page.evaluate(waiting)
     page.evaluate(choose % "interleaved")

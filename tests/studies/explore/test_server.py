@@ -184,8 +184,10 @@ NOT_ALLOWED: list[Any] = [
         [], None, {"level_cd_m2": "25"}, {"level_cd_m2": True}, {"level_cd_m2": -1}, {"seed": 0.5}, {"seed": True},
         {"seed": -1}, {"bits": 99.5}, {"lamps": []}, {"lamps": {"sun": 3}}, {"lamps": {"sun": {"power": "x"}}},
         {"lamps": {"sun": {"table": [[1]]}}}, {"lamps": {"sun": {"table": [[1, 2]] * 3000}}}, {"lens": {"nope": 1}},
-        {"pixel": {"pitch_um": 1}}, {"processor": "no"}, {"processor": 3}, {"mosaic": "mono"}, {"exposure": "auto:Z"},
-        {"settings": {"sigma_d": 0}}, {"settings": {"patch": 2}}, {"unknown": 1}, {"exposure_s": 0},
+        {"pixel": {"pitch_um": 1}}, {"processor": "no"}, {"processor": 3}, {"mosaic": "cmyw"}, {"exposure": "auto:Z"},
+        {"processor": "interleaved", "settings": {"sigma_d": 0}},
+        {"processor": "interleaved", "settings": {"patch": 2}}, {"settings": {"patch": 3}},
+        {"unknown": 1}, {"exposure_s": 0},
         {"processor": "bayer", "mosaic": "bayer", "settings": {"patch": 3}}, {"shot_noise": 1}, {"shot_noise": "off"},
 ]  # fmt: skip
 

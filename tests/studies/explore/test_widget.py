@@ -41,7 +41,7 @@ def answer(widget: Any, content: dict[str, Any]) -> tuple[dict[str, Any], list[b
 def test_the_widget_shows_what_python_makes(widget):
     header, _ = answer(widget, {"kind": "hello", "number": 1})
     assert header["groups"] == {"sun": False, "sky": False}
-    asked = {"level_cd_m2": 3.0, "seed": 4}
+    asked = {"level_cd_m2": 3.0, "seed": 4, "processor": "interleaved"}
     header, (picture,) = answer(widget, {"kind": "show", "number": 2, "cameras": [asked], "views": [[0, "picture"]]})
     assert header["number"] == 2
     shot = photograph(small_transport(), Controls(**asked))
