@@ -57,6 +57,7 @@ app.command("studies.commands.list:list_names", name="list", help="List scenes, 
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
 app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
 app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
+app.command("studies.commands.plot:plot", name="plot", help="Draw a metric of a sweep over light into a file.")
 app.command("studies.commands.demo:reference", name="reference", help="Render the light that studies photograph.")
 app.command("studies.commands.develop:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")

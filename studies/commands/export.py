@@ -5,8 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from rodcone.errors import InputError
-from studies.sweep.export import lines, markdown, read_rows, write_csv
+from studies.sweep.export import axis_values, lines, markdown, read_rows, write_csv
 
 
 def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
@@ -48,10 +47,4 @@ def table(
         AXIS=VALUE to keep, such as level=10lux; may be given several times.
     """
     axes, figures = ([name.strip() for name in text.split(",")] for text in (by, show))
-    values = {}
-    for text in where or ():
-        axis, equals, value = text.partition("=")
-        if not equals:
-            raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
-        values[axis] = value
-    print(markdown(lines(read_rows(folder), folder, axes, figures, values), axes, figures))
+    print(markdown(lines(read_rows(folder), folder, axes, figures, axis_values(where or ())), axes, figures))

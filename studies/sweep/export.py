@@ -47,6 +47,17 @@ def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
         return rows(base, everything)
 
 
+def axis_values(texts: Sequence[str]) -> dict[str, str]:
+    """Values to keep by axis, of texts such as ``level=10lux``."""
+    values = {}
+    for text in texts:
+        axis, equals, value = text.partition("=")
+        if not equals:
+            raise InputError(f"where: {text!r} is not allowed; write AXIS=VALUE, such as level=10lux")
+        values[axis] = value
+    return values
+
+
 def to_csv(table: Sequence[Row]) -> str:
     """Rows as CSV (RFC 4180) with a header; a text that a spreadsheet would run as a formula gets a quote in front."""
     return csv_text(COLUMNS, ([_harmless(value) for value in vars(row).values()] for row in table))
