@@ -9,9 +9,11 @@ how much the weights turn up the noise of bands whose relative errors are alike 
 import numpy as np
 
 from render.bands.error import curve_error
+from render.bands.mixed_light import band_light
 from render.illuminants import illuminant, names
 from render.scene import LightGroup
 from render.spectrum import Spectrum, even_bands, photons_per_joule
+from rodcone.types import Floats
 from scenes.reflectances import color_checker
 from sensor.presets import low_noise
 from sensor.response import electrons_per_irradiance
@@ -50,11 +52,18 @@ def table(count: int) -> None:
             )
         ]
         planes = surface_means.T.reshape(1, count, 4, 6)
-        told = curve_error({"lamp": LightGroup(("lamp",), lamp)}, planes, nm, width, sensor.responses.curves)
-        noise = np.sqrt(((known * emission) ** 2).sum(axis=1) / ((plain * emission) ** 2).sum(axis=1)).max()
+        lights = {"lamp": LightGroup(("lamp",), lamp)}
+        light = band_light(lights, np.ones(1), nm, width)
+        told = curve_error(lights, light, planes, nm, width, sensor.responses.curves)
+        noise = (relative_noise(known * emission) / relative_noise(plain * emission)).max()
         largest = "   ".join(f"{100 * np.abs(error).max():8.2f}" for error in errors)
         found = np.sqrt(np.mean(errors[1] ** 2, axis=0)).max()
         print(f"{name:12} {largest}   {100 * max(told.values()):8.3f}   {100 * found:8.3f}   {noise:8.3f}")
+
+
+def relative_noise(weights: Floats) -> Floats:
+    """Relative error of each channel where those of the bands are independent and 1."""
+    return np.asarray(np.linalg.norm(weights, axis=1) / weights.sum(axis=1))
 
 
 if __name__ == "__main__":

@@ -4,12 +4,13 @@ Light within a band is a transport T (what surfaces and paths make of a lamp) ti
 smooth, and S is known to the last line, so that the integral of a curve Q over the light is that of S Q times T, and T
 is interpolated from its band means. As interpolation T is taken as a Gaussian process of wavelength: its covariance
 gives the weights of the least expected squared error (Rasmussen & Williams, "Gaussian Processes for Machine Learning",
-2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature") and that error itself. Weights are at least 0, so that
-they never turn up the noise of a band by the difference of two.
+2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature") and that error itself. Weights are at least 0,
+and where they would turn a render's noise up by more than 5 %, the ones of least error within that are taken.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -29,9 +30,12 @@ _STEP_NM = 2.5  # longest piece that a quadratic rule takes
 NARROW_NM = 2.0  # within a band up to so wide T is as good as constant
 _NODES = np.array([-1.0, 1.0]) / 3**0.5  # Gauss-Legendre, exact for cubics
 _IN_BAND, _IN_BAND_SHARES = np.polynomial.legendre.leggauss(4)
+_LEAST_BESIDE_DARK = 1e-2  # of a lamp's light
 LEAST_LIGHT = 1e-6  # of the brightest band's: darker ones tell nothing of T
 _TOUCH, _AS_WIDE = 0.02, 1.5  # gap over width, ratio of widths
 _LEAST_NEGATIVE = 1e-9  # of the largest weight: rounding
+MOST_NOISE = 1.05  # of weights: times that of products of averages
+_RIDGES, _HALVINGS = (1e-8, 10.0), 12  # of T's variance: found within 0.5 %
 
 
 class LampSpectrum(Protocol):
@@ -79,6 +83,17 @@ class BandPoints:
         return np.asarray(self.mean > LEAST_LIGHT * self.mean.max(initial=0.0))
 
 
+def of_few_lines(energy: Floats) -> bool:
+    """Whether dark bands lie beside much of a lamp's light: they tell what surfaces do at its lines.
+
+    Parameters
+    ----------
+    energy : (band,) float64
+    """
+    dark = np.concatenate([[False], energy <= LEAST_LIGHT * energy.max(initial=0.0), [False]])
+    return bool(energy[dark[:-2] | dark[2:]].sum() > _LEAST_BESIDE_DARK * energy.sum())
+
+
 def points_of(knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: LampSpectrum | None) -> BandPoints:
     """Points on which bands are summed, two in each piece between knots; no light: the same at all wavelengths.
 
@@ -111,7 +126,12 @@ def points_of(knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: 
 
 
 def band_weights(
-    curves: Curves, knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: LampSpectrum | None = None
+    curves: Curves,
+    knots_nm: Floats,
+    wavelength_nm: Floats,
+    width_nm: Floats,
+    light: LampSpectrum | None = None,
+    most_noise: float = MOST_NOISE,
 ) -> Floats:
     """Weights by which band means of light give the integral of each curve over it, shape (curve, band).
 
@@ -123,6 +143,8 @@ def band_weights(
     wavelength_nm, width_nm : (band,) float64
     light : Spectrum, optional
         The lamp, up to a factor; None where it isn't known: the light itself is then taken as smooth.
+    most_noise : float
+        Of the weights, times that of products of averages, where bands have independent relative errors of one size.
 
     Returns
     -------
@@ -135,99 +157,180 @@ def band_weights(
     lit = np.flatnonzero(points.lit)
     if not lit.size:
         return even
-    products = values * (points.light * points.step_nm)
     if width_nm[lit].max() <= NARROW_NM or lit.size == 1:
+        products = values * (points.light * points.step_nm)
         return np.where(points.lit, _sums(products, points, wavelength_nm.size), even)
     result = even
-    result[:, lit] = interpolating(points, wavelength_nm, width_nm).weights(products)
+    result[:, lit] = interpolating(points, wavelength_nm, width_nm, lit).weights(values, most_noise) / points.mean[lit]
     return result
+
+
+def transport_weights(
+    curves: Curves,
+    knots_nm: Floats,
+    wavelength_nm: Floats,
+    width_nm: Floats,
+    light: LampSpectrum,
+    most_noise: float = MOST_NOISE,
+) -> tuple[Floats, Floats]:
+    """Weights by which band means of transport give the integral of each curve over a lamp's light on it.
+
+    Parameters are as of `band_weights`. Of a lamp of few lines dark bands count too, for what surfaces do beside a line
+    tells what they do at it; some weights may be negative then.
+
+    Returns
+    -------
+    weights : (curve, band) float64
+    deviation : (curve,) float64
+        Expected error of each integral, for transport of variance 1.
+    """
+    points = points_of(knots_nm, wavelength_nm, width_nm, light)
+    values = curves(points.nm)
+    lit = np.flatnonzero(points.lit)
+    if not lit.size or width_nm[lit].max() <= NARROW_NM:
+        products = values * (points.light * points.step_nm)
+        return _sums(products, points, wavelength_nm.size) * points.mean, np.zeros(len(values))
+    if of_few_lines(points.mean * width_nm):
+        known = interpolating(points, wavelength_nm, width_nm, np.arange(wavelength_nm.size))
+        found = known.signed_weights(values, most_noise)
+    else:
+        known = interpolating(points, wavelength_nm, width_nm, lit)
+        found = known.weights(values, most_noise)
+    weights = np.zeros((len(values), wavelength_nm.size))
+    weights[:, known.known] = found
+    return weights, known.expected_error(values, found)
 
 
 @dataclass(frozen=True)
 class Interpolation:
-    """T at points by its means in the lit bands.
+    """T at points by its means in bands.
 
     Attributes
     ----------
     points : BandPoints
-    lit : (lit,) int
-        Indices of the bands.
-    towards : (n, lit) float64
+    known : (known,) int
+        Indices of the bands whose means are known.
+    towards : (n, known) float64
         Covariance of T at the points with its band means.
-    among : (lit, lit) float64
+    among : (known, known) float64
         Covariance of the band means.
     """
 
     points: BandPoints
-    lit: NDArray[np.intp]
+    known: NDArray[np.intp]
     towards: Floats
     among: Floats
 
-    @property
-    def mean_light(self) -> Floats:
-        """Mean of the lamp's light in the lit bands, shape (lit,)."""
-        return self.points.mean[self.lit]
+    def weights(self, values: Floats, most_noise: float) -> Floats:
+        """Weights of T's band means in the integral of curves over the light, shape (curve, known).
 
-    def raw(self, products: Floats) -> Floats:
-        """Weights of the transport's band means of the least error, which may be negative, shape (curve, lit).
+        They have the least expected error among those that aren't negative and within the noise allowed.
 
         Parameters
         ----------
-        products : (curve, n) float64
-            Curve times the lamp's light over its band mean times step, at the points.
+        values : (curve, n) float64
+            The curves at the points.
+        most_noise : float
+            As of `band_weights`.
         """
-        of_light = products * self.points.mean[self.points.band]
-        factor = scipy.linalg.cho_factor(self.among)
+        result = self._of_ridge(values, 0.0)
+        run = self.points.run[self.known]
+        root = np.linalg.cholesky(self.among + _MEAN_VARIANCE * (run[:, None] == run)).T
+        for row, curve, average in zip(result, values, self._averages(values), strict=True):
+            if curve.min() < 0 or not row.any():
+                continue
+            target = row.copy()
+            any_sign = row.min() < -_LEAST_NEGATIVE * np.abs(row).max()
+            best = _least(root, target, 0.0) if any_sign else np.maximum(row, 0.0)
+            row[:] = _within_noise(best, partial(_least, root, target), most_noise * _noise(average))
+        return result
+
+    def signed_weights(self, values: Floats, most_noise: float) -> Floats:
+        """Weights as `weights`, some of which may be negative."""
+        result = self._of_ridge(values, 0.0)
+        for row, one, average in zip(result, values, self._averages(values), strict=True):
+            row[:] = _within_noise(row, partial(self._of_ridge, one[None]), most_noise * _noise(average))
+        return result
+
+    def _of_ridge(self, values: Floats, ridge: float) -> Floats:
+        """Weights of the least expected error plus `ridge` times their squares, of any sign, shape (curve, known)."""
+        of_light = self._of_light(values)
+        factor = scipy.linalg.cho_factor(self.among + ridge * np.eye(self.known.size))
         result = scipy.linalg.cho_solve(factor, (of_light @ self.towards).T).T
         # Universal kriging: whatever is the same all over a run is found exactly.
-        each = self.points.run[self.lit][:, None] == np.unique(self.points.run[self.lit])
+        run = self.points.run[self.known]
+        each = run[:, None] == np.unique(run)
         even = scipy.linalg.cho_solve(factor, each.astype(np.float64))
-        missing = self._totals(of_light) - result @ each
+        total = of_light @ (self.points.run[self.points.band][:, None] == np.unique(run))  # where T is 1
+        missing = total - result @ each
         return np.asarray(result + (missing / np.einsum("br,br->r", each, even)) @ even.T)
 
-    def _totals(self, of_light: Floats) -> Floats:
-        """Integral over each run where T is 1, shape (curve, run)."""
-        runs = self.points.run[self.points.band][:, None] == np.unique(self.points.run[self.lit])
-        return np.asarray(of_light @ runs)
+    def _averages(self, values: Floats) -> Floats:
+        """Weights that are products of averages, shape (curve, band)."""
+        return _sums(values * self.points.step_nm, self.points, self.points.mean.size) * self.points.mean
 
-    def weights(self, products: Floats) -> Floats:
-        """Weights of the light's band means, of the least expected error among those that aren't negative."""
-        of_transport = self.raw(products)
-        run = self.points.run[self.lit]
-        root = np.linalg.cholesky(self.among + _MEAN_VARIANCE * (run[:, None] == run)).T
-        for row, product in zip(of_transport, products, strict=True):
-            most = np.abs(row).max()
-            if row.min() < -_LEAST_NEGATIVE * most and product.min() >= 0:
-                least = scipy.optimize.nnls(root, root @ row / most, maxiter=100 * row.size)[0]
-                row[:] = least * (row.sum() / least.sum())
-            elif product.min() >= 0:
-                np.maximum(row, 0.0, out=row)
-        return np.asarray(of_transport / self.mean_light)
-
-    def expected_error(self, products: Floats, weights: Floats) -> Floats:
-        """Standard deviation of the integral's error, for transport of variance 1, shape (curve,)."""
-        of_light = products * self.points.mean[self.points.band]
-        of_transport = weights * self.mean_light
-        nm = self.points.nm
+    def expected_error(self, values: Floats, weights: Floats) -> Floats:
+        """Standard deviation of the integral's error by such weights, for T of variance 1, shape (curve,)."""
+        of_light, nm = self._of_light(values), self.points.nm
         own = np.einsum("cx,xy,cy->c", of_light, _matern(nm[:, None] - nm), of_light, optimize=True)
-        cross = np.einsum("cx,xb,cb->c", of_light, self.towards, of_transport, optimize=True)
-        known = np.einsum("cb,bd,cd->c", of_transport, self.among, of_transport, optimize=True)
+        cross = np.einsum("cx,xb,cb->c", of_light, self.towards, weights, optimize=True)
+        known = np.einsum("cb,bd,cd->c", weights, self.among, weights, optimize=True)
         return np.asarray(np.sqrt(np.maximum(own - 2 * cross + known, 0.0)))
 
+    def _of_light(self, values: Floats) -> Floats:
+        return np.asarray(values * (self.points.light * self.points.mean[self.points.band] * self.points.step_nm))
 
-def interpolating(points: BandPoints, wavelength_nm: Floats, width_nm: Floats) -> Interpolation:
-    """Interpolation of T from its means in the lit bands."""
-    lit = np.flatnonzero(points.lit)
-    within = (wavelength_nm[lit, None] + width_nm[lit, None] / 2 * _IN_BAND).ravel()  # (lit x node)
-    shares = _IN_BAND_SHARES / 2
 
-    def means(covariance: Floats) -> Floats:  # over each band, along the last axis
-        return np.asarray(covariance.reshape(len(covariance), lit.size, shares.size) @ shares)
+def interpolating(
+    points: BandPoints, wavelength_nm: Floats, width_nm: Floats, known: NDArray[np.intp]
+) -> Interpolation:
+    """Interpolation of T from its means in the bands of indices `known`."""
+    within = _nodes(wavelength_nm[known], width_nm[known])
+    run = points.run[known]
+    towards = _means(_matern(points.nm[:, None] - within)) * (points.run[points.band][:, None] == run)
+    among = band_covariance(wavelength_nm[known], width_nm[known]) * (run[:, None] == run)
+    return Interpolation(points, known, towards, among + _ROUNDING * np.eye(known.size))
 
-    run = points.run[lit]
-    towards = means(_matern(points.nm[:, None] - within)) * (points.run[points.band][:, None] == run)
-    among = means(means(_matern(within[:, None] - within)).T) * (run[:, None] == run)
-    return Interpolation(points, lit, towards, among + _ROUNDING * np.eye(lit.size))
+
+def band_covariance(wavelength_nm: Floats, width_nm: Floats) -> Floats:
+    """Covariance of the band means of T, of variance 1, shape (band, band)."""
+    within = _nodes(wavelength_nm, width_nm)
+    return _means(_means(_matern(within[:, None] - within)).T)
+
+
+def _nodes(wavelength_nm: Floats, width_nm: Floats) -> Floats:
+    """Where means over bands are summed, shape (band x node,)."""
+    return np.asarray((wavelength_nm[:, None] + width_nm[:, None] / 2 * _IN_BAND).ravel())
+
+
+def _means(covariance: Floats) -> Floats:
+    """Means over each band, along the last axis, of what is known at `_nodes`."""
+    return np.asarray(covariance.reshape(len(covariance), -1, _IN_BAND.size) @ (_IN_BAND_SHARES / 2))
+
+
+def _least(root: Floats, target: Floats, ridge: float) -> Floats:
+    """Weights of 0 or more nearest to `target` in expected error, plus `ridge` times their squares, of its sum."""
+    most = np.abs(target).max()
+    rows = np.vstack([root, ridge**0.5 * np.eye(target.size)]) if ridge else root
+    sought = np.concatenate([root @ target, np.zeros(len(rows) - len(root))]) / most
+    found = scipy.optimize.nnls(rows, sought, maxiter=100 * target.size)[0]
+    return np.asarray(found * (target.sum() / found.sum()))
+
+
+def _within_noise(best: Floats, of_ridge: Callable[[float], Floats], most: float) -> Floats:
+    """Return `best`, or weights of the least ridge whose noise is at most `most`."""
+    if _noise(best) <= most:
+        return best
+    low, high = _RIDGES
+    for _ in range(_HALVINGS):
+        middle = (low * high) ** 0.5
+        low, high = (low, middle) if _noise(of_ridge(middle)) <= most else (middle, high)
+    return of_ridge(high)
+
+
+def _noise(weights: Floats) -> float:
+    """Relative error of a sum of bands whose errors are independent and 1 each."""
+    return float(np.linalg.norm(weights) / abs(weights.sum())) if weights.any() else 0.0
 
 
 def _runs(wavelength_nm: Floats, width_nm: Floats) -> NDArray[np.intp]:

@@ -148,11 +148,12 @@ class Transport:
             powers = dict.fromkeys(self.groups, spectra)
             spectra = None
         lights = self._lights(spectra, powers)
-        light, level_error = self._at_level(self._in_bands(lights), luminance_cd_m2, illuminance_lux, lux)
+        in_bands = self._in_bands(lights)
+        light, level_error = self._at_level(in_bands, luminance_cd_m2, illuminance_lux, lux)
         planes = combine(light.maps, self.radiance)
         if light.mixed:  # beside a line the map of a lamp takes light off its neighbour
             np.maximum(planes, np.float32(0), out=planes)
-        warn_of_wide_bands(self._curve_error(lights), self.width_nm)
+        warn_of_wide_bands(self._curve_error(lights, in_bands), self.width_nm)
         return SpectralRadiance(
             values=np.moveaxis(planes, 0, -1),
             wavelength_nm=self.wavelength_nm,
@@ -225,7 +226,8 @@ class Transport:
                 require_kind(f"responses[{name!r}]", curve, Spectrum, "give sensor.responses.curves")
             if not responses:
                 raise InputError("responses: none given; allowed: one curve or more; give sensor.responses.curves")
-        return self._curve_error(self._lights(spectra, powers), responses)
+        lights = self._lights(spectra, powers)
+        return self._curve_error(lights, self._in_bands(lights), responses)
 
     def level(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Level:
         """Mean luminance [cd m^-2] of what is no light, under given lights: what a level in cd/m^2 sets.
@@ -307,9 +309,9 @@ class Transport:
         return band_light(lights, means, self.wavelength_nm, self.width_nm)
 
     def _curve_error(
-        self, lights: Mapping[str, LightGroup], responses: Mapping[str, Spectrum] | None = None
+        self, lights: Mapping[str, LightGroup], light: BandLight, responses: Mapping[str, Spectrum] | None = None
     ) -> dict[str, float]:
-        return curve_error(lights, self.radiance, self.wavelength_nm, self.width_nm, responses)
+        return curve_error(lights, light, self.radiance, self.wavelength_nm, self.width_nm, responses)
 
     def _own_at(self, luminance_cd_m2: float) -> BandLight:
         """Emission of the scene's own lights brought to a level."""

@@ -13,7 +13,8 @@ from functools import lru_cache
 import numpy as np
 from numpy.typing import NDArray
 
-from render.band_weights import NARROW_NM, Curves, interpolating, points_of
+from render.band_weights import Curves, band_covariance, band_weights, transport_weights
+from render.bands.mixed_light import BandLight
 from render.error_estimates import spread_pixels
 from render.scene import LightGroup
 from render.spectrum import OBSERVER_NM, Spectrum, observer, photons_per_joule
@@ -54,6 +55,7 @@ class CurveTerms:
 
 def curve_error(
     lights: Mapping[str, LightGroup],
+    mixture: BandLight,
     radiance: Planes,
     wavelength_nm: Floats,
     width_nm: Floats,
@@ -64,6 +66,8 @@ def curve_error(
     Parameters
     ----------
     lights : mapping of str to LightGroup
+    mixture : BandLight
+        The same lights as the picture holds them.
     radiance : (group, band, h, w) float32
         At unit spectral emission.
     wavelength_nm, width_nm : (band,) float64
@@ -72,18 +76,22 @@ def curve_error(
     """
     names = ["x", "y", "z"] if responses is None else list(responses)
     chosen = radiance[spread_pixels(radiance.shape[2:])].astype(np.float64)
-    missed, total = np.zeros((2, len(names), *chosen.shape[2:]))
-    for light, transport in zip(lights.values(), chosen, strict=True):
+    missed, moved, total = np.zeros((3, len(names), *chosen.shape[2:]))
+    curves, knots_nm = (observer, OBSERVER_NM) if responses is None else _of_photons(responses)
+    together = band_weights(curves, knots_nm, wavelength_nm, width_nm, mixture.spectrum) if mixture.mixed else None
+    for light, light_map, transport in zip(lights.values(), mixture.maps, chosen, strict=True):
         if not light.power:
             continue
         if responses is None:
             shape = light.spectrum.wavelength_nm.tobytes(), light.spectrum.values.tobytes()
             terms = _observer_terms(wavelength_nm.tobytes(), width_nm.tobytes(), *shape)
         else:
-            terms = curve_terms(*_of_photons(responses), wavelength_nm, width_nm, light.spectrum)
+            terms = curve_terms(curves, knots_nm, wavelength_nm, width_nm, light.spectrum)
         total += light.power * np.tensordot(terms.weights, transport, 1)
         missed += light.power * _missed(terms, transport)
-    relative = np.divide(missed, total, out=np.zeros_like(total), where=total > 0)
+        if together is not None:  # what the lamps' common spectrum makes of this one's light
+            moved += np.tensordot(together @ light_map - light.power * terms.weights, transport, 1)
+    relative = np.divide(np.hypot(missed, moved), total, out=np.zeros_like(total), where=total > 0)
     lit = np.maximum((total > 0).sum(axis=(1, 2)), 1)
     errors = np.sqrt(np.square(relative).sum(axis=(1, 2)) / lit)
     if responses is None:  # a curve that nearly nothing reaches isn't seen
@@ -96,23 +104,14 @@ def curve_terms(
     curves: Curves, knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: Spectrum
 ) -> CurveTerms:
     """Terms of the integral of curves over a lamp's light; parameters as of `render.band_weights.band_weights`."""
-    bands = wavelength_nm.size
-    points = points_of(knots_nm, wavelength_nm, width_nm, light)
-    products = curves(points.nm) * points.light * points.step_nm
-    if not points.lit.any() or width_nm[points.lit].max() <= NARROW_NM:
-        sums = np.array([np.bincount(points.band, row, bands) for row in products])
+    weights, deviation = transport_weights(curves, knots_nm, wavelength_nm, width_nm, light)
+    if not deviation.any():
         none = np.zeros(0)
-        return CurveTerms(sums * points.mean, np.zeros(len(sums)), none.reshape(0, bands), none, none.astype(np.intp))
-    known = interpolating(points, wavelength_nm, width_nm)
-    of_light = known.weights(products)
-    weights = np.zeros((len(products), bands))
-    weights[:, known.lit] = of_light * known.mean_light
-    differences, centre = _differences(wavelength_nm[known.lit])
-    expected = np.einsum("da,ab,db->d", differences, known.among, differences, optimize=True)
-    everywhere = np.zeros((len(differences), bands))
-    everywhere[:, known.lit] = differences
-    deviation = known.expected_error(products, of_light)
-    return CurveTerms(weights, deviation, everywhere, expected, known.lit[centre])
+        return CurveTerms(weights, deviation, none.reshape(0, wavelength_nm.size), none, none.astype(np.intp))
+    differences, centre = _differences(wavelength_nm)
+    among = band_covariance(wavelength_nm, width_nm)
+    expected = np.einsum("da,ab,db->d", differences, among, differences, optimize=True)
+    return CurveTerms(weights, deviation, differences, expected, centre)
 
 
 def warn_of_wide_bands(errors: Mapping[str, float], width_nm: Floats) -> None:

@@ -3,7 +3,8 @@
 A picture holds the sum of its light groups, and weights of bands follow one lamp. Where groups differ, all are referred
 to their mixture: the light of a group is brought, band by band and into the neighbours, to the values whose integrals
 over all smooth curves are the same under the mixture as its own are under its own spectrum. That is linear in the
-transport, so that it costs a few more additions in relighting, and nothing afterwards.
+transport, so that it costs a few more additions in relighting, and nothing afterwards. A lamp of few lines goes the
+same way: what surfaces do at a line is told by its dark neighbours, and goes into the line's band.
 """
 
 from collections.abc import Mapping
@@ -11,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from render.band_weights import NARROW_NM, band_weights
+from render.band_weights import LEAST_LIGHT, MOST_NOISE, NARROW_NM, band_weights, of_few_lines, transport_weights
 from render.combine import emission
 from render.scene import LightGroup
 from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, observer_weights
@@ -72,30 +73,32 @@ def band_light(
     if not shining:
         return BandLight(None, maps, emitted, mixed=False)
     spectra = [groups[index].spectrum for index in shining]
-    narrow = width_nm.max() <= NARROW_NM and len(spectra) > 1  # bands within which lamps don't differ
-    if narrow or all(_alike(spectra[0], other) for other in spectra[1:]):
-        return BandLight(None if narrow else spectra[0], maps, emitted, mixed=False)
+    alike = all(_alike(spectra[0], other) for other in spectra[1:])
+    lit = (emitted > LEAST_LIGHT * emitted.max(axis=1, keepdims=True))[shining].any(axis=0)
+    narrow = width_nm[lit].max() <= NARROW_NM  # bands within which lamps and surfaces don't differ
+    if narrow or (alike and not of_few_lines(emitted[shining[0]] * width_nm)):
+        return BandLight(spectra[0] if alike else None, maps, emitted, mixed=False)
     powers = [groups[index].power * (transport[index] if shares.any() else 1.0) for index in shining]
-    mixture = _mixture(spectra, powers)
+    mixture = spectra[0] if alike else _mixture(spectra, powers)
 
-    # Integrals of curves as wide as a band: what light of 1 in a band gives, (curve, band) in energy
+    # Integrals of curves as wide as a band: of light of 1 in a band of the mixture, and of transport of 1 in one. Noise
+    # is bounded where curves as wide as a camera's channels are summed, and where a line is told by its neighbours.
     edges = wavelength_nm[0] - width_nm[0] / 2, wavelength_nm[-1] + width_nm[-1] / 2
     centres, wide = np.linspace(*edges, 2 * wavelength_nm.size + 1), float(width_nm.max())
 
-    def integrals(spectrum: Spectrum) -> Floats:
-        def bells(nm: Floats) -> Floats:
-            return np.exp(-(((nm - centres[:, None]) / wide) ** 2) / 2)
+    def bells(nm: Floats) -> Floats:
+        return np.exp(-(((nm - centres[:, None]) / wide) ** 2) / 2)
 
-        return band_weights(bells, np.zeros(0), wavelength_nm, width_nm, spectrum) / width_nm
-
-    of_mixture = integrals(mixture)
+    of_mixture = band_weights(bells, np.zeros(0), wavelength_nm, width_nm, mixture, np.inf)[:, lit] / width_nm[lit]
     left, values, right = np.linalg.svd(of_mixture, full_matrices=False)
     inverse = (right.T * (values / (values**2 + (_LEAST_SINGULAR * values[0]) ** 2))) @ left.T
     for index, spectrum in zip(shining, spectra, strict=True):
-        moved = inverse @ (integrals(spectrum) - of_mixture)
-        moved[np.abs(moved) < _LEAST_SHARE] = 0.0
-        shared = (np.eye(wavelength_nm.size) + moved) * width_nm / width_nm[:, None]
-        maps[index] = shared * emitted[index]
+        energy = (emitted[index] * width_nm)[lit]
+        most_noise = MOST_NOISE if of_few_lines(emitted[index] * width_nm) else np.inf
+        own, _ = transport_weights(bells, np.zeros(0), wavelength_nm, width_nm, spectrum, most_noise)
+        moved = inverse @ (groups[index].power * own - of_mixture @ (np.eye(wavelength_nm.size)[lit] * energy[:, None]))
+        moved[np.abs(moved) < _LEAST_SHARE * energy.max()] = 0.0
+        maps[index][lit] += moved / width_nm[lit, None]
     return BandLight(mixture, maps, emitted, mixed=True)
 
 
