@@ -11,6 +11,7 @@ from skimage import data
 from sweep_sample import row
 
 from sensor.presets import preset
+from studies.metrics.flip import seen
 from studies.pages.report_data import ReportCell, ReportData, ReportLevel, ReportRender, ReportScene, ReportSensor
 from studies.pages.report_pictures import LOSSLESS, ReportPictures, as_webp, flip_map, opened
 from studies.sweep.row import Row
@@ -194,7 +195,7 @@ def sample_pictures(report: ReportData) -> ReportPictures:
         if cell.picture
     }
     maps = {
-        name: as_webp(flip_map(opened(pictures[name]), truth[name]), **LOSSLESS)
+        name: as_webp(flip_map(opened(pictures[name]), seen(truth[name] / 255)), **LOSSLESS)
         for name in truth
         if name in pictures and opened(pictures[name]).shape == truth[name].shape
     }

@@ -27,7 +27,8 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.presets import preset, vary
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import flip, measure, true_picture
+from studies.metrics.flip import flip
+from studies.metrics.quality import measure, true_picture
 
 FOUND = {name: Path(__file__).resolve().parents[1] / "filters" / f"{name}.toml" for name in ("strict", "loose")}
 FOLDER = Path("out/filters")

@@ -15,7 +15,7 @@ from rich.text import Text
 from studies.commands.console import print_table
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
-NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image", "flip-evaluator")
+NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image")
 # What pip install 'rodcone[...]' brings for a user, and what for.
 EXTRAS = {
     "explore": ("the explorer", ("starlette", "uvicorn", "websockets", "anywidget")),

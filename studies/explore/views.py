@@ -23,7 +23,7 @@ from sensor.response import electrons_per_irradiance
 from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
 from studies.explore.memo import Memo
-from studies.metrics.quality import flip
+from studies.metrics.flip import flip
 
 Bytes = NDArray[np.uint8]
 Image = NDArray[np.float64]

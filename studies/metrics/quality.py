@@ -7,7 +7,6 @@ HDR", Picture Coding Symposium 2021; constants as the authors publish them with 
 
 from dataclasses import dataclass
 
-import flip_evaluator  # type: ignore[import-untyped]
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.color import deltaE_cie76, deltaE_ciede2000, rgb2lab
@@ -15,7 +14,8 @@ from skimage.metrics import structural_similarity
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import InputError
-from studies.metrics.s_cielab import PIXELS_PER_DEGREE, eye_lab
+from studies.metrics.flip import Seen, flip, seen
+from studies.metrics.s_cielab import eye_lab
 
 
 @dataclass(frozen=True)
@@ -79,28 +79,6 @@ def measure(
     return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
 
 
-def flip(
-    picture: NDArray[np.float64], truth: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE
-) -> NDArray[np.float64]:
-    """LDR-FLIP of each pixel, shape (h, w), from 0 (no difference) to 1; its mean is the usual figure of a picture.
-
-    Andersson et al., "FLIP: A difference evaluator for alternating images", Proc. ACM Comput. Graph. Interact. Tech.
-    3(2), 2020. The program computes in float32 and on all processors that OpenMP gives it.
-
-    Parameters
-    ----------
-    picture, truth : (h, w, 3) float64
-        Encoded sRGB in [0, 1].
-    pixels_per_degree : float
-        Of the eye's view; the default is FLIP's own.
-    """
-    first, second = (np.ascontiguousarray(values, dtype=np.float32) for values in (truth, picture))
-    error, _, _ = flip_evaluator.evaluate(
-        first, second, "LDR", applyMagma=False, computeMeanError=False, parameters={"ppd": float(pixels_per_degree)}
-    )
-    return np.asarray(error[..., 0], dtype=np.float64)
-
-
 Image = NDArray[np.float64]
 
 
@@ -116,12 +94,15 @@ class TruePicture:
         As a display shows it, and its CIELAB.
     eye_lab : (h, w, 3) float64
         CIELAB after the eye's blur.
+    seen : Seen
+        What FLIP needs of it.
     """
 
     linear: Image
     encoded: Image
     lab: Image
     eye_lab: Image
+    seen: Seen
 
 
 @dataclass(frozen=True)
@@ -148,7 +129,7 @@ def true_picture(linear: Image) -> TruePicture:
     """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
     require_finite(truth=linear)
     encoded = encode_srgb(linear)
-    return TruePicture(linear, encoded, rgb2lab(encoded), eye_lab(encoded))
+    return TruePicture(linear, encoded, rgb2lab(encoded), eye_lab(encoded), seen(encoded))
 
 
 def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
@@ -176,7 +157,7 @@ def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: f
     return Appearance(
         float(np.median(difference)),
         float(np.percentile(difference, 95)),
-        float(flip(encoded, truth.encoded).mean()),
+        float(flip(encoded, truth.seen).mean()),
         pu21_psnr_db(*luminances),
     )
 

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from PIL import Image
 from scipy.ndimage import uniform_filter
 
-from studies.metrics.quality import flip
+from studies.metrics.flip import Seen, flip, seen
 from studies.pages.report_compare import Comparison
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole
@@ -61,11 +61,12 @@ def read_pictures(
         And what the page has to say of those that it leaves out.
     """
     files = {name: as_webp(truth, **LOSSLESS) for name, truth in true.items()}
+    halves = {name: seen(truth / 255.0) for name, truth in true.items()}
     maps: dict[str, bytes] = {}
     total_bytes = sum(map(len, files.values()))
     for name, truth in pairs if most is None else pairs[:most]:
         picture = opened(read_whole(folder / PICTURES, name))
-        content, errors = as_webp(picture, **LOSSLESS), as_webp(flip_map(picture, true[truth]), **OF_MAPS)
+        content, errors = as_webp(picture, **LOSSLESS), as_webp(flip_map(picture, halves[truth]), **OF_MAPS)
         total_bytes += len(content) + len(errors)
         if most is None and total_bytes > SHOWN_BYTES and len(maps) >= 2:
             break
@@ -111,9 +112,9 @@ def as_webp(values: NDArray[np.uint8], **options: Any) -> bytes:
     return file.getvalue()
 
 
-def flip_map(picture: NDArray[np.uint8], truth: NDArray[np.uint8]) -> NDArray[np.uint8]:
-    """Return LDR-FLIP of each pixel (h, w) between pictures (h, w, 3), 255 times and rounded."""
-    return np.rint(255 * np.clip(flip(picture / 255.0, truth / 255.0), 0.0, 1.0)).astype(np.uint8)
+def flip_map(picture: NDArray[np.uint8], truth: Seen) -> NDArray[np.uint8]:
+    """Return LDR-FLIP of each pixel (h, w) of a picture (h, w, 3) beside the truth, 255 times and rounded."""
+    return np.rint(255 * np.clip(flip(picture / 255.0, truth), 0.0, 1.0)).astype(np.uint8)
 
 
 def busiest(truth: NDArray[np.uint8]) -> tuple[int, int]:

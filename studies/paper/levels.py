@@ -17,7 +17,8 @@ from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.raw import RawImage
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import flip, measure, psnr_db
+from studies.metrics.flip import flip
+from studies.metrics.quality import measure, psnr_db
 from studies.pages.plots import light_charts
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, paper_figure, within
 from studies.paper.figures_3_5_6 import GAIN_DB

@@ -50,7 +50,7 @@ def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> lis
     return sorted(paths)
 
 
-_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-science", "flip-evaluator")
+_PACKAGES = ("mitsuba", "drjit", "numpy", "scipy", "scikit-image", "colour-science")
 
 
 @dataclass(frozen=True)

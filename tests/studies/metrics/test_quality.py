@@ -2,7 +2,6 @@
 
 from itertools import product
 
-import flip_evaluator  # type: ignore[import-untyped]
 import numpy as np
 import pytest
 from outside_truth import colour_science
@@ -12,8 +11,9 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import appearance, flip, measure, psnr_db, pu21_encode, pu21_psnr_db, true_picture
-from studies.metrics.s_cielab import PIXELS_PER_DEGREE, SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
+from studies.metrics.flip import flip
+from studies.metrics.quality import appearance, measure, psnr_db, pu21_encode, pu21_psnr_db, true_picture
+from studies.metrics.s_cielab import SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
 from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
 
@@ -96,51 +96,6 @@ def test_absolute_luminance_counts_for_pu21_alone_and_an_error_above_white_too()
     above = appearance(glaring, encode_srgb(glaring), true_picture(glaring * 1.5), 40.0)
     assert above.flip_mean == 0.0  # a display clips both
     assert 10 < above.pu21_psnr_db < 30
-
-
-# FLIP: even colours in the paper's closed form, and what holds for any picture.
-
-DRAWS = np.random.default_rng(0)
-FIRST, SECOND = DRAWS.uniform(0, 1, (2, 32, 48, 3))
-
-
-def even_difference(first: tuple[float, ...], second: tuple[float, ...]) -> float:
-    """FLIP of two even pictures, from the paper: no blur changes them and they have no features, so colour is left.
-
-    Hunt-adjusted CIELAB, HyAB distance to the power 0.7, of which 0.4 of the largest maps to 0.95.
-    """
-
-    def hunt(colour: tuple[float, ...]) -> np.ndarray:
-        lightness, a, b = rgb2lab(np.array(colour, dtype=np.float64))
-        return np.array([lightness, 0.01 * lightness * a, 0.01 * lightness * b])
-
-    def hyab(one: tuple[float, ...], other: tuple[float, ...]) -> float:
-        difference = hunt(one) - hunt(other)
-        return float((abs(difference[0]) + np.hypot(*difference[1:])) ** 0.7)
-
-    most, found = hyab((0, 1, 0), (0, 0, 1)), hyab(first, second)
-    knee = 0.4 * most
-    return found / knee * 0.95 if found < knee else 0.95 + (found - knee) / (most - knee) * 0.05
-
-
-def test_even_colours_differ_by_the_papers_closed_form() -> None:
-    for first, second in [
-        ((0.5, 0.5, 0.5), (0.52, 0.5, 0.47)),
-        ((0.8, 0.2, 0.1), (0.2, 0.3, 0.7)),
-        ((0.0, 0.0, 0.0), (1.0, 1.0, 1.0)),
-    ]:
-        pictures = [np.broadcast_to(colour, (24, 24, 3)).astype(np.float64) for colour in (first, second)]
-        # scikit-image's white and matrix have other last digits, and FLIP computes in float32: 0.1 %.
-        assert flip(*pictures) == pytest.approx(np.full((24, 24), even_difference(first, second)), rel=1e-3), (
-            first,
-            second,
-        )
-
-
-def test_the_mean_is_the_programs_own_under_its_own_defaults() -> None:
-    _, mean, parameters = flip_evaluator.evaluate(SECOND.astype(np.float32), FIRST.astype(np.float32), "LDR")
-    assert flip(FIRST, SECOND).mean() == pytest.approx(mean, rel=1e-5)  # float32 sums of 1536 pixels
-    assert parameters["ppd"] == pytest.approx(PIXELS_PER_DEGREE, rel=1e-6)
 
 
 # PU21: the values at its ends and at 100 cd/m^2, its inverse worked out on paper, PSNR in closed form.

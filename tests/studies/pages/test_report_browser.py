@@ -16,7 +16,7 @@ from PIL import Image
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from studies.metrics import metric as figures
-from studies.metrics.quality import flip
+from studies.metrics.flip import flip
 from studies.pages import report_text as text
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, comparisons, groups_of

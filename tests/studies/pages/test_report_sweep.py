@@ -20,6 +20,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refusal
 
+from studies.metrics.flip import seen
 from studies.pages.report import group_views, render_report
 from studies.pages.report_compare import Comparison
 from studies.pages.report_data import ReportSensor
@@ -136,7 +137,7 @@ def test_the_mean_of_a_map_is_the_figure_of_its_picture(out: Path) -> None:
         mean = float(opened(pictures.flip_maps[cell.picture]).mean()) / 255
         assert mean == pytest.approx(cell.first.flip_mean, abs=0.005)
     equal = np.full((8, 8, 3), 100, np.uint8)
-    assert flip_map(equal, equal).max() == 0
+    assert flip_map(equal, seen(equal / 255)).max() == 0
 
 
 @settings(deadline=None)

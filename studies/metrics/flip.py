@@ -1,0 +1,154 @@
+"""LDR-FLIP: the difference that an eye sees where two pictures alternate, from 0 to 1 per pixel.
+
+Source: Andersson, Nilsson, Akenine-Moller, Oskarsson, Astrom & Fairchild, "FLIP: A difference evaluator for alternating
+images", Proc. ACM Comput. Graph. Interact. Tech. 3(2), 2020; numbers of sections and equations are its own. Every
+filter of it is a product of a filter along rows and one along columns, or a sum of two of these, so that each is taken
+along one axis after the other. What one picture needs by itself is computed once, since a study compares many with one.
+"""
+
+from dataclasses import dataclass
+from math import ceil, pi
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+
+from rodcone.colour_spaces import decode_srgb
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE
+
+Image = NDArray[np.float64]
+Plane = NDArray[np.float64]
+
+# Section 4.1.1, Table 1: weights a and widths b [degree^2] of the Gaussians a sqrt(pi / b) exp(-pi^2 r^2 / b) that blur
+# each plane of YCxCz as the eye's contrast sensitivity does.
+CONTRAST = (((1.0, 0.0047),), ((1.0, 0.0053),), ((34.1, 0.04), (13.5, 0.025)))
+WIDEST = 0.04  # of these b: all filters reach as far as its third standard deviation
+Q_COLOUR, P_COLOUR, P_KNEE = 0.7, 0.4, 0.95  # section 4.1.3: q_c, p_c, p_t
+FEATURE_DEG = 0.082  # section 4.2.1: width w of the features' filters; their standard deviation is w / 2
+Q_FEATURE = 0.5  # equation 13: q_f
+# Of linear sRGB under D65, as the authors' program has it; its rows sum to the white.
+TO_XYZ = np.array(
+    [
+        [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
+        [2613072 / 12288897, 8788810 / 12288897, 887015 / 12288897],
+        [1425312 / 73733382, 8788810 / 73733382, 70074185 / 73733382],
+    ]
+)
+WHITE = TO_XYZ.sum(axis=1)
+_SLOPE = 6 / 29  # CIELAB's root becomes a line below its cube
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What FLIP needs of one picture.
+
+    Attributes
+    ----------
+    colour : (h, w, 3) float64
+        CIELAB of the blurred picture after the Hunt effect.
+    edges, points : (h, w) float64
+        Strength of edges, and of points and lines.
+    pixels_per_degree : float
+    """
+
+    colour: Image
+    edges: Plane
+    points: Plane
+    pixels_per_degree: float
+
+
+def seen(encoded: NDArray[np.floating], pixels_per_degree: float = PIXELS_PER_DEGREE) -> Seen:
+    """Return what FLIP needs of one picture, encoded sRGB (h, w, 3) in [0, 1]."""
+    xyz = decode_srgb(np.asarray(encoded, dtype=np.float64)) @ (TO_XYZ / WHITE[:, None]).T
+    luminance = np.ascontiguousarray(xyz[..., 1])
+    # Planes of YCxCz: 116 Y - 16, 500 (X - Y), 200 (Y - Z). Blur keeps sums and constants, so it acts on X, Y, Z here.
+    planes = luminance, xyz[..., 0] - luminance, luminance - xyz[..., 2]
+    y, x_less_y, y_less_z = (
+        _blurred(np.ascontiguousarray(plane), gaussians, pixels_per_degree)
+        for plane, gaussians in zip(planes, CONTRAST, strict=True)
+    )
+    blurred = np.stack([y + x_less_y, y, y - y_less_z], axis=-1)
+    linear = np.clip(blurred @ np.linalg.inv(TO_XYZ / WHITE[:, None]).T, 0.0, 1.0)
+    return Seen(_hunt_lab(linear), *_features(luminance, pixels_per_degree), pixels_per_degree)
+
+
+def flip(
+    picture: NDArray[np.floating], truth: "NDArray[np.floating] | Seen", pixels_per_degree: float = PIXELS_PER_DEGREE
+) -> Plane:
+    """Return LDR-FLIP of each pixel, shape (h, w), from 0 (no difference) to 1; its mean is a picture's usual figure.
+
+    Parameters
+    ----------
+    picture : (h, w, 3) array
+        Encoded sRGB in [0, 1].
+    truth : (h, w, 3) array or Seen
+        The same; or what `seen` made of it, at the same pixels per degree.
+    pixels_per_degree : float
+        Of the eye's view; the default is FLIP's own.
+    """
+    second = truth if isinstance(truth, Seen) else seen(truth, pixels_per_degree)
+    first = seen(picture, second.pixels_per_degree)
+    colour = _redistributed(_hyab(first.colour, second.colour))  # equation 11: Delta E_c
+    feature = np.maximum(np.abs(first.edges - second.edges), np.abs(first.points - second.points))
+    feature = (feature / np.sqrt(2)) ** Q_FEATURE  # equation 13: Delta E_f
+    return np.asarray(colour ** (1 - feature))  # equation 14
+
+
+def _blurred(plane: Plane, gaussians: tuple[tuple[float, float], ...], pixels_per_degree: float) -> Plane:
+    """Blur a plane by a sum of Gaussians of sum 1; beyond the border the border's pixels go on."""
+    reach = ceil(3 * np.sqrt(WIDEST / (2 * pi**2)) * pixels_per_degree)
+    degrees = np.arange(-reach, reach + 1) / pixels_per_degree
+    lines = [np.exp(-(pi**2) * degrees**2 / b) for _, b in gaussians]
+    weights = np.array([a * np.sqrt(pi / b) * line.sum() ** 2 for (a, b), line in zip(gaussians, lines, strict=True)])
+    result = np.zeros_like(plane)
+    for weight, line in zip(weights / weights.sum(), lines, strict=True):
+        taps = line / line.sum()
+        result += weight * _along_both(plane, taps, taps)
+    return result
+
+
+def _features(luminance: Plane, pixels_per_degree: float) -> tuple[Plane, Plane]:
+    """Return the strength of edges and of points: the gradient's length by first and second derivatives (4.2.1).
+
+    Each derivative's positive taps sum to 1, and its negative ones to -1.
+    """
+    sigma = 0.5 * FEATURE_DEG * pixels_per_degree
+    at = np.arange(-ceil(3 * sigma), ceil(3 * sigma) + 1)
+    gaussian = np.exp(-(at**2) / (2 * sigma**2))
+    across = gaussian / gaussian.sum()
+    found = []
+    for derivative in (-at * gaussian, (at**2 / sigma**2 - 1) * gaussian):
+        positive, negative = np.maximum(derivative, 0.0), np.minimum(derivative, 0.0)
+        taps = positive / positive.sum() - negative / negative.sum()
+        found.append(np.hypot(_along_both(luminance, across, taps), _along_both(luminance, taps, across)))
+    return found[0], found[1]
+
+
+def _along_both(plane: Plane, down: NDArray[np.float64], across: NDArray[np.float64]) -> Plane:
+    """Return a plane after one filter along columns and one along rows, the border's pixels going on beyond it."""
+    return np.asarray(correlate1d(correlate1d(plane, down, axis=0, mode="nearest"), across, axis=1, mode="nearest"))
+
+
+def _hunt_lab(linear: Image) -> Image:
+    """Return CIELAB of linear sRGB whose chroma grows with the lightness, as Hunt found (equation 7)."""
+    ratio = linear @ (TO_XYZ / WHITE[:, None]).T
+    root = np.where(ratio > _SLOPE**3, np.cbrt(ratio), ratio / (3 * _SLOPE**2) + 4 / 29)
+    lightness = 116 * root[..., 1] - 16
+    a, b = 500 * (root[..., 0] - root[..., 1]), 200 * (root[..., 1] - root[..., 2])
+    return np.stack([lightness, 0.01 * lightness * a, 0.01 * lightness * b], axis=-1)
+
+
+def _hyab(first: Image, second: Image) -> Plane:
+    """Return the distance of colours by HyAB: of lightness by its size, of a and b Euclid's (equation 8)."""
+    difference = first - second
+    return np.asarray(np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2]))
+
+
+def _redistributed(distance: Plane) -> Plane:
+    """Return colour distances mapped to [0, 1]: up to p_c of the largest by one line, then by a flat one (4.1.3)."""
+    green, blue = (_hunt_lab(np.array([[colour]])) for colour in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
+    largest = float(_hyab(green, blue)[0, 0]) ** Q_COLOUR
+    knee = P_COLOUR * largest
+    power = distance**Q_COLOUR
+    steep, flat = P_KNEE / knee * power, P_KNEE + (power - knee) / (largest - knee) * (1 - P_KNEE)
+    return np.asarray(np.where(power < knee, steep, flat))
