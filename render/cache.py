@@ -6,7 +6,9 @@ The number of samples isn't in the key, nor are the lights' spectra and powers: 
 import hashlib
 import json
 import re
-from collections.abc import Mapping
+import shutil
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import fields
 from importlib import metadata
 from pathlib import Path
@@ -76,6 +78,23 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
     arrays |= {f"{name}_{part}": x for name, both in halves.items() for part, x in vars(both).items()}
     path = _path(folder, scene, film, seed, _kind(transport.denoised is not None))
     write_arrays(path, arrays | {"values": np.array(json.dumps(values))})
+
+
+@contextmanager
+def kept_beside(out: Path) -> Iterator[Path]:
+    """Give a folder for the render of a file that is written later: where that fails, the render isn't lost.
+
+    The folder lies beside the file, and goes once the file is there. What fails says that the same command goes on from
+    it; a refusal of the render itself leaves no folder.
+    """
+    folder = out.with_name(f".{out.name}.render")
+    try:
+        yield folder
+    except BaseException as error:
+        if folder.is_dir():
+            error.add_note(f"the render is kept in {folder}, from which the same command goes on")
+        raise
+    shutil.rmtree(folder, ignore_errors=True)
 
 
 def _kind(denoised: bool) -> str:

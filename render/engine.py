@@ -26,7 +26,8 @@ from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from render.transport import Transport
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError, one_line, require_whole
+from rodcone.jit import compiling, is_out_of_memory
 from rodcone.progress import Step, progress_bar, render_words
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
@@ -100,6 +101,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         For a bad size, band or limit, a scene without light, a material that picks lobes by wavelength, a surface
         or sunsky whose data end within the bands, or an earlier result of another size, bands or lights; for `denoise`
         without the extra of that name; without LLVM and CUDA.
+    MemoryError
+        Where the system or Dr.Jit has no more.
 
     Warns
     -----
@@ -128,14 +131,24 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
     silent: Step | None = (lambda what, share: None) if progress else None
-    with progress_bar(silent) as step:
+    with progress_bar(silent) as step, compiling() as compiled_s:
         step(render_words(np.inf), 0.0)
-        show = progress or (lambda share, error: step(render_words(error), share))
+
+        def show(share: float, error: float) -> None:
+            compiled_s()  # read after each run, what Dr.Jit notes stays short
+            (progress or (lambda share, error: step(render_words(error), share)))(share, error)
+
         try:
             transport = _render(scene, film, limits, earlier, show, denoise)
         except InputError as error:
             let_go(error)
             raise
+        except RuntimeError as error:
+            if not is_out_of_memory(error):
+                raise
+            let_go(error)
+            raise MemoryError(one_line(error)) from None
+        transport = replace(transport, compile_s=compiled_s())
     if cache is not None:
         save_transport(Path(cache), scene, film, seed, transport)
     return replace(transport, meter=meter)

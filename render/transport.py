@@ -62,6 +62,8 @@ class Transport:
         Gives the irradiance on the scene's reference plane, traced at its first call; None without a plane.
     denoised : Denoised or None
         Denoised light beside the unbiased, where it was asked for (`render.denoised.relight`).
+    compile_s : float
+        Seconds in which kernels were compiled for it; 0 where they were there already, or the light was.
     """
 
     light: Halves
@@ -81,6 +83,7 @@ class Transport:
     shared: SharedPaths | None = None
     meter: Callable[[], Irradiance] | None = None
     denoised: Denoised | None = None
+    compile_s: float = 0.0
 
     __repr__ = brief
 

@@ -1,6 +1,6 @@
 """Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
 from typing import Any, Literal
@@ -12,7 +12,8 @@ from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
 
-__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "dr"]
+__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "compiling", "dr",
+           "is_out_of_memory"]  # fmt: skip
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
@@ -29,6 +30,26 @@ def compiler_version() -> str:
     """Version of the LLVM or CUDA that kernels are compiled by, ``none`` on ``numpy``."""
     version = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
     return ".".join(map(str, version())) if version else "none"
+
+
+def is_out_of_memory(error: RuntimeError) -> bool:
+    """Whether Dr.Jit says that memory ran out, of the machine or of its device: it has no error of its own for that."""
+    return "out of memory" in str(error).lower()
+
+
+@contextmanager
+def compiling() -> Iterator[Callable[[], float]]:
+    """Give a function that tells the seconds of compiling so far: 0 where all kernels were there already."""
+    seconds: float = 0.0
+
+    def told() -> float:
+        nonlocal seconds
+        seconds += float(sum(kernel.get("backend_time", 0.0) for kernel in dr.kernel_history())) / 1e3
+        return seconds
+
+    with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
+        dr.kernel_history_clear()
+        yield told
 
 
 def arrays() -> Any:

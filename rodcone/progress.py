@@ -15,6 +15,7 @@ from rich.progress import Progress, SpinnerColumn, Task, TimeElapsedColumn
 Step: TypeAlias = Callable[[str, float], None]  # what is being done, and the share of the whole (0..1)
 LINE_EVERY_S = 5.0
 SHOW_EVERY_S = 0.2  # in a notebook
+LEAST_COMPILE_S = 1.0  # a shorter one is no reason to wonder
 START = "start"  # what a task says before its first step
 
 
@@ -108,6 +109,13 @@ def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
 def render_words(error: float) -> str:
     """What a render is at: its first passes compile, and only after them is its relative error known."""
     return f"render, relative error {error:.3f}" if math.isfinite(error) else "render, compiling"
+
+
+def compile_note(seconds: float) -> str | None:
+    """Say how long a first render compiled; None where that is short."""
+    if seconds < LEAST_COMPILE_S:
+        return None
+    return f"render: compiling took {duration(seconds)}, once for these surfaces and so many bands"
 
 
 def duration(seconds: float) -> str:

@@ -19,6 +19,7 @@ BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
 _FRACTION = re.compile(r"^[-+]?\d*\.\d+$")
+_OUT_OF_MEMORY = re.compile("out of memory", re.IGNORECASE)  # Dr.Jit's RuntimeError; Dr.Jit isn't loaded for --help
 _UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
@@ -105,18 +106,27 @@ def main(arguments: list[str] | None = None) -> Any:
     except CycloptsError as error:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except InputError as error:
-        fail(str(error), BAD_INPUT)
-    except MemoryError as error:
+        fail(_with_notes(str(error), error), BAD_INPUT)
+    except (MemoryError, RuntimeError) as error:
         what = " ".join(str(error).split()) or "the system gave no more"
-        fail(f"memory: it ran out ({what}); take a smaller picture (--size), fewer bands or fewer workers", BAD_INPUT)
+        if isinstance(error, RuntimeError) and not _OUT_OF_MEMORY.search(what):
+            raise
+        fix = "take a smaller picture (--size), fewer bands or fewer workers"
+        fail(_with_notes(f"memory: it ran out ({what}); {fix}", error), BAD_INPUT)
     except BrokenPipeError:  # the reader, such as head, has enough
         sys.stdout = None  # which Python would flush at its end, to nobody
         sys.exit(0)
     except OSError as error:
-        fail(f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out", 1)
-    except KeyboardInterrupt:
-        fail("stopped; nothing was written", INTERRUPTED)
+        where = f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out"
+        fail(_with_notes(where, error), 1)
+    except KeyboardInterrupt as error:
+        fail(_with_notes("stopped; nothing was written", error), INTERRUPTED)
     sys.exit(code or 0)
+
+
+def _with_notes(message: str, error: BaseException) -> str:
+    """Message and what was noted on the way up, such as where a render is kept."""
+    return "; ".join([message, *getattr(error, "__notes__", [])])
 
 
 def fail(message: str, code: int) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Any
 import numpy as np
 from cyclopts import Parameter
 
+from render.cache import kept_beside
 from render.denoised.relight import relight_denoised
 from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
@@ -19,7 +20,7 @@ from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
 from rodcone.files import check_place, require_ending
 from rodcone.memory import memory, require_memory
-from rodcone.progress import progress, render_words
+from rodcone.progress import compile_note, progress, render_words
 from studies.commands.console import INTERRUPTED, Seconds, print_result, say
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture
@@ -242,14 +243,16 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     )
     check_place(order.out)
     # Render and write
-    if ready:
-        transport, notes = ready.transport, (*opened.notes, ready.line)
-    else:
-        transport, notes = _rendered(order, scene, size, (wavelength_nm, width_nm)), opened.notes
-    radiance = (
-        relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
-    )
-    write_exr(radiance, order.out, scene=scene.name)
+    with kept_beside(order.out) as kept:
+        if ready:
+            transport, notes = ready.transport, (*opened.notes, ready.line)
+        else:
+            transport, notes = _rendered(order, scene, size, (wavelength_nm, width_nm), kept), opened.notes
+            notes = (*notes, *filter(None, [compile_note(transport.compile_s)]))
+        radiance = (
+            relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
+        )
+        write_exr(radiance, order.out, scene=scene.name)
     # Say what was done
     say(*notes)
     interrupted = transport.stopped_by == "interrupt"
@@ -261,7 +264,9 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     return INTERRUPTED if interrupted else 0
 
 
-def _rendered(order: RenderOrder, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats]) -> Transport:
+def _rendered(
+    order: RenderOrder, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], kept: Path
+) -> Transport:
     with progress(sys.stderr) as step:
         step(render_words(np.inf), 0.0)
         return render_transport(
@@ -274,7 +279,7 @@ def _rendered(order: RenderOrder, scene: Scene, size: tuple[int, int], bands: tu
             max_seconds=order.max_seconds,
             max_depth=order.max_depth,
             seed=order.seed,
-            cache=order.cache,
+            cache=order.cache or kept,
             progress=lambda share, error: step(render_words(error), share),
             denoise=order.denoise,
         )

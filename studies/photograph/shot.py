@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.converters import converter_note, write_with_bayer
+from render.cache import kept_beside
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -20,7 +21,7 @@ from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import memory, require_memory
-from rodcone.progress import Step, render_words
+from rodcone.progress import Step, compile_note, render_words
 from sensor.capture import capture
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
@@ -169,6 +170,12 @@ def take(order: Order, step: Step | None = None) -> Taken:
     OSError
         Where the folder can't be written.
     """
+    with kept_beside(Path(order.out)) as kept:
+        return _taken(order, step, kept)
+
+
+def _taken(order: Order, step: Step | None, kept: Path) -> Taken:
+    """Photograph and write as `take`, with a folder for the render meanwhile."""
     sensor, opened, asked_s, ready = _check(order)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
@@ -199,7 +206,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
         if ready:
             transport, notes = ready.transport, [*notes, ready.line]
         else:
-            transport = _rendered(order, opened, spectra, step)
+            transport = _rendered(order, opened, spectra, step, kept)
+            notes += filter(None, [compile_note(transport.compile_s)])
 
     # The exposure.
     if step:
@@ -265,7 +273,9 @@ def _exposure(
     return exposed_by_rule(order.exposure, channel_electrons(image, sensor, 1.0), sensor)
 
 
-def _rendered(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None) -> Transport:
+def _rendered(
+    order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, kept: Path
+) -> Transport:
     """Light of a scene, rendered here."""
     if step:
         step(render_words(np.inf), 0.0)
@@ -277,6 +287,7 @@ def _rendered(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], 
         width_nm=bands[1],
         spp=order.spp or _SPP,
         seed=order.seed,
+        cache=kept,
         progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
     )
 

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import in_new_python
 
@@ -113,3 +114,14 @@ def test_the_wheels_library_is_a_file_of_an_accepted_version() -> None:
         pytest.skip("karellen-llvm-core is not installed here (its wheels are for Linux x86-64)")
     assert library.is_file()
     assert (llvm.llvm_version(library) or 0) >= llvm.OLDEST_LLVM
+
+
+@pytest.mark.skipif(jit.backend() == "numpy", reason="Dr.Jit has neither LLVM nor CUDA here")
+def test_compiling_counts_new_kernels_alone() -> None:
+    new = float(np.random.default_rng().random())  # a number in the code: no kernel that Dr.Jit keeps has it
+    kind = jit.arrays().Float
+    with jit.compiling() as told:
+        jit.dr.eval(jit.dr.sin(jit.dr.arange(kind, 3)) * new)
+        first = told()
+        jit.dr.eval(jit.dr.sin(jit.dr.arange(kind, 3)) * new)
+        assert told() == first > 0

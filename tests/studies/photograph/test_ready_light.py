@@ -122,6 +122,41 @@ def test_a_scenes_light_goes_by_its_name() -> None:
     refusal(public.load_transport, "seen.exr", size=64, match="size: 64 for 'seen.exr'")
 
 
+def test_a_render_is_kept_where_what_follows_it_fails(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """By the same command the light is there, and nothing of it stays once the file is written."""
+    monkeypatch.chdir(tmp_path)
+    for command, name in (("capture", "shot.tif"), ("render", "seen.exr")):
+        arguments = [command, "flat_field", *["--height", "8", "--width", "8", "--spp", "2"], "-o", name]
+        with monkeypatch.context() as patch:
+            for module, written in ((shot, "write_with_bayer"), (develop, "write_exr")):
+                patch.setattr(module, written, lambda *_, **__: full())
+            code, _, err = call(arguments)
+            assert (code, err.count(f"the render is kept in .{name}.render")) == (cli.BAD_INPUT, 1)
+        with monkeypatch.context() as patch:
+            patch.setattr("render.engine._render", lambda *_: full())
+            assert call(arguments)[0] == 0
+        assert not list(tmp_path.glob(".*"))
+
+
+def full() -> None:
+    raise MemoryError("Unable to allocate 3.00 GiB")
+
+
+@pytest.mark.parametrize("name", ["jit_malloc(): out of memory! Could not allocate 8589934592 bytes of host memory."])
+def test_memory_that_dr_jit_has_no_more_of_is_one_line(
+    name: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    def fail(*_: object) -> None:
+        raise RuntimeError(name)
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("render.engine._render", fail)
+    code, _, err = call(["capture", "flat_field", "-o", "shot.tif", "--size", "8", "--spp", "2"])
+    assert code == cli.BAD_INPUT
+    assert err.splitlines()[-1].startswith(f"rodcone: memory: it ran out ({name}); take a smaller picture")
+    assert not list(tmp_path.iterdir())
+
+
 def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     def full(*_: object, **__: object) -> None:
         raise MemoryError("Unable to allocate 3.00 GiB")
