@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from sensor.calibration import NoiseStep
+from sensor.calibration import ChannelNoise, NoiseStep
 from sensor.cfa import mask
 from sensor.raw import RawImage
 
@@ -58,12 +58,27 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
     electrons : (h, w) float32 or float64
         The mosaic of `raw`, or a part of it that begins with a whole tile.
     """
+    stable = _stabilise_in_steps(electrons, raw)
+    for noise in raw.channel_noise:
+        at = mask(raw.cfa, noise.channel, electrons.shape)
+        stable[at] = _stabilise_apart(electrons[at], noise)
+    return stable
+
+
+def stabilise_channel(electrons: NDArray[Any], raw: RawImage, channel: str) -> NDArray[Any]:
+    """Take a plane of `channel` [e-] into units of the noise of its samples, as `stabilise_raw` takes the samples."""
+    apart = [noise for noise in raw.channel_noise if noise.channel == channel]
+    return _stabilise_apart(electrons, apart[0]) if apart else _stabilise_in_steps(electrons, raw)
+
+
+def _stabilise_apart(electrons: NDArray[Any], noise: ChannelNoise) -> NDArray[Any]:
+    return stabilise(electrons / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
+
+
+def _stabilise_in_steps(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
     stable = stabilise(electrons, raw.dark_noise_e, raw.prnu)
     for step, offset in _joined(raw):
         stable = np.where(electrons >= step.from_e, _piece(electrons, step) + offset, stable).astype(electrons.dtype)
-    for noise in raw.channel_noise:
-        at = mask(raw.cfa, noise.channel, electrons.shape)
-        stable[at] = stabilise(electrons[at] / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
     return stable
 
 

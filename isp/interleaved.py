@@ -4,24 +4,29 @@
 
 What the paper leaves open is settled so:
 
-- Patches h_i are compared in units of noise: Anscombe-transformed and filled by normalised convolution
-  (`isp.planes`), extended beyond the border by reflection without repeating the edge.
-- The squared distance that noise alone makes is subtracted (`isp.similarity.noise_distance`), clamped at 0.
+- One guide serves all channels: every sample read as W (`isp.panchromatic`), in units of noise by the Anscombe
+  transform. The paper's own method fills a plane a channel (`isp.planes`), in electrons, and eq. (6) mixes them.
+- Patches go on beyond the border by reflection without repeating the edge.
 - Omega ends at the border, where W_y normalises. Samples are averaged in electrons.
 - The largest weight counts as 1, so W_y is never 0: where all others underflow, the most similar sample is the result.
 """
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.colour.white_balance import neutral_response
 from isp.kernel.run import reconstruct_strips
+from isp.panchromatic import read_as_white
 from isp.reference import reference_with_noise
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from rodcone.jit import backend
+from rodcone.types import Floats
 from sensor.raw import RawImage
 
 
-def reconstruct(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.float32]:
+def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | None = None) -> NDArray[np.float32]:
     """Reconstruct every channel at every pixel.
 
     Parameters
@@ -30,6 +35,9 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.floa
         One exposure; any tile of channels.
     settings : Settings
         Widths of Omega and the patches, sigmas, units of the distance.
+    neutral : (channel,) float64, optional
+        Response to a neutral in any unit, in the order of `sensor.cfa.channels`; the project's own curves' under D65
+        by default. The paper's own method doesn't ask for it.
 
     Returns
     -------
@@ -46,17 +54,20 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.floa
     Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
     own. Besides the result a call takes some 0.6 GB at most.
     """
-    settings.check_reaches(raw.cfa)
-    if backend() == "numpy":
-        return reference_with_noise(raw, settings).estimate.astype(np.float32)
-    return reconstruct_strips(raw, settings, noise=False)[0]
+    return reconstruct_with_noise(raw, settings, neutral).estimate.astype(np.float32, copy=False)
 
 
-def reconstruct_with_noise(raw: RawImage, settings: Settings = DEFAULTS) -> Reconstruction:
-    """As `reconstruct`, with the factor by which the weights reduce white noise, and the engine that ran."""
+def reconstruct_with_noise(
+    raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | None = None
+) -> Reconstruction:
+    """As `reconstruct`, with the factor by which the weights reduce white noise, the guide, and the engine that ran."""
     settings.check_reaches(raw.cfa)
-    engine = backend()
+    engine, white = backend(), None
+    if settings.distance == "noise":
+        white = read_as_white(raw, neutral_response(raw.channels) if neutral is None else neutral)
+        raw = white.raw
+    guide = None if white is None else white.guide
     if engine == "numpy":
-        return reference_with_noise(raw, settings)
-    estimate, noise_gain = reconstruct_strips(raw, settings, noise=True)
-    return Reconstruction(estimate=estimate, noise_gain=noise_gain, engine=engine)
+        return replace(reference_with_noise(raw, settings, guide), white=white)
+    estimate, noise_gain = reconstruct_strips(raw, settings, guide)
+    return Reconstruction(estimate, noise_gain, engine, white)

@@ -9,7 +9,7 @@ from isp.planes import bilinear, rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
 from isp.similarity.guide import saturated_fraction
 from isp.substitution import SMOOTH_COLOUR_ERROR, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
-from isp.unseen import draw_unseen, without_unseen
+from rodcone.errors import InputError
 from sensor.raw import RawImage
 
 
@@ -21,15 +21,15 @@ def picture_interleaved(
     settings: Settings = DEFAULTS,
     substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
-    """Develop an interleaved RGBW raw image: eqs. (1)-(6), Gray World, matrix, luminance substitution.
+    """Develop an interleaved RGBW raw image: eqs. (1)-(5), Gray World, matrix, substitution.
 
     Parameters
     ----------
     raw : RawImage
         Mosaic with R, G, B and W.
     colours : ColourFit
-        A fit of all channels (`isp.colour.colour_fit.fit_colours`) lets W into the colours where it isn't saturated, as
-        far as the noise asks; one of a plain matrix (`ColourFit.of`) doesn't.
+        A fit of all channels (`isp.colour.colour_fit.fit_colours`) lets W into the colours as far as the noise
+        asks; one of a plain matrix (`ColourFit.of`) doesn't.
     balance : WhiteBalance
         Gray World's, or a response to what should come out neutral, such as a file's as-shot neutral.
     settings : Settings
@@ -48,28 +48,16 @@ def picture_interleaved(
         For a mosaic with other channels.
     """
     require_letters(raw, ("R", "G", "B", "W"))
-
-    # The paper's own method stays as it is.
-    ours, everything = settings.distance == "noise", raw
-    if ours:
-        raw, unseen = without_unseen(raw, balance.response(raw))
-    result = reconstruct_with_noise(raw, settings)
+    result = reconstruct_with_noise(raw, settings, balance.expected(raw))
+    if result.white is None:
+        raise InputError("settings.distance: 'raw' isn't allowed; give 'noise', or take picture_interleaved_paper")
     gains, sources = balance.gains(raw, result.estimate)
     noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
     snr = green_snr(raw, result.estimate)
-    share = substitution_weight(snr, substitution_snr)
-    weight = share if ours else float(share > 0.5)
-    alpha = saturated_fraction(raw, settings.window)
-    planes = sharpen(raw, result.estimate, gains, result.noise_gain) if ours else result.estimate
+    weight = substitution_weight(snr, substitution_snr)
+    planes = sharpen(result.white, result.estimate, gains, result.noise_gain)
     balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
-    if ours:
-        draw_unseen(everything, unseen, gains, balanced)
-
-    # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
-    mixed = alpha > 0.0
-    without, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * SMOOTH_COLOUR_ERROR)
-    rgb[mixed] = (1.0 - without) * rows_at(rgb, mixed) + without * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
@@ -86,9 +74,22 @@ def picture_interleaved_paper(
     Distances in electrons, alpha counted over the patch, a plain 3x3 matrix without W, and a switch to W's luminance.
     `settings` is `isp.settings.PAPER`, one pixel, the bilateral filter; `PAPER_5X5` is its non-local means.
     """
-    return picture_interleaved(
-        raw, ColourFit.of(colours.matrix()), balance=balance, settings=settings, substitution_snr=substitution_snr
-    )
+    require_letters(raw, ("R", "G", "B", "W"))
+    colours = ColourFit.of(colours.matrix())
+    result = reconstruct_with_noise(raw, settings)
+    gains, sources = balance.gains(raw, result.estimate)
+    noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
+    snr = green_snr(raw, result.estimate)
+    weight = float(substitution_weight(snr, substitution_snr) > 0.5)
+    balanced = clip_highlights(raw, result.estimate * gains, highlight_level(raw, gains))
+
+    # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
+    rgb = balanced @ matrix_with_white(colours, noise, weight).T
+    alpha = saturated_fraction(raw, settings.patch)
+    mixed = alpha > 0.0
+    without, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * SMOOTH_COLOUR_ERROR)
+    rgb[mixed] = (1.0 - without) * rows_at(rgb, mixed) + without * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
+    return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
 
 def picture_bayer(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:

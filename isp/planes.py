@@ -1,7 +1,7 @@
-"""From the mosaic to one full plane a channel, in units of noise: where the patches h_i of eq. (5) are read.
+"""From the mosaic to one full plane a channel: where the paper reads the patches h_i of eq. (5).
 
 Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samples with a tent, so a flat field stays
-flat up to the border. They serve only to guide the similarity: what is averaged are the samples themselves.
+flat up to the border.
 """
 
 from collections.abc import Sequence
@@ -11,9 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.anscombe import stabilise_raw
-from isp.settings import Distance
-from sensor.cfa import Tile, channels
+from sensor.cfa import Tile
 from sensor.raw import RawImage
 
 Plane = NDArray[np.float64]
@@ -38,29 +36,6 @@ def tent_radius(tile: Tile, channel: str) -> int:
         if np.all(reached):
             return radius
     return int(max(sampled.shape))
-
-
-def tent_weights(tile: Tile) -> list[Plane]:
-    """Weights with which `fill` makes a plane of an endless mosaic, by phase.
-
-    Returns
-    -------
-    list of (th, tw, 2r + 1, 2r + 1) float64
-        For each channel, in the order of `sensor.cfa.channels`: weight, for the pixel at phase (i, j) of the tile, of
-        the site at each offset up to the radius r. Sums to 1.
-    """
-    return [_channel_weights(tile, channel) for channel in channels(tile)]
-
-
-def _channel_weights(tile: Tile, channel: str) -> Plane:
-    radius = tent_radius(tile, channel)
-    weights = np.zeros((len(tile), len(tile[0]), 2 * radius + 1, 2 * radius + 1))
-    for phase in np.ndindex(*weights.shape[:2]):
-        if tile[phase[0]][phase[1]] == channel:
-            weights[(*phase, radius, radius)] = 1.0
-        else:
-            weights[phase] = _phase_tent(tile, channel, phase, radius)
-    return np.asarray(weights / weights.sum((2, 3), keepdims=True))
 
 
 def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
@@ -148,17 +123,6 @@ def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
         if 2 * power > count:
             return np.asarray(total)
         values, power = values[:-power] + values[power:], 2 * power
-
-
-def guide_mosaic(electrons: NDArray[Any], raw: RawImage, distance: Distance) -> NDArray[Any]:
-    """The mosaic of `raw` [e-] as patches are read from it: in units of noise, or as it is."""
-    return stabilise_raw(electrons, raw) if distance == "noise" else electrons
-
-
-def planes(raw: RawImage, distance: Distance = "noise") -> Plane:
-    """Planes h_i, shape (channel, h, w), in the order of `sensor.cfa.channels`."""
-    mosaic = guide_mosaic(raw.electrons, raw, distance)
-    return np.stack([fill(mosaic, raw.cfa, channel) for channel in raw.channels])
 
 
 def bilinear(raw: RawImage) -> NDArray[np.float64]:

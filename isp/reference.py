@@ -5,17 +5,16 @@ against, and what runs where Dr.Jit can't.
 """
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.planes import Plane, fill, guide_mosaic
-from isp.settings import DEFAULTS, Reconstruction, Settings
+from isp.planes import Plane, fill
+from isp.settings import PAPER, Reconstruction, Settings
 from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import saturated_fraction
-from isp.similarity.interpolation import certainty
-from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import mask
 from sensor.raw import RawImage
 
@@ -26,18 +25,16 @@ LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the fi
 class _Inputs:
     """What eqs. (1)-(6) read.
 
-    Electrons, the channel sampled at each pixel, padded planes, alpha, certainty of similarity, up to where samples
-    count, noise distances, W.
+    Electrons, the channel sampled at each pixel, padded planes a channel or one for all, alpha, up to where samples
+    count, W's plane.
     """
 
     electrons: Plane
     channel: NDArray[np.intp]
     h: Plane
     alpha: Plane
-    certainty: Plane
     brightest: Plane
-    noise: list[Plane]
-    white: int | None
+    white: int
 
 
 @dataclass(frozen=True)
@@ -50,33 +47,31 @@ class ReferenceSums:
     value: Plane
 
 
-def reconstruct_reference(raw: RawImage, settings: Settings = DEFAULTS) -> NDArray[np.float64]:
-    """Reconstruct every channel at every pixel: `isp.interleaved.reconstruct` in float64.
+def reference_with_noise(
+    raw: RawImage, settings: Settings = PAPER, guide: NDArray[Any] | None = None
+) -> Reconstruction:
+    """Reconstruct every channel at every pixel in float64: estimate and noise gain.
 
-    Returns
-    -------
-    (h, w, channel) float64
-        f_i(x) [e-], channels in the order of `sensor.cfa.channels`.
+    Parameters
+    ----------
+    guide : (h, w) float64, optional
+        The one plane that patches are read from, of `isp.panchromatic.read_as_white`. Left out, each channel has its
+        own as the paper writes, W's stands for it by eq. (6), and distances are in electrons.
 
     Raises
     ------
     InputError
-        As `reconstruct`.
+        Where Omega may miss a channel of the tile.
     """
     settings.check_reaches(raw.cfa)
-    return np.asarray(reference_with_noise(raw, settings).estimate, dtype=np.float64)
-
-
-def reference_with_noise(raw: RawImage, settings: Settings = DEFAULTS) -> Reconstruction:
-    """Estimate and noise gain in float64."""
-    sums = sum_weights(raw, settings)
+    sums = sum_weights(raw, settings, guide)
     return Reconstruction(sums.value / sums.weight, sums.square / sums.weight**2, "numpy")
 
 
-def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
+def sum_weights(raw: RawImage, settings: Settings, guide: NDArray[Any] | None = None) -> ReferenceSums:
     """Sums of eqs. (1) and (3) in float64, one offset of the neighbourhood after the other."""
-    inputs = _inputs(raw, settings)
-    shape = (*raw.shape, len(inputs.h))
+    inputs = _inputs(raw, settings, guide)
+    shape = (*raw.shape, len(raw.channels))
     sums = ReferenceSums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
     reach = range(-settings.reach, settings.reach + 1)
     for row in (d for d in reach if abs(d) < raw.shape[0]):
@@ -85,20 +80,16 @@ def sum_weights(raw: RawImage, settings: Settings) -> ReferenceSums:
     return sums
 
 
-def _inputs(raw: RawImage, settings: Settings) -> _Inputs:
-    names, half, in_noise = raw.channels, settings.patch // 2, settings.distance == "noise"
-    noise = noise_distances(raw.cfa, settings.patch, settings.reach)
-    mosaic = guide_mosaic(raw.electrons, raw, settings.distance)
-    h = np.stack([fill(mosaic, raw.cfa, name) for name in names])
+def _inputs(raw: RawImage, settings: Settings, guide: NDArray[Any] | None) -> _Inputs:
+    names, half = raw.channels, settings.patch // 2
+    planes = [fill(raw.electrons, raw.cfa, name) for name in names] if guide is None else [guide]
     return _Inputs(
         electrons=raw.electrons,
         channel=np.argmax([mask(raw.cfa, name, raw.shape) for name in names], axis=0),
-        h=np.pad(h, ((0, 0), (half, half), (half, half)), mode="reflect"),
-        alpha=saturated_fraction(raw, settings.window),
-        certainty=certainty(mosaic, raw.cfa, settings.patch) if in_noise else np.ones(raw.shape),
+        h=np.pad(np.stack(planes), ((0, 0), (half, half), (half, half)), mode="reflect"),
+        alpha=saturated_fraction(raw, settings.patch) if guide is None else np.zeros(raw.shape),
         brightest=brightest_allowed(raw.electrons, raw, settings),
-        noise=noise if in_noise and settings.patch > 1 else [np.zeros_like(table) for table in noise],
-        white=names.index("W") if "W" in names else None,
+        white=names.index("W") if guide is None and "W" in names else 0,
     )
 
 
@@ -107,35 +98,29 @@ def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset
     shape = inputs.electrons.shape
     x = tuple(np.arange(max(-d, 0), size - max(d, 0)) for d, size in zip(offset, shape, strict=True))
     y = tuple(line + d for line, d in zip(x, offset, strict=True))
-    distance = [_distance(inputs, i, settings, x, offset) for i in range(len(inputs.h))]
+    distance = [_distance(plane, settings, x, offset) for plane in inputs.h]
     log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
-    trust = inputs.certainty[np.ix_(*x)]
     phase = tuple(d % size for d, size in zip(offset, inputs.brightest.shape[:2], strict=True))
     bound = inputs.brightest[phase][np.ix_(*x)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
-    for i in range(len(inputs.h)):
+    for i in range(sums.weight.shape[2]):
         at = np.nonzero(channel == i)  # S_i(y) of eq. (1)
-        white = i if inputs.white is None else inputs.white
-        beta_s = alpha[at] * np.sqrt(distance[i][at]) + (1.0 - alpha[at]) * np.sqrt(distance[white][at])  # eq. (5)
-        log_weight = log_spatial - trust[at] * beta_s**2 / (2.0 * settings.sigma_s**2)
+        own = distance[min(i, len(distance) - 1)][at]
+        beta_s = alpha[at] * np.sqrt(own) + (1.0 - alpha[at]) * np.sqrt(distance[inputs.white][at])  # eq. (5)
+        log_weight = log_spatial - beta_s**2 / (2.0 * settings.sigma_s**2)
         log_weight[electrons[at] > bound[at]] = LEFT_OUT
         _accumulate(sums, (x[0][at[0]], x[1][at[1]], np.full(at[0].shape, i)), log_weight, electrons[at])
 
 
-def _distance(
-    inputs: _Inputs, channel: int, settings: Settings, x: tuple[NDArray[np.intp], ...], offset: tuple[int, int]
-) -> Plane:
-    """Squared distance of h_i(x) and h_i(x + offset) over what noise alone makes, 0 or more, for a grid of x."""
+def _distance(h: Plane, settings: Settings, x: tuple[NDArray[np.intp], ...], offset: tuple[int, int]) -> Plane:
+    """Squared distance of h_i(x) and h_i(x + offset) for a grid of x."""
     half = settings.patch // 2
     # The patch around (r, c) of the frame is [r, r + patch) x [c, c + patch) of the padded plane.
     grown = [np.arange(line[0], line[-1] + 2 * half + 1) for line in x]
-    h = inputs.h[channel]
     squares = (h[np.ix_(*grown)] - h[np.ix_(grown[0] + offset[0], grown[1] + offset[1])]) ** 2
     for axis in (0, 1):
         squares = scipy.ndimage.convolve1d(squares, np.ones(settings.patch), axis, mode="constant")
-    total = squares[half : half + len(x[0]), half : half + len(x[1])]
-    noise = inputs.noise[channel][:, :, offset[0] + settings.reach, offset[1] + settings.reach]
-    return np.asarray(np.maximum(total - noise[np.ix_(x[0] % noise.shape[0], x[1] % noise.shape[1])], 0.0))
+    return np.asarray(squares[half : half + len(x[0]), half : half + len(x[1])])
 
 
 def _accumulate(sums: ReferenceSums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:

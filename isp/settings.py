@@ -1,4 +1,6 @@
-"""The reconstruction's settings, checked once, and its result."""
+"""The reconstruction's settings, checked once, and its results."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
@@ -10,6 +12,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError, require_name
 from rodcone.jit import Backend
 from sensor.cfa import Tile
+from sensor.raw import RawImage
 
 Distance = Literal["noise", "raw"]
 
@@ -19,7 +22,6 @@ NEIGHBOURHOOD = 21  # Parmar & Wandell 2009, section 3.1: the only one of the fo
 PATCH = 1
 SIGMA_D = 6.0
 SIGMA_S = 3.0
-WINDOW = 9  # pixels a side over which W's SNR is averaged, and eq. (6) counts in units of noise
 SMALLEST_SIGMA = 1e-3  # below it the spatial weight of the next pixel is exp(-5e5) or less: nothing new to ask for
 
 
@@ -37,8 +39,8 @@ class Settings:
         Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
         0.001 to inf.
     distance : {"noise", "raw"}
-        Whether patches are compared in units of noise, and trusted as far as noise allows, or as the paper has it: in
-        electrons, with alpha counted over the same patch.
+        Whether one guide serves all channels, in units of noise (`isp.panchromatic`), or as the paper has it each
+        channel its own plane, in electrons, for which W's stands by eq. (6), alpha counted over the patch.
 
     Raises
     ------
@@ -56,11 +58,6 @@ class Settings:
     def reach(self) -> int:
         """Largest offset in Omega along one axis [pixels]."""
         return self.neighbourhood // 2
-
-    @cached_property
-    def window(self) -> int:
-        """Pixels a side over which eq. (6) counts: the paper's is the patch itself."""
-        return WINDOW if self.distance == "noise" else self.patch
 
     def __post_init__(self) -> None:
         for name in ("neighbourhood", "patch"):
@@ -102,8 +99,31 @@ class Reconstruction:
         sum w^2 / (sum w)^2, 0 to 1: the factor by which the weights reduce the variance of white noise on the samples.
     engine : {"cuda", "llvm", "numpy"}
         What computed it.
+    white : WhiteReading or None
+        The guide; None where each channel has its own.
     """
 
     estimate: NDArray[np.floating]
     noise_gain: NDArray[np.floating]
     engine: Backend
+    white: WhiteReading | None = None
+
+
+@dataclass(frozen=True)
+class WhiteReading:
+    """A frame whose every sample is read as W (`isp.panchromatic.read_as_white`).
+
+    Attributes
+    ----------
+    raw : RawImage
+        The frame; a full sample of W is what the colours around say of a neutral, and full at least.
+    shares : (rows, columns, channel) float
+        Each channel's electrons per electron of W in the surroundings of every tile, in the order of
+        `sensor.cfa.channels`.
+    guide : (h, w) float
+        What W would read at every pixel [standard deviations of the noise of a sample of W].
+    """
+
+    raw: RawImage
+    shares: NDArray[np.floating]
+    guide: NDArray[np.floating]

@@ -97,6 +97,10 @@ class WhiteBalance:
         """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
         return raw.channel_mixing @ neutral_response(raw.channels) if self.neutral is None else self.neutral
 
+    def expected(self, raw: RawImage) -> Floats:
+        """Response to a neutral before the picture is known: the given one, else the calibrated, shape (channel,)."""
+        return self.response(raw) if self.given is None else self.given
+
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
         """Gains of a frame, and where they come from.
 

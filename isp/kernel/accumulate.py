@@ -37,12 +37,12 @@ ROOT_SCALE = 2.0**-32
 # more time.
 EXP2 = (0.99992522, 0.69583354, 0.22606716, 0.07802452)
 
-Sums = tuple[Any, ...]  # of the weights, of weight times sample[, of the squared weights][, largest log weight so far]
+Sums = tuple[Any, ...]  # of the weights, of weight times sample, of the squared weights[, largest log weight so far]
 
 
-def start_sums(running: bool, noise: bool) -> tuple[float, ...]:
+def start_sums(running: bool) -> tuple[float, ...]:
     """Sums before the first sample."""
-    return (0.0, 0.0) + (0.0,) * noise + (NO_LOG_WEIGHT,) * running
+    return (0.0, 0.0, 0.0) + (NO_LOG_WEIGHT,) * running
 
 
 def add_samples(
@@ -57,23 +57,20 @@ def add_samples(
 
 
 def squared_distances(
-    at_x: dict[int, list[Any]], at_y: dict[int, list[Any]], noise: list[Any], pixels: list[tuple[int, int]], patch: int
+    at_x: dict[int, list[Any]], at_y: dict[int, list[Any]], pixels: list[tuple[int, int]], patch: int
 ) -> list[Any]:
-    """Squared distance of each pixel's patches; of more than one pixel less what noise alone makes, 0 or more.
+    """Squared distance of each pixel's patches.
 
     Parameters
     ----------
     at_x, at_y : mapping of int to list
         Rows under the patches around x and y; a pixel's patch begins at its own row and column.
-    noise : list
-        A number a pixel; empty for patches of one pixel.
     """
     # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
     squares = {i: [dr.square(y - x) for x, y in zip(at_x[i], at_y[i], strict=True)] for i in at_x}
     columns = sorted({c for _, c in pixels})
     lines = {c: {i: _sum(line, c, patch) for i, line in squares.items()} for c in columns}
-    totals = [_sum(lines[c], r, patch) for r, c in pixels]
-    return [larger(total - share, 0.0) for total, share in zip(totals, noise, strict=True)] if noise else totals
+    return [_sum(lines[c], r, patch) for r, c in pixels]
 
 
 def mixed_squares(colour: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
@@ -103,13 +100,13 @@ def larger(a: Any, b: Any) -> Any:
 
 
 def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
-    weight, value, *square = sums
+    weight, value, square = sums
     new = dr.select(sample <= brightest, _exp2(larger(log_weight, LOWEST_EXPONENT)), 0.0)
-    return weight + new, dr.fma(new, sample, value), *(dr.fma(new, new, total) for total in square)
+    return weight + new, dr.fma(new, sample, value), dr.fma(new, new, square)
 
 
 def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
-    weight, value, *square, largest = sums
+    weight, value, square, largest = sums
     bounded = dr.select((log_weight > LOWEST_LOG_WEIGHT) & (sample <= brightest), log_weight, LOWEST_LOG_WEIGHT)
     ahead = bounded - largest
     smaller = _exp2(larger(-dr.abs(ahead), LOWEST_EXPONENT))  # one exponential: of the two weights the larger is 1
@@ -119,7 +116,7 @@ def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest:
     return (
         dr.fma(weight, old, new),
         dr.fma(value, old, new * sample),
-        *(dr.fma(total, dr.square(old), dr.square(new)) for total in square),
+        dr.fma(square, dr.square(old), dr.square(new)),
         dr.select(is_larger, bounded, largest),
     )
 

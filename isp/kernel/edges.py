@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.kernel.accumulate import larger
+from isp.settings import WhiteReading
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
 from rodcone.types import Floats
@@ -20,15 +21,14 @@ SIDE = 2 * REACH + 1
 # and makes flats noisier.
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
-MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
 FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
+APART = 9.0  # squared standard deviations by which a sample stands out of its plane
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
 # of 1.5 0.3.
 OFFSETS = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
 CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
-NEAR = CORRELATION[4] ** 4 / (CORRELATION[4] ** 4).sum()
 
 
 def channel_noise(raw: RawImage) -> NDArray[np.float64]:
@@ -37,13 +37,14 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
 
-def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArray[np.float32]:
+def sharpen_frame(white: WhiteReading, planes: NDArray[Any], scales: Floats) -> NDArray[np.float32]:
     """As `isp.colour.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
-    jit, names, (height, width) = arrays(), raw.channels, raw.shape
+    jit, raw = arrays(), white.raw
+    names, (height, width) = raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
     # Mirrored at the borders: row r stands at FAR + r.
     rows, columns = (np.pad(np.arange(length, dtype=np.uint32), FAR, mode="reflect") for length in raw.shape)
-    frame = upload(planes)
+    frame, share_planes = upload(planes), upload(white.shares)
     electrons = upload((raw.dn.astype(np.float32) - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
     cells = upload(np.array([[names.index(name) for name in line] for line in raw.cfa], np.uint32))
     row_starts, row_cells = upload(rows * np.uint32(width)), upload(rows % down * across)
@@ -91,48 +92,52 @@ def sharpen_frame(raw: RawImage, planes: NDArray[Any], scales: Floats) -> NDArra
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
 
     # The best linear estimate.
-    to_samples = [_pick(covariance, s) for s in site]
+    to_samples = [pick(covariance, s) for s in site]
     among_samples = [
-        [float(CORRELATION[y, z]) * _pick([*to_samples[y]], site[z]) for z in range(y + 1)] for y in range(9)
+        [float(CORRELATION[y, z]) * pick([*to_samples[y]], site[z]) for z in range(y + 1)] for y in range(9)
     ]
-    value = [_pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
-    noises = [(_pick([*shot], s), _pick([*dark], s)) for s in site]
+    value = [pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
+    noises = [(pick([*shot], s), pick([*dark], s)) for s in site]
     sample_noise = [larger(k * larger(v, 0.0) + d, TINY) for v, (k, d) in zip(value, noises, strict=True)]
-    is_full = [e >= _pick([*full_e], s) for e, s in zip(sample, site, strict=True)]
+    is_full = [e >= pick([*full_e], s) for e, s in zip(sample, site, strict=True)]
     counted = [dr.select(f, UNKNOWN, n) for f, n in zip(is_full, sample_noise, strict=True)]
-    residual = [e - _pick([*mean], s) for e, s in zip(sample, site, strict=True)]
+    residual = [e - pick([*mean], s) for e, s in zip(sample, site, strict=True)]
     weights = _solve(among_samples, counted, residual)
     terms = [float(CORRELATION[4, y]) * weights[y] * to_samples[y] for y in range(9)]
     estimate = mean + sum(terms[1:], terms[0])
 
-    # As far as an edge was missed.
-    squares = [dr.square(e - v) / n for e, v, n in zip(sample, value, sample_noise, strict=True)]
-    chi_squared = sum(squares[1:], squares[0]) / 9.0
-    chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
-    sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
-    sharp -= hidden * (plane - tint * plane[3])
+    # A colour that noise hides is the surroundings'.
+    sharp = estimate - hidden * (plane - tint * plane[3])
 
-    # Light of unknown colour: q (hue) and q_c. W is channel 3.
-    channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
-    full = reduce(or_, channels_full)  # a bit a channel
-    white = [[larger(values[3], 0.0) for values in window[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
-    lattices = [[w for line in white[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
-    least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
-    # Times 1.5: at 1 the dark beside corners of windows is greyed, at 3 more hues around lamps stay.
-    dark = (sum((white[i][j] for i, j in product(near, near)), 0.0) / 9.0 - 1.5 * least) / larger(light[3], TINY)
-    missed = dr.minimum(larger(chi_squared / MISSED, dark), 1.0)
-    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
+    # Light of unknown hue: q and q_c. W is channel 3.
+    full = reduce(
+        or_, [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
+    )  # a bit a channel
     black = dr.minimum(contrast, 1.0)
-    hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
+    hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), 0.0))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
-    risen = sharp + unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
+    sharp += unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
+
+    # Light that fills less than half of the window: the sample's own, in the colour around.
+    here, (k, d) = site[4], noises[4]
+    no_hue = is_full[4] & ((full & 0b111) > 0)
+    tile_row, tile_column = (divide(line, divisor(int(size)))[0] for line, size in ((row, down), (column, across)))
+    of_tile = tile_row * dr.opaque(jit.UInt, white.shares.shape[1]) + tile_column
+    shares = dr.gather(jit.Array4f, share_planes, of_tile)
+    shares = dr.select(no_hue, balance[3] / balance, shares)
+    own, of_w = pick([*shares], here), plane[3]
+    as_white_noise = larger((k * larger(of_w, 0.0) + d / own) / own, TINY)
+    difference = sample[4] / own - of_w
+    seen = larger(1.0 - APART * as_white_noise / larger(dr.square(difference), TINY), 0.0)
+    small = (of_w + seen * difference) * shares
+    sharp = small + (sharp - small) / (1.0 + dr.square(dr.square(contrast)))
     result = dr.empty(jit.Float, planes.size)
-    dr.scatter(result, risen, dr.arange(jit.UInt, height * width), mode=dr.ReduceMode.NoConflicts)
+    dr.scatter(result, sharp, dr.arange(jit.UInt, height * width), mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
     return np.asarray(result.numpy().reshape(planes.shape))
 
 
-def _pick(values: list[Any], site: Any) -> Any:
+def pick(values: list[Any], site: Any) -> Any:
     """That of four values whose number is `site`."""
     *rest, result = values
     for number, value in enumerate(rest):

@@ -1,8 +1,8 @@
 """Eqs. (1) to (5) for many blocks of pixels: what one thread does, in Dr.Jit, for LLVM and CUDA alike.
 
-With guide W a thread owns all pixels of its block and reads W's plane. Otherwise it owns those whose y lie at one cell
-of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and all
-mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
+With a shared guide a thread owns all pixels of its block and reads one plane. Otherwise it owns those whose y lie at
+one cell of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and
+all mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
 (`isp.kernel.layout`).
 """
 
@@ -25,10 +25,10 @@ class Shape:
         Rows and columns of the CFA's tile, and of a block.
     patch : int
         Width of the patches.
-    guide : {"W", "channel", "mixed"}
-        The plane that guides: W's, that of the channel at y, or both as alpha mixes them.
-    running, noise : bool
-        Whether sums are in units of the largest weight so far, or at a fixed scale; whether weights are squared too.
+    guide : {"shared", "channel", "mixed"}
+        The plane that guides: one for all channels, that of the channel at y, or that and W's as alpha mixes them.
+    running : bool
+        Whether sums are in units of the largest weight so far, or at a fixed scale.
     """
 
     tile: tuple[int, int]
@@ -36,7 +36,6 @@ class Shape:
     patch: int
     guide: Guide
     running: bool
-    noise: bool
 
 
 @dataclass(frozen=True)
@@ -51,8 +50,8 @@ class KernelSums:
         Sum of the weights in units of 2^unit.
     mean : Float
         Weighted mean of the samples.
-    noise_gain : Float or None
-        Sum of the squared weights over the squared sum; None where nobody asks for it.
+    noise_gain : Float
+        Sum of the squared weights over the squared sum.
     first_row, rows, columns : Int
         The strip's first row in the frame; rows and columns of a phase.
     """
@@ -68,21 +67,20 @@ class KernelSums:
 
 def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
     """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
-    patch, (down, across), count = shape.patch, shape.tile, dr.width(threads.row)
-    dense = shape.guide == "W"
+    patch, across, count = shape.patch, shape.tile[1], dr.width(threads.row)
+    dense = shape.guide == "shared"
     rows, columns = (range(0, n, 1 if dense else step) for n, step in zip(shape.block, shape.tile, strict=True))
     # Row by row: instructions come in the order in which sums are evaluated, and each row of patches is loaded when
     # the first pixel needs it.
     pixels = [(r, c) for r in rows for c in columns]
     window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
     under, block = shape.block[1] + patch - 1, shape.block[1]  # values of a packet: of the plane, and samples
-    noises = 0 if patch == 1 else down * across if dense else 2
 
     # Where things are
     x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
     x = jit.UInt(x_row) * inputs.stride + jit.UInt(x_column)  # pixel
     x_plane = jit.UInt(threads.plane)
-    planes = {"W": [inputs.white], "channel": [x_plane], "mixed": [x_plane, inputs.white]}[shape.guide]
+    planes = {"shared": [inputs.white], "channel": [x_plane], "mixed": [x_plane, inputs.white]}[shape.guide]
     first_packets = [plane * inputs.plane_packets for plane in planes]
     pair, step = inputs.packet_rows, inputs.packet_columns
     lines = sorted({i // pair for i in window})  # of packets
@@ -90,8 +88,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     # x as y is counted, in packets: (row + a) / pair, (column + b) / step for phase (a, b), whole numbers
     a, b = threads.phase // across % pair, threads.phase % step
     x_packet = jit.UInt(x_row + a) // pair * inputs.row_packets + jit.UInt(x_column + b) // step
-    # A list of offsets a phase, or a phase and cell: phase * cells + cell
-    offsets = jit.UInt(threads.phase if dense else threads.phase * (down * across) + threads.cell)
+    offsets = jit.UInt(threads.phase)  # a list a phase
     first_entry, entries = offsets * inputs.length, dr.gather(jit.UInt, inputs.counts, offsets)
 
     # What the thread reads at x, once
@@ -105,7 +102,6 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
         }
         for plane in planes
     ]
-    inverse_variance = [dr.gather(jit.Float, inputs.inverse_variance, x + r * inputs.stride + c) for r, c in pixels]
     bound = jit.UInt(threads.phase) * inputs.plane_size + x
     brightest = [dr.gather(jit.Float, inputs.brightest, bound + r * inputs.stride + c) for r, c in pixels]
 
@@ -119,7 +115,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
 
     def add_offset(k: Any, totals: list[Any]) -> tuple[Any, list[Any]]:
         """Add the samples at y = x + d for offset k of the list."""
-        steps, log_spatial, *noise = load(inputs.entries, first_entry + k, inputs.entry_values, 2 + noises)
+        steps, log_spatial = load(inputs.entries, first_entry + k, inputs.entry_values, 2)
         y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # packet
         distances, samples = list[list[Any]](), dict[int, list[Any]]()
         for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
@@ -132,20 +128,18 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
                 for j, i in enumerate(own_rows):
                     patches_at_y[i] = values[j * under : (j + 1) * under]
                     samples.setdefault(i, values[pair * under + j * block :][:block])
-            # A noise distance for each cell of y, or for each plane.
-            less = [noise[r % down * across + c % across if dense else n] for r, c in pixels] if noise else []
-            distances.append(squared_distances(patches, patches_at_y, less, pixels, patch))
+            distances.append(squared_distances(patches, patches_at_y, pixels, patch))
         beta_squared = distances[0]
         if shape.guide == "mixed":
             alpha = {r: load(inputs.alpha, y + below[r], inputs.alpha_values, block) for r in rows}
             beta_squared = mixed_squares(distances[0], distances[1], [alpha[r][c] for r, c in pixels])
         if not shape.running:
             log_spatial = log_spatial + HEADROOM
-        log_weights = [dr.fma(-v, beta, log_spatial) for v, beta in zip(inverse_variance, beta_squared, strict=True)]
+        log_weights = [dr.fma(-inputs.inverse_variance, beta, log_spatial) for beta in beta_squared]
         values = [samples[r][c] for r, c in pixels]
         return k + 1, add_samples(totals, log_weights, values, brightest, running=shape.running)
 
-    start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running, shape.noise))] * len(pixels)
+    start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running))] * len(pixels)
     _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)
 
     # What is stored first is evaluated first: a pixel's sample is used as soon as it is loaded. Were the weights asked
@@ -172,17 +166,16 @@ def _store(
     jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
 ) -> list[Any]:
     """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
-    targets = [sums.weight, sums.mean] + [sums.noise_gain] * shape.noise + [sums.unit] * shape.running
+    targets = [sums.weight, sums.mean, sums.noise_gain] + [sums.unit] * shape.running
     stored = [
-        (weight, value / weight, *(square / dr.square(weight) for square in more[: shape.noise]), *more[shape.noise :])
-        for weight, value, *more in totals
+        (weight, value / weight, square / dr.square(weight), *largest) for weight, value, square, *largest in totals
     ]
     # [phase, row, column]: (phase * rows + row) * columns + column, of the pixel (row + a, column + b)
     row = threads.row - sums.first_row + threads.phase // shape.tile[1]
     column = threads.column + threads.phase % shape.tile[1]
     first = (threads.phase * sums.rows + row) * sums.columns + column
     # Values that are stored at once: the largest power of two that divides a row of the block.
-    packet = shape.block[1] & -shape.block[1] if shape.guide == "W" else 1
+    packet = shape.block[1] & -shape.block[1] if shape.guide == "shared" else 1
     for i in range(0, len(pixels), packet):
         index = jit.UInt(first + pixels[i][0] * sums.columns + pixels[i][1]) // packet
         for target, *values in zip(targets, *stored[i : i + packet], strict=True):

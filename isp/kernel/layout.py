@@ -18,8 +18,8 @@
     Packets:    |h0 h1 h2 h3 s0 s1 s2 s3|h2 h3 h4 h5 s2 s3 s4 s5| ...      (block 4 wide, patch 1, every 2nd column)
 
 A packet holds all that a thread reads of a row of y: the plane under the patches of its block, and the block's samples.
-Where W guides it holds two rows (h of both, then s of both), which is a line of the cache. At x, which a thread reads
-once, planes are read pixel by pixel. The addresses, with `packet_step` = (down, across):
+Where one plane guides all channels it holds two rows (h of both, then s of both), which is a line of the cache. At x,
+which a thread reads once, planes are read pixel by pixel. The addresses, with `packet_step` = (down, across):
     pixel   (row - top) * stride + column - left
     packet  (row - top) / down * row_packets + (column - left) / across
 
@@ -35,11 +35,10 @@ from numpy.typing import NDArray
 
 from isp.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
 from isp.kernel.schedule import Guide, Pattern, list_offsets
-from isp.planes import fill, guide_mosaic
-from isp.settings import WINDOW, Settings
+from isp.planes import fill
+from isp.settings import Settings
 from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import fraction_of_full
-from isp.similarity.interpolation import certainty
 from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
 from sensor.raw import RawImage, full_at_sites
@@ -62,12 +61,12 @@ class Strip:
         Row and column of the frame where the arrays begin: whole tiles lie before it.
     samples : (h, w) float32
         Mosaic over black [DN].
-    guide : (h, w) float32
-        Mosaic as patches are read from it (`isp.planes.guide_mosaic`).
-    inverse_variance : (h, w) float32
-        log2(e) c(x) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5) with `certainty`.
+    electrons : (h, w) float32
+        Mosaic [e-], which fills the paper's planes h_i.
+    guide : (h, w) float32 or None
+        The one plane that patches are read from; None where each channel has its own.
     alpha : (h, w) float64 or None
-        Eq. (6); None where it is 0 everywhere, or without W.
+        Eq. (6); None where it is 0 everywhere, and where one plane guides all channels.
     brightest : (th, tw, h, w) float32
         Up to where samples count, of `isp.similarity.brightest` [DN over black].
     """
@@ -75,8 +74,8 @@ class Strip:
     shape: tuple[int, int]
     origin: tuple[int, int]
     samples: Array
-    guide: Array
-    inverse_variance: Array
+    electrons: Array
+    guide: Array | None
     alpha: Array | None
     brightest: Array
 
@@ -87,12 +86,14 @@ class Inputs:
 
     Attributes
     ----------
-    planes, inverse_variance, brightest : Float
-        Read at x: planes h_i, [channel, row, column], W's alone with guide W; [row, column]; [phase, row, column].
+    planes, brightest : Float
+        Read at x: planes h_i, [channel, row, column], the shared one alone; [phase, row, column].
+    inverse_variance : Float
+        log2(e) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5).
     packets : Float
         Read at y: [channel, row, packet, value].
     alpha : Float
-        Packets of alpha, [row, packet, value]. None with guide W, and where it is 0 everywhere.
+        Packets of alpha, [row, packet, value]. None with a shared guide, and where it is 0 everywhere.
     entries, counts : Float, UInt
         Of `isp.kernel.schedule.list_offsets`.
     length : UInt
@@ -106,14 +107,14 @@ class Inputs:
     stride, row_packets, plane_size, plane_packets : UInt
         Pixels and packets in a row, and in a plane.
     white : UInt
-        Number of W's plane.
+        Number of W's plane, or of the shared one.
     height, width : UInt
         Of the whole frame.
     """
 
     planes: Any
-    inverse_variance: Any
     brightest: Any
+    inverse_variance: Any
     packets: Any
     alpha: Any
     entries: Any
@@ -150,27 +151,24 @@ def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
     return -(-blocks // -(-blocks // most)) * block[0]
 
 
-def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings) -> Strip:
-    """What some rows of a frame depend on."""
+def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, guide: Array | None) -> Strip:
+    """What some rows of a frame depend on; without a `guide` the paper's planes a channel."""
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
-    full = full_at_sites(raw, dn)
-    alpha = fraction_of_full(full, raw.cfa, settings.window) if pattern.white is not None and full.any() else None
+    alpha = None
+    if guide is None:
+        full = full_at_sites(raw, dn)
+        alpha = fraction_of_full(full, raw.cfa, settings.patch) if pattern.white is None or full.any() else None
     dn = dn.astype(np.float32)
     samples, electrons = dn - black, (dn - black) * gain
-    guide = guide_mosaic(electrons, raw, settings.distance)
-    inverse_variance = np.full(dn.shape, np.float32(np.log2(np.e) / (2.0 * settings.sigma_s**2)))
-    if settings.distance == "noise":
-        inverse_variance *= certainty(guide, raw.cfa, settings.patch)
-    np.maximum(inverse_variance, np.float32(LEAST_INVERSE_VARIANCE), out=inverse_variance)
     bounds = brightest_allowed(electrons, raw, settings)
     return Strip(
         shape=(shape[0], shape[1]),
         origin=(part[0].start, part[1].start),
         samples=samples,
-        guide=guide,
-        inverse_variance=inverse_variance,
+        electrons=electrons,
+        guide=None if guide is None else guide[part],
         alpha=alpha,
         brightest=np.divide(bounds, gain, out=bounds),
     )
@@ -201,16 +199,16 @@ def lay_out(
     box = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
     half, block = settings.patch // 2, pattern.block[1]
-    channels = [number for number in range(len(pattern.channels)) if guide != "W" or number == pattern.white]
+    names = pattern.channels if guide != "shared" else ["W"]  # whose planes are laid out
     samples = _window(strip.samples[box], start, (size[0], size[1] + block), 0, 0.0)
 
     # Packets: one or two rows of a plane under the patches of a block, then as many of the block's samples.
     down, across = packet_step(pattern, guide)
     row_packets, under = size[1] // across, block + settings.patch - 1
-    planes = aligned((len(channels), *size), np.float32)
-    packets = aligned((len(channels), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
-    for number, plane, target in zip(channels, planes, packets, strict=True):
-        filled = fill(strip.guide[box], pattern.cfa, pattern.channels[number])
+    planes = aligned((len(names), *size), np.float32)
+    packets = aligned((len(names), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
+    for name, plane, target in zip(names, planes, packets, strict=True):
+        filled = fill(strip.electrons[box], pattern.cfa, name) if strip.guide is None else strip.guide[box]
         wide = _window(filled, (start[0] - half, start[1] - half), (size[0], size[1] + under), half, OUTSIDE)
         plane[:] = wide[:, : size[1]]
         for k in range(down):
@@ -218,7 +216,7 @@ def lay_out(
             first = down * under + k * block
             _put_packets(target[..., first : first + block], samples[k::down], across)
     alpha = None
-    if guide != "W" and strip.alpha is not None:
+    if guide != "shared" and strip.alpha is not None:
         alpha = aligned((size[0], row_packets, packet_width(block)), np.float32)
         _put_packets(alpha[..., :block], _window(strip.alpha[box], start, (size[0], size[1] + block), 0, 0.0), across)
 
@@ -226,12 +224,11 @@ def lay_out(
     entries = np.zeros((*offsets.shape[:2], packet_width(offsets.shape[2] - 1)), np.float32)
     steps = offsets[..., 0] // down * row_packets + offsets[..., 1] // across  # packets from x to y
     entries[..., 0] = steps.astype(np.int32).view(np.float32)
-    entries[..., 1 : offsets.shape[2] - 1] = offsets[..., 2:]
+    entries[..., 1] = offsets[..., 2]
     brightest = aligned((len(pattern.cells), *size), np.float32)
     for phase, target in zip(np.ndindex(pattern.tile), brightest, strict=True):
         _window(strip.brightest[phase][box], start, size, 0, 0.0, target)
     read = {"planes": planes, "packets": packets, "brightest": brightest, "entries": entries, "counts": counts}
-    read |= {"inverse_variance": _window(strip.inverse_variance[box], start, size, 0, 0.0)}
     read |= {} if alpha is None else {"alpha": alpha}
     numbers = {
         "length": entries.shape[1],
@@ -239,10 +236,11 @@ def lay_out(
         "row_packets": row_packets,
         "plane_size": size[0] * size[1],
         "plane_packets": packets.shape[1] * row_packets,
-        "white": channels.index(pattern.white) if pattern.white is not None else 0,
+        "white": names.index("W") if "W" in names else 0,
     } | dict(zip(("height", "width"), strip.shape, strict=True))
     return Inputs(
         **{"alpha": None} | {name: upload(values) for name, values in read.items()},
+        inverse_variance=dr.opaque(jit.Float, max(np.log2(np.e) / (2.0 * settings.sigma_s**2), LEAST_INVERSE_VARIANCE)),
         **{name: dr.opaque(jit.UInt, number) for name, number in numbers.items()},
         **{name: dr.opaque(jit.Int, number) for name, number in (("top", top), ("left", left))},
         packet_rows=down,
@@ -256,17 +254,17 @@ def lay_out(
 def packet_step(pattern: Pattern, guide: Guide) -> tuple[int, int]:
     """Rows in a packet, and columns from one packet to the next.
 
-    With guide W all y of a block begin at the tile's first cell: at its first column, and at an even row where the
-    tile's height is even. Two rows of planes and samples are then one line of the cache.
+    With a shared guide all y of a block begin at the tile's first cell: at its first column, and at an even row where
+    the tile's height is even. Two rows of planes and samples are then one line of the cache.
     """
-    return (2 if pattern.tile[0] % 2 == 0 else 1, pattern.tile[1]) if guide == "W" else (1, 1)
+    return (2 if pattern.tile[0] % 2 == 0 else 1, pattern.tile[1]) if guide == "shared" else (1, 1)
 
 
 def _surroundings(
     shape: tuple[int, ...], spans: tuple[Span, Span], pattern: Pattern, settings: Settings
 ) -> tuple[slice, slice]:
-    """Rows and columns of the frame that some depend on: half a patch or window for sums, twice a tile for tents."""
-    margin = max(settings.patch // 2, WINDOW // 2) + 2 * max(pattern.tile)
+    """Rows and columns of the frame that some depend on: half a patch for sums, twice a tile for tents."""
+    margin = settings.patch // 2 + 2 * max(pattern.tile)
     rows, columns = (
         slice(max(first - margin, 0) // size * size, min(last + margin, length))
         for (first, last), size, length in zip(spans, pattern.tile, shape, strict=True)  # with the frame's phase

@@ -39,27 +39,32 @@ class Started:
     launches: list[Launch]
 
 
-def reconstruct_strips(raw: RawImage, settings: Settings, *, noise: bool) -> list[NDArray[np.float32]]:
-    """f_i(x) of eq. (1) [e-] and, where asked for, sum w^2 / (sum w)^2; each (h, w, channel)."""
+def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | None) -> list[NDArray[np.float32]]:
+    """f_i(x) of eq. (1) [e-] and sum w^2 / (sum w)^2; each (h, w, channel).
+
+    With a `guide` (h, w), one plane guides all channels; else each has its own, which W's stands for as eq. (6) has it.
+    """
     jit, pattern, (height, width) = arrays(), make_pattern(raw.cfa), raw.dn.shape
     shape = height, width, len(pattern.channels)
-    results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(1 + noise)]
+    results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(2)]
     step, started = strip_rows((height, width), pattern, settings.patch), list[Started]()
     for first in range(0, height, step):
-        started.append(_start(jit, raw, (first, min(first + step, height)), pattern, settings, noise=noise))
+        started.append(_start(jit, raw, (first, min(first + step, height)), pattern, settings, guide))
         if len(started) > 1:
             _finish(jit, started.pop(0), raw, pattern, results)
     _finish(jit, started.pop(), raw, pattern, results)
     return [values.numpy().reshape(shape) for values in results]
 
 
-def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, *, noise: bool) -> Started:
+def _start(
+    jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, shared: NDArray[Any] | None
+) -> Started:
     """Start the kernels of some rows of the frame; the first row is a whole number of blocks."""
     columns, launches = (0, raw.dn.shape[1]), list[Launch]()
-    strip, sums = cut_strip(raw, rows, pattern, settings), _empty_sums(jit, rows, columns[1], pattern, noise=noise)
+    strip, sums = cut_strip(raw, rows, pattern, settings, shared), _empty_sums(jit, rows, columns[1], pattern)
     work = list_threads(pattern, strip.shape, rows, strip.alpha, strip.origin[0], settings.reach)
-    # W's threads read W's plane alone. For the others all planes are laid out, around them alone: mostly few.
-    for guides in (["W"], ["channel", "mixed"]):
+    # Threads of a shared guide read that plane alone. For the others all planes are laid out, around them: mostly few.
+    for guides in (["shared"], ["channel", "mixed"]):
         kinds: list[Guide] = [guide for guide in work if guide in guides and len(work[guide].row)]
         if not kinds:
             continue
@@ -72,16 +77,14 @@ def _start(jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Sett
         )
         inputs = lay_out(jit, strip, region, pattern, settings, kinds[0])
         for guide in kinds:
-            shape = Shape(
-                tile=pattern.tile, block=pattern.block, patch=settings.patch, guide=guide, running=False, noise=noise
-            )
+            shape = Shape(tile=pattern.tile, block=pattern.block, patch=settings.patch, guide=guide, running=False)
             threads = Threads(**{name: upload(values) for name, values in vars(work[guide]).items()})
             failed = launch(jit, inputs, threads, shape, sums)
             launches.append(Launch(inputs=inputs, threads=threads, shape=shape, failed=failed))
     return Started(rows=rows, sums=sums, launches=launches)
 
 
-def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bool) -> KernelSums:
+def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern) -> KernelSums:
     """Room for what the blocks of all phases give; at the fixed scale they leave the unit as it is."""
     # Whole blocks that cover the strip and the tile - 1 rows and columns by which phases begin early.
     size = [
@@ -93,7 +96,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bo
         weight=dr.empty(jit.Float, count),
         unit=dr.full(jit.Float, -HEADROOM, count),
         mean=dr.empty(jit.Float, count),
-        noise_gain=dr.empty(jit.Float, count) if noise else None,
+        noise_gain=dr.empty(jit.Float, count),
         first_row=dr.opaque(jit.Int, rows[0]),
         rows=dr.opaque(jit.Int, size[0]),
         columns=dr.opaque(jit.Int, size[1]),
@@ -101,7 +104,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern, *, noise: bo
 
 
 def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
-    """Put estimate and, where asked for, noise gain of a strip into the frame's results, [row, column, channel]."""
+    """Put estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
         again: Any = dr.compress(one.failed)  # waits for the launch
         if dr.width(again):
@@ -113,7 +116,7 @@ def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results
     width, gain_e_per_dn = dr.opaque(jit.Int, raw.dn.shape[1]), dr.opaque(jit.Float, raw.gain_e_per_dn)
     pixel = dr.arange(jit.Int, (last - first) * raw.dn.shape[1])
     row, column = pixel // width, pixel % width
-    stored = [array for array in (sums.weight, sums.unit, sums.mean, sums.noise_gain) if array is not None]
+    stored = [sums.weight, sums.unit, sums.mean, sums.noise_gain]
     planes = list[list[Any]]()
     for channel in range(len(pattern.channels)):
         parts = []
@@ -123,8 +126,8 @@ def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results
             # [phase, row, column]: (phase * rows + row + a) * columns + column + b
             index = ((a * across + b) * sums.rows + row + a) * sums.columns + column + b
             parts.append([dr.gather(jit.Float, array, jit.UInt(index)) for array in stored])
-        mean, *noise_gain = _merge(parts)
-        planes.append([mean * gain_e_per_dn, *noise_gain])
+        mean, noise_gain = _merge(parts)
+        planes.append([mean * gain_e_per_dn, noise_gain])
     index = jit.UInt(pixel + dr.opaque(jit.Int, first * raw.dn.shape[1]))
     for result, values in zip(results, zip(*planes, strict=True), strict=True):
         dr.scatter(result, jit.ArrayXf([*values]), index, mode=dr.ReduceMode.NoConflicts)
@@ -132,7 +135,7 @@ def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results
 
 
 def _merge(parts: list[list[Any]]) -> list[Any]:
-    """Mean[, noise gain] of the samples at several cells, whose weights are in units of their own."""
+    """Mean and noise gain of the samples at several cells, whose weights are in units of their own."""
     if len(parts) == 1:
         return parts[0][2:]
     common = parts[0][1]
@@ -141,8 +144,5 @@ def _merge(parts: list[list[Any]]) -> list[Any]:
     weights = [weight * dr.exp2(unit - common) for weight, unit, *_ in parts]
     total = sum(weights[1:], weights[0])
     shares = [weight / total for weight in weights]
-    means, *noise_gains = zip(*(part[2:] for part in parts), strict=True)
-    result = [sum(share * mean for share, mean in zip(shares, means, strict=True))]
-    return result + [
-        sum(dr.square(share) * gain for share, gain in zip(shares, gains, strict=True)) for gains in noise_gains
-    ]
+    mean = sum(share * part[2] for share, part in zip(shares, parts, strict=True))
+    return [mean, sum(dr.square(share) * part[3] for share, part in zip(shares, parts, strict=True))]

@@ -14,10 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.settings import Settings
-from isp.similarity.noise_distance import noise_distances
 from sensor.cfa import Tile, channels
 
-Guide = Literal["W", "channel", "mixed"]
+Guide = Literal["shared", "channel", "mixed"]
 Index = NDArray[np.int32]
 
 # Pixels of a block: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time); 12 x 4 or 8 x 8
@@ -59,7 +58,7 @@ class Threads:
     row, column : (n,) int32
         Its first pixel in the frame; may lie outside.
     cell : (n,) int32
-        With guide W 0: it owns all pixels of its block. Else those whose y lie at this cell of the tile.
+        With a shared guide 0: it owns all pixels of its block. Else those whose y lie at this cell of the tile.
     plane : (n,) int32
         Number of the channel at that cell.
     phase : (n,) int32
@@ -88,41 +87,26 @@ def make_pattern(cfa: Tile) -> Pattern:
 
 @lru_cache(maxsize=4)  # of two cameras, by W and by channels
 def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Every offset of Omega, phase by phase.
+    """Every offset of Omega, a list for each phase.
 
     Returns
     -------
     entries : (list, length, values) float32
-        Row and column of the offset, log2 G(beta_d, sigma_d) of eqs. (2) and (4), and noise distances where patches
-        have more than one pixel. With guide W there is a list for each phase, with W's distances for the cells of y.
-        Else there is one for each phase and cell, with those of the channel at that cell and of W.
+        Row and column of the offset, and log2 G(beta_d, sigma_d) of eqs. (2) and (4).
     counts : (list,) uint32
         Entries that hold; the rest is padding.
     """
-    (down, across), reach, lists = pattern.tile, settings.reach, []
-    tables = noise_distances(pattern.cfa, settings.patch, reach)
-    if settings.distance == "raw":
-        tables = [np.zeros_like(table) for table in tables]
+    down, reach, lists = pattern.tile[0], settings.reach, []
     line = np.arange(-reach, reach + 1)
     for phase in np.ndindex(pattern.tile):
         rows, columns = (line[line % size == first] for size, first in zip(pattern.tile, phase, strict=True))
         row, column = (offset.ravel() for offset in np.meshgrid(rows, columns, indexing="ij"))
-        if guide != "W":
+        if guide != "shared":
             # Two rows of offsets in turn: they read mostly the same packets.
             order = np.lexsort((row, column, (row - row[0]) // (2 * down)))
             row, column = row[order], column[order]
         log_spatial = -np.log2(np.e) * (row**2 + column**2) / (2.0 * settings.sigma_d**2)
-
-        # B(x, d) by channel and cell of y: x = y - d lies at cell - phase.
-        at_x = [((i - phase[0]) % down, (j - phase[1]) % across) for i, j in np.ndindex(pattern.tile)]
-        noise = [[table[at][row + reach, column + reach] for at in at_x] for table in tables]
-        white = [np.zeros(row.size)] * len(at_x) if pattern.white is None else noise[pattern.white]
-        distances = [[noise[channel][k], white[k]] for k, channel in enumerate(pattern.cells)]
-        if guide == "W":
-            distances = [white]
-        if settings.patch == 1:
-            distances = [[]] * len(distances)
-        lists += [np.stack([row, column, log_spatial, *noise_columns], axis=-1) for noise_columns in distances]
+        lists.append(np.stack([row, column, log_spatial], axis=-1))
     counts = np.array([len(table) for table in lists], dtype=np.uint32)
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
@@ -141,8 +125,8 @@ def list_threads(
 ) -> dict[Guide, Threads]:
     """Threads that reconstruct some rows of a frame, by what guides them.
 
-    Where no alpha > 0 is in a block's reach, eq. (5) holds W's distance alone; where all alpha are 1, the channel's own
-    alone, as it does wherever that channel is W. Exact, at a part of the work.
+    Where no alpha > 0 is in a block's reach, eq. (5) holds one distance for all channels, W's; where all alpha are 1,
+    the channel's own alone, as it does wherever that channel is W. Exact, at a part of the work.
 
     Parameters
     ----------
@@ -151,7 +135,8 @@ def list_threads(
     rows : (int, int)
         First and past the last row to reconstruct; the first is a whole number of blocks.
     alpha : (n, w) array or None
-        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0.
+        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0, and where one
+        plane guides all channels.
     """
     # First row and column of the blocks that cover the rows in phase (0, 0), and in others that begin earlier.
     ends = rows[1] + pattern.tile[0] - 1, shape[1] + pattern.tile[1] - 1
@@ -159,9 +144,8 @@ def list_threads(
         np.arange(first, end, step, dtype=np.int32)
         for first, end, step in zip((rows[0], 0), ends, pattern.block, strict=True)
     ]
-    any_full = np.full((len(lines[0]), len(lines[1])), pattern.white is None)
-    all_full = any_full
-    if pattern.white is not None and alpha is not None:
+    any_full = all_full = np.zeros((len(lines[0]), len(lines[1])), bool)
+    if alpha is not None:
         # What a block may reach in any phase: [first - (tile - 1) - reach, first + block + reach).
         rows_of, columns_of = (
             np.clip([line - size + 1 - reach - first, line + block + reach - first], 0, length)
@@ -174,7 +158,7 @@ def list_threads(
     white = [cell for cell, channel in enumerate(pattern.cells) if channel == pattern.white]
     colours = [cell for cell, channel in enumerate(pattern.cells) if channel != pattern.white]
     shares: dict[Guide, list[tuple[NDArray[np.bool_], list[int]]]] = {
-        "W": [(~any_full, [0])],
+        "shared": [(~any_full, [0])],
         "channel": [(any_full & all_full, colours), (any_full, white)],
         "mixed": [(any_full & ~all_full, colours)],
     }

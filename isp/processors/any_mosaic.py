@@ -1,7 +1,5 @@
 """Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved."""
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,11 +7,11 @@ from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, require_letters
-from isp.settings import DEFAULTS, Reconstruction, Settings
+from isp.settings import DEFAULTS, Settings
 from isp.substitution import COLOUR_ERROR
 from render.spectrum import Floats
 from sensor.cfa import channels, tile_of
-from sensor.raw import RawImage, renamed
+from sensor.raw import RawImage
 
 Plane = NDArray[np.float64]
 
@@ -26,10 +24,10 @@ def picture_any_mosaic(
     mosaic: str | None = None,
     settings: Settings = DEFAULTS,
 ) -> Picture:
-    """Develop a raw image of any mosaic: eqs. (1)-(6), Gray World, a matrix over all channels that knows their noise.
+    """Develop a raw image of any mosaic: eqs. (1)-(5), Gray World, a matrix over all channels that knows their noise.
 
     With three channels or more the picture has colours as far as these tell them; one or two give a grey picture of
-    luminance. W guides the similarity, or where there is none the mosaic's unit, such as C of RCCB.
+    luminance. Every sample guides the similarity, read as W, or as the mosaic's unit, such as C of RCCB.
 
     Parameters
     ----------
@@ -48,7 +46,7 @@ def picture_any_mosaic(
     if mosaic is not None:
         require_letters(raw, channels(tile_of(mosaic)))
 
-    result = _guided(raw, settings)
+    result = reconstruct_with_noise(raw, settings, balance.expected(raw))
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
     balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
@@ -67,14 +65,3 @@ def rgb_of_channels(raw: RawImage, balanced: Plane, colours: ColourFit, noise: F
     unit = names.index(raw.unit_channel)
     three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
     return np.asarray(three @ colours.plain.T)
-
-
-def _guided(raw: RawImage, settings: Settings) -> Reconstruction:
-    """Reconstruction whose guide is W, or the unit of a mosaic that has neither W nor G, which then goes as W."""
-    names, unit = raw.channels, raw.unit_channel
-    if {"W", "G"} & set(names):
-        return reconstruct_with_noise(raw, settings)
-    named = renamed(raw, {unit: "W"})
-    result = reconstruct_with_noise(named, settings)
-    order = [channels(named.cfa).index("W" if name == unit else name) for name in names]
-    return replace(result, estimate=result.estimate[..., order], noise_gain=result.noise_gain[..., order])

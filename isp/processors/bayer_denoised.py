@@ -30,12 +30,12 @@ OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6
 
 
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruct`, each channel its own guide.
+    """Develop a Bayer raw image with `isp.interleaved.reconstruct`; every sample, read as green, guides.
 
     The colours know their noise, as the interleaved camera's do.
     """
     require_bayer(raw.cfa)
-    result = reconstruct_with_noise(raw)
+    result = reconstruct_with_noise(raw, neutral=balance.expected(raw))
     planes = np.asarray(result.estimate, dtype=np.float64)
     return finish(raw, planes, colours, balance=balance, engine=result.engine, noise_gain=result.noise_gain)
 

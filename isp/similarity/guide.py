@@ -1,12 +1,13 @@
-"""What guides the similarity at each pixel, W or the channel itself (eq. 6)."""
+"""What guides the paper's similarity at each pixel, W or the channel itself (eq. 6)."""
 
 import numpy as np
 from numpy.typing import NDArray
 
 from isp.planes import Plane, box_sums, fill
-from isp.settings import WINDOW
 from sensor.cfa import Tile
 from sensor.raw import RawImage
+
+WINDOW = 9  # pixels a side over which a frame's share of saturated pixels is counted; the paper counts the patch
 
 
 def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
@@ -24,7 +25,7 @@ def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
     return fraction_of_full(raw.saturated, raw.cfa, window)
 
 
-def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int = WINDOW) -> Plane:
+def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
     """`saturated_fraction` of the mosaic's saturated samples, (h, w)."""
     if "W" not in "".join(tile):
         return np.ones(full.shape)

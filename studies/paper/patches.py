@@ -14,8 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from isp.anscombe import stabilise_raw
 from isp.interleaved import reconstruct
-from isp.planes import planes
+from isp.planes import fill
 from isp.settings import Settings
 from rodcone.colour_spaces import encode_srgb
 from sensor.device import draw_device
@@ -66,6 +67,11 @@ def edge_columns(truth: Image) -> NDArray[np.intp]:
     return np.asarray((truth < middle).sum(axis=1), dtype=np.intp)  # the dark half is on the left
 
 
+def white_plane(raw: RawImage) -> Image:
+    """Fill W's plane h_W in units of noise (h, w), for the distances to have one."""
+    return np.asarray(fill(stabilise_raw(raw.electrons, raw), raw.cfa, "W"))
+
+
 def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
     """Compare the patches of h_W around x, y and z beside the edge, in every row that holds all three.
 
@@ -74,7 +80,7 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
     columns : (h,) intp
         Of `edge_columns`.
     """
-    plane = planes(raw)[raw.channels.index("W")]
+    plane = white_plane(raw)
     half = PATCH // 2
     rows = np.arange(half, plane.shape[0] - AWAY - half)
     places = np.stack([rows, columns[rows] + ASIDE], axis=-1)
@@ -106,7 +112,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             edge = triplets(raw, columns)
             shares[f"{reading}, {name}"] = edge.share
             if name == next(iter(LEVELS)):
-                parts.append((reading, planes(raw)[raw.channels.index("W")], edge))
+                parts.append((reading, white_plane(raw), edge))
     return paper_figure("4", _drawing(parts), level=next(iter(LEVELS))), claims_4(shares)
 
 

@@ -6,9 +6,11 @@ import numpy as np
 from hard.case import Image, Margin, Situation, worse, worst_of
 from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
+from isp.colour.white_balance import neutral_response
 from isp.kernel.edges import FAR
+from isp.panchromatic import read_as_white
 from isp.reference import sum_weights
-from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, WINDOW, Settings
+from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Settings
 from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
@@ -18,6 +20,7 @@ KERNEL_ERROR = 1e-4
 KERNEL_ROUNDINGS = 16 * 2.0**-24
 DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision
 NOTHING_E = 1e-12
+GUIDE = 24  # pixels that a pixel of the guide depends on
 
 
 def equivariant(situation: Situation) -> Margin | None:
@@ -67,8 +70,8 @@ def _turn(cfa: Tile, steps: int, axis: int) -> Tile:
 def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None:
     """Pixels of the cut frame that nothing at the border reaches; None where the frame has none."""
     develop = situation.develop
-    reach = develop.get("neighbourhood", NEIGHBOURHOOD) // 2 + max(develop.get("patch", PATCH), WINDOW) // 2
-    margin = reach + FAR + 4 * len(raw.cfa)  # surroundings; tents of a sample's plane and of its alpha, mended pixels
+    reach = develop.get("neighbourhood", NEIGHBOURHOOD) // 2 + develop.get("patch", PATCH) // 2 + GUIDE
+    margin = reach + FAR + 2 * len(raw.cfa)  # the surroundings of colours that noise hides, and mended pixels
     if min(raw.shape) - 1 <= 2 * margin:
         return None
     return np.s_[margin:-margin, margin:-margin]
@@ -85,7 +88,8 @@ def _margin(error: Image, raw: RawImage, situation: Situation) -> Margin:
     plain = _beside(error, raw, situation, KERNEL_ERROR * spread + sums)
     if plain.kept:
         return plain
-    largest = float(-sum_weights(raw, settings).largest.min())
+    white = read_as_white(raw, neutral_response(raw.channels))
+    largest = float(-sum_weights(white.raw, settings, white.guide).largest.min())
     return _beside(error, raw, situation, np.clip(KERNEL_ROUNDINGS * largest, KERNEL_ERROR, 0.5) * spread + sums)
 
 

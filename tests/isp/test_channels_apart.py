@@ -14,6 +14,7 @@ from isp.ple.prior import own_prior
 from isp.ple.pyramid import reconstruct as reconstruct_ple
 from isp.reference import reference_with_noise
 from isp.remosaic import remosaic
+from isp.settings import DEFAULTS
 from sensor.cfa import RGBW, channels, mask
 from sensor.chip import ChannelReading
 from sensor.config import with_channel_readings
@@ -80,7 +81,8 @@ def test_a_flat_field_comes_out_at_its_level_in_every_channel(reading):
 def test_both_engines_read_the_same():
     raw, _ = flat(WAYS[0], 2.0)
     part = replace(raw, dn=raw.dn[:32, :32])
-    kernel, reference = reconstruct_with_noise(part), reference_with_noise(part)
+    kernel = reconstruct_with_noise(part)
+    reference = reference_with_noise(kernel.white.raw, DEFAULTS, np.float64(kernel.white.guide))
     assert np.abs(kernel.estimate - reference.estimate).max() < 2e-3 * reference.estimate.max()
     assert np.abs(kernel.noise_gain - reference.noise_gain).max() < 2e-3
 

@@ -13,10 +13,9 @@ from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct, reconstruct_with_noise
 from isp.kernel.schedule import list_threads, make_pattern
 from isp.processors.catalogue import NAMED
-from isp.reference import reconstruct_reference, reference_with_noise, sum_weights
-from isp.settings import PAPER, PAPER_5X5, WINDOW, Settings
+from isp.reference import reference_with_noise, sum_weights
+from isp.settings import PAPER, PAPER_5X5, Settings
 from isp.similarity.guide import saturated_fraction
-from isp.similarity.noise_distance import noise_distances
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import BAYER, RGBW, Tile, channel_map, channels
@@ -65,15 +64,24 @@ def test_without_similarity_an_impulse_is_the_spatial_weight_in_closed_form(tile
             assert result.noise_gain[(*x, i)] == pytest.approx(gain, rel=2 * EXP2_ERROR)
 
 
-def transcription(raw, settings):
+def by_reference(raw, settings):
+    """The kernel's result, the reference's on the same guide, and the reference's sums."""
+    kernel = reconstruct_with_noise(raw, settings)
+    if kernel.white is None:
+        return kernel, reference_with_noise(raw, settings), sum_weights(raw, settings)
+    guided = kernel.white.raw, settings, np.float64(kernel.white.guide)
+    return kernel, reference_with_noise(*guided), sum_weights(*guided)
+
+
+def transcription(raw, settings, guide=None):
     """Log weights and samples of eq. (1) by pixel and channel, from eqs. (2) to (6); for RGBW in a 2x2 tile alone.
 
-    By the paper's own method distances are in electrons, every sample counts, and alpha is counted over the patch.
+    With a guide it alone is compared, and samples over a bound don't count. By the paper's own method each channel has
+    a plane, distances are in electrons, every sample counts, and alpha is counted over the patch.
     """
     height, width = raw.shape
-    plain, half, reach = settings.distance == "raw", settings.patch // 2, settings.reach
+    plain, half, reach = guide is None, settings.patch // 2, settings.reach
     letters, sigma_s = channel_map(raw.cfa, raw.shape), settings.sigma_s
-    stable = raw.electrons if plain else 2 * np.sqrt(np.maximum(raw.electrons + 3 / 8 + raw.dark_noise_e**2, 0))
 
     def plane(values, letter, y):
         if letters[y] == letter:
@@ -86,10 +94,9 @@ def transcription(raw, settings):
                 total, weight = total + w * values[s], weight + w
         return total / weight
 
-    h = {i: {y: plane(stable, i, y) for y in np.ndindex(raw.shape)} for i in "RGBW"}
+    h = {i: {y: plane(raw.electrons, i, y) if plain else guide[y] for y in np.ndindex(raw.shape)} for i in "RGBW"}
     white = {y: plane(raw.electrons, "W", y) for y in np.ndindex(raw.shape)}
     steps = list(product(range(-half, half + 1), repeat=2))
-    noise = dict(zip("RGBW", noise_distances(raw.cfa, settings.patch, reach), strict=True))
 
     def reflect(k, size):
         while not 0 <= k < size:
@@ -98,26 +105,7 @@ def transcription(raw, settings):
 
     def distance(i, x, y):
         at = lambda p, a: h[i][reflect(p[0] + a[0], height), reflect(p[1] + a[1], width)]  # noqa: E731
-        total = sum((at(x, a) - at(y, a)) ** 2 for a in steps)
-        bias = noise[i][x[0] % 2, x[1] % 2, y[0] - x[0] + reach, y[1] - x[1] + reach] if half and not plain else 0.0
-        return math.sqrt(max(total - bias, 0.0))
-
-    around = half if plain else WINDOW // 2
-    window = list(product(range(-around, around + 1), repeat=2))
-
-    def trust(x):
-        return 1.0 if plain else 1 / (1 + spread(x) / 9)
-
-    def spread(x):
-        """Half differences of opposite samples, squared, less their noise; the four letters of the tile in turn."""
-        total = 0.0
-        for a in steps:
-            c = reflect(x[0] + a[0], height), reflect(x[1] + a[1], width)
-            for p, share in {(0, 1): 1 / 4, (1, 0): 1 / 4, (1, 1): 1 / 8, (1, -1): 1 / 8}.items():
-                ends = [(c[0] + sign * p[0], c[1] + sign * p[1]) for sign in (-1, 1)]
-                if all(end in white for end in ends):
-                    total += share * ((stable[ends[0]] - stable[ends[1]]) ** 2 / 4 - 1 / 2)
-        return max(total, 0.0)
+        return math.sqrt(sum((at(x, a) - at(y, a)) ** 2 for a in steps))
 
     def counts(x, y):
         """Whether y isn't brighter than the brightest of its letter around x allows."""
@@ -136,7 +124,7 @@ def transcription(raw, settings):
         return any(full.get(s, False) for s in around)
 
     def alpha(y):
-        near = [filled_from_full(s) for a in window if (s := (y[0] + a[0], y[1] + a[1])) in white]
+        near = [filled_from_full(s) for a in steps if (s := (y[0] + a[0], y[1] + a[1])) in white]
         return sum(near) / len(near)
 
     for x in np.ndindex(raw.shape):
@@ -144,9 +132,10 @@ def transcription(raw, settings):
             log_weights, values = [], []
             for y in np.ndindex(raw.shape):
                 if letters[y] == i and max(abs(y[0] - x[0]), abs(y[1] - x[1])) <= reach and counts(x, y):
-                    beta_s = alpha(y) * distance(i, x, y) + (1 - alpha(y)) * distance("W", x, y)
+                    share = alpha(y) if plain else 0.0
+                    beta_s = share * distance(i, x, y) + (1 - share) * distance("W", x, y)
                     spatial = math.dist(x, y) ** 2 / (2 * settings.sigma_d**2)
-                    log_weights.append(-spatial - trust(x) * beta_s**2 / (2 * sigma_s**2))
+                    log_weights.append(-spatial - beta_s**2 / (2 * sigma_s**2))
                     values.append(raw.electrons[y])
             yield (*x, k), np.array(log_weights), np.array(values)
 
@@ -163,11 +152,12 @@ CASES = [
 def test_the_reference_is_the_paper_pixel_by_pixel(settings, seed):
     raw = scene((7, 8), 2500.0, seed=seed)  # partly saturated
     assert 0 < raw.saturated.mean() < 0.5
-    got, kernel = reconstruct_reference(raw, settings), reconstruct(raw, settings)
-    for place, log_weights, values in transcription(raw, settings):
+    kernel, reference, _ = by_reference(raw, settings)
+    guided = (raw, settings) if kernel.white is None else (kernel.white.raw, settings, np.float64(kernel.white.guide))
+    for place, log_weights, values in transcription(*guided):
         expected = np.average(values, weights=np.exp(log_weights - log_weights.max()))
-        assert got[place] == pytest.approx(expected, rel=1e-10)
-        assert kernel[place] == pytest.approx(expected, abs=0.2)
+        assert reference.estimate[place] == pytest.approx(expected, rel=1e-10)
+        assert kernel.estimate[place] == pytest.approx(expected, abs=0.2)
 
 
 KERNEL_CASES = [
@@ -184,21 +174,18 @@ KERNEL_CASES = [
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("sigma_s", [0.1, 4.0])
+@pytest.mark.parametrize("settings", [Settings(patch=5, sigma_s=x) for x in (0.1, 4.0)] + [PAPER_5X5])
 @pytest.mark.parametrize(("shape", "tile", "level", "seed"), KERNEL_CASES)
-def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, sigma_s):
-    raw = scene(shape, level, tile, seed)
-    kernel = reconstruct_with_noise(raw, Settings(patch=5, sigma_s=sigma_s))
-    settings = Settings(patch=5, sigma_s=sigma_s)
-    reference = reference_with_noise(raw, settings)
+def test_kernel_is_the_reference_in_single_precision(shape, tile, level, seed, settings):
+    kernel, reference, sums = by_reference(scene(shape, level, tile, seed), settings)
     assert kernel.engine == backend()
-    bound = single_precision(sum_weights(raw, settings).largest, FULL)
+    bound = single_precision(sums.largest, FULL)
     assert (np.abs(kernel.estimate - reference.estimate) < bound).all()
     assert np.abs(kernel.noise_gain - reference.noise_gain).max() < 2e-3
 
 
 def test_all_three_guides_occur_in_the_partly_saturated_frames():
-    alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3))
+    alpha = saturated_fraction(scene((40, 31), 2500.0, seed=3), 5)
     assert (alpha == 0.0).any()
     assert ((alpha > 0.0) & (alpha < 1.0)).any()
     assert (alpha == 1.0).any()
@@ -214,23 +201,23 @@ def half_saturated(turns=0):
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("turns", [0, 1, 2, 3])
 def test_threads_of_every_guide_are_the_reference(turns):
-    raw, settings = half_saturated(turns), Settings(patch=5, sigma_s=20.0)  # so large that both halves count
-    alpha = saturated_fraction(raw)
+    raw, settings = half_saturated(turns), replace(PAPER_5X5, sigma_s=2000.0)  # so large that both halves count
+    alpha = saturated_fraction(raw, settings.patch)
     work = list_threads(make_pattern(RGBW), raw.shape, (0, raw.shape[0]), alpha, 0, settings.reach)
-    assert {guide for guide, threads in work.items() if len(threads.row)} == {"W", "channel", "mixed"}
-    error = np.abs(
-        reconstruct(raw, Settings(patch=5, sigma_s=20.0)) - reconstruct_reference(raw, Settings(patch=5, sigma_s=20.0))
-    )
+    assert {guide for guide, threads in work.items() if len(threads.row)} == {"shared", "channel", "mixed"}
+    error = np.abs(reconstruct(raw, settings) - reference_with_noise(raw, settings).estimate)
     assert error.max() < 4e-5 * FULL
 
 
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without Dr.Jit")
 def test_other_sizes_sigmas_and_phases_run_the_kernels_that_are_compiled_already():
-    reconstruct(half_saturated(), Settings(patch=5))
+    for settings in (Settings(patch=5), PAPER_5X5):
+        reconstruct(half_saturated(), settings)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         for turns, sigma in ((1, 3.0), (3, math.inf)):
-            reconstruct(half_saturated(turns), Settings(patch=5, sigma_d=sigma, sigma_s=2.0 * sigma))
-        reconstruct(scene((33, 65), 2500.0, ("WB", "GR")), Settings(patch=5, neighbourhood=15))
+            for distance in ("noise", "raw"):
+                settings = Settings(patch=5, sigma_d=sigma, sigma_s=2.0 * sigma, distance=distance)
+                reconstruct(half_saturated(turns), settings)
         history = [kernel for kernel in dr.kernel_history() if "cache_hit" in kernel]
     assert len(history) > 6
     assert all(kernel["cache_hit"] for kernel in history)
@@ -257,19 +244,19 @@ def test_the_result_does_not_depend_on_the_number_of_threads():
 @pytest.mark.parametrize("sigma_s", [1e-3, 1e-2])
 def test_with_a_tiny_sigma_the_result_lies_among_the_samples_that_tie_for_the_best(sigma_s):
     """Single precision can't tell log weights apart that differ by its rounding: any mean of those samples is right."""
-    raw = scene((8, 9), 2500.0)
-    result = reconstruct(raw, Settings(neighbourhood=11, patch=5, sigma_s=sigma_s))
-    largest = 2 * math.sqrt(raw.electrons.max() + raw.dark_noise_e**2 + 3 / 8)
-    for place, log_weights, values in transcription(raw, Settings(neighbourhood=11, patch=5, sigma_s=sigma_s)):
+    settings = Settings(neighbourhood=11, patch=5, sigma_s=sigma_s)
+    result = reconstruct_with_noise(scene((8, 9), 2500.0), settings)
+    largest = float(result.white.guide.max())
+    for place, log_weights, values in transcription(result.white.raw, settings, np.float64(result.white.guide)):
         distance = -log_weights.max() * 2 * sigma_s**2
         # Rounding of 25 squares and their sum, and of the planes they come from: 2 d (delta x - delta y).
         rounding = (32 * distance + 2 * math.sqrt(25 * distance) * 2 * largest) * 2.0**-24 / (2 * sigma_s**2)
         tied = values[log_weights >= log_weights.max() - 2 * rounding - 20.0]  # 20: a weight of 2e-9 is nothing
         slack = 1e-5 * np.abs(values).max()
-        assert tied.min() - slack <= result[place] <= tied.max() + slack
+        assert tied.min() - slack <= result.estimate[place] <= tied.max() + slack
 
 
-@pytest.mark.parametrize("function", [reconstruct, reconstruct_reference])
+@pytest.mark.parametrize("function", [reconstruct, reference_with_noise])
 def test_bad_parameters_are_one_line_of_advice(function):
     for wrong, message in (
         ({"neighbourhood": 20}, "neighbourhood: 20 isn't allowed"),
@@ -295,7 +282,10 @@ def test_without_dr_jit_the_reference_runs_and_the_result_says_so(monkeypatch):
     raw = scene((9, 8), 300.0)
     result = reconstruct_with_noise(raw)
     assert result.engine == "numpy"
-    assert np.array_equal(result.estimate, reconstruct_reference(raw))
+    assert result.estimate.dtype == np.float64
+    assert np.array_equal(
+        result.estimate, reference_with_noise(result.white.raw, Settings(), result.white.guide).estimate
+    )
     assert reconstruct(raw).dtype == np.float32
 
 

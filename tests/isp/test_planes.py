@@ -10,9 +10,9 @@ from numpy.polynomial.hermite_e import hermegauss
 from scipy.stats import poisson
 
 from isp.anscombe import LEAST_PRNU, stabilise, stabilise_raw, unstabilise, unstabilise_raw, without_prnu
-from isp.planes import bilinear, fill, tent_radius, tent_weights
+from isp.planes import bilinear, fill, tent_radius
 from sensor.capture import expose
-from sensor.cfa import BAYER, MOSAICS, RGBW, channels
+from sensor.cfa import BAYER, MOSAICS, RGBW
 from sensor.device import draw_device
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -32,19 +32,6 @@ def test_impulse_spreads_as_the_tent_and_samples_are_kept():
 def test_tent_has_the_smallest_radius_that_reaches_a_sample():
     sites = ((RGBW, "W"), (BAYER, "G"), (RGBW_4X4, "W"), (SPARSE, "R"), (("R",), "R"))
     assert [tent_radius(*site) for site in sites] == [1, 1, 1, 2, 0]
-
-
-def test_weights_are_what_fill_does_inside_a_frame():
-    for tile in [RGBW, BAYER, RGBW_4X4, SPARSE]:
-        for letter in channels(tile):
-            weights = tent_weights(tile)[channels(tile).index(letter)]
-            radius = weights.shape[2] // 2
-            values = np.random.default_rng(3).normal(size=(12, 12))
-            plane = fill(values, tile, letter)
-            for row, column in product(range(4, 8), repeat=2):
-                around = values[row - radius : row + radius + 1, column - radius : column + radius + 1]
-                w = weights[row % len(tile), column % len(tile[0])]
-                assert plane[row, column] == pytest.approx((w * around).sum(), abs=1e-13), tile
 
 
 def test_stabilised_noise_has_unit_variance() -> None:

@@ -37,8 +37,9 @@ def test_non_local_means_are_those_of_the_interleaved_camera() -> None:
     expected = expected_e(BAYER, (33, 38), 400.0)
     rng = np.random.default_rng(1)
     image = exposure(rng.poisson(expected) + 2.0 * rng.standard_normal(expected.shape), BAYER)
-    planes = np.asarray(reconstruct(image), dtype=np.float64)
-    picture = PROCESSORS["bayer_nlm"].develop(image, np.eye(3), balance=[0.5, 1.0, 0.4])
+    balance = [0.5, 1.0, 0.4]
+    planes = np.asarray(reconstruct(image, neutral=np.array(balance)), dtype=np.float64)
+    picture = PROCESSORS["bayer_nlm"].develop(image, np.eye(3), balance=balance)
     assert picture.rgb == pytest.approx(planes / [0.5, 1.0, 0.4], rel=1e-12)
 
 

@@ -1,0 +1,273 @@
+"""The formulas of `isp.panchromatic` in Dr.Jit, in bands of rows, so that memory stays bounded.
+
+Shares change more slowly than light: a thread a tile makes them, a thread a pixel the guide.
+"""
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.kernel.accumulate import larger
+from isp.kernel.edges import TINY, channel_noise, pick
+from isp.kernel.layout import packet_width
+from isp.planes import tent
+from rodcone.device_arrays import divide, divisor, upload
+from rodcone.jit import arrays, dr
+from rodcone.types import Floats
+from sensor.cfa import Tile
+from sensor.raw import RawImage
+
+WINDOW_PX = 6  # a side, or three tiles, over which a channel's share is taken: colours change more slowly than light
+APART_PX = 6  # between the 5 x 5 windows of the surroundings
+DETAIL_PX = 5  # a side, over which detail is told from noise
+FAINT = 12.0  # dark noises of W, under which light says nothing of colour
+LEAST_LIGHT = 0.3  # of m_W, which is 1 in light: under it colours go to a neutral's
+LEAST_SHARE = 0.02  # of a neutral's share, for a sample to be read as W
+BAND_PIXELS = 2_000_000  # that are read together: 60 bytes each
+
+Numbers = list[Any]  # Dr.Jit arrays, such as one a channel
+EIGHT = [0.0625, 0.125, 0.0625, 0.125, 0.125, 0.0625, 0.125, 0.0625]  # [1 2 1] / 4 down and across, but the middle
+
+
+def window_steps(tile: int) -> range:
+    """Tiles of a share's window along one axis, from the middle one, for tiles of so many pixels."""
+    half = max(WINDOW_PX // tile // 2, 1)
+    return range(-half, half + 1)
+
+
+def surroundings_steps(tile: int) -> range:
+    """Tiles from the middle one to the middles of the windows of the surroundings."""
+    step = max(round(APART_PX / tile), 1)
+    return range(-2 * step, 2 * step + 1, step)
+
+
+def tent_radii(tile: Tile) -> tuple[int, int]:
+    """Pixels to either side, down and across, of the smallest tent that takes all cells of a tile alike."""
+    return max(len(tile) - 1, 1), max(len(tile[0]) - 1, 1)
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Threads in rows, one a pixel or one a tile, and where a thread finds its neighbours, mirrored at the borders.
+
+    Attributes
+    ----------
+    row, column : UInt
+        Of each thread.
+    row_starts, columns : UInt
+        By row, and by column, from `margin` before the first: where it starts.
+    margin, size : int
+    """
+
+    row: Any
+    column: Any
+    row_starts: Any
+    columns: Any
+    margin: int
+    size: int
+
+    def around(self, rows: Iterable[int], columns: Iterable[int]) -> Numbers:
+        """Places that many rows and columns away, row by row."""
+        number = type(self.row)
+        of_rows = [dr.gather(number, self.row_starts, self.row + (self.margin + step)) for step in rows]
+        of_columns = [dr.gather(number, self.columns, self.column + (self.margin + step)) for step in columns]
+        return [r + c for r in of_rows for c in of_columns]
+
+    def store(self, *values: Any) -> Any:
+        """Evaluate some values of each thread, which then lie together."""
+        real, width = type(values[0]), packet_width(len(values))
+        target, index = dr.empty(real, width * self.size), dr.arange(type(self.row), self.size)
+        packet = dr.array_t(arrays().ArrayXf)([*values, *values[:1] * (width - len(values))])
+        dr.scatter(target, packet, index, mode=dr.ReduceMode.NoConflicts)
+        dr.eval(target)
+        return target
+
+    def load(self, source: Any, places: Sequence[Any], values: int) -> list[Numbers]:
+        """Read the values that were stored together at some places."""
+        width, kind = packet_width(values), arrays().ArrayXf
+        return [[*dr.gather(kind, source, place, shape=(width, self.size))][:values] for place in places]
+
+
+def _grid(height: int, width: int, margin: int) -> Grid:
+    jit = arrays()
+    lines, columns = (np.pad(np.arange(size, dtype=np.uint32), margin, mode="reflect") for size in (height, width))
+    row, column = divide(dr.arange(jit.UInt, height * width), divisor(width))
+    return Grid(row, column, upload(lines * np.uint32(width)), upload(columns), margin, height * width)
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What is known of a frame.
+
+    Attributes
+    ----------
+    raw : RawImage
+    cells : list of int
+        Number of the channel at each cell of the tile, row by row.
+    white : int
+        Number of the channel that stands for W.
+    ratios : (channel,) float64
+        A neutral's electrons per electron of W.
+    """
+
+    raw: RawImage
+    cells: list[int]
+    white: int
+    ratios: Floats
+
+
+def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Shares of the surroundings, by tile (rows, columns, channel), and guide [e-], (h, w).
+
+    As `isp.panchromatic.read_as_white` states them.
+    """
+    (height, width), (down, across) = raw.shape, (len(raw.cfa), len(raw.cfa[0]))
+    frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)
+    shares = np.empty((-(-height // down), -(-width // across), len(ratios)), np.float32)
+    guide = np.empty((height, width), np.float32)
+    # Rows that a pixel depends on: windows of the surroundings, in tiles, and tents and the window of detail.
+    reach = (window_steps(down)[-1] + surroundings_steps(down)[-1] + 6) * down
+    step = max(BAND_PIXELS // width // down, 1) * down
+    for first in range(0, height, step):
+        last = min(first + step, height)
+        start, end = max(first - reach, 0), min(last + reach, height)
+        of_band, guide[first:last] = _guide_band(frame, (start, end), slice(first - start, last - start))
+        inside = slice((first - start) // down, -(-(last - start) // down))
+        shares[first // down : -(-last // down)] = of_band[inside, :, : len(ratios)]
+    return shares, guide
+
+
+def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[Any], NDArray[Any]]:
+    jit, raw, (shot, dark, _) = arrays(), frame.raw, channel_noise(frame.raw)
+    height, width, down, across = rows[1] - rows[0], raw.shape[1], len(raw.cfa), len(raw.cfa[0])
+    pixels, near = _grid(height, width, max(DETAIL_PX // 2, *tent_radii(raw.cfa))), range(-1, 2)
+
+    def opaque(values: Iterable[Any]) -> Numbers:
+        """Numbers that are data of the kernel, so that others don't compile it again."""
+        return [dr.opaque(jit.Float, float(x)) for x in values]
+
+    dn = raw.dn[rows[0] : rows[1]].astype(np.float32)
+    electrons = upload((dn - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
+    tile_row, tile_column = (
+        divide(line, divisor(size)) for line, size in ((pixels.row, down), (pixels.column, across))
+    )
+    cells = upload(np.array(frame.cells, np.uint32))
+    site = dr.gather(jit.UInt, cells, tile_row[1] * np.uint32(across) + tile_column[1])
+
+    # Samples as a neutral's light, and beside the light around.
+    neutral = opaque(frame.ratios)
+    plain = electrons / pick(neutral, site)
+    dr.eval(plain, site)
+    wide = [range(-radius, radius + 1) for radius in tent_radii(raw.cfa)]
+    tents = np.outer(*(tent(radius) / tent(radius).sum() for radius in tent_radii(raw.cfa))).ravel()
+    light = _weighted([dr.gather(jit.Float, plain, place) for place in pixels.around(*wide)], tents.tolist())
+    faint = dr.opaque(jit.Float, float(FAINT * np.sqrt(dark[frame.white]) + TINY))
+    dr.eval(light)
+    samples = pixels.store(plain, electrons / larger(light, faint))
+    tiles = _grid(-(-height // down), -(-width // across), max(*surroundings_steps(down), *surroundings_steps(across)))
+    shares, around = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
+
+    # The sample's own word v, and its weight.
+    of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
+    own = pick(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
+    shots, darks = pick(opaque(shot), site), pick(opaque(dark), site)
+
+    def variance(light: Any) -> Any:
+        """Variance of a sample read as W [e-^2], at some light."""
+        return larger((shots * larger(light, 0.0) + darks / own) / own, TINY)
+
+    weighed = pixels.store(electrons / own, 1.0 / variance(light))
+
+    # t, that of the eight around it.
+    eight = pixels.load(weighed, pixels.around(near, near), 2)
+    value, _ = eight.pop(4)
+    total = _weighted([w for _, w in eight], EIGHT)
+    mean = _weighted([w * v for v, w in eight], EIGHT) / total
+    mean_variance = _weighted([w for _, w in eight], [t * t for t in EIGHT]) / dr.square(total)
+    own_variance, difference = variance(mean), value - mean
+    inverse = 1.0 / (own_variance + mean_variance)
+    spread = pixels.store(dr.square(difference) * inverse, inverse)
+    parts = pixels.store(mean, difference, mean_variance, own_variance)
+
+    # Detail that t misses.
+    steps = range(-(DETAIL_PX // 2), DETAIL_PX // 2 + 1)
+    lines = pixels.store(*_sums(pixels.load(spread, pixels.around([0], steps), 2)))
+    squares, inverse = _sums(pixels.load(lines, pixels.around(steps, [0]), 2))
+    mean, difference, mean_variance, own_variance = pixels.load(parts, pixels.around([0], [0]), 4)[0]
+    trusted = larger(squares - float(DETAIL_PX**2), 0.0) / inverse + mean_variance
+    guide = mean + trusted / (trusted + own_variance) * difference
+    dr.eval(guide)
+    by_tile = around.numpy().reshape(-(-height // down), -(-width // across), -1)
+    return by_tile, guide.numpy().reshape(height, width)[inside]
+
+
+def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dark: float) -> tuple[Any, Any]:
+    """Shares by tile, of the window and of the surroundings.
+
+    `samples` hold each pixel's as a neutral's light, and beside the light around.
+    """
+    jit, count, (down, across) = arrays(), len(frame.ratios), (len(frame.raw.cfa), len(frame.raw.cfa[0]))
+    height, width = (dr.opaque(jit.UInt, size) for size in shape)
+    level, *neutral = (dr.opaque(jit.Float, float(x)) for x in (np.sqrt(dark) + TINY, *frame.ratios))
+    sums, squares, counts = ([jit.Float(0.0)] * count for _ in range(3))
+    light, light_squares = jit.Float(0.0), jit.Float(0.0)
+    for (i, j), channel in zip(np.ndindex(down, across), frame.cells, strict=True):
+        row, column = tiles.row * np.uint32(down) + np.uint32(i), tiles.column * np.uint32(across) + np.uint32(j)
+        inside = (row < height) & (column < width)
+        place = dr.select(inside, row * width + column, 0)
+        plain, beside = (dr.select(inside, value, 0.0) for value in tiles.load(samples, [place], 2)[0])
+        sums[channel] = sums[channel] + beside
+        squares[channel] = squares[channel] + dr.square(beside)
+        counts[channel] = counts[channel] + dr.select(inside, jit.Float(1.0), 0.0)
+        light, light_squares = light + plain, light_squares + dr.square(plain)
+    stored = [tiles.store(*values) for values in (sums, squares, counts, [light, light_squares])]
+
+    # Means over each channel's samples, and how far they can be wrong.
+    places = tiles.around(window_steps(down), window_steps(across))
+    sums, squares, counts = (_sums(tiles.load(source, places, count)) for source in stored[:3])
+    light, light_squares = _sums(tiles.load(stored[3], places, 2))
+    means = [total / n for total, n in zip(sums, counts, strict=True)]
+    samples_all = sum(counts[1:], counts[0])
+    contrast = larger(light_squares / samples_all / dr.square(larger(light / samples_all, level)) - 1.0, 0.0)
+    alias = contrast * dr.square(contrast)
+    error = [
+        larger(s / n - dr.square(m), 0.0) / n + alias / n * dr.square(m)
+        for s, n, m in zip(squares, counts, means, strict=True)
+    ]
+    white = frame.white
+    mean_planes, error_planes = tiles.store(*means), tiles.store(*error)
+
+    # The window's, as far as its samples tell; else those of the surroundings.
+    rows, columns = surroundings_steps(down), surroundings_steps(across)
+    lines = tiles.store(*_sums(tiles.load(mean_planes, tiles.around([0], columns), count)))
+    far = _sums(tiles.load(lines, tiles.around(rows, [0]), count))
+    far = [larger(total / (len(rows) * len(columns)), 0.0) for total in far]
+    here = tiles.around([0], [0])
+    means, error = tiles.load(mean_planes, here, count)[0], tiles.load(error_planes, here, count)[0]
+    far = _lifted(far, neutral, white)
+    ratio = [f / far[white] for f in far]
+    away = [m - r * means[white] for m, r in zip(means, ratio, strict=True)]
+    errors = [larger(e + dr.square(r) * error[white], TINY) for e, r in zip(error, ratio, strict=True)]
+    chi_squared = sum((dr.square(a) / e for a, e in zip(away, errors, strict=True)), 0.0)
+    hidden = dr.minimum(1.0 / larger(chi_squared, TINY), 1.0)
+    means = _lifted([larger(m - hidden * a, 0.0) for m, a in zip(means, away, strict=True)], neutral, white)
+    of_window = [larger(m / means[white], LEAST_SHARE * n) for m, n in zip(means, neutral, strict=True)]
+    around = [larger(r, LEAST_SHARE * n) for r, n in zip(ratio, neutral, strict=True)]
+    return tiles.store(*of_window), tiles.store(*around)
+
+
+def _lifted(means: Numbers, neutral: Numbers, white: int) -> Numbers:
+    """Means of channels with as much of a neutral's as W is too faint."""
+    missing = larger(LEAST_LIGHT - means[white], 0.0)
+    return [mean + missing * n for mean, n in zip(means, neutral, strict=True)]
+
+
+def _weighted(values: Numbers, weights: Sequence[float]) -> Any:
+    return sum((float(w) * value for w, value in zip(weights, values, strict=True)), 0.0)
+
+
+def _sums(values: list[Numbers]) -> Numbers:
+    return [sum(parts[1:], parts[0]) for parts in zip(*values, strict=True)]

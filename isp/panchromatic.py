@@ -1,0 +1,185 @@
+"""Every sample read as W: one guide for the similarity of all channels, and each channel's share of W around a pixel.
+
+A channel's own plane knows its samples alone, one pixel in four, and its edges fall on other pixels than the other
+channels' edges do. Yet light and shade go together in all channels. So a sample S of channel o, over the share that the
+channel has of W around it, tells what W would read there: v = S / r_o (docs/decisions/0057-every-sample-as-w.md).
+Where a mosaic has no W, its unit channel (`sensor.cfa.unit_channel`) stands for W.
+"""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import correlate1d
+
+from isp.anscombe import stabilise_channel
+from isp.kernel.edges import TINY, channel_noise
+from isp.kernel.panchromatic import (
+    DETAIL_PX,
+    FAINT,
+    LEAST_LIGHT,
+    LEAST_SHARE,
+    guide_frame,
+    surroundings_steps,
+    tent_radii,
+    window_steps,
+)
+from isp.planes import tent
+from isp.settings import WhiteReading
+from rodcone.jit import backend
+from rodcone.types import Floats
+from sensor.cfa import mask
+from sensor.raw import RawImage
+
+
+def white_of(raw: RawImage) -> str:
+    """Return the channel that stands for W: W itself, or the mosaic's unit."""
+    return "W" if "W" in raw.channels else raw.unit_channel
+
+
+def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
+    """Read every sample of a frame as W.
+
+    With n_c a neutral's electrons of channel c per electron of W, s_W the dark noise of W, tent the [1 2 1] mean of
+    3 x 3 pixels (wider where a tile is larger, so that it takes all channels alike), and <> means over the channel's
+    samples in 3 x 3 tiles, a sample S of channel o is taken beside the light around it, so that a lamp has no more say
+    than any other pixel:
+
+        x = S / max(tent(S / n_o), 12 s_W),    m_c = <x>_c,    s_c^2 = (<x^2>_c - m_c^2) / samples.
+
+    A lamp's line misses whole channels, for which s_c^2 gets e^3 m_c^2 / samples, e the relative variance of S / n_o in
+    the window. The share m_c / m_W is trusted as far as s_c allows. Beyond that the surroundings' share q_c = f_c / f_W
+    stands, f the mean of m at 5 x 5 places 6 pixels apart: with a_c = m_c - q_c m_W,
+
+        m_c -= a_c min(1, 1 / chi^2),    chi^2 = sum_c a_c^2 / (s_c^2 + q_c^2 s_W^2).
+
+    Where W is under 0.3, light is too faint to have a colour: f and m get a neutral's, (0.3 - m_W) n_c. So
+    r_c = m_c / m_W, 0.02 n_c at least.
+
+    The guide weighs the sample's own word v = S / r_o, with the variance N = (k_o L + s_o^2 / r_o) / r_o at light L,
+    k_o being 1 where a channel counts every electron,
+    and the tent-weighted mean t of the eight around it, by their noise, of variance T:
+
+        g = t + (D + T) / (D + T + N) (v - t),    D = max(0, <(v - t)^2 / (N + T)> - 1) / <1 / (N + T)>,
+
+    D the variance of detail that t misses, <> over 5 x 5 pixels.
+
+    Parameters
+    ----------
+    raw : RawImage
+    neutral : (channel,) float64
+        Response to a neutral in any unit, in the order of `sensor.cfa.channels`.
+    """
+    white = raw.channels.index(white_of(raw))
+    ratios = np.asarray(neutral, np.float64) / neutral[white]
+    raw = with_full_white(raw, ratios)
+    if backend() == "numpy":
+        shares, guide_e = _read_numpy(raw, ratios, white)
+        return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]))
+    kernel_shares, kernel_guide_e = guide_frame(raw, ratios, white)
+    return WhiteReading(raw, kernel_shares, stabilise_channel(kernel_guide_e, raw, raw.channels[white]))
+
+
+def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:
+    """Give each full sample of W what the colours around say of a neutral, n_W sum(t S) / sum(t n), if that is more.
+
+    The tent t reaches one pixel less than the tile. Beyond a full sample W knows nothing, and the colours do.
+    """
+    if not {"W", "G"} <= set(raw.channels):
+        return raw
+    row, column = np.nonzero(raw.saturated & mask(raw.cfa, "W", raw.shape))
+    if not row.size:
+        return raw
+    reach = max(len(raw.cfa), len(raw.cfa[0])) - 1
+    response = np.array(
+        [[0.0 if name == "W" else ratios[raw.channels.index(name)] for name in line] for line in raw.cfa]
+    )
+    rows, columns = (np.pad(np.arange(length), reach, mode="reflect") for length in raw.shape)
+    light, share = np.zeros((2, row.size))
+    for (i, j), weight in np.ndenumerate(np.outer(tent(reach), tent(reach))):
+        y, x = rows[row + i], columns[column + j]
+        of_colour = weight * (response[y % len(raw.cfa), x % len(raw.cfa[0])] > 0.0)
+        light += of_colour * (raw.dn[y, x] - float(raw.black_dn))
+        share += of_colour * response[y % len(raw.cfa), x % len(raw.cfa[0])]
+    dn: NDArray[Any] = raw.dn.astype(np.float32)
+    dn[row, column] = np.maximum(dn[row, column], light / np.maximum(share, TINY) + raw.black_dn)
+    return replace(raw, dn=dn)
+
+
+def _mean(values: Floats, weights: Floats, across: Floats | None = None) -> Floats:
+    """Weighted mean down and across around each pixel of each plane, mirrored at the border; weights sum to 1."""
+    lines = correlate1d(values, weights, 0, mode="mirror")
+    return np.asarray(correlate1d(lines, weights if across is None else across, 1, mode="mirror"))
+
+
+def _box(values: Floats, size: int) -> Floats:
+    return _mean(values, np.full(size, 1.0 / size))
+
+
+def _comb(steps: range) -> Floats:
+    """Equal weights at some steps from the middle."""
+    weights = (np.arange(steps[0], steps[-1] + 1) - steps[0]) % steps.step == 0
+    return np.asarray(weights / weights.sum())
+
+
+def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats]:
+    """Shares of the surroundings and guide [e-], in double precision; `isp.kernel.panchromatic` does it in single."""
+    site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
+    (shot, dark, _), electrons = channel_noise(raw), raw.electrons
+    down, across = len(raw.cfa), len(raw.cfa[0])
+    tent_3, wide_tents = tent(1) / tent(1).sum(), [tent(size) / tent(size).sum() for size in tent_radii(raw.cfa)]
+
+    def of_tiles(values: Floats) -> Floats:
+        """Sum each channel's values over every tile and its neighbours in the window."""
+        missing = (0, -raw.shape[0] % down), (0, -raw.shape[1] % across)
+        planes = np.stack([np.pad(np.where(site == c, values, 0.0), missing) for c in range(len(ratios))])
+        sums = planes.reshape(len(ratios), -(-raw.shape[0] // down), down, -1, across).sum(axis=(2, 4))
+        rows, columns = window_steps(down), window_steps(across)
+        return _mean(np.moveaxis(sums, 0, -1), _comb(rows), _comb(columns)) * len(rows) * len(columns)
+
+    # Means over each channel's samples, and how far they can be wrong.
+    neutral = electrons / ratios[site]
+    light = _mean(neutral, *wide_tents)
+    beside = electrons / np.maximum(light, FAINT * np.sqrt(dark[white]) + TINY)
+    samples = of_tiles(np.ones(raw.shape))
+    means, squares = of_tiles(beside) / samples, of_tiles(beside**2) / samples
+    all_samples = samples.sum(axis=2)
+    mean, mean_square = (of_tiles(x).sum(axis=2) / all_samples for x in (neutral, neutral**2))
+    contrast = np.maximum(mean_square / np.maximum(mean, np.sqrt(dark[white]) + TINY) ** 2 - 1.0, 0.0)
+    error = (np.maximum(squares - means**2, 0.0) + contrast[..., None] ** 3 * means**2) / samples
+
+    # Shares: the window's, as far as its samples tell; else those of the surroundings.
+    far = np.maximum(_mean(means, _comb(surroundings_steps(down)), _comb(surroundings_steps(across))), 0.0)
+    far += np.maximum(LEAST_LIGHT - far[..., white, None], 0.0) * ratios
+    share = far / far[..., white, None]
+    away = means - share * means[..., white, None]
+    chi_squared = (away**2 / np.maximum(error + share**2 * error[..., white, None], TINY)).sum(axis=2, keepdims=True)
+    means = np.maximum(means - away * np.minimum(1.0 / np.maximum(chi_squared, TINY), 1.0), 0.0)
+    means += np.maximum(LEAST_LIGHT - means[..., white, None], 0.0) * ratios
+    shares = np.maximum(means / means[..., white, None], LEAST_SHARE * ratios)
+    surroundings = np.maximum(share, LEAST_SHARE * ratios)
+
+    # The sample's own word v, and t, that of the eight around it.
+    own = np.take_along_axis(at_pixels(shares, raw), site[..., None], axis=-1)[..., 0]
+    value = electrons / own
+
+    def noise(light: Floats) -> Floats:
+        """Variance of a sample read as W [e-^2], at some light."""
+        return np.asarray(np.maximum((shot[site] * np.maximum(light, 0.0) + dark[site] / own) / own, TINY))
+
+    weight, middle = 1.0 / noise(light), tent_3[1] ** 2
+    total = _mean(weight, tent_3) - middle * weight
+    around = (_mean(weight * value, tent_3) - middle * weight * value) / total
+    around_variance = (_mean(weight, tent_3**2) - middle**2 * weight) / total**2
+    own_variance, difference = noise(around), value - around
+    inverse = 1.0 / (own_variance + around_variance)
+    detail = np.maximum(_box(difference**2 * inverse, DETAIL_PX) - 1.0, 0.0) / _box(inverse, DETAIL_PX)
+    trusted = detail + around_variance
+    return surroundings, around + trusted / (trusted + own_variance) * difference
+
+
+def at_pixels(shares: NDArray[Any], raw: RawImage) -> NDArray[Any]:
+    """Shares by tile, at every pixel (h, w, channel)."""
+    repeated = shares.repeat(len(raw.cfa), axis=0).repeat(len(raw.cfa[0]), axis=1)
+    return repeated[: raw.shape[0], : raw.shape[1]]
