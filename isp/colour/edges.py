@@ -11,7 +11,21 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from isp.kernel.edges import APART, CORRELATION, FAR, REACH, SPREAD, TINY, UNKNOWN, channel_noise, sharpen_frame
+from isp.kernel.edges import (
+    APART,
+    CORRELATION,
+    FAR,
+    FEW,
+    MISSED,
+    NEAR,
+    REACH,
+    SMALL,
+    SPREAD,
+    TINY,
+    UNKNOWN,
+    channel_noise,
+    sharpen_frame,
+)
 from isp.panchromatic import at_pixels
 from isp.settings import WhiteReading
 from rodcone.jit import backend
@@ -36,31 +50,39 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
 
         E_c = m_c + sum_yz C'(c, o_y) exp(-r_y^2 / 2) [C'(o_y, o_z) exp(-r_yz^2 / 2) + N_y delta_yz]^-1 (S_z - m_o_z),
 
-    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. A colour that noise hides
-    is that of the surroundings:
+    N_y = P(o_y, y) + s^2 the noise of a sample on its plane, without samples that are full. With chi^2 the mean of
+    their squared distances to planes over N_y, and chi_0^2 that weighted by exp(-2 r_y^2), it counts less where
+    contrast is a lamp's and the samples lie on their planes:
 
-        F = E - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,    D_c = P_c - r_c P_W,
+        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P) - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,
 
-    with 1 / nu_c the frame's mean of 1 / noise gain, r_c the ratio of channel c to W in the sum of 3 x 3 planes, 24
-    pixels apart, each over b^2, b the largest of its W, m_W and (nu_W N_W)^(1/2), so that a lamp has no say, and <> the
-    mean over the window.
+    the last for a colour that noise hides, which is that of the surroundings: with 1 / nu_c the frame's mean of
+    1 / noise gain, r_c the ratio of channel c to W in the sum of 3 x 3 planes, 24 pixels apart, each over b^2, b the
+    largest of its W, m_W and (nu_W N_W)^(1/2), so that a lamp has no say, and <> the mean over the window,
+    D_c = P_c - r_c P_W.
 
-    A channel of which one of the nine samples is full has no known light, q_c = 1; nor, as far as there is contrast,
-    has any hue where a colour is full, q = min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels
-    rise to the brightest:
+    The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
+    the samples or it lies between those of a channel, l = (n - 1.5 s) / m_W with n the mean of P_W over the nine pixels
+    and s the least of its means over the four lattices of every second pixel in the window; nor the light of a channel
+    of which one of the nine samples is full, q_c = 1; nor, as far as there is contrast, any hue where a colour is, q =
+    min(1, e), or W alone, q = min(1, e^4). Balanced by the gains g, channels rise to the brightest:
 
-        F'_c = F_c + max(q, q_c) (max_d g_d F_d / g_c - F_c).
+        F'_c = F_c + max((1 - 1 / e^2) min(1, max(chi^2 / 30, l)), q, q_c) (max_d g_d F_d / g_c - F_c).
 
-    Light that fills less than half of the window, e > 1, is the sample's own S, in the colour around: by the shares q
-    of the surroundings (`isp.panchromatic`), or a neutral's where S and a colour beside are full. With v = S / q_o, and
-    N_v its noise,
+    Light that fills less than two fifths of the window, e > 1.5, and of which a plane averages few samples, is the
+    sample's own S, in the colour around: by the shares u of the surroundings (`isp.panchromatic`), or a neutral's where
+    S and a colour beside are full. With v = S / u_o, N_v its noise, and G the largest noise gain of a channel,
 
-        F''_c = L_c + (F'_c - L_c) / (1 + e^4),    L_c = q_c (P_W + max(0, 1 - 9 N_v / (v - P_W)^2) (v - P_W)).
+        F''_c = F'_c + min(1, 4 G) (1 - 1 / (1 + (e / 1.5)^4)) (L_c - F'_c),
+
+        L_c = u_c (P_W + max(0, 1 - 9 N_v / (v - P_W)^2) (v - P_W)).
+
+    A wall beside a window has contrast as well, and yet many samples that tell its light.
 
     Parameters
     ----------
     white : WhiteReading
-        The frame, and the shares q.
+        The frame, and the shares u.
     planes : (h, w, 4) float
         R, G, B and W of `isp.interleaved.reconstruct` [e-].
     gains : (4,) float64
@@ -74,20 +96,28 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     """
     raw, nu = white.raw, 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
     if backend() != "numpy":
-        return sharpen_frame(white, np.ascontiguousarray(planes, dtype=np.float32), np.stack([gains, nu]))
+        singles = (np.ascontiguousarray(values, dtype=np.float32) for values in (planes, noise_gain))
+        return sharpen_frame(white, *singles, np.stack([gains, nu]))
     border = (FAR, FAR), (FAR, FAR)
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
-    parts, shares = list[Floats](), at_pixels(white.shares, raw).astype(np.float64)
+    parts, at_pixel = list[Floats](), (at_pixels(white.shares, raw).astype(np.float64), noise_gain)
     for first in range(0, raw.shape[0], STRIP_ROWS):
-        rows, own = slice(first, first + STRIP_ROWS + 2 * FAR), shares[first : first + STRIP_ROWS]
-        parts.append(_sharpen(raw, gains, nu, padded[rows], own, electrons[rows], sites[rows]))
+        rows, own = slice(first, first + STRIP_ROWS + 2 * FAR), slice(first, first + STRIP_ROWS)
+        plain = (values[own] for values in at_pixel)
+        parts.append(_sharpen(raw, gains, nu, padded[rows], *plain, electrons[rows], sites[rows]))
     return np.concatenate(parts).astype(np.float32)
 
 
 def _sharpen(
-    raw: RawImage, gains: Floats, nu: Floats, planes: Floats, shares: Floats, *samples: NDArray[Any]
+    raw: RawImage,
+    gains: Floats,
+    nu: Floats,
+    planes: Floats,
+    shares: Floats,
+    noise_gain: NDArray[Any],
+    *samples: NDArray[Any],
 ) -> Floats:
     """In double precision; the arrays reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
@@ -126,13 +156,22 @@ def _sharpen(
     weights = np.linalg.solve(CORRELATION * among_samples + counted[..., None] * np.eye(9), residual[..., None])
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
-    # A colour that noise hides is the surroundings'.
-    sharp = estimate - hidden * (plane - tint * plane[..., 3:])
+    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    squares = (sample - value) ** 2 / sample_noise
+    sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
-    # Light of unknown hue.
+    # A colour that noise hides is the surroundings'.
+    sharp -= hidden * (plane - tint * plane[..., 3:])
+
+    # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
+    of_white = np.maximum(window[..., 3, :, :], 0.0)
+    least = np.min([of_white[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
+    between = (of_white[..., 1:-1, 1:-1].mean(axis=(2, 3)) - 1.5 * least) / np.maximum(light[..., 3], TINY)
+    missed = np.minimum(np.maximum(squares.mean(axis=2) / MISSED, between), 1.0)[..., None]
+    lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
     black = np.minimum(contrast, 1.0)
-    hue = np.where(full[..., :3].any(axis=2, keepdims=True), black, np.where(full[..., 3:], black**4, 0.0))
+    hue = np.where(full[..., :3].any(axis=2, keepdims=True), black, np.where(full[..., 3:], black**4, lamp))
     unknown = np.where(full, 1.0, hue)
     sharp += unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp)
 
@@ -144,4 +183,5 @@ def _sharpen(
     difference = sample[..., 4] / own - of_w
     seen = np.maximum(1.0 - APART * as_white_noise / np.maximum(difference**2, TINY), 0.0)
     small = (of_w + seen * difference)[..., None] * shares
-    return np.asarray(small + (sharp - small) / (1.0 + contrast**4))
+    few = np.minimum(FEW * noise_gain.max(axis=2, keepdims=True), 1.0)
+    return np.asarray(sharp + few * (1.0 - 1.0 / (1.0 + (contrast / SMALL) ** 4)) * (small - sharp))

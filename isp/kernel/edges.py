@@ -21,14 +21,19 @@ SIDE = 2 * REACH + 1
 # and makes flats noisier.
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
+MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
 FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
 APART = 9.0  # squared standard deviations by which a sample stands out of its plane
+# Contrast from which on light is small: at 1 edges of windows show their tile, at 2 halos of lamps have 15 % more hues.
+SMALL = 1.5
+FEW = 4.0  # samples: of a plane that averages more, light is known; with 1 lamps have hues, with more walls the window's
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
 # of 1.5 0.3.
 OFFSETS = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
 CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
+NEAR = CORRELATION[4] ** 4 / (CORRELATION[4] ** 4).sum()
 
 
 def channel_noise(raw: RawImage) -> NDArray[np.float64]:
@@ -37,14 +42,16 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
 
-def sharpen_frame(white: WhiteReading, planes: NDArray[Any], scales: Floats) -> NDArray[np.float32]:
+def sharpen_frame(
+    white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any], scales: Floats
+) -> NDArray[np.float32]:
     """As `isp.colour.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
     jit, raw = arrays(), white.raw
     names, (height, width) = raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
     # Mirrored at the borders: row r stands at FAR + r.
     rows, columns = (np.pad(np.arange(length, dtype=np.uint32), FAR, mode="reflect") for length in raw.shape)
-    frame, share_planes = upload(planes), upload(white.shares)
+    frame, noise_gains, share_planes = upload(planes), upload(noise_gain), upload(white.shares)
     electrons = upload((raw.dn.astype(np.float32) - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
     cells = upload(np.array([[names.index(name) for name in line] for line in raw.cfa], np.uint32))
     row_starts, row_cells = upload(rows * np.uint32(width)), upload(rows % down * across)
@@ -55,7 +62,8 @@ def sharpen_frame(white: WhiteReading, planes: NDArray[Any], scales: Floats) -> 
     def lines(table: Any, first: Any, steps: range) -> list[Any]:
         return [dr.gather(jit.UInt, table, first + step) for step in steps]
 
-    row, column = divide(dr.arange(jit.UInt, height * width), divisor(width))
+    pixel = dr.arange(jit.UInt, height * width)
+    row, column = divide(pixel, divisor(width))
 
     def places(steps: range) -> list[list[Any]]:
         return [[r + c for c in lines(column_starts, column, steps)] for r in lines(row_starts, row, steps)]
@@ -106,15 +114,27 @@ def sharpen_frame(white: WhiteReading, planes: NDArray[Any], scales: Floats) -> 
     terms = [float(CORRELATION[4, y]) * weights[y] * to_samples[y] for y in range(9)]
     estimate = mean + sum(terms[1:], terms[0])
 
-    # A colour that noise hides is the surroundings'.
-    sharp = estimate - hidden * (plane - tint * plane[3])
+    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    squares = [dr.square(e - v) / n for e, v, n in zip(sample, value, sample_noise, strict=True)]
+    chi_squared = sum(squares[1:], squares[0]) / 9.0
+    chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
+    sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
 
-    # Light of unknown hue: q and q_c. W is channel 3.
-    full = reduce(
-        or_, [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
-    )  # a bit a channel
+    # A colour that noise hides is the surroundings'.
+    sharp -= hidden * (plane - tint * plane[3])
+
+    # Light of unknown colour: q (hue) and q_c. W is channel 3.
+    channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
+    full = reduce(or_, channels_full)  # a bit a channel
+    of_white = [[larger(values[3], 0.0) for values in window[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
+    lattices = [[w for line in of_white[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
+    least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
+    # Times 1.5: at 1 the dark beside corners of windows is greyed, at 3 more hues around lamps stay.
+    between = (sum((of_white[i][j] for i, j in product(near, near)), 0.0) / 9.0 - 1.5 * least) / larger(light[3], TINY)
+    missed = dr.minimum(larger(chi_squared / MISSED, between), 1.0)
+    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
     black = dr.minimum(contrast, 1.0)
-    hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), 0.0))
+    hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
     sharp += unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
 
@@ -130,9 +150,10 @@ def sharpen_frame(white: WhiteReading, planes: NDArray[Any], scales: Floats) -> 
     difference = sample[4] / own - of_w
     seen = larger(1.0 - APART * as_white_noise / larger(dr.square(difference), TINY), 0.0)
     small = (of_w + seen * difference) * shares
-    sharp = small + (sharp - small) / (1.0 + dr.square(dr.square(contrast)))
+    few = dr.minimum(FEW * reduce(larger, [*dr.gather(jit.Array4f, noise_gains, pixel)]), 1.0)
+    sharp += few * (1.0 - 1.0 / (1.0 + dr.square(dr.square(contrast / SMALL)))) * (small - sharp)
     result = dr.empty(jit.Float, planes.size)
-    dr.scatter(result, sharp, dr.arange(jit.UInt, height * width), mode=dr.ReduceMode.NoConflicts)
+    dr.scatter(result, sharp, pixel, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
     return np.asarray(result.numpy().reshape(planes.shape))
 

@@ -68,18 +68,26 @@ def by_hand(raw, planes, gains, noise_gain, row, column):
     around = planes[np.ix_(*(mirrored[x : x + 49 : 24] for x in (row, column)))].reshape(9, 4)
     brightness = np.maximum(around[:, 3:], max(mean[3], np.sqrt(noise_gain[3] * noise[3])))
     around = (around / brightness**2).sum(axis=0)
+    squares = (samples - on_planes) ** 2 / read
+    near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
+    counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
     hidden = planes[row, column] - around / around[3] * planes[row, column, 3]
     distances = ((window - around / around[3] * window[:, 3:]) ** 2).mean(axis=0)
-    sharp = estimate - min(1.0, 3.0 / (distances / noise_gain / noise).sum()) * hidden
+    sharp = planes[row, column] + counts * (estimate - planes[row, column])
+    sharp -= min(1.0, 3.0 / (distances / noise_gain / noise).sum()) * hidden
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
-    unknown = np.where(full, 1.0, min(1.0, contrast) ** (1 if any(full[:3]) else 4) if any(full) else 0.0)
+    white = window[:, 3].reshape(5, 5)
+    between = white[1:4, 1:4].mean() - 1.5 * min(white[i::2, j::2].mean() for i, j in product((0, 1), repeat=2))
+    lamp = (1.0 - 1.0 / max(contrast, 1.0) ** 2) * min(1.0, max(squares.mean() / 30.0, between / mean[3]))
+    unknown = np.where(full, 1.0, min(1.0, contrast) ** (1 if any(full[:3]) else 4) if any(full) else lamp)
     sharp = sharp + unknown * ((gains * sharp).max() / gains - sharp)
     shares = gains[3] / gains if 4 not in kept and any(full[:3]) else COLOUR / COLOUR[3]
     difference = samples[4] / shares[own[4]] - planes[row, column, 3]
     noise_as_white = (planes[row, column, 3] + dark / shares[own[4]]) / shares[own[4]]
     seen = max(0.0, 1.0 - 9.0 * noise_as_white / max(difference**2, 1e-9))
     light = planes[row, column, 3] + seen * difference
-    return light * shares + (sharp - light * shares) / (1.0 + contrast**4)
+    small = 1.0 - 1.0 / (1.0 + (contrast / 1.5) ** 4)
+    return sharp + min(1.0, 4.0 * noise_gain.max()) * small * (light * shares - sharp)
 
 
 @pytest.mark.sample(5)
@@ -94,7 +102,7 @@ def test_the_estimate_is_the_formula_s(tile):
     picture = np.minimum(shaded(rng.choice([0.1, 0.5, 1.0, 4.0], (16, 16))), 15_000.0)
     picture[2:7, 3:8] = planes[2:7, 3:8]  # on its planes the lamp is known to be small alone
     raw = frame(picture, tile)
-    averaged = np.array([1.0, 2.0, 3.0, 4.0])
+    averaged = np.array([0.05, 0.1, 0.15, 0.2])
     got = sharpen(read(raw), planes, GAINS, np.broadcast_to(averaged, planes.shape))
     for row, column in product(range(2, 14), repeat=2):
         assert got[row, column] == pytest.approx(by_hand(raw, planes, GAINS, averaged, row, column), rel=1e-3, abs=0.1)
@@ -162,10 +170,10 @@ def test_a_lamp_stays_where_it_is():
 
 
 def test_a_lamp_of_a_pixel_has_the_colour_around():
-    """Of 25 pixels one is lit: e = 24, and F'' is L but for one part in 330 000. Planes have half of it, in no W."""
+    """Of 25 pixels one is lit: e = 24, and F'' is L but for one part in 65 000. Planes have half of it, in no W."""
     planes = np.zeros((16, 16, 4))
     planes[8, 8] = [3000.0, 6000.0, 1000.0, 0.0]
-    got = sharpen(read(frame(2.0 * planes)), planes, GAINS, np.zeros(planes.shape))[8, 8]
+    got = sharpen(read(frame(2.0 * planes)), planes, GAINS, np.ones(planes.shape))[8, 8]
     assert got / COLOUR == pytest.approx(np.full(4, 6000.0 / COLOUR[0]), rel=0.01)  # an R site: 6000 electrons
 
 
@@ -205,17 +213,29 @@ def test_a_lamp_full_in_every_colour_ends_in_white():
         assert rgb[light > 45_000.0] == pytest.approx(15_000.0), (row, column)
 
 
-def test_dark_beside_a_window_keeps_its_light():
-    """Window and wall differ by fifty times in light, and in colour: the wall stays as it is, for two pixels by 15 %.
-
-    There small lights would have the surroundings' colour, which are wall and window.
-    """
+def test_dark_beside_a_window_keeps_its_colour():
+    """Its light, fifty times as much, fills less than half of their 5 x 5 pixels: walls were grey for two around."""
     planes = np.broadcast_to(0.02 * COLOUR * [1.0, 0.5, 0.2, 0.7], (24, 24, 4)).copy()
     planes[16:, 14:] = COLOUR
     got = sharpen(read_as_white(frame(planes), COLOUR), planes, GAINS, np.zeros(planes.shape))
-    assert got[:13, :11] == pytest.approx(planes[:13, :11], rel=0.02)
-    assert got[18:, 16:] == pytest.approx(planes[18:, 16:], rel=0.02)
-    assert got[13:16, 16:22] == pytest.approx(planes[13:16, 16:22], rel=0.15)
+    assert got == pytest.approx(planes, rel=0.02)
+
+
+@pytest.mark.parametrize("engine", ["kernel"], indirect=True)
+def test_a_wall_beside_a_window_takes_none_of_its_light():
+    """Developed from samples: within two pixels of windows 50 times as bright each channel is 0.16 off (2.1 before)."""
+    off, levels = list[float](), COLOUR / COLOUR[1]
+    for wall, window in (([1, 0.5, 0.2, 0.7], [1, 1, 1, 1]), ([1, 1, 1, 1], [1, 0.5, 0.1, 0.7])):
+        for row, column in product((16, 17), (22, 23)):
+            light = np.broadcast_to(60.0 * levels * wall, (48, 48, 4)).copy()
+            beside = np.zeros((48, 48), bool)
+            beside[row - 2 : row + 14, column - 2 : column + 11] = True
+            beside[row : row + 12, column : column + 9] = False
+            light[row : row + 12, column : column + 9] = 3000.0 * levels * window
+            raw = frame(np.random.default_rng(1).poisson(light))
+            rgb = NAMED["interleaved"].develop(raw, np.eye(3), balance=levels).rgb
+            off.extend((rgb[beside] / (light[..., :3] / levels[:3])[beside] - 1.0).ravel())
+    assert np.sqrt(np.mean(np.square(off))) < 0.25
 
 
 SHAPES = [(129, 9), (2, 2), (2, 7), (5, 2), (4, 3)]
