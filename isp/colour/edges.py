@@ -96,17 +96,17 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     """
     raw, nu = white.raw, 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
     if backend() != "numpy":
-        singles = (np.ascontiguousarray(values, dtype=np.float32) for values in (planes, noise_gain))
-        return sharpen_frame(white, *singles, np.stack([gains, nu]))
+        single = [np.ascontiguousarray(values, dtype=np.float32) for values in (planes, noise_gain)]
+        return sharpen_frame(white, single[0], single[1], np.stack([gains, nu]))
     border = (FAR, FAR), (FAR, FAR)
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
-    parts, at_pixel = list[Floats](), (at_pixels(white.shares, raw).astype(np.float64), noise_gain)
+    parts, shares = list[Floats](), at_pixels(white.shares, raw).astype(np.float64)
     for first in range(0, raw.shape[0], STRIP_ROWS):
         rows, own = slice(first, first + STRIP_ROWS + 2 * FAR), slice(first, first + STRIP_ROWS)
-        plain = (values[own] for values in at_pixel)
-        parts.append(_sharpen(raw, gains, nu, padded[rows], *plain, electrons[rows], sites[rows]))
+        around = padded[rows], electrons[rows], sites[rows]
+        parts.append(_sharpen(raw, gains, nu, shares[own], noise_gain[own], *around))
     return np.concatenate(parts).astype(np.float32)
 
 
@@ -114,12 +114,12 @@ def _sharpen(
     raw: RawImage,
     gains: Floats,
     nu: Floats,
-    planes: Floats,
     shares: Floats,
     noise_gain: NDArray[Any],
+    planes: Floats,
     *samples: NDArray[Any],
 ) -> Floats:
-    """In double precision; the arrays reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
+    """In double precision; planes and samples reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))

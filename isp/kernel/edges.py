@@ -26,7 +26,7 @@ FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart
 APART = 9.0  # squared standard deviations by which a sample stands out of its plane
 # Contrast from which on light is small: at 1 edges of windows show their tile, at 2 halos of lamps have 15 % more hues.
 SMALL = 1.5
-FEW = 4.0  # samples: of a plane that averages more, light is known; with 1 lamps have hues, with more walls the window's
+FEW = 4.0  # samples; more tell a plane's light: with 1 lamps have hues, with more walls have the window's
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
@@ -87,8 +87,7 @@ def sharpen_frame(
         for c, d in combinations_with_replacement(range(4), 2)
     }
     covariance = [jit.Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
-    light = larger(mean, 0.0)
-    noise = larger(shot * light + dark, TINY)
+    light, noise = larger(mean, 0.0), larger(shot * larger(mean, 0.0) + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
     faint = larger(light[3], dr.sqrt(nu[3] * noise[3]))
@@ -126,36 +125,45 @@ def sharpen_frame(
     # Light of unknown colour: q (hue) and q_c. W is channel 3.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
     full = reduce(or_, channels_full)  # a bit a channel
-    of_white = [[larger(values[3], 0.0) for values in window[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
-    lattices = [[w for line in of_white[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
-    least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
-    # Times 1.5: at 1 the dark beside corners of windows is greyed, at 3 more hues around lamps stay.
-    between = (sum((of_white[i][j] for i, j in product(near, near)), 0.0) / 9.0 - 1.5 * least) / larger(light[3], TINY)
-    missed = dr.minimum(larger(chi_squared / MISSED, between), 1.0)
-    lamp = (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
+    lamp = _lamp([values[3] for values in window], light[3], contrast, chi_squared)
     black = dr.minimum(contrast, 1.0)
     hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
     sharp += unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
 
     # Light that fills less than half of the window: the sample's own, in the colour around.
-    here, (k, d) = site[4], noises[4]
     no_hue = is_full[4] & ((full & 0b111) > 0)
     tile_row, tile_column = (divide(line, divisor(int(size)))[0] for line, size in ((row, down), (column, across)))
     of_tile = tile_row * dr.opaque(jit.UInt, white.shares.shape[1]) + tile_column
-    shares = dr.gather(jit.Array4f, share_planes, of_tile)
-    shares = dr.select(no_hue, balance[3] / balance, shares)
-    own, of_w = pick([*shares], here), plane[3]
-    as_white_noise = larger((k * larger(of_w, 0.0) + d / own) / own, TINY)
-    difference = sample[4] / own - of_w
-    seen = larger(1.0 - APART * as_white_noise / larger(dr.square(difference), TINY), 0.0)
-    small = (of_w + seen * difference) * shares
+    shares = dr.select(no_hue, balance[3] / balance, dr.gather(jit.Array4f, share_planes, of_tile))
+    small = _own_light(sample[4], pick([*shares], site[4]), plane[3], noises[4]) * shares
     few = dr.minimum(FEW * reduce(larger, [*dr.gather(jit.Array4f, noise_gains, pixel)]), 1.0)
     sharp += few * (1.0 - 1.0 / (1.0 + dr.square(dr.square(contrast / SMALL)))) * (small - sharp)
     result = dr.empty(jit.Float, planes.size)
     dr.scatter(result, sharp, pixel, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
     return np.asarray(result.numpy().reshape(planes.shape))
+
+
+def _lamp(white: list[Any], light: Any, contrast: Any, chi_squared: Any) -> Any:
+    """How far a lamp's colour isn't known, from the planes of W in its window and their mean."""
+    lines = [[larger(value, 0.0) for value in white[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
+    lattices = [[w for line in lines[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
+    least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
+    near = [lines[i][j] for i, j in product(range(REACH - 1, REACH + 2), repeat=2)]
+    # Times 1.5: at 1 the dark beside corners of windows is greyed, at 3 more hues around lamps stay.
+    between = (sum(near[1:], near[0]) / 9.0 - 1.5 * least) / larger(light, TINY)
+    missed = dr.minimum(larger(chi_squared / MISSED, between), 1.0)
+    return (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
+
+
+def _own_light(sample: Any, share: Any, of_white: Any, noise: tuple[Any, Any]) -> Any:
+    """What W would read by the pixel's own sample, as far as that stands out of W's plane."""
+    shot, dark = noise
+    as_white_noise = larger((shot * larger(of_white, 0.0) + dark / share) / share, TINY)
+    difference = sample / share - of_white
+    seen = larger(1.0 - APART * as_white_noise / larger(dr.square(difference), TINY), 0.0)
+    return of_white + seen * difference
 
 
 def pick(values: list[Any], site: Any) -> Any:

@@ -36,6 +36,10 @@ _COARSE = "a step of 3922 e⁻ hides 1000 e⁻: without noise as wide as a step,
 _NEUTRAL = (
     "light of unknown colour at an edge is drawn neutral, and a neutral of this balance is 10^6 times one channel"
 )
+_TILES = (
+    "what a channel reads of W's light is known by tiles of the mosaic, which begin at the frame's first row and "
+    "column; in a frame of an odd length they lie elsewhere once it is mirrored"
+)
 
 # Exactly what isn't kept, and why. A fault is mended, not listed.
 LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
@@ -61,6 +65,10 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
         ): "whole electrons on steps of 0.92 e⁻: without dark noise their rounding isn't evened out",
         ("well_1e6_8bit", "raw unbiased"): _COARSE,
         ("well_1e6_8bit", "pictures unbiased"): _COARSE,
+        ("frame_64x3", "equivariant"): _TILES,
+        ("frame_5x7", "equivariant"): _TILES,
+        ("frame_33x35", "equivariant"): _TILES,
+        ("frame_61x67", "equivariant"): _TILES,
         ("prnu_50", OWN): "a response can't be negative: of a normal spread of 50 %, 2 % of the pixels are cut at 0, "
         "which raises the mean by 0.4 %",
     }

@@ -24,7 +24,7 @@ GUIDE = 24  # pixels that a pixel of the guide depends on
 
 
 def equivariant(situation: Situation) -> Margin | None:
-    """Mirrored both ways, and without its first row and column: the same picture, mirrored or cut."""
+    """Mirrored both ways, and without its first tile's rows and columns: the same picture, mirrored or cut."""
     margins = []
     for name in CAMERAS:
         raw = shoot(situation, name)
@@ -34,7 +34,8 @@ def equivariant(situation: Situation) -> Margin | None:
         ]
         inside = _interior(raw, situation)
         if inside is not None:
-            pairs.append((develop_fixed(cut(raw), situation), picture[1:, 1:], inside))
+            down, across = len(raw.cfa), len(raw.cfa[0])
+            pairs.append((develop_fixed(cut(raw), situation), picture[down:, across:], inside))
         margins += [_margin(found[where] - same[where], raw, situation) for found, same, where in pairs]
     return worse(*margins)
 
@@ -53,12 +54,11 @@ def mirrored(raw: RawImage, axis: int) -> RawImage:
 
 
 def cut(raw: RawImage) -> RawImage:
-    """The frame without its first row and column: the mosaic begins at another phase."""
-    defects = raw.defects
+    """The frame without its first tile's rows and columns."""
+    tile, defects = (len(raw.cfa), len(raw.cfa[0])), raw.defects
     if defects is not None:
-        defects = defects[np.all(defects > 0, axis=1)] - 1
-    cfa = _turn(_turn(raw.cfa, 1, 0), 1, 1)
-    return replace(raw, dn=np.ascontiguousarray(raw.dn[1:, 1:]), cfa=cfa, defects=defects)
+        defects = defects[np.all(defects >= tile, axis=1)] - tile
+    return replace(raw, dn=np.ascontiguousarray(raw.dn[tile[0] :, tile[1] :]), defects=defects)
 
 
 def _turn(cfa: Tile, steps: int, axis: int) -> Tile:
@@ -72,7 +72,7 @@ def _interior(raw: RawImage, situation: Situation) -> tuple[slice, slice] | None
     develop = situation.develop
     reach = develop.get("neighbourhood", NEIGHBOURHOOD) // 2 + develop.get("patch", PATCH) // 2 + GUIDE
     margin = reach + FAR + 2 * len(raw.cfa)  # the surroundings of colours that noise hides, and mended pixels
-    if min(raw.shape) - 1 <= 2 * margin:
+    if min(raw.shape) - len(raw.cfa) <= 2 * margin:
         return None
     return np.s_[margin:-margin, margin:-margin]
 
