@@ -1,0 +1,79 @@
+"""What an eye sees first in a developed picture and a mean over all pixels hides: spots, holes in lights, dots.
+
+A spot is a pixel of a hue that nothing around it has. A hole is a dark pixel in a light. A dot is a pixel of an even
+surface that stands out of it.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+from skimage.color import deltaE_ciede2000, rgb2lab
+
+from rodcone.colour_spaces import decode_srgb, luminance_of_srgb
+from studies.metrics.quality import require_finite
+
+SPOT = 20.0  # CIEDE2000 to every neighbour's truth: another colour by name
+LIGHT, HOLE = 0.5, 0.2  # a light is half as bright as white or more; its hole a fifth of that, or less
+EVEN, DOT = 1.0, 5.0  # CIEDE2000: the truth of an even surface varies less, a dot differs by more
+
+
+@dataclass(frozen=True)
+class Blemishes:
+    """Counts of pixels, and of those among which dots are sought.
+
+    Attributes
+    ----------
+    spots : int
+        Of a hue that no truth within a pixel has.
+    holes : int
+        Dark where the truth is a light.
+    dots : int
+        Standing out of an even surface.
+    even : int
+        On even surfaces.
+    """
+
+    spots: int
+    holes: int
+    dots: int
+    even: int
+
+
+def count_blemishes(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Blemishes:
+    """Count the blemishes of an encoded sRGB picture (h, w, 3) in [0, 1] beside the truth.
+
+    Spots are compared at the truth's lightness, so that noise of light alone is none; they differ from the median of
+    the picture's 5 x 5 pixels as well, so that a wrong cast over an area is none. Even is a pixel whose truth in
+    5 x 5 pixels is its own within one CIEDE2000; a dot differs by five from the picture's median there.
+
+    Raises
+    ------
+    InputError
+        For a value that is NaN or infinite.
+    """
+    require_finite(picture=picture, truth=truth)
+    shown, true = rgb2lab(picture), rgb2lab(truth)
+    median = median_filter(shown, (5, 5, 1), mode="mirror")
+    spot = _difference_of_hue(shown, median) > SPOT / 2.0
+    for neighbour in _around(true, 1):
+        spot &= _difference_of_hue(shown, neighbour) > SPOT
+    light, shown_light = (luminance_of_srgb(decode_srgb(values)) for values in (truth, picture))
+    hole = (light >= LIGHT) & (shown_light < HOLE * light)
+    even = np.all([deltaE_ciede2000(true, neighbour) < EVEN for neighbour in _around(true, 2)], axis=0)
+    dot = even & (deltaE_ciede2000(shown, median) > DOT)
+    return Blemishes(*(int(pixels.sum()) for pixels in (spot, hole, dot, even)))
+
+
+def _around(values: NDArray[np.float64], reach: int) -> list[NDArray[np.float64]]:
+    """Each pixel's neighbours up to some pixels away and itself, mirrored at the border."""
+    padded = np.pad(values, ((reach, reach), (reach, reach), (0, 0)), mode="reflect")
+    windows = sliding_window_view(padded, (2 * reach + 1,) * 2, axis=(0, 1))
+    return [windows[..., i, j] for i, j in np.ndindex(windows.shape[3:])]
+
+
+def _difference_of_hue(lab: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
+    """CIEDE2000 of two colours at the other's lightness."""
+    return np.asarray(deltaE_ciede2000(np.concatenate([other[..., :1], lab[..., 1:]], axis=-1), other))
