@@ -1,6 +1,7 @@
 """The generalised Anscombe transform, from electrons to units of noise, and its exact inverse, which has no bias."""
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -8,7 +9,7 @@ from numpy.typing import NDArray
 
 from sensor.calibration import ChannelNoise, NoiseStep
 from sensor.cfa import mask
-from sensor.raw import RawImage
+from sensor.raw import RawImage, gains_shot
 
 # Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
 LEAST_PRNU = 1e-4
@@ -51,7 +52,8 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
 
     From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
     with PRNU p / k, over k. The pieces join where they meet. Of a channel that is read apart, e / k electrons are what
-    its sites count, and have the transform of any others.
+    its sites count, and have the transform of any others. The same holds where columns' gains act on dark current too,
+    which makes k of 1 (`sensor.raw.gains_shot`): variance k e + s^2 + (p e)^2 is k^2 times that of e / k.
 
     Parameters
     ----------
@@ -59,38 +61,47 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
         The mosaic of `raw`, or a part of it that begins with a whole tile.
     """
     stable = _stabilise_in_steps(electrons, raw)
-    for noise in raw.channel_noise:
+    for noise in map(raw.noise_of, _read_apart(raw)):
         at = mask(raw.cfa, noise.channel, electrons.shape)
-        stable[at] = _stabilise_apart(electrons[at], noise)
+        stable[at] = _counted(electrons[at], noise)
     return stable
 
 
 def stabilise_channel(electrons: NDArray[Any], raw: RawImage, channel: str) -> NDArray[Any]:
     """Take a plane of `channel` [e-] into units of the noise of its samples, as `stabilise_raw` takes the samples."""
-    apart = [noise for noise in raw.channel_noise if noise.channel == channel]
-    return _stabilise_apart(electrons, apart[0]) if apart else _stabilise_in_steps(electrons, raw)
-
-
-def _stabilise_apart(electrons: NDArray[Any], noise: ChannelNoise) -> NDArray[Any]:
-    return stabilise(electrons / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
+    if channel in _read_apart(raw):
+        return _counted(electrons, raw.noise_of(channel))
+    return _stabilise_in_steps(electrons, raw)
 
 
 def _stabilise_in_steps(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
-    stable = stabilise(electrons, raw.dark_noise_e, raw.prnu)
+    stable = _counted(electrons, raw.plain_noise)
     for step, offset in _joined(raw):
         stable = np.where(electrons >= step.from_e, _piece(electrons, step) + offset, stable).astype(electrons.dtype)
     return stable
 
 
+def _read_apart(raw: RawImage) -> list[str]:
+    return [noise.channel for noise in raw.channel_noise]
+
+
+def _counted(electrons: NDArray[Any], noise: ChannelNoise) -> NDArray[Any]:
+    return stabilise(electrons / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
+
+
+def _electrons(stable: NDArray[np.floating], noise: ChannelNoise) -> NDArray[np.float64]:
+    return unstabilise(stable, noise.dark_noise_e / noise.shot) * noise.shot
+
+
 def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
     """Steps of a raw image's noise, each with what its piece of the transform is moved by to meet the one before."""
     joined: list[tuple[NoiseStep, float]] = []
-    before, offset = NoiseStep(0.0, 1.0, raw.dark_noise_e, 0.0, raw.prnu), 0.0
-    for step in raw.noise_steps:
+    both, below, offset = gains_shot(raw, raw.dark_current_e), partial(_counted, noise=raw.plain_noise), 0.0
+    for step in (replace(step, shot=step.shot + both) for step in raw.noise_steps):
         seam_e = np.array(step.from_e)
-        offset += float(_piece(seam_e, before) - _piece(seam_e, step))
+        offset += float(below(seam_e) - _piece(seam_e, step))
         joined.append((step, offset))
-        before = step
+        below = partial(_piece, step=step)
     return joined
 
 
@@ -115,14 +126,14 @@ def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.f
     Before the first step `unstabilise`. Beyond one, where noise is tens of electrons and more, its mean is k / 4
     electrons off at most.
     """
-    electrons = unstabilise(stable, raw.dark_noise_e)
+    electrons = _electrons(stable, raw.plain_noise)
     for step, offset in _joined(raw):
         dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
         bright = unstabilise(step.shot * (stable - offset), dark_e) / step.shot
         electrons = np.where(stable >= _piece(np.array(step.from_e), step) + offset, bright, electrons)
-    for noise in raw.channel_noise:
+    for noise in map(raw.noise_of, _read_apart(raw)):
         at = mask(raw.cfa, noise.channel, stable.shape)
-        electrons[at] = unstabilise(stable[at], noise.dark_noise_e / noise.shot) * noise.shot
+        electrons[at] = _electrons(stable[at], noise)
     return electrons
 
 

@@ -99,7 +99,7 @@ class NoiseStep:
     """
 
     from_e: Annotated[float, (0.0, 1e12, "give electrons")]
-    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    shot: Annotated[float, (1e-6, 1e21, "give a factor")]
     read_noise_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
     dsnu_e: Annotated[float, (0.0, 1e12, "give electrons, 0 for none")]
     prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]
@@ -134,7 +134,7 @@ class ChannelNoise:
 
     channel: str
     full_well_e: Annotated[float, (1e-18, 1e20, "give electrons")]
-    shot: Annotated[float, (1e-6, 1e12, "give a factor")]
+    shot: Annotated[float, (1e-6, 1e21, "give a factor")]
     read_noise_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
     dsnu_e: Annotated[float, (0.0, 1e20, "give electrons, 0 for none")]
     prnu: Annotated[float, (0.0, 1.0, "give a fraction: 1.7 % is 0.017")]

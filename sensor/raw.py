@@ -175,8 +175,18 @@ class RawImage:
 
     @method
     def noise_of(self, channel: str) -> ChannelNoise:
-        """Noise and well of a channel's samples; of pixels read several times up to the first of `noise_steps`."""
-        return next((noise for noise in self.channel_noise if noise.channel == channel), self._plain(channel))
+        """Noise and well of a channel's samples; of pixels read several times up to the first of `noise_steps`.
+
+        Its ``shot`` holds what columns' gains make of dark current and light together (`gains_shot`) too.
+        """
+        noise = next((noise for noise in self.channel_noise if noise.channel == channel), self._plain(channel))
+        return replace(noise, shot=noise.shot + gains_shot(self, noise.dark_current_e))
+
+    @property
+    def plain_noise(self) -> ChannelNoise:
+        """`noise_of` the channels that aren't read apart."""
+        noise = self._plain("")
+        return replace(noise, shot=noise.shot + gains_shot(self, noise.dark_current_e))
 
     def _plain(self, channel: str) -> ChannelNoise:
         return ChannelNoise(channel, self.full_well_e, 1.0, self.dark_noise_e, 0.0, self.prnu, self.dark_current_e)
@@ -225,6 +235,15 @@ def full_at_sites(raw: RawImage, dn: NDArray[Any]) -> NDArray[np.bool_]:
     return full
 
 
+def gains_shot(raw: RawImage, dark_current_e: float) -> float:
+    """Variance per electron of light that columns' gains add where there is dark current.
+
+    A column's gain is one factor of light e and dark current D: of its variance c^2 (e + D)^2 the term 2 c^2 D e grows
+    as shot noise does.
+    """
+    return 2.0 * raw.column_gain_spread**2 * dark_current_e
+
+
 def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
     """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
 
@@ -236,9 +255,7 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
     light = np.maximum(electrons, 0.0)
 
     def variance_of(noise: NoiseStep | ChannelNoise, dark_current_e: float, mean_e: NDArray[Any]) -> NDArray[Any]:
-        # a column's gain is one factor of what light and dark current gave
-        both = 2 * raw.column_gain_spread**2 * dark_current_e
-        return replace(noise.law, shot=noise.shot + both).variance(mean_e)
+        return replace(noise.law, shot=noise.shot + gains_shot(raw, dark_current_e)).variance(mean_e)
 
     variance = variance_of(raw._plain(""), raw.dark_current_e, light)
     parts: list[tuple[NDArray[np.bool_], NoiseStep | ChannelNoise, float]]

@@ -131,7 +131,7 @@ def _sampling(
 
 
 def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Factor k by which electrons of R, G, B and W, read apart, are scaled up; dark noise in counted electrons."""
+    """Variance k of R, G, B and W per electron of light, 1 of plain counts; dark noise in counted electrons."""
     noise = [raw.noise_of(name) for name in LETTERS]
     return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
 
@@ -139,9 +139,11 @@ def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float6
 def counted_electrons(raw: RawImage) -> Singles:
     """Electrons that the sites of a mosaic count, (h, w) float32: over k, so that their shot noise is Poisson's."""
     electrons = raw.electrons.astype(np.float32)
-    for noise in raw.channel_noise:
-        electrons[mask(raw.cfa, noise.channel, raw.shape)] /= np.float32(noise.shot)
-    return electrons
+    counted = electrons / np.float32(raw.plain_noise.shot)
+    for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
+        at = mask(raw.cfa, noise.channel, raw.shape)
+        counted[at] = electrons[at] / np.float32(noise.shot)
+    return counted
 
 
 def full_white(raw: RawImage) -> NDArray[np.bool_]:
@@ -176,8 +178,9 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
         )
         for top in range(0, lcm(down, STRIDE), STRIDE)
     )
-    samples = transform(electrons, raw.dark_noise_e)
-    for noise in raw.channel_noise:
+    plain = raw.plain_noise
+    samples = transform(electrons, plain.dark_noise_e / plain.shot)
+    for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
         at = mask(raw.cfa, noise.channel, raw.shape)
         samples[at] = transform(electrons[at], noise.dark_noise_e / noise.shot)
     samples, full = continued(raw.cfa, samples, full)

@@ -79,10 +79,11 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
     index = list(cells.index)
     planes, noise = estimates.planes[..., index], estimates.noise[index]
+    plain = raw.plain_noise
     apart = [(c, i) for c, i in enumerate(index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
 
     def in_electrons(values: Singles) -> NDArray[np.float64]:
-        result = readings(raw.dark_noise_e).electrons(values)
+        result = readings(plain.dark_noise_e / plain.shot).electrons(values) * plain.shot
         for c, i in apart:
             result[..., c] = readings(float(dark_e[i])).electrons(values[..., c]) * shot[i]
         return result

@@ -61,10 +61,11 @@ def picture_demosaicked_first(
     mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     names, sites = raw.channels, channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
-    stable = stabilise(mosaic / gain, raw.dark_noise_e, 0.0) * np.sqrt(gain)
+    noise = raw.plain_noise
+    stable = stabilise(mosaic / (gain * noise.shot), noise.dark_noise_e / noise.shot, 0.0) * np.sqrt(gain)
     planes = demosaic(stable, raw.cfa)
     if denoise is not None:
         sigma = NOISE_AFTER_DEMOSAICKING * np.sqrt(OPPONENT**2 @ gains)
         planes = denoise(planes @ OPPONENT.T, sigma.tolist()) @ OPPONENT
-    electrons = unstabilise(planes / np.sqrt(gains), raw.dark_noise_e)
+    electrons = unstabilise(planes / np.sqrt(gains), noise.dark_noise_e / noise.shot) * noise.shot
     return Picture(to_rgb(raw, electrons * gains, level, colours, MALVAR_REACH), sources)

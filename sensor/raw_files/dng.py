@@ -226,9 +226,8 @@ def dng_tags(raw: RawImage) -> Tags:
 def _noise_profile(raw: RawImage) -> tuple[float, ...]:
     """S and O of `dng_tags`, of all channels together or of each plane where some are read apart."""
     noise = [raw.noise_of(name) for name in raw.channels[: None if raw.channel_noise else 1]]
-    full_e, both = raw.full_well_e, 2 * raw.column_gain_spread**2  # as in `noise_at_sites`
-    pairs = [((x.shot + both * x.dark_current_e) / full_e, (x.dark_noise_e / full_e) ** 2) for x in noise]
-    return tuple(part for pair in pairs for part in pair)
+    full_e = raw.full_well_e
+    return tuple(part for x in noise for part in (x.shot / full_e, (x.dark_noise_e / full_e) ** 2))
 
 
 def exif_tags(raw: RawImage) -> Tags:
