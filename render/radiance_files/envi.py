@@ -8,7 +8,6 @@ import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from numpy.typing import NDArray
 from render.radiance_files.file_checks import require_extent, require_file
 from rodcone.curve_file import LENGTHS_NM
 from rodcone.errors import InputError
+from rodcone.file_keys import require_known
 from rodcone.types import Floats
 
 _MOST_HEADER_BYTES = 1 << 20  # of ENVI; one of 500 bands with their names takes 20 kB
@@ -31,27 +31,6 @@ _ORDER = {
 _ENDINGS = ("", ".raw", ".img", ".dat", ".bin", ".bsq", ".bil", ".bip")
 _FIELD = re.compile(r"^\s*([^=;\n]+?)\s*=\s*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
 _NO_UNIT = ("", "unknown")  # of wavelengths: nm are taken, which values under 50 contradict
-
-# The known fields. What the specification gives a meaning to and is in none of these three is applied nowhere.
-_APPLIED = (
-    *("lines", "samples", "bands", "header offset", "data type", "interleave", "byte order", "file type"),
-    *("file compression", "wavelength", "wavelength units", "bbl", "data ignore value", "reflectance scale factor"),
-    *("data gain values", "data offset values", "data reflectance gain values", "data reflectance offset values"),
-)
-_REFUSED = {  # but where it stands for nothing, by what that is
-    "major frame offsets": "0",
-    "minor frame offsets": "0",
-    "complex function": "",
-    "classes": "0",
-    "read procedures": "",
-}
-_WITHOUT_EFFECT = (
-    *("acquisition time", "band names", "class lookup", "class names", "cloud cover", "coordinate system string"),
-    *("default bands", "default stretch", "dem band", "dem file", "description", "fwhm", "geo points", "map info"),
-    *("pixel size", "product type", "projection info", "rpc info", "security tag", "sensor type", "solar irradiance"),
-    *("spectra names", "sun azimuth", "sun elevation", "time", "timestamp", "x start", "y start", "z plot average"),
-    *("z plot range", "z plot titles"),
-)
 
 
 @dataclass(frozen=True)
@@ -152,16 +131,9 @@ def _fields(header: Path) -> dict[str, str]:
     if not text.startswith("ENVI"):
         raise InputError("it doesn't begin with ENVI; give the .hdr of an ENVI picture")
     fields = {" ".join(key.lower().replace("_", " ").split()): value.strip() for key, value in _FIELD.findall(text)}
-    for name, nothing in _REFUSED.items():
-        if set(fields.get(name, nothing).strip("{} \n").replace(" ", "").split(",")) - {nothing, ""}:
-            raise InputError(f"{name}: {fields[name][:40]!r} changes values or their places and can't be applied; save "
-                             "the picture without it")  # fmt: skip
+    require_known("ENVI header", fields)
     if fields.get("file type", "ENVI Standard").lower() not in ("envi standard", "envi"):
         raise InputError(f"file type: {fields['file type']!r} is not allowed; give an ENVI Standard picture")
-    for name in fields:
-        near = get_close_matches(name, _APPLIED, n=1, cutoff=0.85)
-        if near and name not in (*_APPLIED, *_WITHOUT_EFFECT):
-            raise InputError(f"field {name!r} is unknown; did you mean {near[0]!r}? Correct the header, or take it out")
     return fields
 
 

@@ -31,6 +31,7 @@ from render.radiance_files.file_checks import (
 from render.spectrum import band_widths, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, in_place, one_line, read_errors, require_range
+from rodcone.file_keys import require_known
 from rodcone.files import replacing
 from rodcone.types import Floats
 
@@ -252,6 +253,7 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     with in_place(str(path)), _damage():
         header = _part(path, header_only=True).header
         reflectance, bands = spectral_channels(channel.name for channel in header["channels"])
+        require_known("OpenEXR attribute", {key: header[key] for key in header if key not in bands})
         _check_geometry(header)
         if not reflectance:
             check_units(header, bands)

@@ -16,8 +16,10 @@ from render.illuminants import unit_luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import SMALL_BYTES, bands_between, require_extent, require_file
 from render.radiance_files.mat_file import read_numbers
+from render.radiance_files.mat_reader import NAMES
 from render.spectrum import Spectrum, photons_per_joule
 from rodcone.errors import InputError, in_place, require_range
+from rodcone.file_keys import require_known
 from rodcone.types import Floats
 
 MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
@@ -57,9 +59,10 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
-    numbers = read_numbers(path, (*_KEYS, *_OF_LAMP, *_VIEWS_DEG))
+    numbers = read_numbers(path, (*_KEYS, *_OF_LAMP, *_VIEWS_DEG, NAMES))
     lamp, view_deg = _lamp(numbers, path), _view_deg(numbers, path)
     with in_place(str(path)):
+        require_known("ISETCam variable", dict.fromkeys(str(name) for name in numbers[NAMES]))
         from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
         nm, shape, photons = _from_basis(numbers) if from_basis else _stored(numbers)
         centres, widths = bands_between(nm)

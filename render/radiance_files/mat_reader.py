@@ -3,11 +3,13 @@
 import resource
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+NAMES = "names of all"  # as a key what to read; no variable's, which hold no blank
 READER_BYTES = 1 << 28  # beside the file's values: SciPy's buffers
 COPIES = 4  # of the values on their way: inflated, stored type, MATLAB's type, written
 
@@ -21,7 +23,23 @@ def main(path: str, output: str, most_bytes: str, *keys: str) -> None:
     names = {key.split("/")[0] for key in keys}
     content = loadmat(path, variable_names=names, mat_dtype=True, struct_as_record=False)
     numbers: dict[str, Any] = {key: value for key in keys if (value := _numbers(content, key)) is not None}
+    if NAMES in keys:
+        numbers[NAMES] = np.array(list(_names(path, content)))
     np.savez(output, **numbers)
+
+
+def _names(path: str, content: dict[str, Any]) -> Iterator[str]:
+    """Names of a file's variables, and of the fields of those structs that are read, by their places."""
+    from scipy.io import whosmat
+
+    yield from (name for name, _, _ in whosmat(path))
+    places = [(name, value) for name, value in content.items() if not name.startswith("__")]
+    while places:
+        place, value = places.pop()
+        struct = value.item() if isinstance(value, np.ndarray) and value.dtype == object and value.size == 1 else None
+        for field in getattr(struct, "_fieldnames", ()):
+            yield f"{place}/{field}"
+            places.append((f"{place}/{field}", getattr(struct, field)))
 
 
 def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:

@@ -13,7 +13,8 @@ from render.scene import EMISSION_PARAMETER, Keys, LightGroup, Node, Scene, tabl
 from render.spectrum import Spectrum, flat
 from render.user_scene.allowed_plugins import ALLOWED, CAMERAS, METER, SPECTRA, kind_of
 from rodcone.display import brief
-from rodcone.errors import InputError, require_name, require_whole
+from rodcone.errors import InputError, in_place, require_name, require_whole
+from rodcone.file_keys import require_known
 from rodcone.jit import dr
 from rodcone.types import Floats
 
@@ -71,13 +72,13 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
         For a scene without camera or light, a broken reference, or a light that can't be relit.
     """
     kinds = {key: _kind(mi, child) for key, child in description.items()}
+    _check_left_out(mi, name, description)
     integrators = [description[key] for key, kind in kinds.items() if kind == "integrator"]
     (depth, rr_depth), notes = _depths(name, integrators), []
     for integrator in integrators:
         limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
         engine = f"the engine brings its own, with paths {limit}, roulette from {rr_depth}"
-        lamps = "; lights are seen, hide_emitters is left out" if integrator.get("hide_emitters") else ""
-        notes.append(f"integrator {integrator['type']!r}: {engine}{lamps}")
+        notes.append(f"integrator {integrator['type']!r}: {engine}")
     camera, size = _camera(mi, name, description, notes)
     geometry: Node = {"type": "scene", "sensor": camera}
     planes = []
@@ -123,6 +124,18 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
     if depth >= 0:
         require_whole(f"scene {name}: max_depth", depth, 1, 1 << 31, "1 is emission alone, -1 without a limit")
     return DEEPEST if depth < 0 else min(int(depth), DEEPEST), min(int(rr_depth), DEEPEST)
+
+
+def _check_left_out(mi: Any, name: str, description: Node) -> None:
+    """Raise for a property that changes the picture, of a part that the engine doesn't take over."""
+    for _, node in walk(description):
+        kind = _kind(mi, node).replace("reconstructionfilter", "rfilter")
+        if kind in _LEFT_OUT:
+            own = {
+                key: value for key, value in node.items() if key not in ("type", "id") and not isinstance(value, dict)
+            }
+            with in_place(f"scene {name}: {node['type']}"):
+                require_known(f"Mitsuba {kind} property", own)
 
 
 def _kind(mi: Any, part: Any) -> str:

@@ -226,6 +226,12 @@ def test_a_tile_far_larger_than_the_picture_is_refused(tmp_path: Path, tile: tup
         read_exr(path)
 
 
+def test_attributes_that_change_nothing_are_let_through(tmp_path: Path) -> None:
+    stated = {"EV": 2.0, "spectralLayoutVersion": "1.0", "polarisationHandedness": "left", "owner": "me", "mine": "1"}
+    channels = {f"S0.{nm}nm": plane(nm) for nm in (500, 510)}
+    assert read_exr(write_by_hand(tmp_path / "a.exr", channels, **stated)).values[0, 0].tolist() == [500, 510]
+
+
 def test_stokes_vector_is_read_as_its_radiance(tmp_path: Path) -> None:
     channels = {f"S{s}.{nm}nm": plane(s + nm) for s in range(4) for nm in (500, 510)}
     assert read_exr(write_by_hand(tmp_path / "a.exr", channels)).values[0, 0].tolist() == [500, 510]
@@ -264,6 +270,13 @@ def test_one_band_of_unknown_width_is_refused(tmp_path: Path) -> None:
     [
         ({"S0.500nm": 1, "S0.510nm": 1, "T.500nm": 1}, {}, "radiance (S0 channels) and reflectance (T)"),
         ({"S0.500nm": 1, "S0.510nm": 1}, {"pixelAspectRatio": 2.0}, "pixelAspectRatio: 2 is not allowed"),
+        ({"S0.500nm": 1, "S0.510nm": 1}, {"multiView": "left,right"}, "multiView: 'left,right' changes values"),
+        ({"S0.500nm": 1, "S0.510nm": 1}, {"spectralLayoutVersion": "2.0"}, "spectralLayoutVersion: '2.0' changes"),
+        (
+            {"S0.500nm": 1, "S0.510nm": 1},
+            {"emissiveUnit": "lm"},
+            "'emissiveUnit' is unknown; did you mean 'emissiveUnits'",
+        ),
         ({"R": 1, "G": 1, "B": 1}, {}, "channels B, G, R;"),
         ({"S1.500nm": 1}, {}, "channels S1.500nm;"),
         ({"beauty.S0.500nm": 1}, {}, "beauty"),

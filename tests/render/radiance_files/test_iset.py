@@ -327,3 +327,14 @@ def test_the_illuminant_that_a_scene_holds_is_exchanged_and_its_view_is_read(tmp
     assert lit.luminance() == pytest.approx(scene.luminance(), rel=5e-3)
     assert load_picture(path, other, relit=True).relight().values == pytest.approx(lit.values, rel=1e-6)
     refusal(replace(scene, light=None).relight, other, match="it isn't known which lamp is behind these values")
+
+
+def test_a_misspelt_variable_is_refused_and_others_are_let_through(tmp_path: Path) -> None:
+    """As ISETCam has it, values of dmin and dmax bring integers to photons: without them they'd be another picture."""
+    levels = {"photons": np.zeros((5, 6, NM.size), np.uint16), "dmn": 0.0, "dmax": 1.0, "luminance": []}
+    scene = {"type": "scene", "data": levels, "spectrum": {"wave": NM}}
+    refusal(
+        read_iset_scene, save(tmp_path, scene=scene), match=r"'scene/data/dmn' is unknown; did you mean 'scene/data/dm"
+    )
+    refusal(read_iset_scene, save(tmp_path, photons=PHOTONS, wave=NM, imgMeans=NM), match="did you mean 'imgMean'")
+    read_iset_scene(save(tmp_path, photons=PHOTONS, wave=NM, comment="a", mine=1.0, dist=1.2, fov=10.0))

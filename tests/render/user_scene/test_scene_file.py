@@ -263,19 +263,32 @@ def test_an_area_light_stated_beside_its_shape_is_put_on_it(tmp_path: Path) -> N
     assert len(ours) == len(stock) == 1
 
 
-HIDDEN = '<integrator type="volpath"><boolean name="hide_emitters" value="true"/></integrator>'
+HIDDEN = '<integrator type="volpath"><boolean name="hide_emitters" value="{}"/></integrator>'
 
 
 def test_what_the_engine_brings_itself_is_left_out_and_told(tmp_path: Path) -> None:
     second = CAMERA.replace('id="camera"', 'id="second"').replace('value="8"', 'value="80"')
-    opened = load_scene_file(write(tmp_path, HIDDEN, CAMERA, second, SUN))
+    opened = load_scene_file(write(tmp_path, HIDDEN.format("false"), CAMERA, second, SUN))
     assert opened.size == (6, 8)
     assert set(opened.scene.geometry["sensor"]) == {"type", "id", "fov", "to_world"}
     assert {value["type"] for value in opened.scene.geometry.values() if isinstance(value, dict)} == {
         *("perspective", "directional")
     }
     notes = " ".join(opened.notes)
-    assert all(word in notes for word in ("'volpath'", "paths of any length", "1 of 2 cameras", "hide_emitters"))
+    assert all(word in notes for word in ("'volpath'", "paths of any length", "1 of 2 cameras"))
+
+
+def test_a_property_that_changes_the_picture_is_followed_or_refused_by_name(tmp_path: Path) -> None:
+    assert "volpath: hide_emitters: 'True' changes values" in told(tmp_path, HIDDEN.format("true"), CAMERA, SUN, WALL)
+    unknown = '<integrator type="path"><integer name="max_dept" value="3"/></integrator>'
+    assert "integrator property 'max_dept' is unknown" in told(tmp_path, unknown, CAMERA, SUN, WALL)
+    assert "did you mean 'max_depth'?" in told(tmp_path, unknown, CAMERA, SUN, WALL)
+    wide = CAMERA.replace("</film>", '<integer name="widht" value="3"/></film>')
+    assert "film property 'widht' is unknown" in told(tmp_path, wide, SUN, WALL)
+    sampled = CAMERA.replace(
+        "</sensor>", '<sampler type="independent"><integer name="count" value="3"/></sampler></sensor>'
+    )
+    assert "sampler property 'count' is unknown" in told(tmp_path, sampled, SUN, WALL)
 
 
 def test_a_cut_out_of_the_film_is_refused_and_the_whole_is_none(tmp_path: Path) -> None:

@@ -137,7 +137,7 @@ def test_what_is_assumed_of_a_file_is_told(tmp_path: Path) -> None:
     path = tmp_path / "a.exr"
     uneven = np.array([450.0, 500.0, 600.0])
     write_exr(SpectralRadiance(np.ones((16, 16, 3)), uneven, width_nm=np.ones(3)), path)
-    path.write_bytes(path.read_bytes().replace(b"rodconeBands_nm", b"rodconeBandz_nm"))
+    path.write_bytes(path.read_bytes().replace(b"rodconeBands_nm", b"elsewhereTold_x"))
     white = file_white(path, None)
     transport, notes = open_radiance_file(path, white)
     assert transport.width_nm.tolist() == [50, 75, 100]

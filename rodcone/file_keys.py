@@ -1,0 +1,68 @@
+"""Keys of other programs' files that change what is read: followed, or refused by name, from the table beside this."""
+
+import tomllib
+from collections.abc import Mapping
+from difflib import get_close_matches
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+from rodcone.errors import InputError
+
+_LIKE = 0.85  # from which on a key is taken for another one misspelt
+
+
+@cache
+def formats() -> Mapping[str, Mapping[str, Any]]:
+    """Read the table: known keys by format, with what is done about each."""
+    return tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+
+
+def require_known(kind: str, keys: Mapping[str, Any]) -> None:
+    """Raise `InputError` for a key that changes values and can't be followed, or that looks like one which does.
+
+    Parameters
+    ----------
+    kind : str
+        A format of the table, such as ``ENVI header``.
+    keys : mapping of str to object
+        What the file holds; of ENVI texts, of others numbers or anything.
+    """
+    table = formats()[kind]
+    applied, refused = table["applied"], table["refused"]
+    for name, nothing in refused.items():
+        if name in keys and not _changes_nothing(keys[name], nothing):
+            shown = " ".join(str(keys[name]).split())[:40]
+            raise InputError(f"{name}: {shown!r} changes values or their places and can't be applied; save without it")
+    known = (*applied, *refused, *table["without_effect"])
+    for name in keys:
+        if name in known:
+            continue
+        if table.get("only_these"):
+            like = get_close_matches(name, known, n=1)
+            words = f"did you mean {like[0]!r}? Correct it, or take it out" if like else "take it out"
+            raise InputError(f"{kind} {name!r} is unknown; allowed: {', '.join(sorted(known))}; {words}")
+        if near := _almost(name, (*applied, *refused)):
+            raise InputError(f"{kind} {name!r} is unknown; did you mean {near!r}? Correct it, or take it out")
+
+
+def _almost(name: str, known: tuple[str, ...]) -> str:
+    """Known key of the same struct that is spelt almost so; empty where none is."""
+    struct, _, field = name.rpartition("/")
+    fields = {key.rpartition("/")[2]: key for key in known if key.rpartition("/")[0] == struct}
+    return next((fields[near] for near in get_close_matches(field, fields, n=1, cutoff=_LIKE)), "")
+
+
+def _changes_nothing(value: Any, nothing: str) -> bool:
+    """Whether a value, or each of a list of them, is the one without effect, or empty."""
+    if isinstance(value, bool):
+        return str(value).lower() == nothing
+    parts = str(value).strip("{}[]() \n").replace(" ", "").split(",")
+    return all(part in ("", nothing) or _as_number(part) == _as_number(nothing) for part in parts)
+
+
+def _as_number(text: str) -> float | str:
+    try:
+        return float(text)
+    except ValueError:
+        return text
