@@ -19,6 +19,7 @@ help:
 	@echo "make test-all  every test that is not slow: eleven minutes on two cores"
 	@echo "make test-any-cpu  the same as other processors add up; CPU=NAME one of them, CPU=by-date today's"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
+	@echo "             with SCENES=folder: all Mitsuba scenes of a folder beside stock Mitsuba; DEFINE=spp=16 its \$$parameters"
 	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
 	@echo "make results  every figure and table that README and the pages quote: hours, goes on where it was ended; PART=NAME one"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
@@ -53,7 +54,12 @@ test-any-cpu: $(VENV)/installed-dev
 # one that fails.
 CODE = $(shell find rodcone render scenes sensor isp studies tests benchmarks -name "*.py")
 SLOW = $(shell grep -rl --include="test_*.py" "pytest.mark.slow" tests)
+ifdef SCENES
+verify: $(VENV)/installed
+	@$(BIN)/python benchmarks/stock_scenes.py "$(SCENES)" --out out/verify/scenes.csv $(DEFINE:%=--define %)
+else
 verify: $(addprefix out/verify/,$(SLOW) any-cpu faults fuzz soak)
+endif
 out/verify/any-cpu: PART = tests/any_cpu/configurations.py -q -n auto -m "not slow"
 out/verify/faults: PART = tests/faults/plant_faults.py
 out/verify/fuzz: PART = tests/fuzz/run.py --seconds 3600

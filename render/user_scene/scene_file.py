@@ -104,7 +104,9 @@ def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
         state = mi.parser.parse_file(config, str(file), **define)
         mi.parser.transform_upgrade(config, state)
     except RuntimeError as error:
-        raise InputError(f"{mitsuba_words(error)}; correct the file") from None
+        words = mitsuba_words(error)
+        fix = "give it, as -D name=value" if "undefined parameter" in words else "correct the file"
+        raise InputError(f"{words}; {fix}") from None
     except UnicodeDecodeError:  # from a message that cuts a character in half, or a file of spectra
         raise InputError(f"{file}: Mitsuba can't read it, nor say why in UTF-8; correct the file") from None
     finally:

@@ -440,7 +440,10 @@ REFUSED = {
     "missing include": ([CAMERA, SUN, '<include filename="no.xml"/>'], ["'no.xml' is missing"]),
     "unknown element": (["\n\n<spher/>"], ["scene.xml (line 3, col 2)", "<spher>"]),
     "bad number": ([CAMERA.replace('value="20"', 'value="wide"'), SUN], ["(line 3", '"wide"']),
-    "undefined parameter": ([CAMERA.replace('value="8"', 'value="$side"'), SUN], ["undefined parameter: $side"]),
+    "undefined parameter": (
+        [CAMERA.replace('value="8"', 'value="$side"'), SUN],
+        ["undefined parameter: $side", "give it, as -D name=value"],
+    ),
     "unknown reference": (
         [CAMERA, SUN, '<bsdf type="diffuse" id="red"/><shape type="sphere"><ref id="rad"/></shape>'],
         ["(line 7", "ref: 'rad' is unknown", "did you mean 'red'?"],
