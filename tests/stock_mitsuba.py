@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from PIL import Image
 
 from render.loader import mitsuba_module
 from render.scene import Scene
@@ -62,3 +63,10 @@ def picture_of_file(path: Path, spp: int, seed: int) -> NDArray[np.float64]:
     finally:
         mi.set_file_resolver(kept)
     return np.asarray(mi.render(loaded, spp=spp, seed=seed), np.float64)
+
+
+def write_bitmap(path: Path) -> NDArray[np.uint8]:
+    """Write a picture of 4 x 4 pixels, none of them dark or full, and give its values."""
+    pixels = np.random.default_rng(5).integers(30, 230, (4, 4, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(path)
+    return pixels

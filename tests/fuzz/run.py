@@ -10,6 +10,7 @@ import multiprocessing
 import os
 import sys
 import tempfile
+import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -34,10 +35,9 @@ def main() -> int:
     names = asked.target or list(TARGETS)
     path = asked.out / "counts.json"
     counts: dict[str, dict[str, Any]] = json.loads(path.read_text("utf-8")) if path.is_file() else {}
-    found = 0
-    plan = [(name, asked.seconds / len(names)) for name in names]
-    while plan:
-        made, plan = _child(plan, asked.seed, counts, asked.out)
+    found, left_s = 0, asked.seconds
+    while left_s > 0:
+        made, left_s = _child(names, left_s, asked.seed, counts, asked.out)
         found += made
         asked.out.mkdir(parents=True, exist_ok=True)
         path.write_text(json.dumps(counts, indent=1), "utf-8")
@@ -45,15 +45,17 @@ def main() -> int:
     return 1 if found else 0
 
 
-def _child(plan: list[tuple[str, float]], seed: int, counts: dict[str, Any], out: Path) -> tuple[int, list[Any]]:
-    """Run one child to its end; gives the number of findings, and what it left to be done."""
-    shared = Path("/dev/shm")
-    entries = {name: counts.setdefault(f"{name} {seed}", {**dict.fromkeys(NAMES, 0), "next": 0}) for name, _ in plan}
+def _child(
+    names: list[str], seconds: float, seed: int, counts: dict[str, dict[str, int]], out: Path
+) -> tuple[int, float]:
+    """Run one child to its end; gives the number of findings, and the seconds that are left."""
+    shared, began = Path("/dev/shm"), time.monotonic()
+    entries = {name: counts.setdefault(f"{name} {seed}", {**dict.fromkeys(NAMES, 0), "next": 0}) for name in names}
     with tempfile.TemporaryDirectory(dir=shared if shared.is_dir() else None, prefix="rodcone-fuzz-") as place:
         context = multiprocessing.get_context(START)
         messages, end = context.Pipe(duplex=False)
-        steps = [(name, entries[name]["next"], seconds) for name, seconds in plan]
-        child = context.Process(target=work, args=(steps, seed, end, out, Path(place)))
+        first = {name: entry["next"] for name, entry in entries.items()}
+        child = context.Process(target=work, args=(first, seconds, seed, end, out, Path(place)))
         child.start()
         end.close()
         name, found, hangs = "", 0, False
@@ -67,7 +69,7 @@ def _child(plan: list[tuple[str, float]], seed: int, counts: dict[str, Any], out
             child.kill()
         child.join()
     if child.exitcode == 0:
-        return found, []
+        return found, 0.0
     if not name:
         sys.exit("the child ended before its first input; see above")
     number = entries[name]["next"]  # which it died of
@@ -75,10 +77,8 @@ def _child(plan: list[tuple[str, float]], seed: int, counts: dict[str, Any], out
     made = input_files(TARGETS[name], TARGETS[name].samples(), name, seed, number)
     keep(out / "findings" / f"{name}-{words}-{seed}-{number}", made, words)
     _note(entries[name], words)
-    index = [step for step, _ in plan].index(name)
-    seconds = plan[index][1]
-    # half of its time, so that a target that always dies comes to an end
-    return found + 1, [*([(name, seconds / 2)] if seconds > 2.0 else []), *plan[index + 1 :]]
+    # the child's start counts too, so that a target that always dies comes to an end
+    return found + 1, seconds - (time.monotonic() - began)
 
 
 def _note(entry: dict[str, int], told: str) -> bool:

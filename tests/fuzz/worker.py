@@ -9,7 +9,7 @@ import tempfile
 import time
 import traceback
 import warnings
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -121,50 +121,41 @@ def _memory_mib(name: str) -> float:
         return next(int(line.split()[1]) for line in file if line.startswith(name)) / 1024
 
 
-def work(plan: Sequence[tuple[str, int, float]], seed: int, messages: Any, out: Path, place: Path) -> None:
-    """Feed targets one after the other, and tell the parent of each input, so that it knows of which one this died.
+def work(first: Mapping[str, int], seconds: float, seed: int, messages: Any, out: Path, place: Path) -> None:
+    """Feed targets in turns, and tell the parent of each input, so that it knows of which one this died.
 
-    Each gets time in proportion to what an input costs it, so that readers in a process of their own and large files
-    are reached as often as the others.
+    The target that has had the fewest inputs is always the next: readers in a process of their own and large files are
+    reached as often as the others.
 
     Parameters
     ----------
-    plan : sequence of (str, int, float)
-        Target, number of its first input, seconds.
+    first : mapping of str to int
+        By target the number of its first input.
+    seconds : float
+        For all together, once their samples are read.
     messages : end of a pipe
-        Takes the target and what became of an input; nothing became of it where the target begins.
+        Takes the target and what became of an input; nothing became of it where a turn begins.
     out, place : Path
         Where findings are kept, and where files are put to be read.
     """
     quiet()
     folder = place / "in"
     folder.mkdir()
-    samples = {name: TARGETS[name].samples() for name, *_ in plan}
-    for name, *_ in plan:
+    samples = {name: TARGETS[name].samples() for name in first}
+    for name in first:
         for sample in samples[name]:  # loads what is loaded at first use
             judge(TARGETS[name], sample, folder)
-    costs_s = {name: _cost_s(TARGETS[name], samples[name], folder) for name, *_ in plan}
-    per_input = sum(seconds for *_, seconds in plan) / sum(costs_s.values())
-    for name, first, _ in plan:
-        end, number = time.monotonic() + per_input * costs_s[name], first
+    end, numbers = time.monotonic() + seconds, dict(first)
+    while time.monotonic() < end:
+        name = min(numbers, key=lambda each: numbers[each])
+        _reset_peak()
         messages.send((name, ""))
-        while time.monotonic() < end:
-            if number % 1000 == 0:
-                _reset_peak()
-            made = input_files(TARGETS[name], samples[name], name, seed, number)
-            told, words = judge(TARGETS[name], made, folder)
-            if told not in ("refused", "accepted"):
-                keep(out / "findings" / f"{name}-{told}-{seed}-{number}", made, words)
-            messages.send((name, told))
-            number += 1
-
-
-def _cost_s(target: Target, samples: Sequence[Sample], folder: Path) -> float:
-    """Mean time that a valid input takes: no changed one may end this process before the first is counted."""
-    began = time.monotonic()
-    for sample in samples:
-        judge(target, sample, folder)
-    return (time.monotonic() - began) / len(samples)
+        made = input_files(TARGETS[name], samples[name], name, seed, numbers[name])
+        told, words = judge(TARGETS[name], made, folder)
+        if told not in ("refused", "accepted"):
+            keep(out / "findings" / f"{name}-{told}-{seed}-{numbers[name]}", made, words)
+        messages.send((name, told))
+        numbers[name] += 1
 
 
 def quiet() -> None:

@@ -5,9 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from loop import loop
-from PIL import Image
 from refusal import refusal
-from stock_mitsuba import picture_of_file, spectral_film
+from stock_mitsuba import picture_of_file, spectral_film, write_bitmap
 
 from render.engine import render
 from render.geometry import look_at, scale, to_world, translate
@@ -110,8 +109,7 @@ def instance(body: str, move: str) -> str:
 
 
 def write_scene(folder: Path, body: str, name: str = "scene") -> Path:
-    pixels = np.random.default_rng(5).integers(30, 230, (4, 4, 3), dtype=np.uint8)
-    Image.fromarray(pixels).save(folder / "p.png")
+    write_bitmap(folder / "p.png")
     for mesh, options in {"plain": {}, "vertex": {"vertex": True}, "face": {"face": True}}.items():
         write_quad(folder / f"{mesh}.ply", **options)
     write_quad(folder / "smooth.ply", normals=True)

@@ -13,7 +13,7 @@ import pytest
 from PIL import Image
 from scipy.stats import norm
 from scipy.stats import t as student
-from stock_mitsuba import picture_of_file, spectral_film
+from stock_mitsuba import picture_of_file, spectral_film, write_bitmap
 
 from render.engine import render
 from render.loader import Film, load_groups, mitsuba_module
@@ -167,8 +167,7 @@ FILM = spectral_film((6, 8), BANDS_NM, WIDTH_NM)
 
 
 def write_scene(folder: Path, paint: str, lights: str, camera: str = PERSPECTIVE) -> Path:
-    pixels = np.random.default_rng(5).integers(30, 230, (4, 4, 3), dtype=np.uint8)
-    Image.fromarray(pixels).save(folder / "p.png")
+    pixels = write_bitmap(folder / "p.png")
     Image.fromarray(pixels[:, :, 0]).save(folder / "g.png")
     grid = np.random.default_rng(6).uniform(0.2, 0.8, (4, 4, 4, 3)).astype("<f4")
     head = b"VOL\x03" + np.array([1, 4, 4, 4, 3], "<i4").tobytes() + np.array([0, 0, 0, 1, 1, 1], "<f4").tobytes()
