@@ -294,21 +294,28 @@ def test_the_mean_patch_reflects_as_much_luminance_as_its_file_states(name: str)
     assert seen[1] / white[1] == pytest.approx(1.0, abs=0.01)
 
 
-def test_luminance_is_that_of_the_estimate_whose_component_is_known() -> None:
-    """Counted again from the closed form's parts, beside the linear estimate's, which is worse."""
+def test_each_figure_is_that_of_its_own_metric_and_estimate() -> None:
+    """Counted again from the closed form's parts; the linear estimate is worse, and no two figures are alike."""
     spectral, seen, level = load_prior("drawn"), view_of("drawn", "D65"), 2.0
     row = expect(BAYER, [level], exposure=0.02)[0]
     sampling = sampling_of(BAYER, responses_e(BAYER, seen), lens_of(BAYER, False))
-    white, noise = level / spectral.reflectances.mean(), noise_of(chip_readings(BAYER, 0.02))
+    # a scene's level is the mean over its patches' reflectances
+    white, noise = level / np.mean(spectral.reflectances), noise_of(chip_readings(BAYER, 0.02))
     found = []
     for patches in (spectral.patches, pooled(spectral.patches)):
         samples, errors = sampled(patches, sampling, MIDDLE, np.eye(len(sampling))), []
         for mean in spectral.reflectances:
-            rows = metric_rows(spectral, seen, mean)[1]
-            forms = rows.swapaxes(-1, -2) @ rows
+            forms = np.array([rows.swapaxes(-1, -2) @ rows for rows in metric_rows(spectral, seen, mean)])
             if len(patches.weights) == 1:
-                forms = np.tensordot(spectral.patches.weights, forms, 1)[None]
-            errors.append(expected_error(samples, mean * white * 0.02, noise, forms[None])[0])
-        found.append(-10 * np.log10(np.mean(errors)))
-    assert row.luminance_db == pytest.approx(found[0], abs=1e-6)
-    assert found[0] > found[1] + 0.3
+                forms = np.tensordot(spectral.patches.weights, forms, (0, 1))[:, None]
+            errors.append(expected_error(samples, mean * white * 0.02, noise, forms))
+        found.append(np.mean(errors, axis=0))
+    known, linear = found
+    told = (row.psnr_db, row.luminance_db, row.linear_psnr_db, row.lightness, row.colour)
+    expected = (*-10 * np.log10(known[:2]), -10 * np.log10(linear[0]), *np.sqrt(known[2:]))
+    assert told == pytest.approx(expected, rel=1e-9)
+    assert min(np.diff(np.sort(expected))) > 0.01
+    assert (-10 * np.log10(known) > -10 * np.log10(linear) + 0.3).all()
+    # three channels' squared errors are averaged, not summed
+    r, g, b = (np.array(x) for x in metric_rows(spectral, seen, 0.3)[0][:, :, :3, 0].reshape(3, -1))
+    assert max(abs(r).max(), abs(g).max(), abs(b).max()) > 0
