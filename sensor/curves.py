@@ -9,8 +9,9 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike
 
+from render.band_weights import band_weights
 from render.illuminants import illuminant
-from render.spectrum import DEFAULT_WAVELENGTH_NM, ELECTRON_C, Floats, Spectrum, band_widths, photons_per_joule
+from render.spectrum import ELECTRON_C, VISIBLE_NM, Floats, Spectrum, even_bands, photons_per_joule
 from rodcone.curve_file import read_columns
 from rodcone.display import Axes, brief, draw_curves
 from rodcone.doors import method
@@ -139,15 +140,32 @@ def matched_transmittance(responses: Responses) -> float:
         Where G or W is missing, or W collects less than G.
     """
     _require_channels(responses, "GW")
-    nm = DEFAULT_WAVELENGTH_NM
-    width = band_widths(nm)
-    photons = illuminant("D65").band_average(nm, width) * photons_per_joule(nm) * width
-    green, white = responses.band_average(("G", "W"), nm, width) @ photons
+    green, white = electrons_from_neutral(responses, ("G", "W"), illuminant("D65"))
     if not 0 < green <= white:
         raise InputError(
             f"responses: W collects {white:g} where G does {green:g}; allowed: W more than G; correct a curve"
         )
     return float(green / white)
+
+
+def electrons_from_neutral(responses: Responses, names: Sequence[str], light: Spectrum) -> Floats:
+    """Electrons of each channel, in any unit, from a surface that reflects the light evenly, 380-780 nm: exact.
+
+    Raises
+    ------
+    InputError
+        Where a channel has no curve.
+    """
+    require_keys("responses: channel", names, responses.curves)
+    curves = [responses.curves[name] for name in names]
+
+    def seen(nm: Floats) -> Floats:
+        values = [np.interp(nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves]
+        return np.asarray(np.array(values) * photons_per_joule(nm))
+
+    corners = np.concatenate([curve.wavelength_nm for curve in curves])
+    one, width = even_bands(VISIBLE_NM, 1)
+    return band_weights(seen, corners, one, width, light)[:, 0]
 
 
 def neutral_density(responses: Responses) -> Responses:

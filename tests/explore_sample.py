@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 import rodcone as public
+from render.radiance import SpectralRadiance
 from render.transport import Transport
 from studies.explore.controls import TIME, Controls, Lamp
 
@@ -19,6 +20,14 @@ RENDER = (
     "transport = rodcone.render('still_life_outdoor', (40, 48), spp=4, **bands)\n"
 )
 GAUSSIAN = tuple((float(nm), float(np.exp(-(((nm - 600) / 40) ** 2)))) for nm in range(380, 790, 10))
+
+
+def lamps_apart(transport: Transport, level_cd_m2: float) -> list[SpectralRadiance]:
+    """Radiance of each light group alone, at a level of all together, as the explorer keeps it."""
+    over_own = level_cd_m2 / transport.level().value
+    off = dict.fromkeys(transport.groups, 0.0)
+    own = {name: group.power * over_own for name, group in transport.groups.items()}
+    return [transport.relight(powers=off | {name: power}) for name, power in own.items()]
 
 
 @cache

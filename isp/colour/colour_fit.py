@@ -15,7 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import rows_at
-from render.spectrum import Floats, band_widths, colour_matching_functions, photons_per_joule
+from render.spectrum import (
+    Floats,
+    Spectrum,
+    band_widths,
+    colour_matching_functions,
+    observer_weights,
+    photons_per_joule,
+)
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.display import brief
 from rodcone.errors import InputError
@@ -133,8 +140,9 @@ def fit_colours(
     illuminant_spd: ArrayLike,
     reflectances: ArrayLike,
     width_nm: ArrayLike | None = None,
+    lamp: Spectrum | None = None,
 ) -> ColourFit:
-    """Fit a camera's colours under a light; parameters as `fit_matrix`, the responses those of the channels `names`.
+    """Fit a camera's colours under a light; parameters as `training`, the responses those of the channels `names`.
 
     Beside three colours W counts as a_R R + a_G G + a_B B and an independent rest, where a, of sum 1, has the least
     squares. So W tells nothing of the colours that they don't tell with less noise: fitted freely to a chart's two
@@ -146,7 +154,7 @@ def fit_colours(
     InputError
         As `fit_matrix`.
     """
-    signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
+    signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm, lamp)
     if signals.shape[1] != len(names):
         raise InputError(f"responses: {signals.shape[1]} channels don't fit the names {tuple(names)}; give one each")
     if len(names) < 3:
@@ -220,8 +228,19 @@ def training(
     illuminant_spd: ArrayLike,
     reflectances: ArrayLike,
     width_nm: ArrayLike | None = None,
+    lamp: Spectrum | None = None,
 ) -> tuple[Floats, Floats]:
-    """Balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces; as `fit_matrix` takes them."""
+    """Balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces.
+
+    Parameters
+    ----------
+    responses, wavelength_nm, illuminant_spd, reflectances, width_nm
+        As `fit_matrix` takes them.
+    lamp : Spectrum, optional
+        The light within the bands, up to a factor, where the responses are weights that follow it
+        (`sensor.response.electrons_per_irradiance`). Left out, camera and eye alike are averages over bands: what both
+        miss within a band is nearly the same.
+    """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     width = band_widths(nm, width_nm)
     camera, surfaces = _band_last("responses", responses, nm.size), _band_last("reflectances", reflectances, nm.size)
@@ -230,8 +249,10 @@ def training(
         raise InputError(f"reflectances: {surfaces.shape[0]} surfaces can't fit {camera.shape[0]} channels; give more")
     photons = light * photons_per_joule(nm) * width
     signals = (surfaces * photons) @ camera.T / (photons @ camera.T)
-    # Camera and eye alike by band averages: what both miss within a band is nearly the same.
-    eye = np.stack([curve.band_average(nm, width) for curve in colour_matching_functions()], axis=-1) * width[:, None]
+    if lamp is None:
+        eye = np.array([curve.band_average(nm, width) for curve in colour_matching_functions()]).T * width[:, None]
+    else:
+        eye = observer_weights(nm, width, lamp).T
     white = light @ eye
     return signals, xyz_to_srgb(adapt_to_d65((surfaces * light) @ eye / white[1], white))
 

@@ -15,11 +15,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import box_sums, rows_at
 from render.illuminants import illuminant
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, band_widths, photons_per_joule
+from render.spectrum import Floats
 from rodcone.display import brief
 from rodcone.errors import InputError
 from sensor.cfa import mask
-from sensor.curves import Responses, built_in
+from sensor.curves import Responses, built_in, electrons_from_neutral
 from sensor.raw import RawImage, channel_variance
 
 
@@ -147,10 +147,7 @@ class WhiteBalance:
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:
     """Relative electrons of curves, the project's own by default, from a neutral under D65, shape (channel,)."""
-    nm = DEFAULT_WAVELENGTH_NM
-    width = band_widths(nm)
-    light = illuminant("D65").band_average(nm, width) * photons_per_joule(nm)
-    return np.asarray((responses or built_in()).band_average(tuple(names), nm, width) @ light)
+    return electrons_from_neutral(responses or built_in(), names, illuminant("D65"))
 
 
 def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | None:

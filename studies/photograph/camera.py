@@ -88,7 +88,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
             "allowed: a channel that sees light; give another curve, or colours under a broad light, such as D65"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
-    signals, _ = training(response[three], nm, light.spectrum, surfaces, width)
+    signals, _ = training(response[three], nm, light.spectrum, surfaces, width, light.lamp)
     white = tristimulus(light.spectrum, nm, width, light.lamp)  # Y = 1
     colours = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width, light.lamp), white))
     to_srgb = fit_through_neutral(signals, colours if len(three) == 3 else grey_of(colours))
@@ -145,10 +145,11 @@ def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> Colo
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
     colours = processor.colours or sensor.channels
     names = (*colours, *(x for x in sensor.channels if x not in colours))
-    responses, index = sensor.responses.band_average(names, nm, width), [sensor.channels.index(x) for x in names]
-    fit = fit_colours(names, responses, nm, light.spectrum, surfaces, width)
-    behind_filters_e = responses @ (light.spectrum * photons_per_joule(nm) * width)
-    return mixed_fit(fit, mixing_of(sensor)[np.ix_(index, index)], behind_filters_e)
+    index = [sensor.channels.index(x) for x in names]
+    weights = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)[index]
+    responses = weights / (photons_per_joule(nm) * width)
+    fit = fit_colours(names, responses, nm, light.spectrum, surfaces, width, light.lamp)
+    return mixed_fit(fit, mixing_of(sensor)[np.ix_(index, index)], weights @ light.spectrum)
 
 
 def develop_to_scale(
