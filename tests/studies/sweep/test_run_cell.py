@@ -21,7 +21,7 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.radiance_files.radiance_source import as_transport, load_radiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, photons_per_joule
 from rodcone.colour_spaces import encode_srgb
 from rodcone.digests import digest, digest_file
 from scenes.reflectances import color_checker
@@ -32,7 +32,7 @@ from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
-from sensor.response import behind_filters, expected_electrons
+from sensor.response import behind_filters, electrons_per_irradiance, expected_electrons
 from sensor.shake import SHAKES, shaken
 from studies.budget.ledger import Plan
 from studies.metrics.quality import appearance, measure, true_picture
@@ -66,8 +66,9 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
     fine = light_in_bands(illuminant("E"), nm, width)
-    responses = sensor.responses.band_average(("R", "G", "B"), nm, width)
-    colours = fit_colours(("R", "G", "B"), responses, nm, fine.spectrum, surfaces, width)
+    assert sensor.channels == ("R", "G", "B")
+    responses = electrons_per_irradiance(sensor, nm, width, 1.0, fine.lamp) / (photons_per_joule(nm) * width)
+    colours = fit_colours(("R", "G", "B"), responses, nm, fine.spectrum, surfaces, width, fine.lamp)
     device = draw_device(sensor, radiance.shape, device_stream(cell.condition.sensor, "bayer", cell.seed))
     raw = read_out(expected_e, sensor, device, exposure_s, exposure_stream(cell.condition, "bayer", cell.seed))
     neutral = neutral_electrons(sensor, light, exposure_s)
