@@ -24,7 +24,7 @@ from render.meter import Meter
 from render.runs import add_run, fields_of, let_go, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
-from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
 from render.transport import Transport
 from rodcone.errors import InputError, one_line, require_whole
 from rodcone.jit import compiling, is_out_of_memory
@@ -62,7 +62,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     size : (int, int) or int
         Height and width in pixels, or the longer side, of which the other follows from the scene's own proportions.
     wavelength_nm, width_nm : (band,) array_like, optional
-        Band centres and widths; 40 bands of 10 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
+        Band centres and widths; 20 bands of 20 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
     spp : int, optional
         Samples a pixel in the mean over the picture, in two independent halves; rounded up by an eighth at most.
@@ -167,7 +167,9 @@ def _checked_film(
     if len(sides) != 2 or not all(isinstance(n, int | np.integer) and 1 <= n <= 1 << 15 for n in sides):
         raise InputError(f"size: {size!r} is not allowed; give (height, width) in pixels, each 1 to 32768")
     require_whole("max_depth", max_depth, 1, 1 << 16, "1 is emission alone, 2 direct light")
-    nm = np.array(DEFAULT_WAVELENGTH_NM if wavelength_nm is None else wavelength_nm, dtype=np.float64)
+    if wavelength_nm is None:
+        wavelength_nm = even_bands(VISIBLE_NM, round((VISIBLE_NM[1] - VISIBLE_NM[0]) / RENDER_BAND_NM))[0]
+    nm = np.array(wavelength_nm, dtype=np.float64)
     widths = band_widths(nm, width_nm)
     check_combinations(scene)
     check_range(scene, float((nm - widths / 2).min()), float((nm + widths / 2).max()))

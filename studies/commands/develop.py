@@ -14,7 +14,7 @@ from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.scene import Scene
-from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
+from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, Floats, even_bands, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
@@ -143,8 +143,7 @@ class RenderOrder:
     width : int, optional
         Pixels; as height.
     bands : str, optional
-        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; by default those of the light that is there already,
-        380:780:20, or else 380:780:10 and a lamp's lines apart.
+        Wavelength bands in nm as FIRST_EDGE:LAST_EDGE:WIDTH; by default 380:780:20, and a lamp's lines apart.
     light : tuple of str
         GROUP=ILLUMINANT, such as lamp=A: another spectrum for a light group, at the same luminance; or ILLUMINANT
         alone, for all of them; may be given several times. An illuminant is a name or a file: lamp=led.csv.
@@ -236,7 +235,9 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
     ready = None if order.renders else find_ready(scene, opened.size, stated, lamps, bands or BANDS)
     size = ready.size if ready else size
     wavelength_nm, width_nm = (
-        (ready.transport.wavelength_nm, ready.transport.width_nm) if ready else (bands or fine_bands(lamps))
+        (ready.transport.wavelength_nm, ready.transport.width_nm)
+        if ready
+        else (bands or fine_bands(lamps, width_nm=RENDER_BAND_NM))
     )
     require_memory(
         memory(size[0] * size[1], wavelength_nm.size, len(scene.groups), denoised=order.denoise), order.force

@@ -15,7 +15,7 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import film_size
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, fine_bands
+from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, Spectrum, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
@@ -279,7 +279,8 @@ def _rendered(
     """Light of a scene, rendered here."""
     if step:
         step(render_words(np.inf), 0.0)
-    bands = fine_bands(spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items())
+    lamps = [spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items()]
+    bands = fine_bands(lamps, width_nm=RENDER_BAND_NM)
     return render(
         opened.scene,
         _size(order, opened),
@@ -344,7 +345,8 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, 
     ready = _ready(order, opened, asked_spectra(opened.scene, order.light))
     height, width = ready.size if ready else _size(order, opened)
     check_frame(sensor, (height, width))
-    require_memory(memory(height * width, DEFAULT_WAVELENGTH_NM.size, len(opened.scene.groups)), order.force)
+    bands = round((VISIBLE_NM[1] - VISIBLE_NM[0]) / RENDER_BAND_NM)
+    require_memory(memory(height * width, bands, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s, ready
 
 
