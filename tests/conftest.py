@@ -34,8 +34,9 @@ def pytest_unconfigure() -> None:
 
 @pytest.fixture(autouse=True)
 def no_progress_lines(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Print no line of progress, which a busy machine would add to what a command says every few seconds."""
+    """Print no line of progress, nor how long kernels compiled: a busy or new machine would add them."""
     monkeypatch.setattr("rodcone.progress.LINE_EVERY_S", 1e6)
+    monkeypatch.setattr("rodcone.progress.LEAST_COMPILE_S", 1e6)
 
 
 @pytest.fixture(scope="module")

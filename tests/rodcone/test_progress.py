@@ -14,7 +14,7 @@ import pytest
 from render.engine import render
 from rodcone import progress as module
 from rodcone.errors import InputError
-from rodcone.progress import progress, progress_bar, render_words
+from rodcone.progress import compile_note, progress, progress_bar, render_words
 from scenes.catalog import load
 
 
@@ -142,3 +142,9 @@ def test_a_render_shows_a_bar_by_itself(shown: list[dict[str, str]]) -> None:
     count = len(shown)
     render(load("flat_field"), (8, 8), spp=4, progress=lambda share, error: None)
     assert len(shown) == count
+
+
+def test_a_first_render_says_how_long_it_compiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "LEAST_COMPILE_S", 1.0)
+    assert compile_note(13.5) == "render: compiling took 14 s, once for these surfaces and so many bands"
+    assert compile_note(0.9) is None
