@@ -8,7 +8,7 @@ on threads.
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from math import pi, radians, tan
+from math import ceil, inf, isnan, nan, pi, radians, tan
 
 import numpy as np
 import scipy
@@ -183,8 +183,8 @@ def left_out(sensor: SensorConfig) -> tuple[str, ...]:
         lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
     if (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
         lines.append(
-            f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist; "
-            "4 samples a pixel don't"
+            f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist"
+            f"{_edge_words(sensor)}; {least_samples(sensor)} samples a pixel don't"
         )
     if not lens.horizontal_view_deg:
         corner = (1 + (tan(radians(VIEW_DEG / 2)) * DIAGONAL) ** 2) ** -2
@@ -209,11 +209,48 @@ def left_out(sensor: SensorConfig) -> tuple[str, ...]:
 
 def loss_within_pixels(sensor: SensorConfig) -> float:
     """Largest loss of the MTF along an axis up to Nyquist, 550 nm, as one sample a pixel is imaged."""
+    _, ideal, imaged = _axis_mtfs(sensor)
+    return float(np.max(ideal - imaged))
+
+
+def least_samples(sensor: SensorConfig) -> int:
+    """Samples along each side of a pixel from which on the lens's own transfer is imaged below the pixels' Nyquist.
+
+    Samples fold the frequencies beyond them back, so that the limit of diffraction, at 550 nm, has to lie under the
+    sampling frequency less the pixels' Nyquist frequency. Without diffraction one does.
+    """
+    limit_per_px = limit_per_um(WAVELENGTH_NM, sensor.lens) * sensor.site_pitch_um
+    return 1 if limit_per_px == inf else max(2, ceil(limit_per_px + 0.5))
+
+
+def mtf50_error(sensor: SensorConfig) -> float:
+    """Relative error of an edge's MTF50 that one sample a pixel makes, at 550 nm; nan where MTF50 is beyond Nyquist."""
+    frequency, ideal, imaged = _axis_mtfs(sensor)
+    true, found = (_half(frequency, mtf) for mtf in (ideal, imaged))
+    return found / true - 1
+
+
+def _edge_words(sensor: SensorConfig) -> str:
+    error = mtf50_error(sensor)
+    return "" if isnan(error) else f" and an edge's mtf50_cy_per_px by {-error:.1%}"
+
+
+def _half(frequency: Floats, mtf: Floats) -> float:
+    """First frequency at which a falling transfer is 0.5; nan where it stays above."""
+    under = np.flatnonzero(mtf < 0.5)
+    if not under.size:
+        return nan
+    last = slice(under[0] - 1, under[0] + 1)
+    return float(np.interp(-0.5, -mtf[last], frequency[last]))
+
+
+def _axis_mtfs(sensor: SensorConfig) -> tuple[Floats, Floats, Floats]:
+    """Frequencies along an axis up to Nyquist [1/px], and the MTF of lens and pixel there: the true and the imaged."""
     lens, steps = sensor.lens, np.arange(64) / 128
     ideal = diffraction_otf(steps / sensor.site_pitch_um, WAVELENGTH_NM, lens) if lens.diffraction else 1.0
     ideal = ideal * defocus_otf(steps / sensor.site_pitch_um, lens.defocus_um)
     imaged = sampled_otf((1, 64), sensor.site_pitch_um, lens, folded=False)(WAVELENGTH_NM)[0]
-    return float(np.max((ideal - imaged) * np.sinc(steps)))
+    return steps, ideal * np.sinc(steps), imaged * np.sinc(steps)
 
 
 def _at_nyquist(transfer: float) -> str:

@@ -26,11 +26,12 @@ from sensor.capture import capture
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
-from sensor.optics import SpectralIrradiance, form_image, left_out, spreads
+from sensor.optics import SpectralIrradiance, form_image, least_samples, left_out, spreads
 from sensor.presets import preset
 from sensor.raw_files.raw_file import check_ending
 from sensor.response import channel_electrons, expected_electrons
 from sensor.shake import held_lens
+from studies.metrics.target_figures import EDGE
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.gain import at_gain, gain_text
@@ -206,7 +207,7 @@ def _taken(order: Order, step: Step | None, kept: Path) -> Taken:
         if ready:
             transport, notes = ready.transport, [*notes, ready.line]
         else:
-            transport = _rendered(order, opened, spectra, step, kept)
+            transport = _rendered(order, opened, spectra, step, kept=kept, samples=_samples(order, opened, sensor))
             notes += filter(None, [compile_note(transport.compile_s)])
 
     # The exposure.
@@ -219,17 +220,18 @@ def _taken(order: Order, step: Step | None, kept: Path) -> Taken:
             f"level: {order.level} is the mean of what is no lamp; with the lamps in view the picture's is "
             f"{luminance_cd_m2:.3g} cd/m2"
         ]
-    image = form_image(radiance, sensor)
+    samples = _samples(order, opened, sensor)
+    image = form_image(radiance, sensor, samples)
     exposure_s, sensor = _exposure(order, asked_s, image, sensor)
-    subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
-    device = draw_device(sensor, radiance.shape, np.random.default_rng([order.seed, _DEVICE]))
+    subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
+    device = draw_device(sensor, image.values.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
     taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)
     if opened is not None:
-        even, odd = (_frame_e(half, sensor, exposure_s) for half in transport.relight_halves(spectra, **level))
+        even, odd = (_frame_e(half, sensor, exposure_s, samples) for half in transport.relight_halves(spectra, **level))
         # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
         frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
@@ -274,16 +276,17 @@ def _exposure(
 
 
 def _rendered(
-    order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, kept: Path
+    order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, *, kept: Path, samples: int
 ) -> Transport:
     """Light of a scene, rendered here."""
+    height, width = _size(order, opened)
     if step:
         step(render_words(np.inf), 0.0)
     lamps = [spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items()]
     bands = fine_bands(lamps, width_nm=RENDER_BAND_NM)
     return render(
         opened.scene,
-        _size(order, opened),
+        (samples * height, samples * width),
         wavelength_nm=bands[0],
         width_nm=bands[1],
         spp=order.spp or _SPP,
@@ -302,9 +305,14 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
     return find_ready(opened.scene, opened.size, asked, lights)
 
 
-def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
+def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float, samples: int) -> NDArray[np.float64]:
     """Expected electrons of the raw image's pixels, shape (h, w)."""
-    return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor), sensor, exposure_s))
+    return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s))
+
+
+def _samples(order: Order, opened: SceneFile | None, sensor: SensorConfig) -> int:
+    """Samples of the light along each side of a pixel: more than one where the scene measures sharpness."""
+    return least_samples(sensor) if opened is not None and order.source == EDGE else 1
 
 
 def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, Ready | None]:
@@ -346,7 +354,8 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, 
     height, width = ready.size if ready else _size(order, opened)
     check_frame(sensor, (height, width))
     bands = round((VISIBLE_NM[1] - VISIBLE_NM[0]) / RENDER_BAND_NM)
-    require_memory(memory(height * width, bands, len(opened.scene.groups)), order.force)
+    samples = _samples(order, opened, sensor)
+    require_memory(memory(samples**2 * height * width, bands, len(opened.scene.groups)), order.force)
     return sensor, opened, exposure_s, ready
 
 

@@ -12,8 +12,10 @@ from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, left_out
+from sensor.diffraction import diffraction_otf
+from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, least_samples, left_out, mtf50_error
 from sensor.presets import names, preset
+from studies.metrics.mtf import edge_response
 
 ISET_NM = np.arange(400.0, 701.0, 10.0)  # samples 10 nm apart, summed as rectangles
 
@@ -146,3 +148,30 @@ def test_a_disc_of_a_few_pixels_alone_is_told_too():
 def test_a_disc_within_the_airy_disc_is_called_a_guess():
     assert "rough guess" in line(preset_camera(diffraction=1.0, defocus_um=1.0), "defocus")
     assert not any(text.startswith("defocus") for text in left_out(preset_camera(diffraction=1.0, defocus_um=5.0)))
+
+
+def edge_radiance(samples, size=160, degrees=5.0):
+    """Area averages of an edge through the middle, in closed form: the second integral of a step, four times."""
+    across, along = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    row, column = np.indices((size * samples, size * samples)) - (size * samples - 1) / 2
+    distance, a, b = column * across + row * along, across / 2, along / 2
+    ramp = lambda x: np.maximum(x, 0.0) ** 2 / 2  # noqa: E731
+    corners = ramp(distance + a + b) - ramp(distance + a - b) - ramp(distance - a + b) + ramp(distance - a - b)
+    return SpectralRadiance((0.15 + 0.45 * corners / (4 * a * b))[..., None], np.array([550.0]), width_nm=np.ones(1))
+
+
+@loop("f_number", [2.0, 2.8, 5.6])
+def test_an_edge_imaged_by_the_rules_samples_has_the_lenss_mtf50_and_by_one_the_error_stated(f_number):
+    sensor = preset_camera(diffraction=1.0, f_number=f_number)
+    frequency = np.linspace(0.01, 0.6, 2000)
+    mtf = diffraction_otf(frequency / 2.2, 550.0, sensor.lens) * np.sinc(frequency)
+    true = float(np.interp(-0.5, -mtf, frequency))
+
+    def found(samples):
+        image = form_image(edge_radiance(samples), sensor, samples).values[..., 0]
+        return edge_response(image / image.max()).mtf50_cycles_per_px
+
+    assert least_samples(sensor) == {2.0: 3, 2.8: 2, 5.6: 2}[f_number]
+    assert found(least_samples(sensor)) == pytest.approx(true, rel=0.01)
+    assert found(1) == pytest.approx(true * (1 + mtf50_error(sensor)), rel=0.012)
+    assert mtf50_error(sensor) < -0.03

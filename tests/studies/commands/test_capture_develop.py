@@ -24,6 +24,7 @@ from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw, write_raw
 from sensor.response import expected_electrons
+from studies.photograph import shot
 from studies.photograph.camera import calibrate, capture, iso_speed
 from studies.photograph.shot import Order, take
 from studies.study.lit_scene import open_choice, white_spectrum
@@ -61,6 +62,18 @@ def test_a_scene_becomes_two_negatives_whose_paths_alone_are_printed(tmp_path: P
     assert (raw.exposure_s, raw.camera, raw.f_number) == (0.01, "low_noise", 2.8)
     kept = mask(RGBW, "R", (32, 32)) | mask(RGBW, "G", (32, 32))
     np.testing.assert_array_equal(raw.dn[kept], bayer.dn[kept])
+
+
+def test_the_slanted_edge_is_rendered_with_the_samples_that_its_lens_asks_for(tmp_path: Path, monkeypatch) -> None:
+    """Two along each side of a pixel at f/2.8 and 2.2 um; a scene that measures no sharpness takes one."""
+    sizes = []
+    rendered = shot.render
+    monkeypatch.setattr(shot, "render", lambda scene, size, **more: sizes.append(size) or rendered(scene, size, **more))
+    for scene in ("slanted_edge", "flat_field"):
+        out = str(tmp_path / f"{scene}.dng")
+        assert call(["capture", scene, "--size", "24", "--spp", "2", "--cfa", "bayer", "-o", out])[0] == 0
+        assert read_raw(Path(out)).shape == (24, 24)
+    assert sizes == [(48, 48), (24, 24)]
 
 
 @pytest.mark.parametrize(
