@@ -4,7 +4,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
+from scipy.optimize import brentq
 
 from isp.picture import Picture
 from render.illuminants import illuminant
@@ -17,6 +18,10 @@ from rodcone.types import Image, real_array
 from studies.metrics.quality import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure as quality_of
 from studies.metrics.truth import light_in_bands, true_srgb, white_of
+
+Plane = NDArray[np.float64]
+_CELL_PX = 8
+_MOST_DOUBLED = 40  # times that a lamp's light may exceed what white leaves of it, as a power of 2
 
 
 @dataclass(frozen=True)
@@ -72,9 +77,9 @@ def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None)
 def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[str, float]:
     """Measure a developed picture against the scene without noise, by the metrics of a study.
 
-    The picture is brought to the reference's mean luminance: one factor, so that its brightness isn't judged. A study
-    takes that factor from the camera instead; where both are to agree within 0.1 dB, the noise's mean has to be under
-    1 % of the light's.
+    The picture is brought to the reference's brightness by one factor, so that its brightness isn't judged: the mean
+    luminance is the same where light above white counts as white, since a lamp that a camera clips says nothing of the
+    exposure. A study takes the factor from the camera instead.
 
     Parameters
     ----------
@@ -107,7 +112,32 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
         raise InputError(
             f"picture: its mean luminance is {mean:g}; allowed: above 0, finite; give linear sRGB of a scene"
         )
-    scaled = linear * (float(luminance_of_srgb(reference.linear).mean()) / mean)
+    scaled = linear * _brightness(luminance_of_srgb(linear), luminance_of_srgb(reference.linear))
     encoded = encode_srgb(scaled)
     quality = quality_of(encoded, reference.truth.encoded, reference.truth.lab)
     return asdict(quality) | asdict(appearance(scaled, encoded, reference.truth, reference.white_cd_m2))
+
+
+def _brightness(luminance: Plane, reference: Plane) -> float:
+    """Return the factor k for which the mean of min(k luminance, 1) is the mean of min(reference, 1).
+
+    Both are means over cells of 8 x 8 pixels, so that noise above white isn't taken for light above white.
+    """
+    counts = _cell_sums(np.ones_like(reference))
+    picture, scene = _cell_sums(luminance) / counts, _cell_sums(reference) / counts
+
+    def shown(cells: Plane, factor: float) -> float:
+        return float(np.average(np.minimum(factor * cells, 1.0), weights=counts))
+
+    wanted = shown(scene, 1.0)
+    low = wanted / float(luminance.mean())  # clipping takes light away, so that the factor is never less
+    high = next((k for k in low * 2.0 ** np.arange(1, _MOST_DOUBLED) if shown(picture, k) >= wanted), None)
+    if high is None or shown(picture, low) >= wanted:  # nothing clips, to within rounding
+        return low
+    return float(brentq(lambda k: shown(picture, k) - wanted, low, high))
+
+
+def _cell_sums(plane: Plane) -> Plane:
+    """Return sums over cells of `_CELL_PX` pixels along each side, those at the end smaller."""
+    rows, columns = (np.arange(0, side, _CELL_PX) for side in plane.shape)
+    return np.asarray(np.add.reduceat(np.add.reduceat(plane, rows, axis=0), columns, axis=1))

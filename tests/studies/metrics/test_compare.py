@@ -50,6 +50,16 @@ def test_the_same_picture_of_another_scale_has_no_difference_and_a_known_one_has
     assert len(told) == 8
 
 
+def test_a_lamp_that_the_camera_clips_says_nothing_of_the_brightness() -> None:
+    scene = np.random.default_rng(5).uniform(0.05, 0.6, (32, 40, 3))
+    scene[8:16, 8:16] = 4000.0  # a lamp: its light is most of the picture's
+    reference = ReferencePicture(scene, 100.0)
+    told = measure(7.0 * np.minimum(scene, 1.0), reference)
+    assert told["psnr_db"] > 200  # by the mean luminance 5 dB: all is white
+    noisy = np.minimum(scene + np.random.default_rng(6).normal(0, 0.3, scene.shape), 1.0)
+    assert measure(noisy * 7.0, reference)["psnr_db"] == pytest.approx(measure(noisy, reference)["psnr_db"], abs=1e-6)
+
+
 @pytest.mark.thorough
 def test_four_lines_measure_a_photograph_and_more_light_is_better() -> None:
     radiances = [grey_field("D65", level) for level in (2.0, 200.0)]
