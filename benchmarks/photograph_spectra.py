@@ -42,11 +42,6 @@ COLOURS = ("R", "G", "B")
 
 
 def main() -> None:
-    width = band_widths(NM)
-    light = illuminant("D65").band_average(NM, width)
-    camera = low_noise().responses.band_average(COLOURS, NM, width)
-    patches = np.array([held(curve).band_average(NM, width) for _, curve in color_checker()])
-    own = fit_colours(COLOURS, camera, NM, light, patches, width).matrix(COLOURS)
     rows = []
     for folder, names in PHOTOGRAPHS.items():
         package = find_spec(folder.split("/")[0])
@@ -54,11 +49,8 @@ def main() -> None:
         assert package.origin
         for name in names:
             linear = _linear(Path(package.origin).parents[1] / folder / name)
-            cells = []
-            for spectra in (surface_reflectances(linear)[0], linear @ srgb_basis(NM)):
-                signals, target = training(camera, NM, light, spectra, width)
-                best = np.linalg.lstsq(signals, target, rcond=None)[0]
-                cells += [psnr(signals @ own.T, target), psnr(signals @ best, target)]
+            surfaces, basis = surface_reflectances(linear)[0], linear @ srgb_basis(NM)
+            cells = [*exact_psnr(surfaces), *exact_psnr(basis)]
             rows.append([name, *(f"{cell:.1f}" for cell in cells)])
     head = [
         "picture",
@@ -72,6 +64,18 @@ def main() -> None:
     start = time.process_time()
     surface_reflectances(many)
     print(f"spectra of 1 megapixel of colours at random: {time.process_time() - start:.2f} s of processor time")
+
+
+def exact_psnr(reflectances: Floats) -> tuple[float, float]:
+    """PSNR of exact R, G and B of reflectances (pixel, band) by the camera's own matrix and by the picture's [dB]."""
+    width = band_widths(NM)
+    light = illuminant("D65").band_average(NM, width)
+    camera = low_noise().responses.band_average(COLOURS, NM, width)
+    patches = np.array([held(curve).band_average(NM, width) for _, curve in color_checker()])
+    own = fit_colours(COLOURS, camera, NM, light, patches, width).matrix(COLOURS)
+    signals, target = training(camera, NM, light, reflectances, width)
+    best = np.linalg.lstsq(signals, target, rcond=None)[0]
+    return psnr(signals @ own.T, target), psnr(signals @ best, target)
 
 
 def psnr(found: Floats, right: Floats) -> float:
