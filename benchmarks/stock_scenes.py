@@ -4,7 +4,7 @@
 
 Every .xml file under the folder counts. Mitsuba reads it itself and renders it by its `path`, at the depth that the
 file states, into the same four bands. Told are the means of the two pictures and of 16 blocks, and each refusal's line.
-Two pictures that differ are rendered once more, with 16 times the samples: noise of fireflies goes, an error stays.
+Two pictures that differ are rendered once more, with 64 times the samples: noise of fireflies goes, an error stays.
 A file that isn't opened and that another one includes, or without a camera or light, is no scene but a part of one.
 """
 
@@ -32,7 +32,7 @@ from rodcone.types import Floats
 NM, WIDTH_NM = np.array([425.0, 500.0, 575.0, 650.0]), 60.0
 MOST_MEAN, MOST_BLOCK = 0.03, 0.15  # differences, relative, within which two pictures of this noise agree
 BLOCKS = 4  # a side
-LONGER = 16  # times the samples, where two pictures differ
+LONGER = 64  # times the samples, where two pictures differ
 NO_SCENE = ("it has no light", "camera 'none'", "its root is")
 _INCLUDED = re.compile(r'<include\s[^>]*filename\s*=\s*"([^"]*)"')
 
