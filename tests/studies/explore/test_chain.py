@@ -19,7 +19,7 @@ from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
 from sensor.optics import form_image
 from studies.explore.answers import python_of
-from studies.explore.chain import development_of, expose_scene, photograph
+from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, controls_from, mosaics_of
 from studies.explore.memo import Memo, go_on
 from studies.explore.slow import is_slow, stand_in
@@ -62,9 +62,11 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
     start = Controls(processor="interleaved", exposure="auto:information", pixel=hot)
     memo, transport = Memo(), small_transport()
     first = expose_scene(transport, start, memo)
+    true_picture_of(first, start, memo)
     others = {x.name for x in fields(Controls)} - set(MOVED)
     assert others <= {"gain", "iso"}, "a control without a line in MOVED"
     moved = [{name: value} for name, value in MOVED.items() if value != {}]
+    moved += [{"lamps": {name: Lamp("A")}} for name in transport.groups]
     moved += [{"pixel": hot | {name: PIXEL_MOVED[name]}} for name in PIXEL]
     moved += [{"lens": {name: LENS_MOVED[name]}} for name in LENS]
     for change in moved:
@@ -73,6 +75,8 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
         assert kept.exposure_s == fresh.exposure_s, change
         assert np.array_equal(kept.raw.dn, fresh.raw.dn), change
         assert np.array_equal(kept.light.spectrum, fresh.light.spectrum), change
+        true, true_anew = true_picture_of(kept, controls, memo), true_picture_of(fresh, controls, Memo())
+        assert np.array_equal(true[0], true_anew[0]), change
         developed, anew = development_of(kept, controls, memo), development_of(fresh, controls, Memo())
         assert developed.keywords.keys() == anew.keywords.keys(), change
         for mine, theirs in zip((*developed.args, *developed.keywords.values()),

@@ -125,6 +125,10 @@ def test_levels_rise_in_the_report_in_whatever_order_the_study_has_them(tmp_path
         f"{value}\N{NO-BREAK SPACE}cd/m\N{SUPERSCRIPT TWO}" for value in (1, 5, 25)
     ]
     assert [(cell.level, cell.luminance_cd_m2) for cell in report.cells] == [(0, 1.0), (1, 5.0), (2, 25.0)]
+    assert not any("not made yet" in note for note in report.notes)
+    with closing(sqlite3.connect(tmp_path / "out" / FILE)) as base, base:
+        base.execute("DELETE FROM cells WHERE level = '5cd/m2'")
+    assert "1 of 3 cells are not made yet: rodcone sweep goes on with them." in sweep_report(tmp_path / "out")[0].notes
 
 
 @pytest.mark.thorough

@@ -10,7 +10,13 @@ WRITTEN = {
     text.significant: {0.0999: "0.0999", 80: "80", 1234.0: "1 230", 99.96: "100", 0: "0", None: "—", -2: "−2"},
     text.duration: {0.066: "66 ms", 0.00012: "0.12 ms", 41.23: "41.2 s", 0.0: "0 s"},
     text.level_text: {"0.036cd/m2": "0.036 cd/m²", "500lux": "500 lux"},
-    text.substitution_text: {None: "not applicable", True: "on", 0.25: "on for 25 % of the seeds", 0.0: "off"},
+    text.substitution_text: {
+        None: "not applicable",
+        True: "on",
+        0.25: "on for 25 % of the seeds",
+        0.75: "on for 75 % of the seeds",
+        0.0: "off",
+    },
     text.with_signs: {"10 photons per um^2, 5 cd/m2, cos^4": "10 photons per µm², 5 cd/m², cos⁴"},
     text.plain_name: {"quiet.toml": "quiet", "low_noise": "low_noise", "low_noise.toml": "low_noise.toml"},
     text.camera_name: {

@@ -140,6 +140,7 @@ def test_a_lead_is_worth_the_light_that_the_other_needs() -> None:
     assert np.isnan(found[2:]).all()
     assert np.isnan(light_ratio(light, worse[:, :1] + 2, worse[:, :1])).all(), "one seed has no interval"
     assert light_ratio(light, worse, worse)[0].tolist() == [1.0, 1.0, 1.0]
+    assert np.isnan(light_ratio(light, worse + np.array([0.1, 0.12]), worse)[2]).all(), "0.3 dB in a decade are unseen"
 
 
 def test_the_same_method_on_both_mosaics_is_compared_first_else_what_varies() -> None:

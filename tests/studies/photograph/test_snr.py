@@ -64,6 +64,20 @@ def test_light_and_dark_current_of_several_readings_fit_the_well_together() -> N
         assert electrons_at_snr(beyond, hot, EXPOSURE_S) == inf
 
 
+def test_a_ratio_is_told_up_to_the_deepest_reading_and_the_least_light_is_taken() -> None:
+    """A switched camera has its SNR in the gain that it reads such light with; of two such lights the dimmer one."""
+    deep = preset("dual_gain")
+    wells_e = sorted(reading.full_well_e for reading in deep.chip.readings)
+    green_e = channel_e(deep, light_of("D65"), 1.0, EXPOSURE_S)[1]
+    light = np.array([0.5 * wells_e[0], 2.0 * wells_e[0], 1.2 * wells_e[1]]) / green_e
+    assert np.isnan(snr_at(light, deep, "D65", EXPOSURE_S)["G"]).tolist() == [False, False, True]
+    switched = replace(deep, chip=replace(deep.chip, readout="switched"))
+    seam_e = np.geomspace(1.0, wells_e[1], 4000)
+    for ratio in (3.0, 0.9 * float(snr(np.array([[0.5 * wells_e[0]]]), switched, EXPOSURE_S)[0, 0])):
+        above = seam_e[snr(seam_e[None], switched, EXPOSURE_S)[0] >= ratio]
+        assert electrons_at_snr(ratio, switched, EXPOSURE_S) == pytest.approx(above.min(), rel=0.01)
+
+
 def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
     sensor = low_noise()
     assert electrons_at_snr(1.01 / sensor.pixel.prnu, sensor, EXPOSURE_S) == inf

@@ -10,8 +10,9 @@ import pytest
 import sweep_sample as SAMPLE
 
 from sensor.presets import low_noise, preset
-from studies.study.study import Condition, SceneChoice
+from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
+from studies.sweep import prepare as prepare_module
 from studies.sweep.cells import cell_key, device_stream, exposure_stream, shake_stream
 from studies.sweep.frames import frame_key
 
@@ -39,6 +40,22 @@ def test_a_frames_key_changes_with_each_of_its_inputs_alone(tmp_path: Path, monk
     found.append(key())
     monkeypatch.setattr(frames_module, "versions", lambda: "another version")
     found.append(key())
+    assert len(set(found)) == len(found)
+
+
+def test_the_request_for_a_render_changes_with_each_of_its_inputs_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a render that is noted for a request nothing is made anew, whatever limits the study asks for now."""
+
+    def request(identity: str = "a", model: str = "b", limits: RenderLimits | None = None) -> str:
+        study = SimpleNamespace(render=limits or RenderLimits())
+        job: Any = SimpleNamespace(plan=SimpleNamespace(renders={"scene": model}), study=study)
+        opened: Any = SimpleNamespace(identity=identity, choice="scene")
+        return prepare_module._request(job, opened)
+
+    found = [request(), request("c"), request(model="c"), request(limits=RenderLimits(spp=17))]
+    for name in ("backend", "versions"):
+        monkeypatch.setattr(prepare_module, name, lambda: "another")
+        found.append(request())
     assert len(set(found)) == len(found)
 
 
