@@ -26,7 +26,11 @@ WRITTEN = {
         "two_by_two.py:without_noise": "two by two (without noise)",
         "demosaicnet-0.0.14-py3-none-any.whl:bayer_net": "demosaicnet (bayer net)",
     },
-    text.exposure_name: {text.way_name("auto"): "automatic", text.way_name("2ms", 4): "2 ms, 4 frames"},
+    text.exposure_name: {
+        text.way_name("auto"): "automatic",
+        text.way_name("2ms", 4): "2 ms, 4 frames",
+        text.way_name("auto", 2): "automatic, 2 frames",
+    },
 }
 
 
