@@ -72,10 +72,13 @@ def test_a_ratio_is_told_up_to_the_deepest_reading_and_the_least_light_is_taken(
     light = np.array([0.5 * wells_e[0], 2.0 * wells_e[0], 1.2 * wells_e[1]]) / green_e
     assert np.isnan(snr_at(light, deep, "D65", EXPOSURE_S)["G"]).tolist() == [False, False, True]
     switched = replace(deep, chip=replace(deep.chip, readout="switched"))
-    seam_e = np.geomspace(1.0, wells_e[1], 4000)
-    for ratio in (3.0, 0.9 * float(snr(np.array([[0.5 * wells_e[0]]]), switched, EXPOSURE_S)[0, 0])):
-        above = seam_e[snr(seam_e[None], switched, EXPOSURE_S)[0] >= ratio]
-        assert electrons_at_snr(ratio, switched, EXPOSURE_S) == pytest.approx(above.min(), rel=0.01)
+    light_e = np.geomspace(1.0, wells_e[1], 4000)
+    ratios = snr(light_e[None], switched, EXPOSURE_S)[0]
+    falls = int(np.flatnonzero(np.diff(ratios) < 0)[0])  # where the other gain takes over, with more noise
+    for ratio in (3.0, float(ratios[falls : falls + 2].mean())):
+        least_e = light_e[ratios >= ratio].min()
+        assert electrons_at_snr(ratio, switched, EXPOSURE_S) == pytest.approx(least_e, rel=0.003)
+    assert light_e[falls + 1 :][ratios[falls + 1 :] >= ratio].min() > 1.006 * least_e, "there are two such lights"
 
 
 def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
