@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import cache
 from math import inf, isfinite
 from pathlib import Path
-from typing import Literal, TypeVar, get_args
+from typing import Any, Literal, TypeVar, get_args
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -93,15 +93,24 @@ class Claim:
 
 
 @cache
-def _texts() -> dict[str, dict[str, str]]:
-    """Place, text and note of each claim, by its number; and the captions of the figures."""
+def _stated() -> dict[str, dict[str, Any]]:
+    """Read what `claims.toml` states of each claim, by its number, and the captions of the figures."""
     return tomllib.loads(Path(__file__).with_name("claims.toml").read_text("utf-8"))
 
 
-def claim(number: int, checks: Iterable[ClaimCheck], **values: object) -> Claim:
-    """Claim of a number of `claims.toml`; `values` fill the braces of its note."""
-    text = _texts()[str(number)]
-    return Claim(text["where"], text["text"], tuple(checks), text.get("note", "").format(**values))
+def claim(number: int, checks: Iterable[ClaimCheck], **words: object) -> Claim:
+    """Return a claim of `claims.toml` with checks that state their own ranges; `words` fill the braces of its note."""
+    stated = _stated()[str(number)]
+    return Claim(stated["where"], stated["text"], tuple(checks), stated.get("note", "").format(**words))
+
+
+def judge_claim(number: int, values: Values, **words: object) -> Claim:
+    """Return a claim whose values are checked against the range that `claims.toml` states for it."""
+    stated = _stated()[str(number)]
+    (kind,) = _CHECKS.keys() & stated.keys()
+    ends = stated[kind] if isinstance(stated[kind], list) else [stated[kind]]
+    checks = _CHECKS[kind](values, *ends, unit=stated.get("unit", ""))
+    return claim(number, checks, **words)
 
 
 def within(values: Values, low: float = -inf, high: float = inf, unit: str = "") -> tuple[ClaimCheck, ...]:
@@ -133,6 +142,11 @@ def at_most(values: Values, high: float, unit: str = "") -> tuple[ClaimCheck, ..
     return within(values, high=high, unit=unit)
 
 
+_CHECKS: Mapping[str, Callable[..., tuple[ClaimCheck, ...]]] = {
+    check.__name__: check for check in (within, about, near, at_least, at_most)
+}
+
+
 def beside(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
     """Claims of what the paper's own method gave, with the values of the same claims of what the default gave."""
     return tuple(
@@ -158,7 +172,7 @@ class PaperFigure:
 
 def paper_figure(name: str, drawing: Figure, **values: object) -> PaperFigure:
     """Figure with its caption of `claims.toml`, whose braces `values` fill."""
-    return PaperFigure(name, _texts()["captions"][name].format(**values), drawing)
+    return PaperFigure(name, _stated()["captions"][name].format(**values), drawing)
 
 
 def range_text(check: ClaimCheck) -> str:

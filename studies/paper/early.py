@@ -19,10 +19,11 @@ from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import noise_variance, read_out
 from studies.metrics.truth import light_of
-from studies.paper.claims import Claim, about, at_least, at_most, claim
-from studies.paper.figures_3_5_6 import BRIGHT_CD_M2, GAIN_DB, LOW_CD_M2, PITCH_UM, WHOLE, measure_bright
+from studies.paper.claims import Claim, judge_claim
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Setup, decibels, develop, exposures, sensor_of, view
+from studies.paper.white_in_low_light import LOW_CD_M2
+from studies.paper.white_partly_full import BRIGHT_CD_M2, PITCH_UM, measure_bright
 from studies.photograph.camera import colour_fit
 from studies.photograph.snr import channel_e, electrons_at_snr
 
@@ -137,11 +138,11 @@ def claims_early(
         for how, value in zip(HOW, values, strict=True)
     }
     return (
-        claim(29, at_most(fused, WHOLE), whole=WHOLE),
-        claim(30, at_least(bright[GINDELE], WHOLE)),
-        claim(31, at_least(lost_db, GAIN_DB, "dB"), ms=EXPOSURE_S * 1e3),
-        claim(32, at_least(noise_ratios, 1.0, "×")),
-        claim(33, about(shares, 1.0, "× W's light")),
+        judge_claim(29, fused),
+        judge_claim(30, bright[GINDELE]),
+        judge_claim(31, lost_db, ms=EXPOSURE_S * 1e3),
+        judge_claim(32, noise_ratios),
+        judge_claim(33, shares),
     )
 
 
@@ -152,7 +153,7 @@ def section_2(setup: Setup) -> tuple[Claim, ...]:
     for name, reading in product(DESIGNS, READINGS):
         camera = Camera(reading, name, PITCH_UM)
         raw = exposures(camera, subject, "66ms")[0]
-        bright[name][reading] = measure_bright(raw, develop(camera, raw, subject)[0], subject).result_likeness
+        bright[name][reading] = measure_bright(raw, develop(camera, raw, subject)[0], subject).result_correlation
     lost_db, ratios = (
         {name: value for reading in READINGS for name, value in of(reading).items()}
         for of in (ranges_lost_db, colour_noise_ratios)

@@ -16,7 +16,7 @@ from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
-from studies.paper.claims import Claim, PaperFigure, about, at_least, claim, paper_figure
+from studies.paper.claims import Claim, PaperFigure, about, claim, judge_claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
 from studies.photograph.snr import channel_e, snr
@@ -86,7 +86,7 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
         Of `coverage`.
     """
     return (
-        claim(10, at_least({"W over the largest of the three, at its least": least}, 1.0, "×")),
+        judge_claim(10, {"W over the largest of the three, at its least": least}),
         claim(
             11,
             chain.from_iterable(

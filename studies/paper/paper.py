@@ -14,15 +14,18 @@ from rodcone.files import finite, write_files
 from studies.pages.page import address, own_file, write_out
 from studies.pages.plots import png_bytes, svg_text
 from studies.pages.report_sweep import environment
+from studies.paper.best_exposure import figure_b
 from studies.paper.claims import VERDICTS, Claim, PaperFigure, default_text, range_text, value_text
 from studies.paper.early import section_2
 from studies.paper.figure2 import figure_2
-from studies.paper.figures_1_b import figure_1a, figure_1b, figure_b
-from studies.paper.figures_3_5_6 import figure_3, figure_5, figure_6
-from studies.paper.levels import figure_a
+from studies.paper.light_levels import figure_a
 from studies.paper.numbers import number_claims
 from studies.paper.patches import figure_4, section_3_1
+from studies.paper.pixel_size import figure_1a, figure_1b
 from studies.paper.setup import Setup, view
+from studies.paper.white_beside_bayer import figure_6
+from studies.paper.white_in_low_light import figure_3
+from studies.paper.white_partly_full import figure_5
 
 Made = tuple[PaperFigure, tuple[Claim, ...]]
 

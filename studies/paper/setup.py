@@ -46,6 +46,7 @@ TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
 # The paper's own method, which its claims are tested with, and the default, whose values stand beside them.
 PAPER, DEFAULT = CAMERAS = ("interleaved_paper", "interleaved")
 # Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
+RESULT = {PAPER: "result", DEFAULT: "by the default"}  # words above the pictures
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 
@@ -278,3 +279,8 @@ def shot_noise_alone(sensor: SensorConfig) -> SensorConfig:
     """Sensor with no noise but that of light, and a converter too fine to see."""
     pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     return replace(sensor, pixel=pixel, bits=16)
+
+
+def grey_picture(plane: NDArray[np.floating], white: float) -> Image:
+    """Plane (h, w) as linear grey (h, w, 3), in which `white` is 1."""
+    return np.repeat(np.asarray(plane, dtype=np.float64)[..., None] / white, 3, axis=-1)

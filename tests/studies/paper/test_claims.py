@@ -6,14 +6,17 @@ from math import inf, nan
 import numpy as np
 from numpy.typing import NDArray
 
+from studies.paper.best_exposure import Best, claims_held
 from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near
 from studies.paper.early import GINDELE, claims_early
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
-from studies.paper.figures_1_b import Best, claims_1a, claims_1b, claims_held
-from studies.paper.figures_3_5_6 import Bright, Outcome, Stages, Swap, claims_3, claims_5, claims_6
-from studies.paper.levels import LevelCurves, claims_levels
+from studies.paper.light_levels import LevelCurves, claims_levels
 from studies.paper.numbers import photon_claims, range_claim, table_claim
 from studies.paper.patches import claims_4, filter_claims
+from studies.paper.pixel_size import claims_1a, claims_1b
+from studies.paper.white_beside_bayer import Outcome, Swap, claims_6
+from studies.paper.white_in_low_light import Stages, claims_3
+from studies.paper.white_partly_full import Bright, claims_5
 
 YES, PARTLY, NO = "reproduced", "reproduced under a condition", "not reproduced"
 PIXEL, OUTPUT = "table1_pixel", "table1_output"

@@ -14,13 +14,13 @@ from PIL import Image
 
 from sensor.curves import rgbw
 from studies.metrics.truth import light_of
-from studies.paper import figures_1_b, levels
+from studies.paper import best_exposure, light_levels
 from studies.paper.claims import at_least, value_text, within
 from studies.paper.figure2 import figure_2
-from studies.paper.figures_1_b import gain_db
 from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, make, write
 from studies.paper.patches import edge_columns
+from studies.paper.pixel_size import gain_db
 from studies.paper.setup import READINGS, Setup, noise, sensor_of
 from studies.photograph.snr import channel_e
 
@@ -37,9 +37,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def fewer() -> Iterator[None]:
     """Six levels of light for Figures A and B in place of 40 and 4, and three times."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(levels, "LEVELS_CD_M2", np.geomspace(1e-3, 1e3, 6))
-        patch.setattr(figures_1_b, "LEVELS_CD_M2", (4.0, 16.0))
-        patch.setattr(figures_1_b, "TIMES_S", np.array([0.005, 0.02, 0.08]))
+        patch.setattr(light_levels, "LEVELS_CD_M2", np.geomspace(1e-3, 1e3, 6))
+        patch.setattr(best_exposure, "LEVELS_CD_M2", (4.0, 16.0))
+        patch.setattr(best_exposure, "TIMES_S", np.array([0.005, 0.02, 0.08]))
         yield
 
 

@@ -11,9 +11,9 @@ from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.shake import RESONANCE_HZ, SHAKES, blur_variance, held_lens, shaken
+from studies.paper.best_exposure import best_time_s, blur_px
 from studies.paper.early import colour_noise, gathered, range_db
-from studies.paper.figures_1_b import best_time_s, blur_px
-from studies.paper.levels import LEVELS_CD_M2, largest_step, without_white
+from studies.paper.light_levels import LEVELS_CD_M2, largest_step, without_white
 from studies.paper.patches import noisy_edge
 from studies.paper.setup import sensor_of
 

@@ -1,0 +1,77 @@
+"""Figure 3: in low light one exposure gives a noisy colour image and a cleaner W image, and from both a result."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from isp.planes import bilinear
+from isp.processors.catalogue import PROCESSORS
+from rodcone.colour_spaces import encode_srgb
+from sensor.raw import RawImage
+from studies.metrics.truth import neutral_electrons
+from studies.pages.plots import picture_rows
+from studies.paper.claims import Claim, PaperFigure, beside, judge_claim, paper_figure
+from studies.paper.setup import (
+    CAMERAS,
+    DEFAULT,
+    READINGS,
+    RESULT,
+    Camera,
+    Image,
+    Setup,
+    View,
+    develop,
+    exposures,
+    grey_picture,
+    noise,
+    quality_db,
+    view,
+)
+from studies.photograph.camera import colour_fit
+
+LOW_CD_M2, LOW_S = 2.5, 0.020  # low light: a tenth of Table 1's, at Figure 6's longest time
+
+
+@dataclass(frozen=True)
+class Stages:
+    """How good the three images of Figure 3 are: noise (share of white), PSNR the result gains [dB], (seed,)."""
+
+    colour_noise: float
+    white_noise: float
+    gain_db: Image
+
+
+def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Image, Image]:
+    """Figure 3's linear sRGB from R, G and B alone, balanced by calibration, through the plain matrix, and its W."""
+    planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, subject.light, raw.exposure_s)
+    matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], subject.light).matrix()
+    colour = planes[..., :3] / (neutral[:3] * subject.white_cd_m2) @ matrix.T
+    index = raw.channels.index("W")
+    return np.asarray(colour), grey_picture(planes[..., index], neutral[index] * subject.white_cd_m2)
+
+
+def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
+    """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
+    light = {"cd_m2": LOW_CD_M2, "ms": LOW_S * 1e3}
+    noises = {f"{name}, W's noise over the colours'": x.white_noise / x.colour_noise for name, x in stages.items()}
+    gains_db = {f"{name}, PSNR gained": step.gain_db for name, step in stages.items()}
+    return judge_claim(14, noises, **light), judge_claim(15, gains_db, **light)
+
+
+def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+    """Colour image, W image and result under both readings."""
+    subject = view(setup, "still_life", LOW_CD_M2)
+    stages, rows = {name: dict[str, Stages]() for name in CAMERAS}, []
+    for reading in READINGS:
+        raws = exposures(Camera(reading), subject, "20ms", setup.seeds)
+        colour, white = zip(*(colour_and_white(raw, subject, Camera(reading)) for raw in raws), strict=True)
+        pictures = {f"{reading}: colour": colour[0], "W": white[0]}
+        for name in CAMERAS:
+            result = [develop(Camera(reading, name), raw, subject)[0] for raw in raws]
+            stages[name][reading] = Stages(
+                noise(colour), noise(white), quality_db(result, subject.truth) - quality_db(colour, subject.truth)
+            )
+            pictures[RESULT[name]] = result[0]
+        rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
+    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), beside(claims_3, stages)
