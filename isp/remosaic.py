@@ -53,6 +53,16 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     ------
     InputError
         Where no tile is given, and the mosaic is neither RGBW nor quad Bayer.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> sensor, rng = rodcone.low_noise("rgbw"), np.random.default_rng(1)
+    >>> device = rodcone.draw_device(sensor, (8, 8), rng)
+    >>> raw = rodcone.expose(np.full((8, 8), 1000.0), sensor, 0.01, device, rng)
+    >>> rodcone.remosaic(raw).cfa
+    ('RG', 'GB')
     """
     tile = bayer_tile(raw.cfa) if tile is None else tile
     raw = mend(raw)

@@ -42,6 +42,12 @@ def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float
     ------
     InputError
         Where the two are one place, or `up` points from one to the other.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.look_at((0, 0, 5), (0, 0, 0))[:3, 3]  # the place of the camera [m]
+    array([0., 0., 5.])
     """
     start = np.asarray(origin, dtype=np.float64)
     forward = np.asarray(target, dtype=np.float64) - start

@@ -39,6 +39,12 @@ def names() -> tuple[str, ...]:
 
     CIE 015:2018 has tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps, its HP1 is standard
     high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> "D65" in rodcone.illuminants()
+    True
     """
     return (*sorted((*published_spectra("illuminants"), "E")), "moonlight", *_LINES, "sunlight")
 
@@ -55,6 +61,12 @@ def lines_nm(name: str) -> tuple[float, ...]:
     -----
     UserWarning
         For a lamp of lines whose table has none: plain bands follow the table to its corners.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.lines_nm("sodium_low")
+    (588.995, 589.592)
     """
     illuminant(name)
     if name in TABULATED_LINES:
@@ -81,6 +93,13 @@ def illuminant(name: str) -> Spectrum:
     ------
     InputError
         Where `name` is unknown or its temperature out of range, or the file is none such, or dark.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> light = rodcone.illuminant("3000K")
+    >>> light.wavelength_nm[[0, -1]]
+    array([ 300., 1100.])
     """
     if not isinstance(name, str):
         raise InputError(

@@ -44,6 +44,16 @@ class SpectralRadiance:
     InputError
         Where the shape is wrong, a value is negative, NaN or infinite (its position is named), or bands reach beyond
         100 to 20 000 nm or overlap (`render.spectrum.band_widths`).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.ones((2, 3, 4)), np.array([450.0, 500.0, 550.0, 600.0]))
+    >>> light.shape
+    (2, 3)
+    >>> light.luminance().shape
+    (2, 3)
     """
 
     values: NDArray[np.floating]

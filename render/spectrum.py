@@ -48,6 +48,13 @@ class Spectrum:
     ------
     InputError
         Where the points are not as above, or not within 100 to 20 000 nm.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> ramp = rodcone.Spectrum([400.0, 700.0], [0.0, 1.0])
+    >>> ramp.band_average([550.0], [100.0])
+    array([0.5])
     """
 
     wavelength_nm: Floats
@@ -136,6 +143,13 @@ def line_bands(
     ------
     InputError
         For a line outside the range.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> centre_nm, width_nm = rodcone.line_bands([589.3], (400.0, 700.0), 100.0)
+    >>> round(float(width_nm.sum()))
+    300
     """
     low, high = range_nm
     lines = np.sort(np.atleast_1d(np.asarray(lines_nm, dtype=np.float64)))

@@ -59,7 +59,15 @@ def adapt_to_d65(xyz: NDArray[np.float64], white_xyz: NDArray[np.float64]) -> ND
 
 
 def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Encode linear sRGB for display, clipped to [0, 1] (IEC 61966-2-1)."""
+    """Encode linear sRGB for display, clipped to [0, 1] (IEC 61966-2-1).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> rodcone.encode_srgb(np.array([0.0, 0.18, 1.0])).round(3)
+    array([0.   , 0.461, 1.   ])
+    """
     clipped = np.clip(np.asarray(linear, dtype=np.float64), 0.0, 1.0)
     return np.where(clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055)
 

@@ -18,6 +18,15 @@ class InputError(ValueError):
 
     A message may quote a hostile file: what a terminal would take for a command (control characters, changes of writing
     direction) stands in it as Python's escapes, and the middle of an overlong one is left out.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> try:
+    ...     rodcone.preset("low_nose")
+    ... except rodcone.InputError as error:
+    ...     print(str(error).rpartition("; ")[2])
+    did you mean 'low_noise'?
     """
 
     def __init__(self, message: str) -> None:

@@ -28,7 +28,14 @@ DRAWN = ("diorama", "generated")  # from a number, in hexadecimal after a dash
 
 
 def names() -> tuple[str, ...]:
-    """Names that `load` knows, in alphabetical order."""
+    """Names that `load` knows, in alphabetical order.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> "still_life" in rodcone.scenes()
+    True
+    """
     return _NAMES
 
 

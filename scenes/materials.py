@@ -14,7 +14,14 @@ SKY_LUMINANCE_CD_M2 = 100.0
 
 
 def matte(reflectance: Spectrum) -> Node:
-    """Lambertian surface, lit from either side."""
+    """Lambertian surface, lit from either side.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.matte(rodcone.grey(0.5))["type"]
+    'twosided'
+    """
     return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": spectrum_node(reflectance)}}
 
 

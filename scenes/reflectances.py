@@ -49,7 +49,14 @@ def held(curve: Spectrum) -> Spectrum:
 
 
 def grey(reflectance: float) -> Spectrum:
-    """Same reflectance, 0 to 1, at every wavelength."""
+    """Same reflectance, 0 to 1, at every wavelength.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> set(rodcone.grey(0.18).values.tolist())
+    {0.18}
+    """
     return Spectrum(_NM, np.full_like(_NM, reflectance))
 
 

@@ -117,6 +117,16 @@ def expose(
     InputError
         For a frame that isn't the device's size, negative or non-finite electrons, a negative exposure, or no
         Generator.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> sensor, rng = rodcone.low_noise(), np.random.default_rng(1)
+    >>> device = rodcone.draw_device(sensor, (4, 4), rng)
+    >>> raw = rodcone.expose(np.full((4, 4), 1000.0), sensor, 0.01, device, rng)
+    >>> raw.dn.shape, raw.dn.dtype.name
+    ((4, 4), 'uint16')
     """
     if exact or backend() == "numpy":
         return read_out(expected_e, sensor, device, exposure_s, rng)

@@ -36,7 +36,14 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType({name: tuple(rows) for name, rows
 
 
 def mosaics() -> tuple[str, ...]:
-    """Names of the mosaics that `tile_of` knows."""
+    """Names of the mosaics that `tile_of` knows.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> "rgbw" in rodcone.mosaics()
+    True
+    """
     return tuple(MOSAICS)
 
 
@@ -105,7 +112,15 @@ def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
 
 
 def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where the mosaic samples `channel`, or one of several channels: S_i of eq. (1), shape `shape`."""
+    """Where the mosaic samples `channel`, or one of several channels: S_i of eq. (1), shape `shape`.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.mask(("GR", "BW"), "W", (2, 4)).astype(int)
+    array([[0, 0, 0, 0],
+           [0, 1, 0, 1]])
+    """
     return _repeated(np.isin([list(row) for row in tile], list(channel)), shape)
 
 

@@ -43,6 +43,13 @@ class PixelConfig:
     binned_well_e : float
         Electrons at which the sum of four pixels clips where they bin in charge: what the floating diffusion that they
         share holds. 0 for four times the well.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> pixel = rodcone.PixelConfig(2.8, 0.9, full_well_e=15_000.0, read_noise_e=1.5, dsnu_e=1.0, prnu=0.01)
+    >>> pixel.full_well_e
+    15000.0
     """
 
     pitch_um: Annotated[float, (1e-3, 1e4, "give micrometres")]
@@ -103,6 +110,12 @@ class Reading:
         Share of the exposure time, the longest's 1.
     photodiode : str
         Which one: readings of another have other shot noise and another PRNU.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.Reading(read_noise_e=1.5, dsnu_e=0.5, full_well_e=2_000.0).full_well_e
+    2000.0
     """
 
     read_noise_e: Annotated[float, (0.0, 1e9, "give electrons, 0 for none")]
@@ -146,6 +159,12 @@ class ChannelReading:
         Whether each frame takes the share of the time that puts the channel's bright end at 80 % of its well.
     full_well_e, read_noise_e, dsnu_e : float or None
         Of a conversion gain of its own, in electrons of these sites.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.ChannelReading("W", time_share=0.25).time_share
+    0.25
     """
 
     channel: str

@@ -276,6 +276,14 @@ def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: st
     ------
     InputError
         For readings that no pixel has, or a camera that bins.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> dark, bright = rodcone.Reading(1.0, 0.5, 2_000.0), rodcone.Reading(8.0, 2.0, 15_000.0)
+    >>> sensor = rodcone.with_readings(rodcone.low_noise(), [dark, bright])
+    >>> len(sensor.chip.readings), sensor.pixel.full_well_e
+    (2, 15000.0)
     """
     chip = replace(sensor.chip, readings=tuple(readings), readout=readout)
     return replace(sensor, pixel=pixel_of_readings(sensor.pixel, readings), chip=chip)
@@ -290,6 +298,13 @@ def with_channel_readings(sensor: SensorConfig, readings: Sequence[ChannelReadin
     ------
     InputError
         For a channel that the mosaic lacks or that is listed twice, a camera that bins or one of several readings.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> sensor = rodcone.with_channel_readings(rodcone.low_noise(), [rodcone.ChannelReading("W", time_share=0.25)])
+    >>> [reading.channel for reading in sensor.chip.channels]
+    ['W']
     """
     return replace(sensor, chip=replace(sensor.chip, channels=tuple(readings)))
 

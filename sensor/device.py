@@ -58,6 +58,14 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     ------
     InputError
         Where the shape doesn't hold a tile of the mosaic, is odd for a sensor that bins, or `rng` isn't a Generator.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> sensor = rodcone.low_noise()
+    >>> rodcone.draw_device(sensor, (4, 6), np.random.default_rng(1)).photo_response.shape
+    (4, 6)
     """
     check_frame(sensor, shape)
     check_chip(sensor)

@@ -72,6 +72,15 @@ def auto_exposure_s(
     ------
     InputError
         For a number out of range, or a channel that the mosaic doesn't have.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.full((8, 8, 4), 1e-6), np.arange(430.0, 780.0, 100.0))
+    >>> image = rodcone.form_image(light, rodcone.low_noise())
+    >>> rodcone.auto_exposure_s(image, rodcone.low_noise())
+    0.066
     """
     require_range("longest_s", longest_s, 1e-9, 1e7, "give seconds above 0")
     require_range("percentile", percentile, 0.0, 100.0, "give per cent of the pixels")

@@ -122,6 +122,15 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     ------
     InputError
         Where the samples don't make whole pixels.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.ones((8, 8, 4)), np.arange(430.0, 780.0, 100.0))
+    >>> image = rodcone.form_image(light, rodcone.low_noise())
+    >>> image.values.shape
+    (8, 8, 4)
     """
     require_whole("samples_per_pixel", samples_per_pixel, 1, 64, "give samples a side")
     lens, samples = sensor.lens, int(samples_per_pixel)

@@ -34,6 +34,13 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
     InputError
         For another way than "charge" and "digital", a mosaic whose 2x2 pixels aren't of one channel, several readings,
         or a sum of more bits than a raw image holds.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> sensor = rodcone.preset("low_noise", "quad_bayer")
+    >>> rodcone.binned(sensor, "digital").sites
+    2
     """
     require_name("binning", way, BINNINGS)
     pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
@@ -90,6 +97,13 @@ def with_gain(sensor: SensorConfig, gain: float) -> SensorConfig:
     ------
     InputError
         For a gain out of range, or a camera of several readings, which have gains of their own.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> sensor = rodcone.preset("low_noise")
+    >>> rodcone.with_gain(sensor, 4.0).gain
+    4.0
     """
     binning = sensor.chip.binning
     one = replace(sensor.photosites, gain=gain, gain_limit=1.0)

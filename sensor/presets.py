@@ -22,7 +22,14 @@ _NAMES = (
 
 
 def names() -> tuple[str, ...]:
-    """Names that `preset` knows."""
+    """Names that `preset` knows.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> "low_noise" in rodcone.sensors()
+    True
+    """
     return _NAMES
 
 
@@ -58,6 +65,12 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     ------
     InputError
         For an unknown name or mosaic, or a file that doesn't describe a camera.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.preset("low_noise", "bayer").pixel.pitch_um
+    2.2
     """
     is_path = isinstance(name, Path) or name.endswith(".toml")
     return read_sensor(name if is_path else preset_file(str(name)), cfa)
@@ -74,7 +87,14 @@ def table1_output(cfa: str = "rgbw") -> SensorConfig:
 
 
 def low_noise(cfa: str = "rgbw") -> SensorConfig:
-    """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS)."""
+    """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS).
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.low_noise().pixel.read_noise_e
+    1.5
+    """
     return preset("low_noise", cfa)
 
 

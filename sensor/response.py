@@ -72,7 +72,17 @@ def _electrons_per_joule(curves: Sequence[Spectrum], window_nm: tuple[float, flo
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
-    """Expected photo-electrons that each photodiode would collect behind every filter, shape (h, w, channel)."""
+    """Expected photo-electrons that each photodiode would collect behind every filter, shape (h, w, channel).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.full((8, 8, 4), 1e-3), np.arange(430.0, 780.0, 100.0))
+    >>> image = rodcone.form_image(light, rodcone.low_noise())
+    >>> rodcone.channel_electrons(image, rodcone.low_noise(), 0.01).shape
+    (8, 8, 4)
+    """
     weights = electrons_per_irradiance(
         sensor, irradiance.wavelength_nm, irradiance.widths_nm, exposure_s, irradiance.light
     )
@@ -97,6 +107,15 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
     ------
     InputError
         For a negative exposure, a frame smaller than the mosaic's tile, and as `electrons_per_irradiance`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.full((8, 8, 4), 1e-3), np.arange(430.0, 780.0, 100.0))
+    >>> image = rodcone.form_image(light, rodcone.low_noise())
+    >>> rodcone.expected_electrons(image, rodcone.low_noise(), 0.01).shape
+    (8, 8)
     """
     return behind_filters(channel_electrons(irradiance, sensor, exposure_s), sensor)
 

@@ -182,7 +182,14 @@ def default_processor(tile: Tile) -> str:
 
 
 def names() -> tuple[str, ...]:
-    """Names of all processors, installed or not."""
+    """Names of all processors, installed or not.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> "ple_rgbw" in rodcone.processors()
+    True
+    """
     return tuple(PROCESSORS)
 
 

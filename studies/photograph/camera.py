@@ -54,6 +54,13 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     ------
     InputError
         Where a channel collects nothing, or the three can't tell colours apart.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> colours = rodcone.calibrate(rodcone.low_noise("bayer"), rodcone.illuminant("D65"))
+    >>> colours.to_srgb.shape
+    (3, 3)
     """
     neutral, to_srgb, _, _ = _under(sensor, light)
     _, _, to_camera_a, to_xyz_a = _under(sensor, illuminant("A"))
@@ -299,6 +306,15 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     -----
     UserWarning
         For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> light = rodcone.SpectralRadiance(np.full((8, 8, 4), 1e-3), np.arange(430.0, 780.0, 100.0))
+    >>> raw = rodcone.capture(light, rodcone.low_noise(), 0.01)
+    >>> raw.dn.shape, raw.cfa
+    ((8, 8), ('RG', 'BW'))
     """
     sensor = preset("low_noise") if sensor is None else sensor
     sensor = at_gain(replace(sensor, lens=held_lens(sensor.lens, shake)), gain_text(gain, iso))

@@ -116,6 +116,12 @@ class Order:
         hold: surfaces keep their end values outside their tables' wavelengths; by default bands there are refused.
     force : bool
         Run even where more memory is needed than is free.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.Order("still_life", cfa="bayer", exposure="10ms").exposure
+    '10ms'
     """
 
     source: str | Path = field(kw_only=False)

@@ -46,6 +46,13 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
 
     Both are of clipped samples, as EMVA 1288 has them: beside the well the ratio rises, for full pixels are alike.
     Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import rodcone
+    >>> rodcone.snr(np.array([100.0, 10_000.0]), rodcone.low_noise(), 0.01).round(1)
+    array([ 9.8, 70.7])
     """
     at_channel(chip_readings(sensor, exposure_s), channel)  # which asks for one
     if channel is not None:
@@ -66,6 +73,13 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
     ----------
     ratio : float
         Mean signal over the standard deviation of one pixel of one chip, fixed patterns included.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> found = rodcone.light_for_snr(10.0, rodcone.low_noise(), "D65", 0.01)
+    >>> [row.channel for row in found]
+    ['R', 'G', 'B', 'W']
     """
     of = channel_e(sensor, light_of(light), 1.0, exposure_s)
     names = sensor.channels

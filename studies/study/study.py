@@ -68,6 +68,12 @@ class SceneChoice:
     spectra : str, optional
         Of a photograph's colours, ``surfaces``, which is the default, or ``srgb_basis``
         (`render.radiance_files.photo.read_photo`).
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.SceneChoice("still_life", light="A").label
+    'still_life'
     """
 
     source: str
@@ -114,6 +120,12 @@ class RenderLimits:
     reference : bool
         Photograph the reference light (`render.reference`) where there is one of the scene, size and bands: a render of
         few samples is then made only to compare with it.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.RenderLimits(size=64, spp=32).band_nm
+    20.0
     """
 
     size: Annotated[int | None, (16, 8192, "give the picture's longer side in pixels")] = None
@@ -197,6 +209,13 @@ class Study:
     ------
     InputError
         For whatever isn't allowed and can be told without opening the scenes.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> study = rodcone.Study([rodcone.SceneChoice("still_life")], ["1lux", "100lux"])
+    >>> study.processors
+    ('ple_rgbw', 'ple_bayer')
     """
 
     scenes: tuple[SceneChoice, ...]

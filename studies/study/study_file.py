@@ -33,6 +33,12 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
     ------
     InputError
         For a file that can't be read, an unknown key (the likely one is named), or a value that isn't allowed.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> rodcone.read_study("light_levels", ["seeds=1"]).seeds
+    (0,)
     """
     example = EXAMPLES / f"{path}.toml"
     if not Path(path).exists() and example.parent == EXAMPLES and example.is_file():
