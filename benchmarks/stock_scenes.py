@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from render.engine import render
-from render.loader import as_guest, mitsuba_module
+from render.loader import mitsuba_module, own_mitsuba_variant
 from render.scene import Scene, film_size
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_paths import search_path
@@ -78,7 +78,7 @@ def _compared(path: Path, side: int, samples: int, define: Mapping[str, str]) ->
     return Compared(str(path), "agrees" if agree else "differs", mean, block)
 
 
-@as_guest()
+@own_mitsuba_variant()
 def _stock(path: Path, scene: Scene, size: tuple[int, int], samples: int, define: Mapping[str, str]) -> Floats:
     """Stock Mitsuba's picture of a file that it reads itself, by our camera and depth, (h, w, band)."""
     mi, kept = mitsuba_module(), mitsuba_module().file_resolver()

@@ -12,7 +12,7 @@ from sensor.raw import RawImage
 _RINGS = 3  # tiles around a pixel that are searched for its channel before the whole frame's median serves
 
 
-def mend(raw: RawImage) -> RawImage:
+def interpolate_defects(raw: RawImage) -> RawImage:
     """Replace each listed pixel by the median of the nearest sound samples of its channel; the list is gone then.
 
     Nearest: all in a window of one tile's period to either side, which grows until it holds one. A median, since a

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from isp.defects import mend
+from isp.defects import interpolate_defects
 from isp.kriging import reconstruct_linear
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, is_bayer, is_rgbw, mask, plain
@@ -65,7 +65,7 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     ('RG', 'GB')
     """
     tile = bayer_tile(raw.cfa) if tile is None else tile
-    raw = mend(raw)
+    raw = interpolate_defects(raw)
     estimate_dn = reconstruct_linear(raw).estimate / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
     for index, channel in enumerate(raw.channels):

@@ -19,9 +19,9 @@ from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
-from render.loader import INTEGRATOR, Film, as_guest, load_groups, variant
+from render.loader import INTEGRATOR, Film, load_groups, own_mitsuba_variant, variant
 from render.meter import Meter
-from render.runs import add_run, fields_of, let_go, means_of, no_means, pilot_rates, scene_means_of
+from render.runs import add_run, clear_traceback, fields_of, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
@@ -33,7 +33,7 @@ from rodcone.progress import Step, progress_bar, render_words
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
 
 
-@as_guest()
+@own_mitsuba_variant()
 def render(  # noqa: PLR0913  its calls in README and tutorials go on
     scene: Scene,
     size: tuple[int, int] | int,
@@ -141,12 +141,12 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         try:
             transport = _render(scene, film, limits, earlier, show, denoise)
         except InputError as error:
-            let_go(error)
+            clear_traceback(error)
             raise
         except RuntimeError as error:
             if not is_out_of_memory(error):
                 raise
-            let_go(error)
+            clear_traceback(error)
             raise MemoryError(one_line(error)) from None
         transport = replace(transport, compile_s=compiled_s())
     if cache is not None:

@@ -57,7 +57,7 @@ def mitsuba_module() -> Any:
 
 
 @contextmanager
-def as_guest() -> Iterator[None]:
+def own_mitsuba_variant() -> Iterator[None]:
     """Work in this program's Mitsuba variant and search path, and leave a user's own as they were.
 
     One who has chosen no variant gets this program's: Mitsuba can't go back to none.

@@ -9,8 +9,8 @@ import numpy as np
 from render.cache import load_irradiance, save_irradiance
 from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, as_guest, load_groups
-from render.runs import let_go
+from render.loader import METER_PIXELS, Film, Loaded, load_groups, own_mitsuba_variant
+from render.runs import clear_traceback
 from render.scene import Scene
 from rodcone.errors import InputError
 from rodcone.types import Planes
@@ -52,14 +52,14 @@ class Meter:
         try:
             made = _measured(self.scene, film, self.seed)
         except InputError as error:
-            let_go(error)
+            clear_traceback(error)
             raise
         if self.folder is not None:
             save_irradiance(self.folder, self.scene, film, self.seed, made)
         return made
 
 
-@as_guest()
+@own_mitsuba_variant()
 def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
     """Trace two halves with seeds of their own; summed in float64, so that threads don't change it."""
     shape = (2, len(scene.groups), film.wavelength_nm.size, *film.size)

@@ -225,7 +225,7 @@ def _grouped(channels: Planes, groups: int, film: Film) -> Planes:
     return channels.reshape(chunks, groups, count // max(groups, 1), *film.size)
 
 
-def let_go(error: BaseException) -> None:
+def clear_traceback(error: BaseException) -> None:
     """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
     cause: BaseException | None = error
     while cause:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from render.loader import as_guest, load_unlit, mitsuba_module
+from render.loader import load_unlit, mitsuba_module, own_mitsuba_variant
 from render.scene import EMISSION_PARAMETER, Node, Scene
 from rodcone.digests import digest
 from rodcone.display import brief
@@ -39,7 +39,7 @@ class Surfaces:
     __repr__ = brief
 
 
-@as_guest()
+@own_mitsuba_variant()
 def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     """Trace one ray a pixel to the first surface, glass and mirrors included.
 

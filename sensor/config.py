@@ -224,7 +224,7 @@ class SensorConfig:
 
     @property
     def black_dn(self) -> int:
-        """Black level in DN: whole, for raw converters cut a fraction off and tint the dark by what they cut."""
+        """Black level [DN], a whole number: raw converters truncate fractions, which tints shadows."""
         if self.black_level_dn is not None:
             return int(self.black_level_dn)
         dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)

@@ -111,7 +111,7 @@ def with_gain(sensor: SensorConfig, gain: float) -> SensorConfig:
 
 
 def binned_tile(tile: Tile) -> Tile:
-    """Tile of half the height and width whose pixels are 2x2 of `tile`: `quad` undone.
+    """Merge each 2x2 block of one colour into one pixel; the inverse of `quad`.
 
     Raises
     ------

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from isp.colour.colour_fit import ColourFit
 from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
-from isp.defects import mend
+from isp.defects import interpolate_defects
 from isp.levelling import levelled
 from isp.picture import Picture
 from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
@@ -93,7 +93,7 @@ class Processor:
         **options
             The processor's own, such as `substitution_snr`.
         """
-        raw = mend(raw)
+        raw = interpolate_defects(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
         if raw.crosstalk:
             raw = levelled(raw, white_balance.response(raw) if white_balance.given is None else white_balance.given)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from render.geometry import to_world
-from render.loader import as_guest, mitsuba_module, mitsuba_words
+from render.loader import mitsuba_module, mitsuba_words, own_mitsuba_variant
 from render.scene import Node, spectrum_node, uniform_node
 from render.scene_range import known_range
 from render.spectrum import VISIBLE_NM, Spectrum
@@ -40,7 +40,7 @@ _NUMBER = re.compile(r"[-+]?(?:[\d.]+(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
 _RESERVED = re.compile(r"[./\s]")  # Mitsuba's and our own separators in paths of a scene's dict
 
 
-@as_guest()
+@own_mitsuba_variant()
 def load_scene_file(
     path: str | Path, *, trust: bool = False, extend: str | None = None, define: Mapping[str, str] | None = None
 ) -> SceneFile:

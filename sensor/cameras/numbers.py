@@ -93,7 +93,7 @@ def measured_curves(camera: MeasuredCamera) -> Curves:
     return Curves(f"{camera.maker} {camera.model}", source, camera.responses.curves, note)
 
 
-def lent_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curves:
+def borrowed_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curves:
     """Curves of another camera, scaled to a source's quantum efficiency at one wavelength; every `_STEP_NM` a value.
 
     Those of the channels that the source's mosaic has, or of all. The channel that responds most at the wavelength is

@@ -110,7 +110,7 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
 def noise_of_merged(readings: Sequence[PlainReading]) -> list[NoiseStep]:
     """Noise of merged electrons from the dark on, and from each seam on.
 
-    Dark noise is told where a step begins, the light's shot noise and PRNU where it ends: there each counts.
+    Each step states dark noise at its lower end and shot noise and PRNU at its upper end, where each dominates.
     """
     at, whole = seams(readings), whole_share(readings)
     temporal = ("read noise", "converter noise", "quantisation", "dark current")

@@ -1,4 +1,4 @@
-"""Fewer, wider bands out of a render's fine ones: what a render of those would give, without rendering again."""
+"""Merge a render's fine bands into fewer, wider ones: what a render in those would give, without another render."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -19,14 +19,14 @@ COUNTS = (4, 8, 12, 16, 20, 28, 40)
 
 
 def counts(width_nm: Floats) -> tuple[int, ...]:
-    """Numbers of bands that a plan may choose: those of the visible, and all of a wider range's fine bands."""
+    """Return the numbers of bands that a plan may choose; where the range is wider, also all of its fine bands."""
     return (*COUNTS, width_nm.size) if width_nm.size > COUNTS[-1] else COUNTS
 
 
 def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
-    """Indices of the fine bands of each of about `count` wide ones, neighbours and as even as can be.
+    """Divide the fine bands into about `count` groups of neighbours, as equal as they can be; return their indices.
 
-    A line's narrow band stays alone, so that with lines there are some more.
+    The narrow band of a line is a group of its own, so that lamps with lines have some more.
     """
     size = width_nm.size / min(count, width_nm.size)
     narrow = width_nm < FINE_NM / 4
@@ -38,17 +38,17 @@ def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
 
 
 def wide_bands(nm: Floats, width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> tuple[Floats, Floats]:
-    """Centres and widths of merged bands."""
+    """Return the centres and widths of merged bands [nm]."""
     first = np.array([nm[group[0]] - width_nm[group[0]] / 2 for group in groups])
     last = np.array([nm[group[-1]] + width_nm[group[-1]] / 2 for group in groups])
     return (first + last) / 2, last - first
 
 
 def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) -> Transport:
-    """Transport in wide bands, of the same paths.
+    """Return the transport in wide bands, from the same paths.
 
-    The variance is that of bands which rise and fall together: the most that it can be. The irradiance meter, whose
-    bands are the fine ones, is left out.
+    The variance assumes that bands rise and fall together, which is the most that it can be. The irradiance meter is
+    left out, because its bands are the fine ones.
     """
     nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
     matrix, means = _means(transport.width_nm, groups), transport.scene_means
@@ -75,7 +75,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
 
 def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
-    """Radiance averaged over wide bands: what bands that follow light and scene within themselves would hold."""
+    """Average radiance over wide bands: what bands would hold that follow light and scene within themselves."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
     return SpectralRadiance(
@@ -84,7 +84,7 @@ def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]
 
 
 def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:
-    """Weights of fine bands in the mean over each wide one, shape (wide, fine)."""
+    """Return the weights of the fine bands in the mean over each wide band, shape (wide, fine)."""
     matrix = np.zeros((len(groups), width_nm.size))
     for row, group in enumerate(groups):
         matrix[row, group] = width_nm[group] / width_nm[group].sum()
@@ -92,5 +92,5 @@ def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:
 
 
 def _merge(matrix: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Means over bands of (group, band, h, w)."""
+    """Average (group, band, h, w) over the bands of each wide band."""
     return np.asarray(np.einsum("wf,gfyx->gwyx", matrix, planes, optimize=True), dtype=np.float32)

@@ -87,25 +87,25 @@ def ledger_html(ledgers: Sequence[Ledger]) -> str:
 
 
 def condition_words(row: Ledger) -> tuple[str, ...]:
-    """Scene, spectrum, level, exposure, sensor and mosaic of a row."""
+    """Return the scene, spectrum, level, exposure, sensor and mosaic of a row as words."""
     of = row.condition
     return of.scene.label, label(of.spectrum), of.level, of.exposure, of.sensor, row.mosaic
 
 
 def term_names(ledgers: Sequence[Ledger]) -> list[str]:
-    """Names of all terms: a picture file has no falloff."""
+    """Return the names of all terms; a picture file lacks some that a scene has."""
     longest_first = sorted(ledgers, key=lambda row: -len(row.terms))
     return list(dict.fromkeys(term.name for row in longest_first for term in row.terms))
 
 
 def figures(row: Ledger, names: Sequence[str]) -> list[str]:
-    """Noise and error [e-], the error's share, and the share of each term, in brackets where it is modelled."""
+    """Return the noise and the error [e-], the error's share, and each term's share, in brackets if it is modelled."""
     shares = {x.name: f"({percent(x.share)})" if x.modelled else percent(x.share) for x in row.terms}
     return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", percent(row.share), *(shares.get(name, "") for name in names)]
 
 
 def percent(share: float) -> str:
-    """Share as per cent, from twice on as a factor."""
+    """Write a share as per cent, or as a factor if it is two or more."""
     if share >= 2:
         return f"{share:.1f}x" if share < 10 else f"{share:.0f}x"
     if share >= 0.1:

@@ -16,9 +16,9 @@ from sensor.cameras.library import measured_camera
 from sensor.cameras.noise_files import dng_numbers
 from sensor.cameras.numbers import (
     PixelNumbers,
+    borrowed_curves,
     completed,
     curves_csv,
-    lent_curves,
     measured_curves,
     missing,
     preset_text,
@@ -92,7 +92,7 @@ def preset(
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
         if shape is None and numbers.efficiency is not None:
-            shape = lent_curves(lender, str(name), numbers)
+            shape = borrowed_curves(lender, str(name), numbers)
     if shape is None and anchor and noise and noise.suffix.lower() != ".toml":  # a report is of a chip without filters
         raise InputError(
             f"anchor: {anchor} scales a response, and {noise.name!r} has none; allowed with "

@@ -33,7 +33,7 @@ from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import PILOTS
 from studies.sweep.provenance import code_version
-from studies.sweep.run_sweep import Runner, Swept, at_work
+from studies.sweep.run_sweep import Runner, Swept, locked_folder
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
 
@@ -235,7 +235,7 @@ def make_all(
         What was made, and the report.
     """
     # the folder first: one that can't be written fails before anything is rendered
-    with at_work(out), saying_what_is_kept(out), progress(sys.stderr) as step:
+    with locked_folder(out), saying_what_is_kept(out), progress(sys.stderr) as step:
         with clock.stage("plan"):
             plan = planned(step)
         swept = run_sweep(study, out, plan, runner, step, clock=clock)

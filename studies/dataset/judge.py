@@ -19,7 +19,7 @@ from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
 from sensor.presets import names, preset, vary
-from studies.dataset.shards import Lines, Runner, Shard, read_manifest, read_shard, shards_of, stands
+from studies.dataset.shards import Lines, Runner, Shard, is_intact, read_manifest, read_shard, shards_of
 from studies.design.expect import expect
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import METRICS, ON_TARGETS
@@ -104,7 +104,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
         raise InputError(f"of: {len(samples)} of {manifest[0]['samples']} samples are made; run rodcone dataset again")
     files, shards = _pictures_of(pictures, samples), shards_of(out / SET, manifest)
     for shard in shards:
-        if not stands(shard):
+        if not is_intact(shard):
             raise InputError(f"of: {shard.path.name} isn't what was written; run rodcone dataset again")
     tasks = [shard for shard in shards if any(line["key"] in files for line in shard.lines[1:])]
     rows = [row for judged in runner(tasks, make=partial(judge_shard, files)) for row in judged.lines[1:]]

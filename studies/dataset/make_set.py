@@ -30,7 +30,7 @@ from studies.sweep.cells import Cell
 from studies.sweep.database import open_results
 from studies.sweep.prepare import SET, Job, scene_cells
 from studies.sweep.provenance import versions
-from studies.sweep.run_sweep import at_work
+from studies.sweep.run_sweep import locked_folder
 
 CARD = "README.md"
 _NOT_IN_KEYS = re.compile(r"[^A-Za-z0-9_-]")
@@ -79,7 +79,7 @@ def make_set(
         file, white = opened.choice.source, opened.white
         _windows(opened.size if opened.scene else open_radiance_file(file, white)[0].counts.shape, order.crop)
     identity = _identity(study, scenes.values(), order)
-    with at_work(out), progress_bar(step) as show, open_results(out) as base:
+    with locked_folder(out), progress_bar(step) as show, open_results(out) as base:
         folder.mkdir(exist_ok=True)
         earlier = _earlier(folder, identity)
         job = Job(study, plan_from_settings(study), out, base)

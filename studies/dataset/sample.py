@@ -27,7 +27,7 @@ from sensor.readings.resolve import PlainReading, at_channel, resolve
 from sensor.readout import frame_variance, light_variance, read, sources_of
 from sensor.response import channel_electrons
 from studies.study.lit_scene import OpenedScene, photographed, under
-from studies.study.render_noise import OF_PIXELS, charged_share
+from studies.study.render_noise import OF_PIXELS, monte_carlo_bound
 from studies.study.study import OWN, Condition
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
 from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
@@ -145,7 +145,7 @@ def _facts(
         "snr_db": 10 * log10(max(float((expected_e**2).mean() / variance_e2.mean()), 1e-12)),
         "saturated": float(raw.saturated.mean()),
         "render_noise": {
-            "mean": charged_share(errors_e, expected_e, readings),
+            "mean": monte_carlo_bound(errors_e, expected_e, readings),
             "of_95_percent": float(np.quantile(shares, OF_PIXELS)),
         },
         "groups": list(sample.illuminants["groups"]),

@@ -97,7 +97,7 @@ def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lin
         Lines that the manifest begins with.
     """
     wanted = {shard.key for shard in shards}
-    standing = {made.key: made for made in shards_of(folder, earlier) if made.key in wanted and stands(made)}
+    standing = {made.key: made for made in shards_of(folder, earlier) if made.key in wanted and is_intact(made)}
     missing = [shard for shard in shards if shard.key not in standing]
     _write_manifest(folder, head, standing.values())
     for count, made in enumerate(runner(missing, make=make_shard), start=1):
@@ -177,7 +177,7 @@ def shards_of(folder: Path, lines: Lines) -> list[Shard]:
     return [Shard(x[0]["made_from"], inside(folder, x[0]["name"]).resolve(), lines=x) for x in parts]
 
 
-def stands(shard: Shard) -> bool:
+def is_intact(shard: Shard) -> bool:
     """Whether a shard's file is what was written."""
     path, head = shard.path, shard.lines[0]
     return path.is_file() and path.stat().st_size == head["bytes"] and digest_file(path) == head["digest"]

@@ -159,7 +159,7 @@ class Session:
         self._message = None
 
     def _next(self, left_to_do: Callable[[], Callable[[], None] | None]) -> tuple[Header | None, Callable[[], None]]:
-        """Take the message to answer, or what to do while nothing is asked; waits for one of them."""
+        """Wait for the next message; while idle, return the next background task."""
         with self._changed:
             while not self._closed:
                 if kind := self._first_pending():

@@ -14,7 +14,7 @@ from sensor.config import SensorConfig
 from sensor.shake import blur_variance
 from studies.metrics.truth import light_of
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, PaperFigure, beside, judge_claim, paper_figure
+from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure, with_default
 from studies.paper.setup import (
     DEFAULT,
     PAPER,
@@ -132,7 +132,7 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     light = light_of("D65")
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
     more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice
-    claims = beside(lambda of: claims_held(best[BAYER], of, more_light), best)
+    claims = with_default(lambda of: claims_held(best[BAYER], of, more_light), best)
     names = {"Bayer": best[BAYER], "interleaved": best[PAPER], "the default": best[DEFAULT]}
     charts = {
         "Best time by hand, ms": {

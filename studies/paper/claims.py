@@ -127,7 +127,7 @@ def about(values: Values, claimed: float, unit: str = "") -> tuple[ClaimCheck, .
     return within(values, claimed * (1 - ABOUT), claimed * (1 + ABOUT), unit)
 
 
-def near(values: Values, claimed: float, margin: float, unit: str = "") -> tuple[ClaimCheck, ...]:
+def within_margin(values: Values, claimed: float, margin: float, unit: str = "") -> tuple[ClaimCheck, ...]:
     """Check against a number within a margin on either side."""
     return within(values, claimed - margin, claimed + margin, unit)
 
@@ -143,11 +143,11 @@ def at_most(values: Values, high: float, unit: str = "") -> tuple[ClaimCheck, ..
 
 
 _CHECKS: Mapping[str, Callable[..., tuple[ClaimCheck, ...]]] = {
-    check.__name__: check for check in (within, about, near, at_least, at_most)
+    check.__name__: check for check in (within, about, within_margin, at_least, at_most)
 }
 
 
-def beside(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
+def with_default(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
     """Claims of what the paper's own method gave, with the values of the same claims of what the default gave."""
     return tuple(
         replace(

@@ -20,7 +20,7 @@ from studies.metrics.confidence import half_width
 from studies.metrics.flip import flip
 from studies.metrics.quality import measure, psnr_db
 from studies.pages.plots import light_charts
-from studies.paper.claims import Claim, PaperFigure, at_least, at_most, beside, claim, paper_figure, within
+from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, paper_figure, with_default, within
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -183,5 +183,5 @@ def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         "FLIP": {"interleaved": paper.flip, "the default": default.flip},
     }
     means = {title: {name: x.mean(axis=1) for name, x in lines.items()} for title, lines in charts.items()}
-    claims = beside(claims_levels, by_camera)
+    claims = with_default(claims_levels, by_camera)
     return paper_figure("A", light_charts(LEVELS_CD_M2, means), count=len(LEVELS_CD_M2), reading=READING), claims

@@ -12,7 +12,7 @@ from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
 from studies.metrics.truth import light_of
-from studies.paper.claims import Claim, claim, judge_claim, near
+from studies.paper.claims import Claim, claim, judge_claim, within_margin
 from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
@@ -53,8 +53,8 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
     under_d65 = {f"D65, {name}": value for name, value in per_um2_s.items()}
     in_pixels = {name: value * 2.0**2 * 0.025 for name, value in under_d65.items()}
     thousand = (
-        *near({"closed form, √1000": decibels(sqrt(1000.0))}, 30.0, 0.01, "dB"),
-        *near({"1000 e⁻ read out, shot noise alone": measured_db}, 30.0, margin, "dB"),
+        *within_margin({"closed form, √1000": decibels(sqrt(1000.0))}, 30.0, 0.01, "dB"),
+        *within_margin({"1000 e⁻ read out, shot noise alone": measured_db}, 30.0, margin, "dB"),
     )
     return (judge_claim(1, under_d65, moonlight=MOONLIGHT_CD_M2), judge_claim(2, in_pixels), claim(3, thousand))
 

@@ -9,7 +9,7 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import encode_srgb
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, beside, claim, judge_claim, near, paper_figure
+from studies.paper.claims import Claim, PaperFigure, claim, judge_claim, paper_figure, with_default, within_margin
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -72,7 +72,7 @@ def claims_6(
     noises = {name: camera.noise / bayer[name].noise for name, camera in interleaved.items()}
     gains_db = {name: camera.psnr_db - bayer[name].psnr_db for name, camera in interleaved.items()}
     switches = [
-        near({f"{name}, {'on' if on else 'off'}": camera.substituted or 0.0}, float(on), 0.0)
+        within_margin({f"{name}, {'on' if on else 'off'}": camera.substituted or 0.0}, float(on), 0.0)
         for name, camera in interleaved.items()
         for on in [SUBSTITUTED[name.rsplit(", ", 1)[1]]]
     ]
@@ -101,7 +101,7 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         table.append(pictures)
     swaps = {name: {reading: swap(setup, subject, Camera(reading, name)) for reading in READINGS} for name in CAMERAS}
     judged = {name: (outcomes[name], swaps[name]) for name in CAMERAS}
-    return paper_figure("6", picture_rows(table)), beside(lambda of: claims_6(outcomes["bayer"], *of), judged)
+    return paper_figure("6", picture_rows(table)), with_default(lambda of: claims_6(outcomes["bayer"], *of), judged)
 
 
 def swap(setup: Setup, subject: View, camera: Camera) -> Swap:

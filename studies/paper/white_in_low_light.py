@@ -11,7 +11,7 @@ from rodcone.colour_spaces import encode_srgb
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, beside, judge_claim, paper_figure
+from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure, with_default
 from studies.paper.setup import (
     CAMERAS,
     DEFAULT,
@@ -74,4 +74,4 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             )
             pictures[RESULT[name]] = result[0]
         rows.append([(words, encode_srgb(picture)) for words, picture in pictures.items()])
-    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), beside(claims_3, stages)
+    return paper_figure("3", picture_rows(rows), level=LOW_CD_M2, ms=LOW_S * 1e3), with_default(claims_3, stages)

@@ -12,7 +12,7 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
-from studies.paper.claims import Claim, PaperFigure, beside, judge_claim, paper_figure
+from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure, with_default
 from studies.paper.setup import (
     CAMERAS,
     READINGS,
@@ -104,4 +104,4 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         shown = {f"{name}, white is full": encode_srgb(grey_picture(plane, full_e)) for name, plane in recorded.items()}
         (first, picture), *others = (shown | pictures).items()
         rows.append([(f"{reading}: {first}", picture), *others])
-    return paper_figure("5", picture_rows(rows)), beside(claims_5, bright)
+    return paper_figure("5", picture_rows(rows)), with_default(claims_5, bright)

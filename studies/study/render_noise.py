@@ -79,7 +79,7 @@ def _mean_share(error_e: NDArray[np.floating], variance_e2: NDArray[np.float64],
     return float(np.square(error_e[inside]).mean() / variance_e2[inside].mean())
 
 
-def charged_share(
+def monte_carlo_bound(
     errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> float:
     """Monte Carlo variance that a frame is charged, over the sensor's own noise variance; 0 where the well is full.

@@ -31,7 +31,7 @@ from studies.photograph.clock import machine, timed
 from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
 from studies.study.gain import iso_speed
-from studies.study.render_noise import charged_share
+from studies.study.render_noise import monte_carlo_bound
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text, shake_stream
 from studies.sweep.provenance import in_words, provenance, threads
@@ -116,7 +116,7 @@ def run_cell(cell: Cell) -> Row:
         lens=json.dumps(vars(sensor.lens)),
         budget_share=cell.budget_share,
         **figures,
-        mc_share=charged_share(
+        mc_share=monte_carlo_bound(
             errors_e * frames,
             pixels_e * frames,
             resolve(merged_sensor(sensor, frames), pixels_e * frames, cell.exposure_s * frames),

@@ -33,7 +33,7 @@ MARKER = ".rodcone-sweep"  # locked by each sweep at work: the lock ends with it
 
 
 @contextmanager
-def at_work(out: Path) -> Iterator[None]:
+def locked_folder(out: Path) -> Iterator[None]:
     """Make a folder that of sweeps, and hold its lock; where no other does, remove what killed ones left half written.
 
     A new or an empty folder is marked; hidden files don't count.
@@ -143,7 +143,7 @@ def sweep(
         require_libraries(name)
     scenes = open_all(study)
     runner = runner or (lambda cells: run(cells, InThisProcess()))
-    with at_work(out), progress_bar(step) as show, open_results(out) as base:
+    with locked_folder(out), progress_bar(step) as show, open_results(out) as base:
         plan = plan or plan_of(study, cache=out / PILOTS, step=step)
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")

@@ -78,7 +78,7 @@ def fit_prior(
 
 
 def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
-    """Start: a third of the components by contrast, as even patches deserve their own, the others by k-means."""
+    """Initial components: one third by contrast, so that flat patches get their own; the rest by k-means."""
     count, even = len(reduced), COMPONENTS // 3
     centres = reduced[rng.choice(count, COMPONENTS - even, replace=False)]
     for _ in range(6):

@@ -11,7 +11,7 @@ from page_parts import unstamped
 from real_cameras import REPORTS
 
 from sensor.cameras.emva_report import numbers_of, read_report
-from sensor.cameras.numbers import completed, curves_csv, lent_curves, missing, preset_text
+from sensor.cameras.numbers import borrowed_curves, completed, curves_csv, missing, preset_text
 from sensor.presets import low_noise, preset
 from studies.study.equal_area import EqualArea
 from studies.study.study_file import read_study
@@ -69,7 +69,7 @@ def test_each_camera_of_the_study_is_what_its_report_makes(path: Path) -> None:
     assert not {"pitch_um", "full_well_e", "read_noise_e", "fill_factor"} & set(missing(numbers))  # never lent
     assert numbers.efficiency is not None
     whole = completed(numbers, low_noise(), "low_noise")
-    curves = lent_curves(low_noise(), "low_noise", whole)
+    curves = borrowed_curves(low_noise(), "low_noise", whole)
     name = f"{path.stem}_curves.csv"
     title = f"{whole.source.split(':')[0]}, as its sources tell it."
     assert path.read_text("utf-8") == preset_text(title, whole, curves, name)

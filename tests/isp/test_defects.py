@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.defects import mend
+from isp.defects import interpolate_defects
 from isp.remosaic import remosaic
 from rodcone.errors import InputError
 from sensor.cfa import BAYER, RGBW
@@ -24,7 +24,7 @@ def frame(dn: np.ndarray, cfa: tuple[str, ...], defects: list[tuple[int, int]]) 
 def test_a_pixel_takes_the_median_of_its_letters_neighbours_and_the_list_is_gone() -> None:
     dn = np.arange(100).reshape(10, 10)
     raw = frame(dn, RGBW, [(4, 4)])
-    mended = mend(raw)
+    mended = interpolate_defects(raw)
     assert mended.defects is None
     assert mended.dn[4, 4] == 44  # of 22 24 26 42 46 62 64 66: the mean of 42 and 46
     mended.dn[4, 4] = dn[4, 4]
@@ -36,9 +36,9 @@ def test_bayers_diagonal_greens_count() -> None:
     dn = np.zeros((8, 8))
     dn[[3, 3, 5, 5], [2, 4, 2, 4]] = 100  # greens of the other rows
     dn[[2, 2, 2, 4, 4, 6, 6, 6], [1, 3, 5, 1, 5, 1, 3, 5]] = 80
-    assert mend(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 80  # eight of 80, four of 100
+    assert interpolate_defects(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 80  # eight of 80, four of 100
     dn[[2, 2, 2, 6], [1, 3, 5, 1]] = 100
-    assert mend(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 100
+    assert interpolate_defects(frame(dn, BAYER, [(4, 3)])).dn[4, 3] == 100
 
 
 def test_a_corner_and_a_cluster_look_further() -> None:
@@ -46,12 +46,12 @@ def test_a_corner_and_a_cluster_look_further() -> None:
     cluster = [(row, column) for row in range(3) for column in range(3)]
     for place in cluster:
         dn[place] = 1000
-    np.testing.assert_array_equal(mend(frame(dn, RGBW, cluster)).dn, np.full((12, 12), 50))
+    np.testing.assert_array_equal(interpolate_defects(frame(dn, RGBW, cluster)).dn, np.full((12, 12), 50))
 
 
 def test_a_letter_without_a_sound_sample_reads_black() -> None:
     dn = np.full((2, 2), 500)
-    mended = mend(frame(dn, RGBW, [(1, 1)]))
+    mended = interpolate_defects(frame(dn, RGBW, [(1, 1)]))
     np.testing.assert_array_equal(mended.dn, [[500, 500], [500, 10]])
 
 
@@ -68,7 +68,7 @@ def test_a_simulated_chip_lists_its_hot_pixels_and_mending_takes_them_out() -> N
         hot = tuple(raw.defects.T)
         assert raw.electrons[hot].min() > 9000, cfa
         # the median of 8 samples of 300 e- and 17.5 e- of noise: 5 standard deviations of 17.5 / sqrt(8 * 2 / pi)
-        assert np.abs(mend(raw).electrons[hot] - 300.0).max() < 5 * 17.5 / np.sqrt(16 / np.pi) + 0.5, cfa
+        assert np.abs(interpolate_defects(raw).electrons[hot] - 300.0).max() < 5 * 17.5 / np.sqrt(16 / np.pi) + 0.5, cfa
 
 
 def test_a_remosaiced_frame_holds_no_hot_pixel_and_no_list() -> None:

@@ -9,7 +9,7 @@ from scipy.stats import norm
 
 from render.engine import render
 from render.integrator.matte import STEPS, TableReader, band_offsets, reflectance_table, with_matte_surfaces, with_rows
-from render.loader import as_guest, mitsuba_module
+from render.loader import mitsuba_module, own_mitsuba_variant
 from render.scene import spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat, line_spectrum
 from rodcone.jit import dr
@@ -105,7 +105,7 @@ CHEQUERED = printed("camera", grey(0.05), grey(0.8), 3.0, 20.0)
 CHEQUERED["bsdf"]["a"] = checks(grey(0.3), grey(0.6), 4.0, 4.0)["bsdf"]
 
 
-@as_guest()
+@own_mitsuba_variant()
 @loop(("stock", "rows"), [(PRINT, True), (CHEQUERED, False)])
 def test_a_picture_mixes_two_reflectances_as_mitsuba_s_blend_does(stock, rows, situation):
     """From the table where both have rows; checks under it are evaluated."""

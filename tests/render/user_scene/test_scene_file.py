@@ -12,7 +12,7 @@ from PIL import Image
 from refusal import refusal
 
 from render.engine import render
-from render.loader import as_guest, mitsuba_module
+from render.loader import mitsuba_module, own_mitsuba_variant
 from render.scene_range import check_range
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import LONGEST_CHAIN, SceneFile
@@ -628,7 +628,7 @@ def test_a_stock_name_never_loads_a_file_beside_the_scene(tmp_path: Path, monkey
     mi.file_resolver().prepend(str(tmp_path))  # as where Mitsuba was imported in this folder
     opened = load_scene_file(write(tmp_path, CAMERA, SUN, '<shape type="sphere"><bsdf type="principledthin"/></shape>'))
     assert render(opened.scene, (4, 4), spp=4).radiance.any()
-    with as_guest():
+    with own_mitsuba_variant():
         found = Path(str(mi.file_resolver().resolve("plugins/principledthin.so")))
     assert found == Path(mi.__file__).parent / "plugins" / "principledthin.so"
 

@@ -18,10 +18,10 @@ from sensor.cameras.numbers import (
     PixelNumbers,
     Sourced,
     bits_of,
+    borrowed_curves,
     completed,
     curves_csv,
     greatest_response,
-    lent_curves,
     measured_curves,
     preset_text,
 )
@@ -103,7 +103,7 @@ def test_without_a_source_a_preset_names_every_key_that_is_missing(tmp_path):
 
 def test_lent_curves_have_a_monochrome_sources_quantum_efficiency_in_w(tmp_path):
     numbers = PixelNumbers("sheet 7", lent().pixel, efficiency=(0.64, 528.0))
-    shape, theirs = lent_curves(low_noise(), "low_noise", numbers), low_noise().responses.curves
+    shape, theirs = borrowed_curves(low_noise(), "low_noise", numbers), low_noise().responses.curves
     path = tmp_path / "one.toml"
     path.write_text(preset_text("Mono.", numbers, shape, "one_curves.csv"), "utf-8")
     (tmp_path / "one_curves.csv").write_text(curves_csv(numbers, shape), "utf-8")
@@ -122,16 +122,16 @@ def test_lent_curves_have_a_monochrome_sources_quantum_efficiency_in_w(tmp_path)
 
 
 def test_lent_curves_stop_at_one_electron_a_photon_and_say_so():
-    shape = lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.9125, 536.0)))
+    shape = borrowed_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.9125, 536.0)))
     assert max(curve.values.max() for curve in shape.curves.values()) == pytest.approx(1.0)
     assert "scaled by 1, to 1 electron a photon at most; W would need 1.05" in shape.note
 
 
 def test_lent_curves_refuse_an_anchor_where_they_hardly_respond_and_a_mosaic_of_other_channels():
     with pytest.raises(InputError, match=r"anchor: 0\.5 electrons a photon at 1068 nm, where low_noise responds with"):
-        lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 1068.0)))
+        borrowed_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 1068.0)))
     with pytest.raises(InputError, match="preset low_noise: channel: 'M' is unknown; allowed: B, G, R, W"):
-        lent_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 530.0), cfa=("GM", "YC")))
+        borrowed_curves(low_noise(), "low_noise", PixelNumbers("s", efficiency=(0.5, 530.0), cfa=("GM", "YC")))
 
 
 def test_the_converters_top_is_the_white_level_or_next_above_and_k_rises_with_the_range_above_black():

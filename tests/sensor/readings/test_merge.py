@@ -363,7 +363,7 @@ def test_charge_moves_behind_the_density_as_it_comes():
         assert abs(means[at].mean() - moved[at].mean() / share) < 4.5 * error, channel
 
 
-def test_a_metered_channel_takes_the_time_that_holds_its_bright_end():
+def test_metered_exposure_keeps_highlights_below_saturation():
     sensor = camera(ChannelReading("W", metered=True))
     for white_e, time_share in (
         (9_000.0, 1.0),

@@ -18,7 +18,7 @@ from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.metrics.quality import measure, psnr_db
 from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
-from studies.study.render_noise import charged_share, monte_carlo_share
+from studies.study.render_noise import monte_carlo_bound, monte_carlo_share
 
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
@@ -80,15 +80,15 @@ def test_unbiased_light_is_charged_its_mean_and_denoised_light_its_limit() -> No
     expected_e = np.broadcast_to(np.where(saturated, 2.0 * sensor.pixel.full_well_e, 400.0), (256, 256))
     missed_e = np.broadcast_to(np.where(np.arange(256) % 32 < 16, 2.0, 4.0), (256, 256))
     own, readings = noise_variance(expected_e, sensor, exposure_s)[0, 0], chip_readings(sensor, exposure_s)
-    assert charged_share(missed_e[None], expected_e, readings) == pytest.approx(10 / own)
+    assert monte_carlo_bound(missed_e[None], expected_e, readings) == pytest.approx(10 / own)
     # 256 blocks: of those below the well half hold 4 and half 16, the others 0. Student's quantile of 255 is 1.651.
     blocks = np.concatenate([np.tile([4.0, 16.0], 64), np.zeros(128)]) * 2 / own
     limit = blocks.mean() + 1.651 * blocks.std(ddof=1) / 16
     both = np.stack([missed_e, missed_e])
-    assert charged_share(both, expected_e, readings) == pytest.approx(limit, rel=1e-3)
+    assert monte_carlo_bound(both, expected_e, readings) == pytest.approx(limit, rel=1e-3)
     opposed = np.stack([missed_e, -missed_e])  # never negative
-    assert charged_share(opposed, expected_e, readings) == 0.0
-    assert charged_share(both, np.full((256, 256), 1e9), readings) == 0.0
+    assert monte_carlo_bound(opposed, expected_e, readings) == 0.0
+    assert monte_carlo_bound(both, np.full((256, 256), 1e9), readings) == 0.0
 
 
 def test_a_lamp_in_the_picture_does_not_set_the_white() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.paper.best_exposure import Best, claims_held
-from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, near
+from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, within_margin
 from studies.paper.early import GINDELE, claims_early
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
 from studies.paper.light_levels import LevelCurves, claims_levels
@@ -45,7 +45,7 @@ def test_what_is_not_finite_never_holds() -> None:
 def test_kinds_of_checks_hold_at_their_ends_and_not_beyond() -> None:
     by_kind = (
         (about({"8": 8.0, "12": 12.0, "12.01": 12.01, "7.99": 7.99}, 10.0), {"8", "12"}),
-        (near({"9.5": 9.5, "9.51": 9.51}, 9.0, 0.5), {"9.5"}),
+        (within_margin({"9.5": 9.5, "9.51": 9.51}, 9.0, 0.5), {"9.5"}),
         (at_least({"1": 1.0, "0.99": 0.99}, 1.0), {"1"}),
         (at_most({"1": 1.0, "1.01": 1.01}, 1.0), {"1"}),
     )

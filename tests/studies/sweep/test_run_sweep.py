@@ -25,7 +25,7 @@ from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readings.resolve import chip_readings
 from sensor.response import expected_electrons
-from studies.study.render_noise import charged_share, monte_carlo_share
+from studies.study.render_noise import monte_carlo_bound, monte_carlo_share
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import run_cell as cell_run
 from studies.sweep import run_sweep as sweep_run
@@ -33,7 +33,7 @@ from studies.sweep.cells import Cell
 from studies.sweep.database import last_run
 from studies.sweep.export import read_rows
 from studies.sweep.row import Row
-from studies.sweep.run_sweep import at_work
+from studies.sweep.run_sweep import locked_folder
 from studies.sweep.workers import run
 
 content, half_pictures, here, parts_left, small_study, swept = (
@@ -154,7 +154,7 @@ def test_what_a_killed_run_left_is_cleared_and_nothing_else(tmp_path: Path) -> N
     (out / "pilots").symlink_to(tmp_path / "shared")
     left.pop()
     before = content(out)
-    with at_work(out):
+    with locked_folder(out):
         for path in left:
             path.write_bytes(b"half")
         assert swept(study, out).made == 0
@@ -229,7 +229,7 @@ def test_a_denoised_study_photographs_denoised_light_and_is_charged_its_measured
         expected_electrons(form_image(view, sensor), sensor, row.exposure_s)
         for view in relight_denoised(transport, luminance_cd_m2=1.0)
     )
-    share = charged_share(np.stack([whole - fold for fold in folds]), whole, chip_readings(sensor, row.exposure_s))
+    share = monte_carlo_bound(np.stack([whole - fold for fold in folds]), whole, chip_readings(sensor, row.exposure_s))
     assert row.mc_share == pytest.approx(share, rel=1e-3)  # single precision
     assert json.loads(row.render)["relative_mc_error"] > transport.relative_mc_error  # of all pixels, and their limit
 
