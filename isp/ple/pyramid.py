@@ -25,6 +25,7 @@ from isp.ple.mosaic import (
 from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
 from isp.ple.tables import PILOT_ERROR, Sampling, Singles
+from isp.ple.twicing import twice_colours
 from isp.ple.units import readings
 from sensor.raw import RawImage
 
@@ -90,8 +91,10 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
 
     black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in index]
     follow(planes, raw.cfa, noise, black, lambda values: in_electrons(values) / (white_e * shot)[index])
+    in_noise, planes = planes, np.empty_like(planes)
     for first in range(0, len(planes), TOGETHER):
-        planes[first : first + TOGETHER] = in_electrons(planes[first : first + TOGETHER])
+        planes[first : first + TOGETHER] = in_electrons(in_noise[first : first + TOGETHER])
+    twice_colours(planes, in_noise, raw)
     return planes, noise
 
 

@@ -1,0 +1,113 @@
+"""Colour that the prior took off and the samples still hold, added back: twicing (Tukey 1977) of colours alone.
+
+In the dark the prior takes strong colours for greyer than they are, at every scale, and red for the hue of what is
+common around it. Over a region of one colour the samples tell better: what they differ from the estimate by, in the
+mean, is the estimate's bias b_c and noise. Means are over cells of 4x4 pixels, in which every channel has samples,
+weighted by how alike cells are in the estimate (as a bilateral filter, Tomasi & Manduchi 1998):
+
+    b_c(i) = sum_j w_ij r_c(j) / sum_j w_ij n_c(j),   w_ij = exp(-|x_i - x_j|^2 / 2 ALIKE^2),
+
+r_c the sum of the residuals of a cell's n_c samples, x the estimate in units of noise. Brightness is best known by the
+mosaic's sharpest channel g and stays: a colour gets d_c = b_c - (x_c / x_g) b_g, times 1 - SURE / chi^2 where positive
+(James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance.
+"""
+
+from concurrent.futures import ThreadPoolExecutor
+from os import cpu_count
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
+
+from isp.ple.guide import GUIDES
+from isp.ple.tables import Singles
+from sensor.cfa import channel_map
+from sensor.raw import RawImage
+
+CELL = 4  # pixels a side: a tile has at most as many
+REACH = 4  # cells on each side of one
+SURE = 1.5  # chi^2 up to which nothing is added: at 1 hues are a little nearer, and black has coloured clouds
+ALIKE = 1.0  # between cells of one colour [units of a sample's noise]
+TOGETHER = 16  # rows of cells that are worked on together
+_LEAST = np.float32(1e-12)
+
+
+def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
+    """Add to each colour what samples of like places hold beyond the estimate.
+
+    Parameters
+    ----------
+    planes : (h, w, channel) float32
+        Estimate [e-], channels in the order of `sensor.cfa.channels`; it is overwritten.
+    stable : (h, w, channel) float32
+        The same in units of noise.
+    raw : RawImage
+        Of a tile of 1, 2 or 4 pixels a side. Saturated samples say nothing.
+    """
+    names = raw.channels
+    guide = next((names.index(name) for name in GUIDES if name in names), None)
+    colours = [c for c in range(len(names)) if c != guide]
+    if guide is None or not colours:
+        return
+    sites = channel_map(raw.cfa, raw.shape)[..., None] == np.array(names)
+    sites &= ~raw.saturated[..., None]
+    of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
+    mean, like = _sums(planes) / of_cell, _sums(stable) / of_cell
+    count = _sums(sites.astype(np.float32))
+    residual = _sums(np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0)))
+    laws = [raw.noise_of(name) for name in names]
+    shot, dark = (
+        np.array(values, np.float32) for values in zip(*((x.shot, x.dark_noise_e**2) for x in laws), strict=True)
+    )
+    light = np.maximum(mean, 0.0)
+    variance = count * (shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
+
+    sides = ((REACH, REACH), (REACH, REACH), (0, 0))
+    wide = [np.pad(values, sides, mode="symmetric") for values in (like, residual, count, variance)]
+    bias = np.empty_like(mean)
+
+    def strip(first: int) -> None:
+        rows = slice(first, first + TOGETHER)
+        bias[rows] = _bias(
+            like[rows], [values[first : first + TOGETHER + 2 * REACH] for values in wide], light[rows], guide, colours
+        )
+
+    with ThreadPoolExecutor(cpu_count()) as threads:
+        list(threads.map(strip, range(0, len(mean), TOGETHER)))
+    for c in colours:
+        by_pixel = np.repeat(np.repeat(bias[..., c], CELL, axis=0), CELL, axis=1)
+        added = uniform_filter(by_pixel, 2 * CELL - 1)[: raw.shape[0], : raw.shape[1]]
+        planes[..., c] = np.maximum(planes[..., c] + added, np.minimum(planes[..., c], 0.0))  # no light is the least
+
+
+def _bias(like: Singles, wide: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
+    """Shrunken d_c of each cell [e-], 0 in the guide; `wide` holds likeness, residuals, counts and variances."""
+    others, *parts = wide
+    height, width = like.shape[:2]
+    residual, count, variance = (np.zeros_like(like) for _ in range(3))
+    for dy, dx in np.ndindex(2 * REACH + 1, 2 * REACH + 1):
+        window = slice(dy, dy + height), slice(dx, dx + width)
+        off = others[window] - like
+        weight = np.exp(np.vecdot(off, off) * np.float32(-0.5 / ALIKE**2))[..., None]
+        for total, values, by in zip(
+            (residual, count, variance), parts, (weight, weight, weight * weight), strict=True
+        ):
+            np.add(total, by * values[window], out=total)
+    count = np.maximum(count, _LEAST)
+    mean, variance = residual / count, variance / count**2
+    known = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
+    share = light / known
+    off, error = mean - share * mean[..., guide, None], variance + share**2 * variance[..., guide, None] + _LEAST
+    square = (off[..., colours] ** 2 / error[..., colours]).mean(axis=-1, keepdims=True)
+    result = np.maximum(off * np.maximum(1.0 - SURE / np.maximum(square, _LEAST), 0.0), -light)
+    result[..., guide] = 0.0
+    return np.asarray(result, np.float32)
+
+
+def _sums(values: NDArray[Any]) -> Singles:
+    """Sums over cells; those at the far edges may have fewer pixels."""
+    height, width = values.shape[:2]
+    filled = np.pad(values, ((0, -height % CELL), (0, -width % CELL), *((0, 0),) * (values.ndim - 2)))
+    cells = filled.reshape(len(filled) // CELL, CELL, filled.shape[1] // CELL, CELL, *values.shape[2:])
+    return np.asarray(cells.sum(axis=(1, 3), dtype=np.float32))
