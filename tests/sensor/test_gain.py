@@ -150,3 +150,26 @@ def test_readings_have_gains_of_their_own() -> None:
     refusal(with_gain, preset("dual_gain"), 2.0, match="gain: 2 with several readings, which have gains of their own")
     two = (Reading(1.5, 1.0, 1e4), Reading(3.0, 1.0, 1.5e4))
     refusal(with_readings, replace(low_noise(), gain_limit=8.0), two, match="gain: 8 with several readings")
+
+
+@pytest.mark.thorough
+def test_a_sweep_over_gains_shows_the_knee_where_the_closed_form_has_it() -> None:
+    """In a simulated sweep the dark's variance falls as a + b / gain^2; at the knee, (b / a)^1/2, both are alike.
+
+    The closed form has the converter's b and the pixel's a. 147 456 samples know a variance to 0.37 %, the knee of six
+    gains to 0.6 %: 3 % are five standard errors. Beyond twice the knee a doubling brings under 0.6 dB.
+    """
+    gains = np.array([1.0, 2.0, 4.0, 8.0, 16.0, 32.0])
+    step_e = WELL_E / (2**BITS - 1 - BLACK_DN)
+    knee = step_e * hypot(CONVERTER_DN, 12**-0.5) / READ_E
+    swept = np.array(
+        [frame(camera(gain), 0.0, 11 + n, shape=(384, 384)).electrons.var() for n, gain in enumerate(gains)]
+    )
+    expected = READ_E**2 * (1 + (knee / gains) ** 2)
+    assert swept == pytest.approx(expected, rel=0.02)
+    rows = np.column_stack([np.ones(6), gains**-2]) / expected[:, None]
+    (pixel, converter), *_ = np.linalg.lstsq(rows, swept / expected, rcond=None)
+    assert np.sqrt(converter / pixel) == pytest.approx(knee, rel=0.03)
+    brings_db = 10 * np.log10(swept[:-1] / swept[1:])
+    assert brings_db[0] > 4.0
+    assert brings_db[gains[:-1] >= 2 * knee].max() < 0.6
