@@ -179,7 +179,7 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
         for top in range(0, lcm(down, STRIDE), STRIDE)
     )
     plain = raw.plain_noise
-    samples = transform(electrons, plain.dark_noise_e / plain.shot)
+    samples = transform(electrons, float(plain.dark_noise_e / plain.shot))  # of NumPy, it would make them float64
     for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
         at = mask(raw.cfa, noise.channel, raw.shape)
         samples[at] = transform(electrons[at], noise.dark_noise_e / noise.shot)
