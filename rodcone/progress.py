@@ -119,7 +119,9 @@ def compile_note(seconds: float) -> str | None:
 
 
 def duration(seconds: float) -> str:
-    """Time in words, to the precision that an estimate has: ``40 s``, ``3 min``, ``2.5 h``."""
+    """Time in words, to the precision that an estimate has: ``40 s``, ``3 min``, ``2.5 h``, ``3 days``."""
     if seconds < 100:
         return f"{seconds:.0f} s"
-    return f"{seconds / 60:.0f} min" if seconds < 6000 else f"{seconds / 3600:.1f} h"
+    if seconds < 6000:
+        return f"{seconds / 60:.0f} min"
+    return f"{seconds / 3600:.1f} h" if seconds < 36 * 3600 else f"{seconds / 86400:.0f} days"

@@ -14,13 +14,16 @@ import pytest
 
 from studies.commands.cli import main
 
+# The line that a command begins with, of what it will cost.
+COST = re.compile(r"\Arodcone: (about|\d+ cells, ).*(; at half the size |; with half the ).*\n")
+
 
 def call(arguments: Iterable[object]) -> tuple[int, str, str]:
-    """Exit code, stdout and stderr of ``rodcone`` with some arguments."""
+    """Exit code, stdout and stderr of ``rodcone`` with some arguments, without its line of what it will cost."""
     out, err = StringIO(), StringIO()
     with redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as stopped:
         main([str(argument) for argument in arguments])
-    return int(stopped.value.code or 0), out.getvalue(), err.getvalue()
+    return int(stopped.value.code or 0), out.getvalue(), COST.sub("", err.getvalue())
 
 
 def check_refusals(command: str, rows: Sequence[tuple[str, str]], folder: Path, code: int = 2) -> None:

@@ -4,7 +4,7 @@ import json as notation
 import sys
 from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Protocol
 
 from cyclopts import Parameter
 from rich.console import Console
@@ -48,6 +48,25 @@ def print_result(text: object, facts: Mapping[str, Any], *, json: bool) -> None:
         print_json(facts)
     else:
         print(text)
+
+
+class Estimated(Protocol):
+    """What a command will cost."""
+
+    def words(self) -> str:
+        """One line."""
+
+    def facts(self) -> Mapping[str, Any]:
+        """The same as values."""
+
+
+def told(cost: Estimated, *, dry_run: bool, json: bool) -> bool:
+    """Tell what a command will cost before it begins: as its result, or on stderr; whether it is to begin."""
+    if dry_run:
+        print_result(cost.words(), cost.facts(), json=json)
+    else:
+        say(cost.words())
+    return not dry_run
 
 
 def print_json(facts: Mapping[str, Any]) -> None:

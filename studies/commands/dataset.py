@@ -9,11 +9,13 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.progress import progress
-from studies.commands.console import print_result
-from studies.commands.sweep import WORKERS, Workers, check_memory, saying_what_is_kept
+from studies.commands.console import print_result, told
+from studies.commands.sweep import WORKERS, Workers, require_enough, saying_what_is_kept
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
+from studies.study.cost import cores
 from studies.study.study_file import read_study
+from studies.sweep.cost import estimated
 
 ORDER = SetOrder()
 
@@ -26,6 +28,7 @@ def dataset(
     *,
     out: Path = Path("out/dataset"),
     set: tuple[str, ...] = (),
+    dry_run: bool = False,
     json: bool = False,
 ) -> int:
     """Make raw frames of every scene, light, sensor and seed of a study, with the truth behind them; prints the folder.
@@ -40,12 +43,17 @@ def dataset(
         Folder of renders and frames; the set is its folder "set".
     set
         KEY=VALUE that replaces the file's own, such as render.spp=64; may be given several times.
+    dry_run
+        Print frames, renders, and an estimate of time and memory; compute nothing.
     json
         Print one JSON object instead of the folder.
     """
     task = read_study(study, set)
     task = replace(task, scenes=(*task.scenes, *order.drawn_scenes))
-    check_memory(task, out, reference=False, workers=workforce.processes, force=workforce.force)
+    sizes = estimated(task, out, workforce.processes or cores(), frames=True)
+    if not told(sizes, dry_run=dry_run, json=json):
+        return 0
+    require_enough(task, sizes, force=workforce.force)
     options = [*(("set", change) for change in set), *vars(order).items()]
     words = [word for name, value in options if value is not None for word in (f"--{name}", str(value))]
     command = join(["rodcone", "dataset", study.name, *words])

@@ -23,15 +23,17 @@ from rodcone.errors import require_range
 from rodcone.progress import duration, progress, render_words
 from sensor.presets import preset
 from studies.budget.starting_points import plan_from_settings
-from studies.commands.console import INTERRUPTED, Seconds, Time, say
-from studies.commands.sweep import check_memory, make_all
+from studies.commands.console import INTERRUPTED, Seconds, Time, say, told
+from studies.commands.sweep import make_all, require_enough
 from studies.photograph.clock import Clock
+from studies.study.cost import cores
 from studies.study.lit_scene import film_of, level_luminance, lux_per_cd_m2, open_choice
 from studies.study.render_noise import MARGIN, render_share
 from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
+from studies.sweep.cost import estimated
 from studies.sweep.provenance import versions
-from studies.sweep.workers import cores, run_in_processes
+from studies.sweep.workers import run_in_processes
 
 STUDY = Path(__file__).parent.parent / "configs" / "demo.toml"
 
@@ -117,7 +119,11 @@ DEFAULT = DemoOrder()
 
 
 def demo(
-    order: Annotated[DemoOrder, Parameter(name="*")] = DEFAULT, *, out: Path = Path("out/demo"), force: bool = False
+    order: Annotated[DemoOrder, Parameter(name="*")] = DEFAULT,
+    *,
+    out: Path = Path("out/demo"),
+    force: bool = False,
+    dry_run: bool = False,
 ) -> None:
     """Photograph one scene from moonlight to daylight with RGBW and Bayer and write a report; prints its path.
 
@@ -129,10 +135,15 @@ def demo(
         Folder for report.html and results.json, with the sweep's results database and pictures.
     force
         Run even where more memory is needed than is free.
+    dry_run
+        Print cells, renders, and an estimate of time and memory; compute nothing.
     """
     clock = Clock()
     study = order.of(read_study(STUDY))
-    check_memory(study, out, reference=False, workers=cores(), force=force)
+    sizes = estimated(study, out, cores())
+    if not told(sizes, dry_run=dry_run, json=False):
+        return
+    require_enough(study, sizes, force=force)
     runner = partial(run_in_processes, workers=cores())
     _, report = make_all(study, out, lambda step: plan_from_settings(study), runner, clock=clock)
     print(report)

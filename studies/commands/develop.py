@@ -19,28 +19,34 @@ from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
 from rodcone.files import check_place, require_ending
-from rodcone.memory import memory, require_memory
+from rodcone.memory import require_memory
 from rodcone.progress import compile_note, progress, render_words
-from studies.commands.console import INTERRUPTED, Seconds, print_result, say
+from studies.commands.console import INTERRUPTED, Seconds, print_result, say, told
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture
 from studies.photograph.ready_light import BANDS, find_ready
-from studies.photograph.shot import Order, take
+from studies.photograph.shot import Order, carry_out, check
+from studies.study.cost import Picture
 from studies.study.lit_scene import asked_spectra
 from studies.study.render_facts import render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
 
 
-def capture(order: Annotated[Order, Parameter(name="*")], *, json: bool = False) -> None:
+def capture(order: Annotated[Order, Parameter(name="*")], *, dry_run: bool = False, json: bool = False) -> None:
     """Photograph a scene and write raw files that raw converters open; prints their paths.
 
     Parameters
     ----------
+    dry_run
+        Print what it would cost in time, memory and samples; compute nothing.
     json
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
+    checked = check(order)
+    if not told(checked.cost, dry_run=dry_run, json=json):
+        return
     with progress(sys.stderr) as step:
-        result = take(order, step)
+        result = carry_out(checked, step)
     say(*result.notes)
     print_result("\n".join(map(str, result.paths)), result.facts, json=json)
 
@@ -121,7 +127,8 @@ def develop(
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)
 
 
-MOST_BANDS = 1000
+MOST_BANDS, DEFAULT_SPP = 1000, 64
+_WRITE_S = 2.5e-7  # processor seconds a pixel and band: relit light, and the file
 READING = "reading the scene"  # 100 000 shapes take a minute
 
 
@@ -203,13 +210,18 @@ class RenderOrder:
     force: bool = False
 
     @property
+    def samples(self) -> int | None:
+        """Samples per pixel, at most; None where an error or the time ends the render."""
+        return self.spp if self.spp or self.noise or self.max_seconds else DEFAULT_SPP
+
+    @property
     def renders(self) -> bool:
         """Whether something asks for a render though the scene's light is there already."""
         limits = (self.spp, self.noise, self.max_seconds, self.max_depth, self.cache)
         return self.render or self.denoise or self.seed != 0 or any(limit is not None for limit in limits)
 
 
-def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = False) -> int:
+def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool = False, json: bool = False) -> int:
     """Render a scene into a spectral OpenEXR file; prints its path.
 
     Light of the scene that is there already, such as that of still_life which comes with rodcone, is taken as it is. A
@@ -218,6 +230,8 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
 
     Parameters
     ----------
+    dry_run
+        Print what it would cost in time, memory and samples; compute nothing.
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
@@ -239,9 +253,18 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, json: bool = F
         if ready
         else (bands or fine_bands(lamps, width_nm=RENDER_BAND_NM))
     )
-    require_memory(
-        memory(size[0] * size[1], wavelength_nm.size, len(scene.groups), denoised=order.denoise), order.force
+    cost = Picture(
+        size,
+        wavelength_nm.size,
+        len(scene.groups),
+        0 if ready else order.samples,
+        _WRITE_S,
+        denoised=order.denoise,
+        max_seconds=order.max_seconds,
     )
+    if not told(cost, dry_run=dry_run, json=json):
+        return 0
+    require_memory(cost.memory, order.force)
     check_place(order.out)
     # Render and write
     with kept_beside(order.out) as kept:

@@ -1,24 +1,55 @@
 """The command `rodcone expect`."""
 
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields, replace
 from math import pi
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from rodcone.csv_file import csv_text
 from rodcone.errors import InputError
 from rodcone.files import write_files
+from rodcone.memory import GB
+from rodcone.progress import duration
 from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
 from sensor.cfa import OWN
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
-from studies.commands.console import print_json, print_table, require_place
+from studies.commands.console import print_json, print_table, require_place, told
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.gain_plot import gain_svg
+from studies.study.cost import START_S, cores
 from studies.study.levels import UNITS, levels_between, parse_exposure, parse_level
+
+_TABLES_S, _ERROR_S = 12.0, 0.05  # processor seconds: tables of the prior, and a camera at one level
+_BYTES = 0.6e9
+
+
+@dataclass(frozen=True)
+class _Cost:
+    """What a table of so many cameras and levels costs."""
+
+    cameras: int
+    levels: int
+
+    @property
+    def seconds(self) -> float:
+        """Time on this machine's cores, if they are idle."""
+        return START_S + (_TABLES_S + _ERROR_S * self.cameras * self.levels) / cores()
+
+    def words(self) -> str:
+        """One line: time and memory, and what half of it would take."""
+        half, several = replace(self, levels=max(1, self.levels // 2)), "s" * (self.cameras > 1)
+        return (
+            f"about {duration(self.seconds)}, {_BYTES / GB:.1f} GB: {self.cameras} camera{several} at {self.levels} "
+            f"levels, no samples; with half the levels {duration(half.seconds)}"
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """The same as values."""
+        return {**vars(self), "seconds": self.seconds, "bytes": _BYTES}
 
 
 def expect(
@@ -33,6 +64,7 @@ def expect(
     prior: str = "drawn",
     blur: bool = False,
     out: Path | None = None,
+    dry_run: bool = False,
     json: bool = False,
 ) -> None:
     """Print the error to expect of a sensor's pictures by level of light, in closed form, without rendering.
@@ -60,6 +92,8 @@ def expect(
         Count the lens's diffraction and defocus, at 550 nm, as a blur that the picture keeps.
     out
         Table with every figure (.csv), or plot of the gain over the first camera (.svg).
+    dry_run
+        Print what it would cost in time and memory; compute nothing.
     json
         Print one JSON object: a list of errors by level for each camera.
     """
@@ -68,11 +102,12 @@ def expect(
         raise InputError(f"out: {out} plots gains over the first camera, and there is one; add a sensor or a --mosaic")
     levels = {text: _luminance(text) for text in level} if level else levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
+    cameras = [(name, tile) for name in sensors for tile in mosaic or [""]]
+    if not told(_Cost(len(cameras), len(levels)), dry_run=dry_run, json=json):
+        return
     choices = (list(levels.values()), light, exposure if time_s is None else time_s, prior, blur)
     by_camera = {
-        f"{name} {tile}".strip(): expect_errors(vary(preset(name), tile or OWN), *choices)
-        for name in sensors
-        for tile in mosaic or [""]
+        f"{name} {tile}".strip(): expect_errors(vary(preset(name), tile or OWN), *choices) for name, tile in cameras
     }
     if out is not None:
         write_files({out: _csv(by_camera) if out.suffix.lower() == ".csv" else gain_svg(by_camera)})

@@ -1,95 +1,36 @@
 """The command `rodcone sweep`, and what a run will take, before anything is computed."""
 
 import errno
-import json
 import sys
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
-from math import prod
 from pathlib import Path
 from typing import Annotated, Any
 
 from cyclopts import Parameter
 
 from isp.processors.catalogue import require_libraries
-from render.radiance_files.radiance_source import extent_of
 from rodcone.errors import require_absent, require_fields
-from rodcone.memory import Memory, memory, require_memory
-from rodcone.progress import Step, duration, progress
+from rodcone.memory import Memory, require_memory
+from rodcone.progress import Step, progress
 from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_study
 from studies.budget.starting_points import plan_from_settings, reference_plan
-from studies.commands.console import INTERRUPTED, print_result, say
+from studies.commands.console import INTERRUPTED, print_result, say, told
 from studies.commands.report import write_results
 from studies.photograph.clock import Clock
-from studies.study.equal_area import sensor_shapes
-from studies.study.lit_scene import OpenedScene, open_all
-from studies.study.study import REFERENCE, SceneChoice, Study, conditions
+from studies.study.cost import cores
+from studies.study.study import AUTOMATIC, Study
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
+from studies.sweep.cost import Estimate, estimated
 from studies.sweep.database import FILE
-from studies.sweep.export import read_rows
 from studies.sweep.prepare import PILOTS
-from studies.sweep.provenance import code_version
 from studies.sweep.run_sweep import Runner, Swept, locked_folder
 from studies.sweep.run_sweep import sweep as run_sweep
-from studies.sweep.workers import InThisProcess, cores, run, run_in_processes
-
-# Measured on two shared cores of a server (AVX-512): `benchmarks/bench_sweep.py` prints them for another machine.
-RENDER_S = 1e-7  # a pixel, sample, band and light group
-CELL_S = 6e-6  # a pixel: capture, development, metrics and file together, mean of the interleaved and Bayer cameras
-CELL_LEAST_S = 0.05  # a cell of any size
-START_S = 4.0  # a worker's imports
-
-
-@dataclass(frozen=True)
-class Estimate:
-    """Sizes of a sweep.
-
-    Attributes
-    ----------
-    cells, kept, renders, workers : int
-        `kept` cells at most are in the results database from a run of this code; `renders` counts scenes, not files of
-        radiance.
-    seconds : float
-        With so many workers; renders and cells that exist already are counted too.
-    bytes : float
-        Memory of all processes together, at most.
-    largest_bytes : float
-        Memory of the process that needs most.
-    """
-
-    cells: int
-    kept: int
-    renders: int
-    workers: int
-    seconds: float
-    bytes: float
-    largest_bytes: float
-
-
-def estimate(study: Study, plan: Plan, scenes: Mapping[SceneChoice, OpenedScene], workers: int, kept: int) -> Estimate:
-    """Estimate a sweep."""
-    cells = len(conditions(study)) * len(study.processors) * len(study.seeds)
-    per_scene = cells / len(scenes)
-    seconds = START_S if workers > 1 else 0.0
-    needs = []
-    for choice, opened in scenes.items():
-        if opened.scene is None:
-            (pixels, bands, groups), denoised = extent_of(choice.source), False
-        else:
-            model, pixels, groups = plan.renders[choice], opened.size[0] * opened.size[1], len(opened.scene.groups)
-            bands, denoised = len(model.wavelength_nm), model.denoise
-            seconds += RENDER_S * pixels * bands * groups * model.spp
-            if study.equal_area is not None:
-                pixels = max(pixels, *map(prod, sensor_shapes(study.equal_area, study.sensors, opened.size).values()))
-        seconds += per_scene * max(CELL_LEAST_S, CELL_S * pixels) / max(workers, 1)
-        needs.append(memory(pixels, bands, groups, workers, denoised=denoised))
-    renders = sum(opened.scene is not None for opened in scenes.values())
-    total, largest = max(need.total for need in needs), max(need.largest for need in needs)
-    return Estimate(cells, kept, renders, workers, seconds, total, largest)
+from studies.sweep.workers import InThisProcess, run, run_in_processes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -195,11 +136,11 @@ def sweep(
     """
     clock = Clock()
     task = read_study(study, order.set, trust_code=order.trust_code)
-    if order.dry_run:
-        sizes = _estimated(task, order.out, order.reference, workforce.workers or cores())
-        print_result(_words(sizes), vars(sizes), json=json)
+    planned = task.budget.model == AUTOMATIC and not (order.as_stated or order.reference)
+    sizes = estimated(task, order.out, workforce.processes or cores(), reference=order.reference, planned=planned)
+    if not told(sizes, dry_run=order.dry_run, json=json):
         return 0
-    check_memory(task, order.out, reference=order.reference, workers=workforce.processes, force=workforce.force)
+    require_enough(task, sizes, force=workforce.force)
     with workforce.runner() as runner:
         swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock)
     say(f"its report is {report}")
@@ -209,11 +150,10 @@ def sweep(
     return 0
 
 
-def check_memory(study: Study, out: Path, *, reference: bool, workers: int, force: bool) -> None:
+def require_enough(study: Study, sizes: Estimate, *, force: bool) -> None:
     """Raise `InputError` where a study's processors lack a library, or more memory is needed than is free."""
     for name in study.processors:
         require_libraries(name)
-    sizes = _estimated(study, out, reference, workers)
     require_memory(Memory(sizes.bytes, sizes.largest_bytes), force)
 
 
@@ -242,24 +182,6 @@ def make_all(
         report = write_results(out)
     say(*swept.notes)
     return swept, report
-
-
-def _estimated(study: Study, out: Path, reference: bool, workers: int) -> Estimate:
-    """Estimate without a plan's pilot renders: the study as stated is the most that a plan chooses."""
-    everything = reference or study.budget.model == REFERENCE
-    plan = reference_plan(study) if everything else plan_from_settings(study)
-    rows = read_rows(out) if (out / FILE).is_file() else []
-    code = code_version()
-    kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)
-    return estimate(study, plan, open_all(study), workers, kept)
-
-
-def _words(sizes: Estimate) -> str:
-    return (
-        f"{sizes.cells} cells, at most {sizes.kept} kept from the last run; {sizes.renders} to render\n"
-        f"about {duration(sizes.seconds)} with {sizes.workers} workers, at most {sizes.bytes / 1e9:.1f} GB of memory; "
-        "renders and cells that exist already are counted too"
-    )
 
 
 @contextmanager

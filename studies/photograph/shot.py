@@ -15,12 +15,12 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import film_size
-from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, Spectrum, fine_bands
+from render.spectrum import RENDER_BAND_NM, Floats, Spectrum, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
-from rodcone.memory import memory, require_memory
+from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
 from sensor.capture import capture
 from sensor.config import SensorConfig, check_frame
@@ -34,6 +34,7 @@ from sensor.shake import held_lens
 from studies.metrics.target_figures import EDGE
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.ready_light import Ready, find_ready
+from studies.study.cost import Picture
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
@@ -53,6 +54,7 @@ from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
+_AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
 _DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
 
 
@@ -161,6 +163,31 @@ class Taken:
     notes: tuple[str, ...]
 
 
+@dataclass(frozen=True)
+class Checked:
+    """An order that can be carried out.
+
+    Attributes
+    ----------
+    order : Order
+    sensor : SensorConfig
+    opened : SceneFile or None
+        None for a stored radiance.
+    exposure_s : float or None
+        None by a rule.
+    ready : Ready or None
+        Light that is there already.
+    cost : Picture
+    """
+
+    order: Order
+    sensor: SensorConfig
+    opened: SceneFile | None
+    exposure_s: float | None
+    ready: Ready | None
+    cost: Picture
+
+
 def take(order: Order, step: Step | None = None) -> Taken:
     """Photograph and write; a negative that not every converter develops gets ``NAME_bayer.dng`` beside it.
 
@@ -177,13 +204,19 @@ def take(order: Order, step: Step | None = None) -> Taken:
     OSError
         Where the folder can't be written.
     """
-    with kept_beside(Path(order.out)) as kept:
-        return _taken(order, step, kept)
+    return carry_out(check(order), step)
 
 
-def _taken(order: Order, step: Step | None, kept: Path) -> Taken:
-    """Photograph and write as `take`, with a folder for the render meanwhile."""
-    sensor, opened, asked_s, ready = _check(order)
+def carry_out(checked: Checked, step: Step | None = None) -> Taken:
+    """Photograph what was checked, and write it; parameters and errors as of `take`."""
+    with kept_beside(Path(checked.order.out)) as kept:
+        return _taken(checked, step, kept)
+
+
+def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
+    """Photograph and write as `carry_out`, with a folder for the render meanwhile."""
+    order, sensor, opened, ready = checked.order, checked.sensor, checked.opened, checked.ready
+    require_memory(checked.cost.memory, order.force)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
 
     # what is looked at, and the light that the camera's colours are set to
@@ -228,7 +261,7 @@ def _taken(order: Order, step: Step | None, kept: Path) -> Taken:
         ]
     samples = _samples(order, opened, sensor)
     image = form_image(radiance, sensor, samples)
-    exposure_s, sensor = _exposure(order, asked_s, image, sensor)
+    exposure_s, sensor = _exposure(order, checked.exposure_s, image, sensor)
     subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
     device = draw_device(sensor, image.values.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
@@ -288,8 +321,7 @@ def _rendered(
     height, width = _size(order, opened)
     if step:
         step(render_words(np.inf), 0.0)
-    lamps = [spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items()]
-    bands = fine_bands(lamps, width_nm=RENDER_BAND_NM)
+    bands = _bands(opened, spectra)
     return render(
         opened.scene,
         (samples * height, samples * width),
@@ -300,6 +332,12 @@ def _rendered(
         cache=kept,
         progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
     )
+
+
+def _bands(opened: SceneFile, spectra: Mapping[str, Spectrum]) -> tuple[Floats, Floats]:
+    """Centres and widths of the bands in which a scene is rendered."""
+    lamps = [spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items()]
+    return fine_bands(lamps, width_nm=RENDER_BAND_NM)
 
 
 def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> Ready | None:
@@ -321,10 +359,13 @@ def _samples(order: Order, opened: SceneFile | None, sensor: SensorConfig) -> in
     return least_samples(sensor) if opened is not None and order.source == EDGE else 1
 
 
-def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, Ready | None]:
-    """Sensor, scene (None: a stored radiance), exposure time (None: by a rule) and light that is there already.
+def check(order: Order) -> Checked:
+    """Open what is to be photographed, and say what it costs; nothing is rendered.
 
-    Raises `InputError` for what can't be photographed.
+    Raises
+    ------
+    InputError
+        For what can't be photographed.
     """
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
@@ -352,17 +393,21 @@ def _check(order: Order) -> tuple[SensorConfig, SceneFile | None, float | None, 
                 "it was lit by, such as A; give one"
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
-        require_memory(memory(*extent_of(order.source)), order.force)
-        return sensor, None, exposure_s, None
+        pixels, bands, groups = extent_of(order.source)
+        cost = Picture((1, pixels), bands, groups, 0, _AFTER_S)
+        return Checked(order, sensor, None, exposure_s, None, cost)
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
-    ready = _ready(order, opened, asked_spectra(opened.scene, order.light))
-    height, width = ready.size if ready else _size(order, opened)
-    check_frame(sensor, (height, width))
-    bands = round((VISIBLE_NM[1] - VISIBLE_NM[0]) / RENDER_BAND_NM)
-    samples = _samples(order, opened, sensor)
-    require_memory(memory(samples**2 * height * width, bands, len(opened.scene.groups)), order.force)
-    return sensor, opened, exposure_s, ready
+    spectra = asked_spectra(opened.scene, order.light)
+    ready = _ready(order, opened, spectra)
+    size = ready.size if ready else _size(order, opened)
+    check_frame(sensor, size)
+    across = _samples(order, opened, sensor)
+    centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
+    spp = 0 if ready else order.spp or _SPP
+    rendered = (across * size[0], across * size[1])
+    cost = Picture(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
+    return Checked(order, sensor, opened, exposure_s, ready, cost)
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

@@ -15,9 +15,10 @@ from urllib.parse import urlsplit
 
 from rodcone.errors import InputError, one_line, read_errors
 from rodcone.jit import backend
+from studies.study.cost import cores
 from studies.sweep.provenance import versions
 from studies.sweep.run_cell import run_cell
-from studies.sweep.workers import Task, cores, run
+from studies.sweep.workers import Task, run
 
 PATIENCE_S = 30.0  # for scheduler and workers to answer
 

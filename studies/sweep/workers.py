@@ -19,6 +19,7 @@ from typing import Any, Protocol
 from rodcone.child_process import SAFE_PATH
 from rodcone.errors import InputError, require_whole
 from rodcone.jit import backend, dr
+from studies.study.cost import cores
 from studies.sweep.run_cell import run_cell
 
 MOST_WORKERS = 1024
@@ -68,11 +69,6 @@ class InThisProcess(Executor):
         except Exception as error:
             future.set_exception(error)
         return future
-
-
-def cores() -> int:
-    """Processor cores that this process may use."""
-    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def run(

@@ -12,6 +12,8 @@ import sweep_sample as SAMPLE
 from any_cpu.configurations import environment
 from command_line import call, check_refusals
 
+from studies.study.cost import render_seconds
+
 TEXT = """
 scenes = [{source = "scene.exr", light = "E"}]
 levels = ["1cd/m2", "25cd/m2"]
@@ -87,14 +89,15 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     command = ["sweep", str(study), "-o", str(out), "--dry-run", "--set", "seeds=[0, 1, 2]"]
     code, text, err = call(command)
     assert (code, err) == (0, "")
-    assert text.startswith("6 cells, at most 0 kept from the last run; 0 to render\nabout ")
+    assert text.startswith("6 cells, at most 0 kept from the last run; 0 to render; about ")
     assert not out.exists()
     still = ["--set", 'scenes=["still_life"]', "--set", "render.spp=64", "--json", "--workers", "2"]
     code, text, _ = call([*command, *still])
     facts = json.loads(text)
     assert (code, facts["cells"], facts["renders"], facts["workers"]) == (0, 6, 1, 2)
     more = json.loads(call([*command, *still, "--set", "render.spp=512"])[1])
-    assert more["seconds"] > 4 * facts["seconds"]
+    render_s = [render_seconds(256**2, 20, 1, spp) for spp in (64, 512)]
+    assert more["seconds"] - facts["seconds"] == pytest.approx(render_s[1] - render_s[0])
     larger = json.loads(call([*command, *still, "--set", "render.size=1024"])[1])
     fixed = 3 * 350e6 + 2**27  # this process and two workers, and a run of one light; the rest goes with the pixels
     assert larger["bytes"] - fixed == pytest.approx(16 * (facts["bytes"] - fixed), rel=1e-9)
@@ -104,7 +107,7 @@ def test_dry_run_counts_cells_of_this_code_alone_as_kept(study, tmp_path, monkey
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--json"]
     made = json.loads(call([*command, "--workers", "1", "--as-stated"])[1])["made"]
     assert json.loads(call([*command, "--dry-run"])[1])["kept"] == made > 0
-    monkeypatch.setattr("studies.commands.sweep.code_version", lambda: "0.2.0+other")
+    monkeypatch.setattr("studies.sweep.cost.code_version", lambda: "0.2.0+other")
     assert json.loads(call([*command, "--dry-run"])[1])["kept"] == 0
 
 

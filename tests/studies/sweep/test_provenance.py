@@ -19,6 +19,7 @@ from rodcone.jit import backend, dr
 from rodcone.llvm import LIBLLVM
 from studies.budget.ledger import Plan
 from studies.pages.report_sweep import sweep_report
+from studies.study.cost import cores
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.sweep import provenance
 from studies.sweep.database import add, open_results
@@ -27,7 +28,7 @@ from studies.sweep.provenance import ROOT, Provenance, code_version, deciding_mo
 from studies.sweep.row import Row
 from studies.sweep.run_cell import run_cell
 from studies.sweep.run_sweep import sweep
-from studies.sweep.workers import cores, run_in_processes
+from studies.sweep.workers import run_in_processes
 
 
 def inexact(plan: Plan) -> Plan:

@@ -1,0 +1,117 @@
+"""What a picture costs in time, memory and samples, before anything is computed.
+
+The numbers are processor seconds on a server's cores with AVX-512 (`benchmarks/bench_picture.py` prints them for
+another machine). What all cores share is divided by their number. Scenes differ: a chart's samples cost a third.
+"""
+
+import os
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from rodcone.memory import GB, Memory, memory
+from rodcone.progress import duration
+
+START_S = 1.3  # a process's imports
+_RENDER_S = 1.1e-6  # a pixel, sample and light group in 20 bands
+_PATHS = 0.7  # share of it that doesn't grow with the bands
+_COMPILE_S = 0.3  # a band, where no kernel is kept on disk
+PILOT_FROM, PILOT_SPP = 64, 32  # samples beyond which a pilot goes before
+KERNELS = Path.home() / ".drjit"
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A picture to make.
+
+    Attributes
+    ----------
+    size : (int, int)
+        Height and width in pixels; of a file, whose header isn't read yet, 1 and their number.
+    bands, groups : int
+        Bands and light groups.
+    spp : float or None
+        Samples per pixel of the render, at most; 0 where the light is there already, None where a render goes on until
+        it reaches an error.
+    after_s : float
+        Processor seconds per pixel and band of what follows the light.
+    denoised : bool
+    max_seconds : float, optional
+        Time of the render, at most.
+    """
+
+    size: tuple[int, int]
+    bands: int
+    groups: int
+    spp: float | None
+    after_s: float
+    denoised: bool = False
+    max_seconds: float | None = None
+
+    @property
+    def pixels(self) -> int:
+        """Number of pixels."""
+        return self.size[0] * self.size[1]
+
+    @property
+    def memory(self) -> Memory:
+        """Memory at the peak."""
+        return memory(self.pixels, self.bands, self.groups if self.spp != 0 else 1, denoised=self.denoised)
+
+    @property
+    def seconds(self) -> float:
+        """Time on this machine's cores, if they are idle; of a render until an error, for 64 samples."""
+        spp = PILOT_FROM if self.spp is None else self.spp
+        render = render_seconds(self.pixels, self.bands, self.groups, spp) * (1.5 if self.denoised else 1.0)
+        render = min(render, self.max_seconds or render)
+        compiled = _COMPILE_S * self.bands if spp and not kernels_kept() else 0.0
+        return START_S + compiled + render + self.after_s * self.pixels * self.bands
+
+    def facts(self) -> dict[str, Any]:
+        """What ``--dry-run --json`` prints."""
+        values = {"size": list(self.size), "bands": self.bands, "samples_per_pixel": self.spp}
+        half = {"half_samples_seconds": self._fewer().seconds, "half_size_seconds": self._smaller().seconds}
+        return values | {"seconds": self.seconds, "bytes": self.memory.total} | half
+
+    def words(self) -> str:
+        """One line: time, memory and samples, and what half of it would take."""
+        height, width = self.size
+        samples = f", {self.spp:g} samples per pixel" if self.spp else ""
+        light = ", its light is there already" if self.spp == 0 else f"{samples}, {self.bands} bands"
+        time = f"about {duration(self.seconds)}"
+        if self.spp is None:
+            time = f"about {duration(self.seconds)} for each 64 samples per pixel until the error is reached"
+        small = self._smaller()
+        halves = [f"at half the size {duration(small.seconds)} and {_gigabytes(small.memory)}"]
+        if self.spp and self.spp > 1:
+            halves.insert(0, f"with half the samples {duration(self._fewer().seconds)}")
+        pixels = f"{height} x {width} pixels" if height > 1 else f"{self.pixels / 1e6:.2g} million pixels"
+        return f"{time}, {_gigabytes(self.memory)}: {pixels}{light}; {', '.join(halves)}"
+
+    def _fewer(self) -> "Picture":
+        return self if self.spp is None else replace(self, spp=self.spp / 2)
+
+    def _smaller(self) -> "Picture":
+        height, width = self.size
+        return replace(self, size=(height // 2, width // 2) if height > 1 else (1, width // 4))
+
+
+def render_seconds(pixels: int, bands: int, groups: int, spp: float) -> float:
+    """Time of a render on this machine's cores."""
+    samples = spp + (PILOT_SPP if spp > PILOT_FROM else 0)
+    each_s = _RENDER_S * (_PATHS + (1 - _PATHS) * bands / 20)
+    return each_s * pixels * groups * samples / cores()
+
+
+def kernels_kept() -> bool:
+    """Whether an earlier run left compiled kernels on disk."""
+    return KERNELS.is_dir() and any(KERNELS.iterdir())
+
+
+def cores() -> int:
+    """Processor cores that this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _gigabytes(need: Memory) -> str:
+    return f"{need.total / GB:.1f} GB"

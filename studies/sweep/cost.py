@@ -1,0 +1,192 @@
+"""What a sweep will take: cells, time and memory, before anything is computed."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import prod
+from pathlib import Path
+from typing import Any
+
+from render.radiance_files.radiance_source import extent_of
+from render.reference import find_reference
+from rodcone.memory import memory
+from rodcone.progress import duration
+from studies.budget.ledger import Plan
+from studies.budget.starting_points import plan_from_settings, reference_plan
+from studies.study.cost import START_S, cores, render_seconds
+from studies.study.equal_area import sensor_shapes
+from studies.study.lit_scene import OpenedScene, film_of, open_all
+from studies.study.study import REFERENCE, SceneChoice, Study, conditions, mosaics
+from studies.sweep.database import FILE
+from studies.sweep.export import read_rows
+from studies.sweep.provenance import code_version
+
+# Processor seconds on a server's cores with AVX-512, by 16 cells of the demo in one process.
+_SHARED_S = 7e-7  # a pixel and band of each image that cells share
+_READ_S = 3e-7  # a pixel and band of a picture file
+_PILOT_S = 6.0  # a scene's pilot render and the effects that a plan weighs on it
+_LIVE_SPP = 64  # samples of the render that is compared with a reference
+_CELL_S = 5e-6, 0.03  # a pixel's capture, metrics and files, and a cell of any size
+_FRAME_S = 5e-7, 0.02  # the same of a raw frame and its truth
+# Development of a pixel, and what its first calls take in each process, by what a processor's name holds.
+_DEVELOP_S = (
+    (("bm3d", "park"), 4e-5, 2.0),
+    (("ple",), 5e-6, 2.2),
+    (("residual",), 3.5e-6, 0.3),
+    (("interleaved", "nlm"), 1.2e-6, 0.4),
+)
+_ANY_DEVELOP_S = 1e-6, 0.3
+_FIRST_S = 0.7  # first captures and metrics of a process
+_REPORT_S = 2.5, 0.05  # the report, and each cell in it
+_HALF_SIZE = 0.25  # pixels of half the size
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Sizes of a sweep.
+
+    Attributes
+    ----------
+    cells, kept, renders, workers : int
+        `kept` cells at most are in the results database from a run of this code; `renders` counts scenes, not files of
+        radiance.
+    seconds : float
+        With so many workers on this machine's cores, if they are idle; first calls, imports, metrics and the report
+        are counted, and renders and cells that exist already.
+    half_size_seconds, half_cells_seconds : float
+        The same at half the width and height, and with half the cells.
+    bytes : float
+        Memory of all processes together, at most.
+    largest_bytes : float
+        Memory of the process that needs most.
+    """
+
+    cells: int
+    kept: int
+    renders: int
+    workers: int
+    seconds: float
+    half_size_seconds: float
+    half_cells_seconds: float
+    bytes: float
+    largest_bytes: float
+
+    def words(self) -> str:
+        """Return what is made, then time and memory, and what half of it would take."""
+        return (
+            f"{self.cells} cells, at most {self.kept} kept from the last run; {self.renders} to render; about "
+            f"{duration(self.seconds)} with {self.workers} workers, at most {self.bytes / 1e9:.1f} GB of memory, what "
+            f"exists already counted too; at half the size {duration(self.half_size_seconds)}, with half the cells "
+            f"{duration(self.half_cells_seconds)}"
+        )
+
+    def facts(self) -> dict[str, Any]:
+        """Return the sizes by name."""
+        return vars(self)
+
+
+@dataclass(frozen=True)
+class _Part:
+    """One scene of a sweep: its pixels, bands, light groups and samples, 0 of a picture file."""
+
+    pixels: int
+    sensor_pixels: int
+    bands: int
+    groups: int
+    spp: float
+    denoised: bool = False
+
+
+def estimated(
+    study: Study, out: Path, workers: int, *, reference: bool = False, planned: bool = False, frames: bool = False
+) -> Estimate:
+    """Estimate a sweep into a folder; the study as stated is the most that a plan chooses.
+
+    Parameters
+    ----------
+    study : Study
+    out : Path
+    workers : int
+    reference : bool
+        Whether everything is modelled.
+    planned : bool
+        Whether the pilots of a plan go before.
+    frames : bool
+        Whether raw frames are all that is made, a cell for each mosaic, as of a data set.
+    """
+    everything = reference or study.budget.model == REFERENCE
+    plan = reference_plan(study) if everything else plan_from_settings(study)
+    rows = read_rows(out) if (out / FILE).is_file() else []
+    code = code_version()
+    kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)
+    return estimate(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
+
+
+def estimate(
+    study: Study,
+    plan: Plan,
+    scenes: Mapping[SceneChoice, OpenedScene],
+    workers: int,
+    kept: int,
+    *,
+    planned: bool = False,
+    frames: bool = False,
+) -> Estimate:
+    """Estimate a sweep of opened scenes, `kept` cells of which are there; others as of `estimated`."""
+    cells = len(conditions(study)) * len(study.seeds) * len(mosaics(study) if frames else study.processors)
+    parts = [_part(study, plan, opened) for opened in scenes.values()]
+    needs = [memory(part.pixels, part.bands, part.groups, workers, denoised=part.denoised) for part in parts]
+    at = partial(_seconds, study, parts, workers, planned, frames)
+    return Estimate(
+        cells=cells,
+        kept=kept,
+        renders=sum(part.spp > 0 for part in parts),
+        workers=workers,
+        seconds=at(cells, 1.0),
+        half_size_seconds=at(cells, _HALF_SIZE),
+        half_cells_seconds=at(cells / 2, 1.0),
+        bytes=max(need.total for need in needs),
+        largest_bytes=max(need.largest for need in needs),
+    )
+
+
+def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:
+    if opened.scene is None:
+        pixels, bands, groups = extent_of(opened.choice.source)
+        return _Part(pixels, pixels, bands, groups, 0)
+    model, pixels = plan.renders[opened.choice], opened.size[0] * opened.size[1]
+    shapes = {} if study.equal_area is None else sensor_shapes(study.equal_area, study.sensors, opened.size)
+    groups, bands = len(opened.scene.groups), len(model.wavelength_nm)
+    found = study.render.reference and find_reference(opened.scene, film_of(opened, model)) is not None
+    spp = _LIVE_SPP if found else model.spp
+    return _Part(pixels, max(pixels, *map(prod, shapes.values()), 0), bands, groups, spp, model.denoise)
+
+
+def _seconds(
+    study: Study, parts: Sequence[_Part], workers: int, planned: bool, frames: bool, cells: float, scale: float
+) -> float:
+    """Time of a sweep with a share `scale` of its pixels, on idle cores."""
+    own = [(0.0, 0.0)] if frames else [_develop_s(name) for name in study.processors]
+    pixel_s, least_s = _FRAME_S if frames else _CELL_S
+    report_s, of_cell_s = (0.0, 0.0) if frames else _REPORT_S
+    first_s = _FIRST_S + sum(costs[1] for costs in own)
+    images = len(study.sensors) * len(study.spectra) * len(mosaics(study))
+    seconds = START_S * (2 if workers > 1 else 1) + first_s * max(1.0, workers / cores()) + report_s
+    for part in parts:
+        pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale
+        light = render_seconds(1, part.bands, part.groups, part.spp) * pixels if part.spp else 0.0
+        light = min(light, study.render.max_seconds or light)
+        each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
+        at_once = max(1, min(workers, cores()))
+        seconds += light + pixels * part.bands * (_SHARED_S * images + _READ_S * (part.spp == 0))
+        seconds += cells / len(parts) * (each / at_once + of_cell_s) + _PILOT_S * planned
+    return seconds
+
+
+def _develop_s(processor: str) -> tuple[float, float]:
+    """Processor seconds of a pixel's development, and of the first calls in a process."""
+    for words, pixel_s, first_s in _DEVELOP_S:
+        if any(word in processor for word in words):
+            return pixel_s, first_s
+    return _ANY_DEVELOP_S

@@ -1,0 +1,119 @@
+"""What a command says that it will cost: closed forms of the estimate, and that nothing is computed before."""
+
+import json
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+import sweep_sample as SAMPLE
+from command_line import COST, call
+
+from rodcone.memory import memory
+from rodcone.progress import duration
+from studies.commands import cli, develop
+from studies.photograph import shot
+from studies.study import cost
+from studies.study.cost import START_S, Picture, render_seconds
+from studies.study.study_file import read_study
+from studies.sweep.cost import estimated
+
+PICTURE = Picture((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
+
+
+@pytest.fixture(autouse=True)
+def warm(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two cores, with kernels on disk."""
+    monkeypatch.setattr(cost, "kernels_kept", lambda: True)
+    monkeypatch.setattr(cost, "cores", lambda: 2)
+
+
+def test_a_renders_time_is_by_samples_pixels_and_paths_and_that_of_its_bands() -> None:
+    one = render_seconds(1000, 20, 1, 64)
+    assert one == pytest.approx(1.1e-6 * 1000 * 64 / 2)
+    assert render_seconds(2000, 20, 3, 32) == pytest.approx(3 * one)
+    assert render_seconds(1000, 40, 1, 64) == pytest.approx(1.3 * one), "paths are 0.7 of it at 20 bands"
+    assert render_seconds(1000, 20, 1, 128) == pytest.approx(2.5 * one), "a pilot of 32 samples goes before"
+
+
+def test_a_pictures_time_is_the_sum_of_its_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    after = 1e-7 * 60_000 * 20
+    assert PICTURE.seconds == pytest.approx(START_S + render_seconds(60_000, 20, 2, 64) + after)
+    assert replace(PICTURE, spp=0).seconds == pytest.approx(START_S + after)
+    assert replace(PICTURE, max_seconds=0.5).seconds == pytest.approx(START_S + 0.5 + after)
+    assert PICTURE.memory == memory(60_000, 20, 2)
+    warm = PICTURE.seconds
+    monkeypatch.setattr(cost, "kernels_kept", lambda: False)
+    assert PICTURE.seconds == pytest.approx(warm + 0.3 * 20)
+    assert replace(PICTURE, spp=0).seconds == pytest.approx(START_S + after), "no render is compiled"
+
+
+def test_its_line_says_time_memory_and_samples_and_half_of_it() -> None:
+    half, small = replace(PICTURE, spp=32), replace(PICTURE, size=(100, 150))
+    assert PICTURE.words() == (
+        f"about {duration(PICTURE.seconds)}, {PICTURE.memory.total / 1e9:.1f} GB: 200 x 300 pixels, 64 samples per "
+        f"pixel, 20 bands; with half the samples {duration(half.seconds)}, at half the size {duration(small.seconds)} "
+        f"and {small.memory.total / 1e9:.1f} GB"
+    )
+    assert PICTURE.facts()["half_samples_seconds"] == half.seconds
+    assert PICTURE.facts()["half_size_seconds"] == small.seconds
+    assert "its light is there already; at half" in replace(PICTURE, spp=0).words()
+    assert "for each 64 samples per pixel until the error is reached" in replace(PICTURE, spp=None).words()
+    assert "0.06 million pixels" in replace(PICTURE, size=(1, 60_000)).words()
+    assert [duration(seconds) for seconds in (99.0, 3600.0, 1e5, 2e5)] == ["99 s", "60 min", "27.8 h", "2 days"]
+
+
+def test_a_dry_run_computes_nothing_and_says_what_would_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(develop, "render_transport", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(shot, "render", lambda *_, **__: pytest.fail("rendered"))
+    code, out, err = call(["render", "still_life", "--width", "4000", "--spp", "4096", "-o", "a.exr", "--dry-run"])
+    assert (code, err, out.count("\n")) == (0, "", 1)
+    assert "4000 x 4000 pixels, 4096 samples per pixel" in out
+    facts = json.loads(call(["capture", "still_life", "--size", "64", "--spp", "8", "--dry-run", "--json"])[1])
+    assert (facts["size"], facts["samples_per_pixel"]) == ([64, 64], 8)
+    assert facts["half_samples_seconds"] < facts["seconds"]
+    code, out, _ = call(["expect", "low_noise", "--mosaic", "bayer", "--mosaic", "rgbw", "--dry-run"])
+    assert "2 cameras at 7 levels" in out
+    SAMPLE.picture(tmp_path / "scene.exr")
+    Path("study.toml").write_text('scenes = ["scene.exr"]\nlevels = ["1cd/m2"]\nprocessors = ["bayer"]\n', "utf-8")
+    for command in (["sweep", "study.toml"], ["dataset", "study.toml"]):
+        assert call([*command, "--dry-run"])[1].startswith(
+            "1 cells, at most 0 kept from the last run; 0 to render; about"
+        )
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["scene.exr", "study.toml"]
+
+
+def test_the_line_comes_before_all_else_and_memory_is_refused_after_it(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["render", "still_life", "--width", "30000", "--spp", "4096", "-o", "a.exr"])
+    first, second = capsys.readouterr().err.splitlines()
+    assert COST.match(f"{first}\n")
+    assert "30000 x 30000 pixels" in first
+    assert "days" in first
+    assert second.startswith("rodcone: memory: the run needs about")
+    assert stopped.value.code == cli.BAD_INPUT
+    assert "studies.commands.develop" in sys.modules
+
+
+def test_a_sweeps_time_counts_first_calls_of_each_process_metrics_and_the_report(tmp_path: Path) -> None:
+    SAMPLE.picture(tmp_path / "scene.exr")
+    text = 'scenes = ["{}"]\nlevels = ["1cd/m2"]\nprocessors = {}\nseeds = {}\n'
+
+    def seconds(processors: str, seeds: int, **options: bool) -> float:
+        path = tmp_path / "study.toml"
+        path.write_text(text.format(tmp_path / "scene.exr", processors, seeds), "utf-8")
+        return estimated(read_study(path), tmp_path / "out", 1, **options).seconds
+
+    one, more = seconds('["bayer"]', 1), seconds('["bayer"]', 101)
+    pixels = 16 * 20
+    assert more - one == pytest.approx(100 * (0.03 + 0.05 + pixels * (5e-6 + 1e-6)), rel=0.3), (
+        "a cell, and its place in the report"
+    )
+    assert one > START_S + 0.7 + 0.3 + 2.5
+    assert seconds('["ple_bayer"]', 1) - one > 1.5, "its tables"
+    assert seconds('["bayer"]', 1, planned=True) - one == pytest.approx(6.0)
+    assert seconds('["bayer"]', 1, frames=True) < one - 2.0, "neither developed nor reported"
