@@ -156,6 +156,11 @@ byId("save-png")?.addEventListener("click", () => {
   save("a_and_b.png", canvas.toDataURL("image/png"));
 });
 
+// A click elsewhere, or Escape, closes the menu.
+const menu = document.querySelector(".menu");
+document.addEventListener("pointerdown", (event) => menu.contains(event.target) || (menu.open = false));
+document.addEventListener("keydown", (event) => event.key === "Escape" && (menu.open = false));
+
 for (const part of all("[data-script]")) part.hidden = false;
 viewOfAddress();
 [byId("column").value, byId("row").value] = look;

@@ -83,7 +83,6 @@ function drawLead(of, place, metric) {
   const words = (step) => `${data.axes[of.along].values[step]}: ${found[step].outcome}, ${leadText(metric, found[step].lead)}`;
   chart.prepend(make("rect", band));
   chart.append(make("line", { class: "axis", x1: LEFT, x2: RIGHT, y1: up(0), y2: up(0) }),
-    make("text", { class: "tick", x: LEFT, y: HEIGHT - 5 }, "above 0 A is better; grey: not seen"),
     drawLine(0, xs, found.map((one) => (one.lead === null ? null : [one.lead, one.half])), words, up));
   return chart;
 }

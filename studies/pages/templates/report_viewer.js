@@ -105,6 +105,7 @@ async function drawPictures() {
 async function drawSide() {
   const values = [...range(lengths[of.compared]), TRUTH];
   const shown = await Promise.all(values.map(shownOf));
+  byId("side").style.setProperty("--across", Math.min(values.length, 6)); // the reference in the row of the others
   byId("side").replaceChildren(...values.map((value, index) => {
     const canvas = make("canvas", { role: "img", "aria-label": valueName(value) });
     const told = draw(canvas, shown[index]);

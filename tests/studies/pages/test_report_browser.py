@@ -97,7 +97,15 @@ def test_it_opens_with_the_wipe_at_512_pixels_where_something_is_seen(browser: A
     assert found["b"] == row_of(results, 2 * level + 1)
     box = page.evaluate("(({top, width}) => [top, width])(byId('stage').getBoundingClientRect())")
     assert box[1] == 512
-    assert box[0] < 400, "half of the window at most stands above the picture"
+    assert box[0] + 512 <= 800, "the whole picture is on the first screen"
+    ends = page.evaluate("all('.now > *').map((one) => one.getBoundingClientRect().bottom)")
+    assert len(ends) == 5
+    assert max(ends) - min(ends) < 12, "controls stand in one row"
+    page.click("[name=view][value=side]")
+    shown(page)
+    tops = page.evaluate("all('#side figure').map((one) => one.getBoundingClientRect().top)")
+    assert len(tops) > 2
+    assert max(tops) == min(tops), "the reference stands in the row of the others"
     assert page.evaluate("document.documentElement.scrollHeight") < 6 * 800
 
 
@@ -183,7 +191,11 @@ def test_fits_the_window(browser: Any, report: Path, axes: Path) -> None:
             CHROME.show(page, width=width, height=height, dark=dark)
             assert page.evaluate("document.documentElement.scrollWidth") <= width
             assert page.evaluate("byId('stage').getBoundingClientRect().width") == pytest.approx(wide, abs=2)
-    CHROME.show(page, width=390)
+    CHROME.show(page, width=390, height=844)
+    assert page.evaluate("document.documentElement.scrollHeight") <= 8 * 844
+    page.click(".menu summary")
+    box = page.evaluate("(({left, right}) => [left, right])(document.querySelector('.panel').getBoundingClientRect())")
+    assert 0 <= box[0] < box[1] <= 390
     hint = "getComputedStyle(document.querySelector('#verdicts .scroll'), '::before').content"
     assert "scrolls sideways" in page.evaluate(hint)
     CHROME.show(page, width=2560)
@@ -323,8 +335,8 @@ def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows
     better = "[...document.querySelectorAll('#drawn figure')].map((one) => [one.dataset.metric, one.querySelector('small').textContent])"  # noqa: E501
     for key, words in page.evaluate(better):
         assert words == ("lower is better" if key in LOWER else "higher is better"), key
-    said = "[...document.querySelectorAll('#lead-chart text')].map((one) => one.textContent)"
-    assert "above 0 A is better; grey: not seen" in page.evaluate(said)
+    said = page.evaluate("document.querySelector('#lead figcaption').textContent")
+    assert said.endswith("above 0 A is better; grey: not seen"), "beside the chart: labels cross no curve"
     for percent, words in ((100, "Show B"), (0, "Show A")):
         pick(page, "byId('wiper')", percent)
         assert page.evaluate("byId('flip').textContent").startswith(words)
@@ -382,6 +394,7 @@ def test_wheel_and_double_click_enlarge_about_the_pointer_and_the_wipe_follows(b
 def test_what_is_shown_can_be_saved_as_numbers_and_as_a_picture(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     shown(page)
+    page.click(".menu summary")
     with page.expect_download() as saved:
         page.click("#save-csv")
     rows = list(csv.DictReader(Path(saved.value.path()).read_text("utf-8").splitlines()))
@@ -549,8 +562,15 @@ def test_everything_is_reached_by_keyboard_and_the_focus_is_seen(browser: Any, a
         focus = "document.activeElement"
         reached.append(page.evaluate(f"{focus}.id || {focus}.name || {focus}.className"))
         assert page.evaluate("getComputedStyle(document.activeElement).outlineStyle") != "none", reached[-1]
-    order = ["level", "a", "b", "view", "show", "wiper", "flip", "column", "row"]
+    order = ["level", "a", "b", "view", "wiper", "flip", "column", "row"]
     assert [name for name in reached if name in order] == order
+    # The rest lies in the menu, which opens by keyboard too, and Escape closes it.
+    page.evaluate("document.querySelector('.menu summary').focus()")
+    page.keyboard.press("Enter")
+    page.keyboard.press("Tab")
+    assert page.evaluate("document.activeElement.closest('.panel') !== null")
+    page.keyboard.press("Escape")
+    assert page.evaluate("document.querySelector('.menu').open") is False
 
 
 @pytest.mark.thorough
