@@ -13,6 +13,7 @@ from functools import lru_cache
 import numpy as np
 import scipy
 from numpy.typing import NDArray
+from threadpoolctl import ThreadpoolController
 
 from isp.anscombe import stabilise_raw, unstabilise, without_prnu
 from isp.settings import Reconstruction
@@ -80,11 +81,13 @@ def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORR
     height, width = values.shape
     count, scales = len(channels(tile)), (*deviation.tolist(), correlation)
     estimate, noise_gain = np.empty((count, height, width)), np.empty((count, height, width))
+    blas = ThreadpoolController()
     for rows in _alike(height, len(tile)):
         for columns in _alike(width, len(tile[0])):
             first = rows.start, columns.start
             down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
-            weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
+            with blas.limit(limits=1, user_api="blas"):  # of BLAS: on a busy machine several wait for each other
+                weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
             total = np.zeros((count, len(range(height)[rows]), len(range(width)[columns])))
             for number, (i, j) in enumerate(np.ndindex(down[1] - down[0], across[1] - across[0])):
                 samples = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]

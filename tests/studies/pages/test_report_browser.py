@@ -580,7 +580,8 @@ def test_print_holds_every_level_and_no_control(browser: Any, axes: Path) -> Non
     CHROME.show(page, width=720, medium="print")
     visible = "[...document.querySelectorAll('%s')].filter((one) => one.checkVisibility()).length"
     assert page.evaluate(visible % "input, select, button") == 0
-    assert page.evaluate(visible % ".sheet img") == 12
+    assert page.evaluate(visible % ".sheet [data-cell] img") == 12
+    assert page.evaluate(visible % ".sheet [data-truth]") == 1
     tops = page.evaluate("[...document.querySelectorAll('.sheet')].map((sheet) => new Set([...sheet.children].map("
                       "(item) => item.getBoundingClientRect().top)).size)")  # fmt: skip
     assert tops == [1, 1], "the levels of a contact sheet stand in one row"
