@@ -26,7 +26,7 @@ from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture
 from studies.photograph.ready_light import BANDS, find_ready
 from studies.photograph.shot import Order, carry_out, check
-from studies.study.cost import Picture
+from studies.study.cost import PictureCost
 from studies.study.lit_scene import asked_spectra
 from studies.study.render_facts import render_facts
 from studies.study.scene_source import asked_level, asked_size, open_scene
@@ -253,7 +253,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
         if ready
         else (bands or fine_bands(lamps, width_nm=RENDER_BAND_NM))
     )
-    cost = Picture(
+    cost = PictureCost(
         size,
         wavelength_nm.size,
         len(scene.groups),

@@ -34,7 +34,7 @@ from sensor.shake import held_lens
 from studies.metrics.target_figures import EDGE
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.ready_light import Ready, find_ready
-from studies.study.cost import Picture
+from studies.study.cost import PictureCost
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
@@ -177,7 +177,7 @@ class Checked:
         None by a rule.
     ready : Ready or None
         Light that is there already.
-    cost : Picture
+    cost : PictureCost
     """
 
     order: Order
@@ -185,7 +185,7 @@ class Checked:
     opened: SceneFile | None
     exposure_s: float | None
     ready: Ready | None
-    cost: Picture
+    cost: PictureCost
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
@@ -394,7 +394,7 @@ def check(order: Order) -> Checked:
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
-        cost = Picture((1, pixels), bands, groups, 0, _AFTER_S)
+        cost = PictureCost((1, pixels), bands, groups, 0, _AFTER_S)
         return Checked(order, sensor, None, exposure_s, None, cost)
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
@@ -406,7 +406,7 @@ def check(order: Order) -> Checked:
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
     spp = 0 if ready else order.spp or _SPP
     rendered = (across * size[0], across * size[1])
-    cost = Picture(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
+    cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
     return Checked(order, sensor, opened, exposure_s, ready, cost)
 
 

@@ -21,8 +21,8 @@ KERNELS = Path.home() / ".drjit"
 
 
 @dataclass(frozen=True)
-class Picture:
-    """A picture to make.
+class PictureCost:
+    """What a picture costs that is to be made.
 
     Attributes
     ----------
@@ -88,10 +88,10 @@ class Picture:
         pixels = f"{height} x {width} pixels" if height > 1 else f"{self.pixels / 1e6:.2g} million pixels"
         return f"{time}, {_gigabytes(self.memory)}: {pixels}{light}; {', '.join(halves)}"
 
-    def _fewer(self) -> "Picture":
+    def _fewer(self) -> "PictureCost":
         return self if self.spp is None else replace(self, spp=self.spp / 2)
 
-    def _smaller(self) -> "Picture":
+    def _smaller(self) -> "PictureCost":
         height, width = self.size
         return replace(self, size=(height // 2, width // 2) if height > 1 else (1, width // 4))
 

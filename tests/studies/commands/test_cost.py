@@ -14,11 +14,11 @@ from rodcone.progress import duration
 from studies.commands import cli, develop
 from studies.photograph import shot
 from studies.study import cost
-from studies.study.cost import START_S, Picture, render_seconds
+from studies.study.cost import START_S, PictureCost, render_seconds
 from studies.study.study_file import read_study
 from studies.sweep.cost import estimated
 
-PICTURE = Picture((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
+PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
 
 @pytest.fixture(autouse=True)
