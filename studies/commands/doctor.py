@@ -63,6 +63,7 @@ def findings() -> tuple[Finding, ...]:
     others = intruders(home)
     packages = [package_finding(name, home, others.get(name)) for name in PACKAGES]
     wrong = [finding for finding in packages if not finding.ok]
+    beside = [finding for name in PACKAGES for finding in file_findings(name)]
     places = wrong or [Finding("packages", f"{', '.join(PACKAGES)}: rodcone's own, in {home}")]
     unknown = Finding("engine", "not imported: a package named below is not rodcone's own", False)
     return (
@@ -75,7 +76,15 @@ def findings() -> tuple[Finding, ...]:
         distribution_finding(LLVM_WHEEL, needed=False),
         *map(extra_finding, EXTRAS),
         *places,
+        *beside,
     )
+
+
+def file_findings(name: str) -> list[Finding]:
+    """A file of this folder that has the name of a package: a script beside it would import the file in its place."""
+    path = Path.cwd() / f"{name}.py"
+    words = f"{path} would stand in the place of rodcone's package {name} for every script beside it; rename it"
+    return [Finding(f"file {path.name}", words, False)] if path.is_file() else []
 
 
 def distribution_finding(name: str, *, needed: bool = True) -> Finding:

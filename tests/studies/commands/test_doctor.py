@@ -7,7 +7,7 @@ from importlib.machinery import ModuleSpec
 from pathlib import Path
 
 import pytest
-from command_line import call, in_new_python
+from command_line import call, in_new_python, new_python
 
 from rodcone import jit, llvm
 from studies.commands import doctor
@@ -29,6 +29,19 @@ def test_every_row_is_there_and_this_environment_is_sound() -> None:
     assert all(each.ok for each in found), [each for each in found if not each.ok]
     assert rows["backend"].value.split(":")[0] == jit.backend()
     assert int(rows["Dr.Jit threads"].value) == jit.dr.thread_count()
+
+
+def test_a_file_with_a_packages_name_is_named_by_the_doctor_and_by_the_import(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "sensor.py").write_text("x = 1\n", "utf-8")
+    monkeypatch.chdir(tmp_path)
+    (found,) = [each for each in doctor.findings() if not each.ok]
+    assert found.name == "file sensor.py"
+    assert str(tmp_path / "sensor.py") in found.value
+    done = new_python("import rodcone\nrodcone.capture", folder=tmp_path)
+    (last,) = done.stderr.splitlines()[-1:]
+    assert last.startswith(f"ImportError: rodcone: {tmp_path / 'sensor.py'} stands in the place of rodcone's package")
 
 
 def test_threads_are_those_that_this_process_may_use_of_the_machines(monkeypatch: pytest.MonkeyPatch) -> None:
