@@ -4,15 +4,12 @@ A name is imported from its module when it is asked for, so that `import rodcone
 Mitsuba nor Dr.Jit. It only chooses the LLVM library that Dr.Jit will load: import rodcone before `mitsuba` or `drjit`.
 """
 
-import sys as _sys
 import tomllib
-from importlib import import_module
 from pathlib import Path as _Path
-from types import ModuleType as _ModuleType
 from typing import Any
 
 from rodcone import llvm as _llvm  # noqa: F401  (run for its effect: it names the LLVM library to Dr.Jit)
-from rodcone.doors import door
+from rodcone.doors import door, imported
 
 # Public name: module and attribute. Its strings are the one exemption from the layers (rodcone is the ground that
 # the other packages stand on): import-linter sees no imports here, since nothing is imported until a user asks.
@@ -30,24 +27,9 @@ def __getattr__(name: str) -> Any:
     if name not in _PUBLIC:
         raise AttributeError(f"module 'rodcone' has no attribute {name!r}")
     module, attribute = _PUBLIC[name]
-    value = getattr(_imported(module), attribute)
+    value = getattr(imported(module), attribute)
     globals()[name] = value if isinstance(value, type) else door(name, value)
     return globals()[name]
-
-
-def _imported(module: str) -> _ModuleType:
-    """Import a module; where a file of the user's has the name of a package of ours, name the file."""
-    try:
-        return import_module(module)
-    except ModuleNotFoundError as error:
-        package = str(error.name).partition(".")[0]
-        file = getattr(_sys.modules.get(package), "__file__", None)
-        if "." not in str(error.name) or file is None or _Path(file).name == "__init__.py":
-            raise
-        raise ImportError(
-            f"rodcone: {file} stands in the place of rodcone's package {package}; allowed: a file of another name "
-            "beside your script; rename it"
-        ) from None
 
 
 def __dir__() -> list[str]:

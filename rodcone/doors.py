@@ -5,6 +5,7 @@ given. One table says what a parameter may be, whichever function it belongs to.
 points up by strings, which are imported when they are needed.
 """
 
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
@@ -13,7 +14,7 @@ from math import inf
 from numbers import Integral
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType
+from types import MappingProxyType, ModuleType
 from typing import Any, TypeVar, cast
 
 from rodcone.errors import InputError, require_kind, require_range
@@ -26,7 +27,22 @@ Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives 
 def at(place: str) -> Any:
     """Object at ``module:name``."""
     module, _, name = place.partition(":")
-    return getattr(import_module(module), name)
+    return getattr(imported(module), name)
+
+
+def imported(module: str) -> ModuleType:
+    """Import a module; where a file of the user's has the name of a package of ours, name the file."""
+    try:
+        return import_module(module)
+    except ModuleNotFoundError as error:
+        package = str(error.name).partition(".")[0]
+        file = getattr(sys.modules.get(package), "__file__", None)
+        if "." not in str(error.name) or file is None or Path(file).name == "__init__.py":
+            raise
+        raise ImportError(
+            f"rodcone: {file} stands in the place of rodcone's package {package}; allowed: a file of another name "
+            "beside your script; rename it"
+        ) from None
 
 
 def _value(kind: str, fix: str, by_name: str = "") -> Check:

@@ -19,7 +19,6 @@ from scenes.catalog import load
 from studies.budget.pilot import make_pilot
 from studies.budget.plan import plan
 from studies.budget.starting_points import plan_from_settings
-from studies.commands.sweep import estimate
 from studies.study.equal_area import EqualArea, area_average
 from studies.study.lit_scene import (
     digest_scene,
@@ -32,6 +31,7 @@ from studies.study.lit_scene import (
 )
 from studies.study.scene_source import file_white, open_radiance_file
 from studies.study.study import OWN, RenderLimits, SceneChoice, Study
+from studies.sweep.cost import estimate
 
 NM = np.arange(385.0, 780.0, 10.0)
 STUDY = Study((SceneChoice("still_life"),), ("25cd/m2",))
