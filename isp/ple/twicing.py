@@ -30,6 +30,7 @@ REACH = 4  # cells on each side of one
 SURE = 1.5  # chi^2 up to which nothing is added: at 1 hues are a little nearer, and black has coloured clouds
 ALIKE = 1.0  # between cells of one colour [units of a sample's noise]
 TOGETHER = 16  # rows of cells that are worked on together
+LAMP_SIGMAS = 6.0  # root of a cell's summed squares, beyond which no even surface lies there
 _LEAST = np.float32(1e-12)
 
 
@@ -52,16 +53,24 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
         return
     sites = channel_map(raw.cfa, raw.shape)[..., None] == np.array(names)
     sites &= ~raw.saturated[..., None]
-    of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
-    mean, like = _sums(planes) / of_cell, _sums(stable) / of_cell
-    count = _sums(sites.astype(np.float32))
-    residual = _sums(np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0)))
     laws = [raw.noise_of(name) for name in names]
     shot, dark = (
         np.array(values, np.float32) for values in zip(*((x.shot, x.dark_noise_e**2) for x in laws), strict=True)
     )
+
+    def variance_of(light: Singles) -> Singles:
+        return np.asarray(shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
+
+    off = np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0))
+    count, residual = _sums(sites), _sums(off)
+    of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
+    mean, like = _sums(planes) / of_cell, _sums(stable) / of_cell
     light = np.maximum(mean, 0.0)
-    variance = count * (shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
+    # Where a channel's residuals differ by more than noise lies no surface but a lamp, whose light they would spread.
+    spread = _sums(off * off) - residual**2 / np.maximum(count, 1.0)
+    surface = np.all(spread < LAMP_SIGMAS**2 * variance_of(light), axis=-1, keepdims=True)
+    count, residual = count * surface, residual * surface
+    variance = count * variance_of(light)
 
     sides = ((REACH, REACH), (REACH, REACH), (0, 0))
     wide = [np.pad(values, sides, mode="symmetric") for values in (like, residual, count, variance)]
@@ -75,6 +84,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
 
     with ThreadPoolExecutor(cpu_count()) as threads:
         list(threads.map(strip, range(0, len(mean), TOGETHER)))
+    bias *= surface
     for c in colours:
         by_pixel = np.repeat(np.repeat(bias[..., c], CELL, axis=0), CELL, axis=1)
         added = uniform_filter(by_pixel, 2 * CELL - 1)[: raw.shape[0], : raw.shape[1]]

@@ -90,10 +90,12 @@ def test_a_lamp_lights_its_own_pixels_and_their_neighbours(size):
 
     Lit is what is over a fifth of the lamp, shown up to six times the field; (h + 2) (w + 2) pixels at most. A hole is
     a pixel of the lamp under a fifth of its rim. When rims had the colours' mean share 37 of 432 in 1 e- of green were
-    larger, up to 11 x 7 for 5 x 1, and 18 had a hole. Blue lamps, dark in W, keep three of 864.
+    larger, up to 11 x 7 for 5 x 1, and 18 had a hole. Blue lamps, dark in W, keep three of 864. Of sodium lamps of 30
+    e- in 1 e- of green one of 8 may keep a hole, where a blue site in it counts 1 e- (docs/decisions/0057): 3 of 44 do.
     """
     white = np.array([0.5, 1.0, 0.5, 4.8])
     colours = {"white": white, "sodium": np.array([0.55, 1.0, 0.03, 3.0]), "blue": np.array([0.05, 0.3, 1.5, 2.0])}
+    dim_holes = 0
     for (name, colour), lamp_e, field_e in product(colours.items(), (30.0, 300.0, 6000.0), (1.0, 20.0)):
         for height, width in {size, size[::-1]}:
             rng, shape = np.random.default_rng(0), (2 * APART, 2 * APART)
@@ -117,4 +119,8 @@ def test_a_lamp_lights_its_own_pixels_and_their_neighbours(size):
                     assert (around > dark + 0.2 * (lamp - dark)).sum() <= (height + 2) * (width + 2), case
                 inside, rim = around[12:-12, 12:-12].min(), around[11:-11, 11:-11].copy()
                 rim[1:-1, 1:-1] = 0.0
-                assert inside > 0.2 * rim.max() or name == "blue", case
+                if (name, lamp_e, field_e) == ("sodium", 30.0, 1.0):
+                    dim_holes += int(inside <= 0.2 * rim.max())
+                else:
+                    assert inside > 0.2 * rim.max() or name == "blue", case
+    assert dim_holes <= 1

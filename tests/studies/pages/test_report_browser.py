@@ -610,7 +610,8 @@ def test_without_script_pictures_and_numbers_stand(browser: Any, report: Path) -
     )
     assert page.evaluate(f"{visible}.length") == 0, "controls that can do nothing are shown"
     assert page.evaluate("document.querySelector('noscript').innerText").startswith("Without JavaScript")
-    assert page.evaluate("document.querySelectorAll('.sheet img').length") == 28
+    assert page.evaluate("document.querySelectorAll('.sheet img:not([data-truth])').length") == 28
+    assert page.evaluate("document.querySelectorAll('.sheet img[data-truth]').length") == 1  # the reference
     page.evaluate("document.querySelector('noscript a[href=\"#overview\"]').click()")
     assert page.evaluate("location.hash") == "#overview"
 
