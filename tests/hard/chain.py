@@ -58,7 +58,9 @@ def expected(situation: Situation) -> Image:
         return np.minimum(
             expected_electrons(form_image(radiance, sensor, samples), sensor, situation.exposure_s), MOST_E
         )
-    weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, situation.exposure_s)
+    weights = electrons_per_irradiance(
+        sensor, radiance.wavelength_nm, radiance.widths_nm, situation.exposure_s, radiance.light
+    )
     if samples > 1 or spreads(sensor.lens):
         electrons = expected_electrons_single(form_image(radiance, sensor, samples).values, weights, sensor)
     else:
