@@ -43,7 +43,14 @@ def levelled(raw: RawImage, neutral: Floats) -> RawImage:
 
 
 def site_gains(raw: RawImage, neutral: Floats) -> Floats:
-    """Factor on the electrons of each site of the tile, (row, column): the channel's mean over what the site reads."""
-    mixing = raw.site_mixing
-    mean = np.array([[neutral[raw.channels.index(name)] for name in row] for row in raw.cfa])
-    return np.asarray(mean / (mixing @ unmixed(raw.channel_mixing, neutral)))
+    """Factor on the electrons of each site of the tile, (row, column): the channel's mean over what the site reads.
+
+    Both are of the same unmixed neutral: where crosstalk can't be undone (at 25 % no charge stays), sites of a channel
+    that have the same neighbours still read the same.
+    """
+    reads = np.asarray(raw.site_mixing @ unmixed(raw.channel_mixing, neutral))
+    letters = np.array([list(row) for row in raw.cfa])
+    mean = np.zeros_like(reads)
+    for name in raw.channels:
+        mean[letters == name] = reads[letters == name].mean()
+    return np.asarray(mean / reads)

@@ -134,7 +134,7 @@ PIXEL_CASES = (
         "one hot pixel, listed, in the dark",
         lambda: Situation(even(0.0), _pixel(**(HOT | {"hot_pixel_share": 2.5e-4}))),
     ),
-    Case("crosstalk_25", "all charge goes to the neighbours", lambda: _seen(100.0, _pixel(crosstalk=0.25))),
+    Case("crosstalk_25", "all charge goes to the neighbours", lambda: _seen(200.0, _pixel(crosstalk=0.25))),
     Case("bits_1", "a converter of 1 bit, 3000 e⁻ a pixel", lambda: _seen(3e3, replace(low_noise(), bits=1))),
     Case(
         "bits_16_well_100",

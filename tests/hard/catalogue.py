@@ -36,6 +36,10 @@ _COARSE = "a step of 3922 e⁻ hides 1000 e⁻: without noise as wide as a step,
 _NEUTRAL = (
     "light of unknown colour at an edge is drawn neutral, and a neutral of this balance is 10^6 times one channel"
 )
+_GUIDE = (
+    "a sample is read as W by its channel's share of the light around, shrunk towards neutral by the share's error; an "
+    "even light whose channels are far from W's own shares keeps 2 to 7 % of that"
+)
 _TILES = (
     "what a channel reads of W's light is known by tiles of the mosaic, which begin at the frame's first row and "
     "column; in a frame of an odd length they lie elsewhere once it is mirrored"
@@ -55,8 +59,9 @@ LIMITS: Mapping[tuple[str, str], str] = MappingProxyType(
             OWN,
         ): "similarity of noisy samples takes those that noise raised alike together: 0.5 % of a sample's "
         "noise in W at 6 e⁻; from 10 e⁻ a pixel on under 0.1 %, which 48 frames don't tell from none",
-        ("sigma_s_0.001_dark", "pictures unbiased"): "light between a channel's samples is drawn neutral; in planes "
-        "that nothing smooths noise lies there",
+        ("red_alone", "pictures unbiased"): _GUIDE,
+        ("crosstalk_25", "pictures unbiased"): _GUIDE,
+        ("balance_1e6", "pictures unbiased"): _GUIDE,
         ("balance_1e6", "bounded"): _NEUTRAL,
         ("largest_number", "linear"): "the readout holds means at 1e30 e⁻, over any well",
         (
