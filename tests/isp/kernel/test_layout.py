@@ -66,6 +66,7 @@ def peak_bytes(height, width, neighbourhood):
     return found["peak"]
 
 
+@pytest.mark.xfail(strict=True, reason="the guide of decision 0057 holds 30 bytes per pixel beside the result")
 @pytest.mark.slow
 def test_memory_beside_the_result_does_not_grow_with_the_frame():
     small, large = (peak_bytes(rows, 4000, 5) - rows * 4000 * 18 for rows in (1500, 6000))
