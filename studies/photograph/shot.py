@@ -177,6 +177,8 @@ class Checked:
         None by a rule.
     ready : Ready or None
         Light that is there already.
+    samples : int
+        Samples of the light along each side of a pixel.
     cost : PictureCost
     """
 
@@ -185,6 +187,7 @@ class Checked:
     opened: SceneFile | None
     exposure_s: float | None
     ready: Ready | None
+    samples: int
     cost: PictureCost
 
 
@@ -246,7 +249,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         if ready:
             transport, notes = ready.transport, [*notes, ready.line]
         else:
-            transport = _rendered(order, opened, spectra, step, kept=kept, samples=_samples(order, opened, sensor))
+            transport = _rendered(order, opened, spectra, step, kept=kept, samples=checked.samples)
             notes += filter(None, [compile_note(transport.compile_s)])
 
     # The exposure.
@@ -259,7 +262,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
             f"level: {order.level} is the mean of what is no lamp; with the lamps in view the picture's is "
             f"{luminance_cd_m2:.3g} cd/m2"
         ]
-    samples = _samples(order, opened, sensor)
+    samples = checked.samples
     image = form_image(radiance, sensor, samples)
     exposure_s, sensor = _exposure(order, checked.exposure_s, image, sensor)
     subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
@@ -354,11 +357,6 @@ def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float
     return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s))
 
 
-def _samples(order: Order, opened: SceneFile | None, sensor: SensorConfig) -> int:
-    """Samples of the light along each side of a pixel: more than one where the scene measures sharpness."""
-    return least_samples(sensor) if opened is not None and order.source == EDGE else 1
-
-
 def check(order: Order) -> Checked:
     """Open what is to be photographed, and say what it costs; nothing is rendered.
 
@@ -395,19 +393,20 @@ def check(order: Order) -> Checked:
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
         cost = PictureCost((1, pixels), bands, groups, 0, _AFTER_S)
-        return Checked(order, sensor, None, exposure_s, None, cost)
+        return Checked(order, sensor, None, exposure_s, None, 1, cost)
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
-    ready = _ready(order, opened, spectra)
+    # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
+    samples = least_samples(sensor) if order.source == EDGE else 1
+    ready = _ready(order, opened, spectra) if samples == 1 else None
     size = ready.size if ready else _size(order, opened)
     check_frame(sensor, size)
-    across = _samples(order, opened, sensor)
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
     spp = 0 if ready else order.spp or _SPP
-    rendered = (across * size[0], across * size[1])
+    rendered = (samples * size[0], samples * size[1])
     cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
-    return Checked(order, sensor, opened, exposure_s, ready, cost)
+    return Checked(order, sensor, opened, exposure_s, ready, samples, cost)
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

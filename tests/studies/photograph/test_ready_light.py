@@ -62,6 +62,17 @@ def test_a_smaller_size_is_the_mean_over_blocks_with_the_samples_of_all() -> Non
     assert half.relight().luminance().mean() == pytest.approx(whole.relight().luminance().mean(), rel=1e-5)
 
 
+def test_a_scene_that_measures_sharpness_is_rendered_within_its_pixels_whatever_light_is_there(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    scene = load("color_checker")
+    ready = find_ready(scene, scene.size, None, [group.spectrum for group in scene.groups.values()])
+    monkeypatch.setattr(shot, "find_ready", lambda *_: ready)  # as if `rodcone reference slanted_edge` had been run
+    edge, chart = (shot.check(shot.Order(name, height=32, width=32)) for name in ("slanted_edge", "color_checker"))
+    assert (edge.ready, edge.samples, edge.cost.size) == (None, 2, (64, 64))
+    assert (chart.ready, chart.samples) == (ready, 1)
+
+
 def test_a_size_that_no_file_is_a_multiple_of_and_a_lamp_of_lines_ask_for_a_render() -> None:
     scene = load("color_checker")
     own = [group.spectrum for group in scene.groups.values()]
