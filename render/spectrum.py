@@ -345,8 +345,17 @@ def _observer_weights(nm: bytes, width_nm: bytes, light: tuple[bytes, bytes] | N
 
 def observer(wavelength_nm: Floats) -> Floats:
     """CIE 1931 x, y and z at wavelengths, shape (3, n)."""
-    curves = colour_matching_functions()
+    return at_wavelengths(colour_matching_functions(), wavelength_nm)
+
+
+def at_wavelengths(curves: Iterable[Spectrum], wavelength_nm: Floats) -> Floats:
+    """Values of curves at wavelengths, shape (curve, n); 0 beyond their ends."""
     return np.array([np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves])
+
+
+def per_joule(curves: Iterable[Spectrum], wavelength_nm: Floats) -> Floats:
+    """What responses per photon give per joule of light at wavelengths, shape (curve, n)."""
+    return at_wavelengths(curves, wavelength_nm) * photons_per_joule(wavelength_nm)
 
 
 def photons_per_joule(wavelength_nm: ArrayLike) -> Floats:

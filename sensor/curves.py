@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from types import MappingProxyType
 
@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from render.band_weights import band_weights
 from render.illuminants import illuminant
-from render.spectrum import ELECTRON_C, VISIBLE_NM, Floats, Spectrum, even_bands, photons_per_joule
+from render.spectrum import ELECTRON_C, VISIBLE_NM, Floats, Spectrum, even_bands, per_joule, photons_per_joule
 from rodcone.curve_file import read_columns
 from rodcone.display import Axes, brief, draw_curves
 from rodcone.doors import method
@@ -158,14 +158,9 @@ def electrons_from_neutral(responses: Responses, names: Sequence[str], light: Sp
     """
     require_keys("responses: channel", names, responses.curves)
     curves = [responses.curves[name] for name in names]
-
-    def seen(nm: Floats) -> Floats:
-        values = [np.interp(nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves]
-        return np.asarray(np.array(values) * photons_per_joule(nm))
-
     corners = np.concatenate([curve.wavelength_nm for curve in curves])
     one, width = even_bands(VISIBLE_NM, 1)
-    return band_weights(seen, corners, one, width, light)[:, 0]
+    return band_weights(partial(per_joule, curves), corners, one, width, light)[:, 0]
 
 
 def neutral_density(responses: Responses) -> Responses:

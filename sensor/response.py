@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.band_weights import band_weights
-from render.spectrum import VISIBLE_NM, Floats, Spectrum, photons_per_joule
+from render.spectrum import VISIBLE_NM, Floats, Spectrum, per_joule, photons_per_joule
 from rodcone.errors import InputError
 from sensor.cfa import channel_mixing, channels, check_covers, mask
 from sensor.config import SensorConfig
@@ -67,8 +67,7 @@ def electrons_per_irradiance(
 def _electrons_per_joule(curves: Sequence[Spectrum], window_nm: tuple[float, float], wavelength_nm: Floats) -> Floats:
     """Electrons of each curve per joule of light at wavelengths, shape (curve, n)."""
     inside = (wavelength_nm > window_nm[0]) & (wavelength_nm < window_nm[1])
-    responses = [np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves]
-    return np.asarray(np.array(responses) * photons_per_joule(wavelength_nm) * inside)
+    return np.asarray(per_joule(curves, wavelength_nm) * inside)
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ second differences of its transport over wavelength, over what the process expec
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +17,7 @@ from render.band_weights import Curves, band_covariance, band_weights, transport
 from render.bands.mixed_light import BandLight
 from render.error_estimates import spread_pixels
 from render.scene import LightGroup
-from render.spectrum import OBSERVER_NM, Spectrum, observer, photons_per_joule
+from render.spectrum import OBSERVER_NM, Spectrum, observer, per_joule
 from rodcone.types import Floats, Planes
 
 MOST_BAND_ERROR = 0.01  # of what the eye's x, y or z collects: a larger error of wide bands is said
@@ -135,12 +135,8 @@ def _observer_terms(nm: bytes, width_nm: bytes, light_nm: bytes, light: bytes) -
 
 def _of_photons(responses: Mapping[str, Spectrum]) -> tuple[Curves, Floats]:
     """Curves over energy of responses per photon, and their corners."""
-
-    def curves(nm: Floats) -> Floats:
-        values = [np.interp(nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in responses.values()]
-        return np.asarray(np.array(values) * photons_per_joule(nm))
-
-    return curves, np.concatenate([x.wavelength_nm for x in responses.values()])
+    curves = tuple(responses.values())
+    return partial(per_joule, curves), np.concatenate([x.wavelength_nm for x in curves])
 
 
 def _differences(nm: Floats) -> tuple[Floats, NDArray[np.intp]]:

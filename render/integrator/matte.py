@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.scene import Node, table_of, uniform_node
-from render.spectrum import Spectrum
+from render.spectrum import Spectrum, at_wavelengths
 from rodcone.jit import dr
 from rodcone.types import Floats
 
@@ -34,8 +34,7 @@ def band_offsets(seed: int) -> Floats:
 
 def reflectance_table(curves: tuple[Spectrum, ...], wavelength_nm: Floats) -> NDArray[np.float32]:
     """Reflectance of each curve at (step, band) wavelengths, 0 outside its points, shape (curve, step, band)."""
-    rows = [np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves]
-    return np.array(rows, dtype=np.float32)
+    return at_wavelengths(curves, wavelength_nm).astype(np.float32)
 
 
 class TableReader:
