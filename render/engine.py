@@ -26,8 +26,8 @@ from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
 from render.transport import Transport
-from rodcone.errors import InputError, one_line, require_whole
-from rodcone.jit import compiling, is_out_of_memory
+from rodcone.errors import InputError, is_out_of_memory, one_line, require_whole
+from rodcone.jit import compiling
 from rodcone.progress import Step, progress_bar, render_words
 
 Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far

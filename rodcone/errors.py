@@ -47,6 +47,11 @@ def one_line(error: BaseException) -> str:
     return " ".join(f"{words} {last}".split())
 
 
+def is_out_of_memory(error: RuntimeError) -> bool:
+    """Whether Dr.Jit says that memory ran out, of the machine or of its device: it has no error of its own for that."""
+    return "out of memory" in str(error).lower()
+
+
 @contextmanager
 def read_errors(what: str, fix: str, kinds: Kinds = (OSError, ValueError)) -> Iterator[None]:
     """Turn errors within into an `InputError`, ``what (the error's words); fix``.

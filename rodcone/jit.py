@@ -12,8 +12,7 @@ from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
 
-__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "compiling", "dr",
-           "is_out_of_memory"]  # fmt: skip
+__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "compiling", "dr"]
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
@@ -30,11 +29,6 @@ def compiler_version() -> str:
     """Version of the LLVM or CUDA that kernels are compiled by, ``none`` on ``numpy``."""
     version = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
     return ".".join(map(str, version())) if version else "none"
-
-
-def is_out_of_memory(error: RuntimeError) -> bool:
-    """Whether Dr.Jit says that memory ran out, of the machine or of its device: it has no error of its own for that."""
-    return "out of memory" in str(error).lower()
 
 
 @contextmanager

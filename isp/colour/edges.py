@@ -175,7 +175,7 @@ def _sharpen(
     unknown = np.where(full, 1.0, hue)
     sharp += unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp)
 
-    # Light that fills less than half of the window: the sample's own, in the colour around.
+    # Light that fills less than two fifths of the window: the sample's own, in the colour around.
     no_hue = is_full[..., 4] & (is_full & (site != 3)).any(axis=2)
     shares = np.where(no_hue[..., None], gains[3] / gains, shares)
     own, of_w, here = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0], plane[..., 3], site[..., 4]

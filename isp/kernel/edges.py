@@ -131,7 +131,7 @@ def sharpen_frame(
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])
     sharp += unknown * (reduce(larger, [*(sharp * balance)]) / balance - sharp)
 
-    # Light that fills less than half of the window: the sample's own, in the colour around.
+    # Light that fills less than two fifths of the window: the sample's own, in the colour around.
     no_hue = is_full[4] & ((full & 0b111) > 0)
     tile_row, tile_column = (divide(line, divisor(int(size)))[0] for line, size in ((row, down), (column, across)))
     of_tile = tile_row * dr.opaque(jit.UInt, white.shares.shape[1]) + tile_column

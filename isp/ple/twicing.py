@@ -10,6 +10,9 @@ weighted by how alike cells are in the estimate (as a bilateral filter, Tomasi &
 r_c the sum of the residuals of a cell's n_c samples, x the estimate in units of noise. Brightness is best known by the
 mosaic's sharpest channel g and stays: a colour gets d_c = b_c - (x_c / x_g) b_g, times 1 - SURE / chi^2 where positive
 (James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance.
+
+A cell in which the residuals of a channel differ from each other by more than noise holds a lamp or an edge, and no
+even surface. It gives no residuals to other cells and nothing is added to it.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -66,7 +69,6 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
     mean, like = _sums(planes) / of_cell, _sums(stable) / of_cell
     light = np.maximum(mean, 0.0)
-    # Where a channel's residuals differ by more than noise lies no surface but a lamp, whose light they would spread.
     spread = _sums(off * off) - residual**2 / np.maximum(count, 1.0)
     surface = np.all(spread < LAMP_SIGMAS**2 * variance_of(light), axis=-1, keepdims=True)
     count, residual = count * surface, residual * surface

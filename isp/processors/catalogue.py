@@ -96,7 +96,7 @@ class Processor:
         raw = interpolate_defects(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
         if raw.crosstalk:
-            raw = levelled(raw, white_balance.response(raw) if white_balance.given is None else white_balance.given)
+            raw = levelled(raw, white_balance.expected(raw))
         colours = ColourFit.of(matrix)
         if self.noise_gains is not None and set(self.colours) <= set(raw.channels):  # others are refused below
             colours = colours_in_noise(raw, colours, white_balance, self.unit, self.noise_gains)

@@ -10,7 +10,7 @@ from typing import Any, get_args
 
 from cyclopts import App, CycloptsError, Parameter, Token, convert
 
-from rodcone.errors import InputError
+from rodcone.errors import InputError, is_out_of_memory
 from studies.commands.console import INTERRUPTED, say
 
 # Commands are imported when they run: other distributions have packages named render, sensor, ..., and `doctor`, which
@@ -19,7 +19,6 @@ BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
 _FRACTION = re.compile(r"^[-+]?\d*\.\d+$")
-_OUT_OF_MEMORY = re.compile("out of memory", re.IGNORECASE)  # Dr.Jit's RuntimeError; Dr.Jit isn't loaded for --help
 _UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
@@ -109,7 +108,7 @@ def main(arguments: list[str] | None = None) -> Any:
         fail(_with_notes(str(error), error), BAD_INPUT)
     except (MemoryError, RuntimeError) as error:
         what = " ".join(str(error).split()) or "the system gave no more"
-        if isinstance(error, RuntimeError) and not _OUT_OF_MEMORY.search(what):
+        if isinstance(error, RuntimeError) and not is_out_of_memory(error):
             raise
         fix = "take a smaller picture (--size), fewer bands or fewer workers"
         fail(_with_notes(f"memory: it ran out ({what}); {fix}", error), BAD_INPUT)

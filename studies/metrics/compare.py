@@ -4,7 +4,7 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
 from isp.picture import Picture
@@ -19,7 +19,6 @@ from studies.metrics.quality import TruePicture, appearance, true_picture
 from studies.metrics.quality import measure as quality_of
 from studies.metrics.truth import light_in_bands, true_srgb, white_of
 
-Plane = NDArray[np.float64]
 _CELL_PX = 8
 _MOST_DOUBLED = 40  # times that a lamp's light may exceed what white leaves of it, as a power of 2
 
@@ -118,7 +117,7 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
     return asdict(quality) | asdict(appearance(scaled, encoded, reference.truth, reference.white_cd_m2))
 
 
-def _brightness(luminance: Plane, reference: Plane) -> float:
+def _brightness(luminance: Image, reference: Image) -> float:
     """Return the factor k for which the mean of min(k luminance, 1) is the mean of min(reference, 1).
 
     Both are means over cells of 8 x 8 pixels, so that noise above white isn't taken for light above white.
@@ -126,7 +125,7 @@ def _brightness(luminance: Plane, reference: Plane) -> float:
     counts = _cell_sums(np.ones_like(reference))
     picture, scene = _cell_sums(luminance) / counts, _cell_sums(reference) / counts
 
-    def shown(cells: Plane, factor: float) -> float:
+    def shown(cells: Image, factor: float) -> float:
         return float(np.average(np.minimum(factor * cells, 1.0), weights=counts))
 
     wanted = shown(scene, 1.0)
@@ -137,7 +136,7 @@ def _brightness(luminance: Plane, reference: Plane) -> float:
     return float(brentq(lambda k: shown(picture, k) - wanted, low, high))
 
 
-def _cell_sums(plane: Plane) -> Plane:
+def _cell_sums(plane: Image) -> Image:
     """Return sums over cells of `_CELL_PX` pixels along each side, those at the end smaller."""
     rows, columns = (np.arange(0, side, _CELL_PX) for side in plane.shape)
     return np.asarray(np.add.reduceat(np.add.reduceat(plane, rows, axis=0), columns, axis=1))

@@ -14,10 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
 from rodcone.colour_spaces import decode_srgb
+from rodcone.types import Floats, Image
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
-
-Image = NDArray[np.float64]
-Plane = NDArray[np.float64]
 
 # Section 4.1.1, Table 1: weights a and widths b [degree^2] of the Gaussians a sqrt(pi / b) exp(-pi^2 r^2 / b) that blur
 # each plane of YCxCz as the eye's contrast sensitivity does.
@@ -52,8 +50,8 @@ class Seen:
     """
 
     colour: Image
-    edges: Plane
-    points: Plane
+    edges: Image
+    points: Image
     pixels_per_degree: float
 
 
@@ -74,7 +72,7 @@ def seen(encoded: NDArray[np.floating], pixels_per_degree: float = PIXELS_PER_DE
 
 def flip(
     picture: NDArray[np.floating], truth: "NDArray[np.floating] | Seen", pixels_per_degree: float = PIXELS_PER_DEGREE
-) -> Plane:
+) -> Image:
     """Return LDR-FLIP of each pixel, shape (h, w), from 0 (no difference) to 1; its mean is a picture's usual figure.
 
     Parameters
@@ -94,7 +92,7 @@ def flip(
     return np.asarray(colour ** (1 - feature))  # equation 14
 
 
-def _blurred(plane: Plane, gaussians: tuple[tuple[float, float], ...], pixels_per_degree: float) -> Plane:
+def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_per_degree: float) -> Image:
     """Blur a plane by a sum of Gaussians of sum 1; beyond the border the border's pixels go on."""
     reach = ceil(3 * np.sqrt(WIDEST / (2 * pi**2)) * pixels_per_degree)
     degrees = np.arange(-reach, reach + 1) / pixels_per_degree
@@ -107,7 +105,7 @@ def _blurred(plane: Plane, gaussians: tuple[tuple[float, float], ...], pixels_pe
     return result
 
 
-def _features(luminance: Plane, pixels_per_degree: float) -> tuple[Plane, Plane]:
+def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]:
     """Return the strength of edges and of points: the gradient's length by first and second derivatives (4.2.1).
 
     Each derivative's positive taps sum to 1, and its negative ones to -1.
@@ -124,7 +122,7 @@ def _features(luminance: Plane, pixels_per_degree: float) -> tuple[Plane, Plane]
     return found[0], found[1]
 
 
-def _along_both(plane: Plane, down: NDArray[np.float64], across: NDArray[np.float64]) -> Plane:
+def _along_both(plane: Image, down: Floats, across: Floats) -> Image:
     """Return a plane after one filter along columns and one along rows, the border's pixels going on beyond it."""
     return np.asarray(correlate1d(correlate1d(plane, down, axis=0, mode="nearest"), across, axis=1, mode="nearest"))
 
@@ -138,13 +136,13 @@ def _hunt_lab(linear: Image) -> Image:
     return np.stack([lightness, 0.01 * lightness * a, 0.01 * lightness * b], axis=-1)
 
 
-def _hyab(first: Image, second: Image) -> Plane:
+def _hyab(first: Image, second: Image) -> Image:
     """Return the distance of colours by HyAB: of lightness by its size, of a and b Euclid's (equation 8)."""
     difference = first - second
     return np.asarray(np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2]))
 
 
-def _redistributed(distance: Plane) -> Plane:
+def _redistributed(distance: Image) -> Image:
     """Return colour distances mapped to [0, 1]: up to p_c of the largest by one line, then by a flat one (4.1.3)."""
     green, blue = (_hunt_lab(np.array([[colour]])) for colour in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
     largest = float(_hyab(green, blue)[0, 0]) ** Q_COLOUR

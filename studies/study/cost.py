@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from render.limits import PILOT_FROM
 from rodcone.memory import GB, Memory, memory
 from rodcone.progress import duration
 
@@ -16,7 +17,7 @@ START_S = 1.3  # a process's imports
 _RENDER_S = 1.1e-6  # a pixel, sample and light group in 20 bands
 _PATHS = 0.7  # share of it that doesn't grow with the bands
 _COMPILE_S = 0.3  # a band, where no kernel is kept on disk
-PILOT_FROM, PILOT_SPP = 64, 32  # samples beyond which a pilot goes before
+PILOT_SPP = 32  # samples per pixel of the pilot that goes before a long render
 KERNELS = Path.home() / ".drjit"
 
 
