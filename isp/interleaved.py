@@ -52,7 +52,7 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | 
     Notes
     -----
     Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
-    own. Besides the result a call takes some 0.6 GB at most.
+    own. Besides the result a call takes 32 bytes per pixel and some 0.6 GB.
     """
     return reconstruct_with_noise(raw, settings, neutral).estimate.astype(np.float32, copy=False)
 

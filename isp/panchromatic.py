@@ -77,8 +77,7 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     if backend() == "numpy":
         shares, guide_e = _read_numpy(raw, ratios, white)
         return WhiteReading(raw, shares, stabilise_channel(guide_e, raw, raw.channels[white]))
-    kernel_shares, kernel_guide_e = guide_frame(raw, ratios, white)
-    return WhiteReading(raw, kernel_shares, stabilise_channel(kernel_guide_e, raw, raw.channels[white]))
+    return WhiteReading(raw, *guide_frame(raw, ratios, white))
 
 
 def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from isp.anscombe import stabilise_channel
 from isp.kernel.accumulate import larger
 from isp.kernel.edges import TINY, channel_noise, pick
 from isp.kernel.layout import packet_width
@@ -120,7 +121,7 @@ class Frame:
 
 
 def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Shares of the surroundings, by tile (rows, columns, channel), and guide [e-], (h, w).
+    """Shares of the surroundings, by tile (rows, columns, channel), and guide [standard deviations of W's noise], (h, w).
 
     As `isp.panchromatic.read_as_white` states them.
     """
@@ -134,7 +135,8 @@ def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.f
     for first in range(0, height, step):
         last = min(first + step, height)
         start, end = max(first - reach, 0), min(last + reach, height)
-        of_band, guide[first:last] = _guide_band(frame, (start, end), slice(first - start, last - start))
+        of_band, guide_e = _guide_band(frame, (start, end), slice(first - start, last - start))
+        guide[first:last] = stabilise_channel(guide_e, raw, raw.channels[white])
         inside = slice((first - start) // down, -(-(last - start) // down))
         shares[first // down : -(-last // down)] = of_band[inside, :, : len(ratios)]
     return shares, guide
