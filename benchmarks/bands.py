@@ -10,17 +10,17 @@ import numpy as np
 
 from render.bands.error import curve_error
 from render.bands.mixed_light import band_light
-from render.illuminants import illuminant, names
+from render.illuminants import illuminant, illuminant_names
 from render.scene import LightGroup
 from render.spectrum import Spectrum, even_bands, photons_per_joule
 from rodcone.types import Floats
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.presets import low_noise
 from sensor.response import electrons_per_irradiance
 
 STEP_NM = 0.02
 NM = np.arange(380.0, 780.0, STEP_NM) + STEP_NM / 2
-PATCHES = [spectrum for _, spectrum in color_checker()]
+PATCHES = [spectrum for _, spectrum in color_checker_reflectances()]
 
 
 def table(count: int) -> None:
@@ -34,7 +34,7 @@ def table(count: int) -> None:
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     plain = sensor.responses.band_average(sensor.channels, nm, width) * photons_per_joule(nm) * width * area_m2
     print(f"\n{width[0]:g} nm        means, %   lamp known   unknown   told (RMS)   found (RMS)   noise")
-    for name in names():
+    for name in illuminant_names():
         if name == "sodium_low":
             continue  # lines of 0.1 nm: the fine sum would need more points
         lamp = illuminant(name)

@@ -36,7 +36,7 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM, even_bands
 from rodcone.colour_spaces import SRGB_TO_XYZ, decode_srgb, luminance_of_srgb
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -90,7 +90,7 @@ def chart(kind: Kind) -> tuple[SpectralRadiance, Image]:
     nm, width_nm = even_bands(VISIBLE_NM, BANDS)
     light = light_in_bands(illuminant("D65"), nm, width_nm)
     white = light.spectrum * LEVEL_CD_M2
-    surfaces = np.array([curve.band_average(nm, width_nm) for _, curve in color_checker()])
+    surfaces = np.array([curve.band_average(nm, width_nm) for _, curve in color_checker_reflectances()])
     side = kind.height // ROWS
     values = np.kron((surfaces * white).reshape(ROWS, COLUMNS, -1), np.ones((side, side, 1)))
     if kind.lamp:

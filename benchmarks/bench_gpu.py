@@ -23,7 +23,7 @@ from render.engine import render
 from render.loader import mitsuba_module, variant
 from render.transport import Transport
 from rodcone.jit import arrays, backend, dr
-from scenes.catalog import load
+from scenes.catalogue import load
 
 SCENE = "still_life"
 TESTS = ("tests", "tests/statistics/test_render_unbiased.py")

@@ -32,7 +32,7 @@ from isp.substitution import SUBSTITUTION_SNR, SUBSTITUTION_SNR_TABLE1_PIXEL, su
 from render.engine import render
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
@@ -42,8 +42,8 @@ from sensor.optics import form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.response import expected_electrons
+from studies.metrics.appearance import Quality, picture_quality
 from studies.metrics.confidence import half_width
-from studies.metrics.quality import Quality, measure
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 
@@ -138,7 +138,7 @@ class SceneAndSensor:
         neutral = neutral_electrons(camera.sensor, stage.light, seconds)
         linear, picture = develop_to_scale(raw, processor, camera.colours, camera.sensor, neutral, white, **options)
         encoded = encode_srgb(linear)
-        return MeasuredShot(raw, picture, encoded, measure(encoded, stage.truth))
+        return MeasuredShot(raw, picture, encoded, picture_quality(encoded, stage.truth))
 
     def snr_db(self, name: str, channel: str, level: float, seconds: float) -> float:
         """Median SNR of a channel's pixels, in expectation: shot noise and dark noise."""

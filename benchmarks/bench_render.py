@@ -30,7 +30,7 @@ from render.loader import mitsuba_module, variant
 from render.scene import Scene
 from render.spectrum import photons_per_joule
 from rodcone.jit import backend, dr
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.curves import rgbw
 
 SCENES = ("cornell_box", "still_life_outdoor", "color_checker")

@@ -1,7 +1,7 @@
 """How long a capture takes from 40 float32 bands to digital numbers, for 1 and 4 megapixels.
 
 Run ``python benchmarks/bench_sensor.py``. It prints the environment, the first capture of a fresh process with an empty
-kernel cache (compilation included), then for each size and light the medians of rounds in turn: ``capture``; reading
+kernel cache (compilation included), then for each size and light the medians of rounds in turn: a capture; reading
 the bands' memory once, which nothing can undercut; and NumPy's `Generator.poisson` alone on the same means, which the
 whole is measured against. Before that, the largest memory of a fresh process (``--memory`` runs it alone) that images a
 picture behind a lens that diffracts, beside the size of its bands. NumPy's
@@ -23,7 +23,7 @@ from environment import beside, in_turn, print_environment, seconds_of
 
 from render.radiance import SpectralRadiance
 from rodcone.jit import backend
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.presets import preset
@@ -58,7 +58,7 @@ def calls(radiance: SpectralRadiance) -> dict[str, Callable[[], object]]:
     rng, threads = np.random.default_rng(2), ThreadPoolExecutor(os.cpu_count())
     print(f"  means of {means.min():.2g} to {means.max():.2g} e-, median {np.median(means):.2g}")
     return {
-        "capture": lambda: capture(radiance, sensor, EXPOSURE_S, device, rng),
+        "capture": lambda: photograph_radiance(radiance, sensor, EXPOSURE_S, device, rng),
         "reading the bands": lambda: list(threads.map(np.max, planes)),
         NUMPY: lambda: rng.poisson(means),
     }
@@ -68,7 +68,7 @@ def first_call() -> None:
     """Time of the first capture in this process."""
     sensor, radiance = preset("low_noise"), scene(64, 1e-4)
     device = draw_device(sensor, radiance.shape, np.random.default_rng(1))
-    wall, cpu = seconds_of(lambda: capture(radiance, sensor, EXPOSURE_S, device, np.random.default_rng(2)))
+    wall, cpu = seconds_of(lambda: photograph_radiance(radiance, sensor, EXPOSURE_S, device, np.random.default_rng(2)))
     print(f"first capture, 64x64, compilation included: {wall:.2f} s, processor {cpu:.2f} s", flush=True)
 
 

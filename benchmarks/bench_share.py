@@ -39,7 +39,7 @@ from references import SEEDS, Film, both, make
 from render.denoised.relight import measured_error
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.presets import low_noise
 from studies.pages.plots import CHART, COLOURS, SOFT, STYLE, blank, plain_ticks, svg_text

@@ -28,7 +28,7 @@ def start(name: str, size: int, spp: int, began: float) -> dict[str, Any]:
     from render.loader import Film, load_groups, mitsuba_module
     from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
     from rodcone.jit import dr
-    from scenes.catalog import load
+    from scenes.catalogue import load
 
     mitsuba_module()
     marks.append(time.monotonic())
@@ -74,7 +74,7 @@ def main() -> None:
         return
     from environment import print_environment
 
-    from scenes.catalog import names
+    from scenes.catalogue import scene_names
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--scene", action="append", help="scene by name; may be given several times")
@@ -85,7 +85,7 @@ def main() -> None:
     print_environment()
     head = ("scene", "first", "compiling", "later", "processor", "imports", "scene", "render", "loading", "code")
     print(f"{head[0]:20s}" + "".join(f"{word:>10s}" for word in (*head[1:], "compiled")))
-    for name in given.scene or names():
+    for name in given.scene or scene_names():
         first, *later = starts(name, given.size, given.spp, given.repeats)
         middle = {key: float(np.median([one[key] for one in later])) for key in first}
         told = [first["whole"], first["compiling"], middle["whole"], *(middle[key] for key in head[4:])]

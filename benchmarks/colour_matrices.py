@@ -24,7 +24,7 @@ from isp.colour.colour_fit import fit_through_neutral, training
 from render.illuminants import illuminant
 from render.spectrum import Floats, photons_per_joule
 from rodcone.colour_spaces import xyz_to_srgb
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.presets import low_noise
 
 NM = np.arange(380.0, 781.0, 5.0)
@@ -99,7 +99,7 @@ def report(light: str) -> None:
     sensor = low_noise()
     spd = illuminant(light).band_average(NM, np.full(NM.size, 5.0))
     responses = sensor.responses.band_average(("R", "G", "B", "W"), NM, np.full(NM.size, 5.0))
-    chart = np.array([spectrum.band_average(NM, np.full(NM.size, 5.0)) for _, spectrum in color_checker()])
+    chart = np.array([spectrum.band_average(NM, np.full(NM.size, 5.0)) for _, spectrum in color_checker_reflectances()])
     objects = load_TCS_CIE2017(SpectralShape(380, 780, 5)).values.T
     (on_chart, chart_target), (on_objects, objects_target) = (
         training(responses, NM, spd, surfaces) for surfaces in (chart, objects)

@@ -27,7 +27,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files.photo import srgb_basis
 from render.spectrum import Spectrum, band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -35,9 +35,9 @@ from sensor.exposure import exposure_by_rule_s
 from sensor.optics import form_image
 from sensor.presets import preset, vary
 from sensor.response import expected_electrons
+from studies.metrics.appearance import psnr_db
 from studies.metrics.blemishes import count_blemishes
-from studies.metrics.quality import psnr_db
-from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb, white_of
+from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb, white_of_pixels
 from studies.photograph.camera import colour_fit, develop_to_scale
 
 SCENES = ("night_street", "still_life", "color_checker", "siemens_star")
@@ -109,7 +109,7 @@ def stage_of(name: str, size: int) -> Stage:
         light = light_in_bands(illuminant("D65"), NM, band_widths(NM))
         radiance = SpectralRadiance((decode_srgb(rgb) @ srgb_basis(NM)) * light.spectrum, NM)
         radiance = SpectralRadiance(radiance.values / radiance.luminance().mean(), NM)
-        white = white_of(radiance.luminance(), np.zeros(radiance.luminance().shape))
+        white = white_of_pixels(radiance.luminance(), np.zeros(radiance.luminance().shape))
     return Stage(radiance, light, white, shown_srgb(true_srgb(radiance, light, white)))
 
 

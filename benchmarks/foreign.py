@@ -26,7 +26,7 @@ from isp.processors.bayer_denoised import OPPONENT
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.processors.demosaic import MALVAR_REACH, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
-from isp.processors.network import read_arrays
+from isp.processors.network import read_network
 from render.illuminants import illuminant
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -75,7 +75,7 @@ def ffdnet(mixed: Image, sigma: list[float]) -> Image:
     shapes = {f"{prefix}{n}.weight": (widths[at + 1], widths[at], 3, 3) for at, n in enumerate(names)}
     norms = ("weight", "bias", "running_mean", "running_var")
     shapes |= {f"{prefix}{n + 1}.{norm}": (96,) for n in names[1:-1] for norm in norms}
-    arrays = read_arrays(Path(os.environ["FFDNET"]).read_bytes(), shapes)
+    arrays = read_network(Path(os.environ["FFDNET"]).read_bytes(), shapes)
     planes = mixed @ OPPONENT
     low, high = planes.min(), planes.max()
     odd = [(0, size % 2) for size in planes.shape[:2]]

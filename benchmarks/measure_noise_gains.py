@@ -32,7 +32,7 @@ from sensor.presets import preset, vary
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.metrics.quality import measure
+from studies.metrics.appearance import picture_quality
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import colour_fit, develop_to_scale
 
@@ -118,7 +118,7 @@ def quality(processor: Processor, shot: Shot, gains: NoiseGains) -> tuple[float,
         knowing = replace(processor, noise_gains=gains)
         neutral = shot.neutral
         linear, _ = develop_to_scale(shot.raw, knowing, shot.colours, shot.sensor, neutral, white, balance=neutral)
-    found = measure(encode_srgb(linear), shot.picture.truth)
+    found = picture_quality(encode_srgb(linear), shot.picture.truth)
     return 10 ** (-found.psnr_db / 20), found.delta_e_median
 
 

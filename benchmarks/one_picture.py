@@ -10,7 +10,7 @@ from contextlib import suppress
 import numpy as np
 
 from render.engine import render
-from scenes.catalog import load
+from scenes.catalogue import load
 
 with suppress(ImportError):  # other checkouts
     from render.denoised.relight import relight_denoised

@@ -22,7 +22,7 @@ from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
 from render.spectrum import Floats, band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.csv_file import csv_text
-from scenes.reflectances import color_checker, held
+from scenes.reflectances import color_checker_reflectances, held
 from sensor.presets import low_noise
 
 PHOTOGRAPHS = {
@@ -71,7 +71,7 @@ def exact_psnr(reflectances: Floats) -> tuple[float, float]:
     width = band_widths(NM)
     light = illuminant("D65").band_average(NM, width)
     camera = low_noise().responses.band_average(COLOURS, NM, width)
-    patches = np.array([held(curve).band_average(NM, width) for _, curve in color_checker()])
+    patches = np.array([held(curve).band_average(NM, width) for _, curve in color_checker_reflectances()])
     own = fit_colours(COLOURS, camera, NM, light, patches, width).matrix(COLOURS)
     signals, target = training(camera, NM, light, reflectances, width)
     best = np.linalg.lstsq(signals, target, rcond=None)[0]

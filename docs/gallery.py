@@ -14,7 +14,7 @@ from pathlib import Path
 
 from PIL import Image
 
-from scenes import catalog
+from scenes import catalogue
 from sensor import cfa, presets
 from studies.commands.list import texts
 
@@ -48,7 +48,7 @@ def commands(scene: str) -> list[str]:
 
 def scenes_page() -> str:
     """Page of the scenes."""
-    names = catalog.names()
+    names = catalogue.scene_names()
     sheet = "\n".join(f"[![{name}]({name}.webp)](#{name})" for name in names)
     return f"""# Scenes
 
@@ -62,7 +62,7 @@ The camera is `low_noise` with its RGBW mosaic. A scene of your own: [how to](..
 
 def scene_section(name: str) -> str:
     """Section of one scene: picture, facts, commands."""
-    scene = catalog.load(name)
+    scene = catalogue.load(name)
     module = import_module(f"scenes.{name}")
     options = inspect.signature(getattr(module, name)).parameters.values()
     facts = {
@@ -113,7 +113,7 @@ or lux, when it lights a scene: a render serves all of them.
 def sensors_page() -> str:
     """Page of the sensors and mosaics."""
     rows = []
-    for name in presets.names():
+    for name in presets.preset_names():
         camera = presets.preset(name)
         pixel = camera.pixel
         rows.append(
@@ -197,5 +197,5 @@ if __name__ == "__main__":
         (FOLDER / name).write_text(page(), "utf-8")
     for command in DRAWINGS:
         run(command, FOLDER)
-    for scene in sys.argv[1:] or catalog.names():
+    for scene in sys.argv[1:] or catalogue.scene_names():
         photograph(scene, FOLDER)

@@ -35,7 +35,7 @@ _VALUES = ("stopped_by", "seconds", "integrator", "variant")
 _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries stay in their folder
 
 
-def load_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoised: bool = False) -> Transport | None:
+def read_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoised: bool = False) -> Transport | None:
     """Stored transport, or None where there is no intact file: it begins with its SHA-256 digest.
 
     Renders with `denoised` light are files of their own.

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from render.cache import load_transport, save_transport
+from render.cache import read_transport, save_transport
 from render.combinations import check_combinations
 from render.combine import emission
 from render.denoised.denoise import denoiser
@@ -124,7 +124,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     # What there is already
     earlier = _checked_earlier(resume, scene, film, denoise)
     if cache is not None:
-        stored = load_transport(Path(cache), scene, film, seed, denoised=denoise)
+        stored = read_transport(Path(cache), scene, film, seed, denoised=denoise)
         earlier = max((x for x in (earlier, stored) if x), key=lambda x: x.spp, default=None)
     if earlier is not None:
         meter = earlier.meter or meter  # it may have measured already

@@ -34,7 +34,7 @@ _NOT_POWER = re.compile(r"\b(?:[µμu]?mol\w*|photons?|quanta|dBm?|log\w*|counts
 _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
-def names() -> tuple[str, ...]:
+def illuminant_names() -> tuple[str, ...]:
     """Names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``.
 
     CIE 015:2018 has tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps, its HP1 is standard
@@ -141,10 +141,10 @@ def _named(name: str) -> Spectrum:
         raise InputError(
             f"illuminant: {name!r} has no unit; allowed: kelvin; write {name}K for a black body, D{name}K for daylight"
         )
-    if name not in names():
+    if name not in illuminant_names():
         others = quietly_imported("colour").SDS_ILLUMINANTS
         if name not in list(others):  # colour-science takes any case
-            raise unknown("illuminant", name, (*names(), "temperature such as 3000K"))
+            raise unknown("illuminant", name, (*illuminant_names(), "temperature such as 3000K"))
         return unit_luminance(Spectrum(others[name].wavelengths, others[name].values))
     if name in _LINES:
         return _unit_lines(*_LINES[name])

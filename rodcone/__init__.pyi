@@ -11,14 +11,14 @@ from isp.converters import write_with_bayer as write_raw
 from isp.picture import Picture as Picture
 from isp.picture import finish as finish
 from isp.processors.catalogue import Processor as Processor
-from isp.processors.catalogue import names as processors
+from isp.processors.catalogue import processor_names as processors
 from isp.remosaic import remosaic as remosaic
 from render.denoised.relight import relight_denoised as relight_denoised
 from render.geometry import look_at as look_at
 from render.geometry import to_world as to_world
 from render.illuminants import illuminant as illuminant
+from render.illuminants import illuminant_names as illuminants
 from render.illuminants import lines_nm as lines_nm
-from render.illuminants import names as illuminants
 from render.radiance import SpectralRadiance as SpectralRadiance
 from render.radiance_files.exr import write_exr as write_exr
 from render.radiance_files.radiance_source import load_radiance as load_radiance
@@ -31,8 +31,8 @@ from render.user_scene.scene_file import load_scene_file as load_scene_file
 from rodcone.colour_spaces import encode_srgb as encode_srgb
 from rodcone.errors import InputError as InputError
 from rodcone.progress import Step
-from scenes.catalog import load as load
-from scenes.catalog import names as scenes
+from scenes.catalogue import load as load
+from scenes.catalogue import scene_names as scenes
 from scenes.materials import matte as matte
 from scenes.materials import panel as panel
 from scenes.reflectances import grey as grey
@@ -40,16 +40,16 @@ from sensor.burst import merged_raw as merged_raw
 from sensor.calibration import ColourCalibration
 from sensor.cfa import mask as mask
 from sensor.cfa import mosaics as mosaics
-from sensor.chip import ChannelReading as ChannelReading
-from sensor.chip import PixelConfig as PixelConfig
-from sensor.chip import Reading as Reading
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.emva1288.characterise import Characterisation
 from sensor.optics import SpectralIrradiance
+from sensor.pixel import ChannelReading as ChannelReading
+from sensor.pixel import PixelConfig as PixelConfig
+from sensor.pixel import Reading as Reading
 from sensor.presets import low_noise as low_noise
-from sensor.presets import names as sensors
 from sensor.presets import preset as preset
+from sensor.presets import preset_names as sensors
 from sensor.raw import RawImage as RawImage
 from sensor.raw_files.raw_file import read_raw as read_raw
 from studies.budget.ledger import Plan

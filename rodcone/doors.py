@@ -171,12 +171,12 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "irradiance": _value("sensor.optics:SpectralIrradiance", "give form_image(radiance, sensor)"),
         "transport": _value("render.transport:Transport", "give rodcone.render(...)"),
         "resume": _value("render.transport:Transport", "give what render gave before"),
-        "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalog:load"),
+        "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalogue:load"),
         "sensor": _value("sensor.config:SensorConfig", "give a preset's name or file", "sensor.presets:preset"),
         "with_channel_readings.readings": _each(
-            _value("sensor.chip:ChannelReading", "give rodcone.ChannelReading(...)")
+            _value("sensor.pixel:ChannelReading", "give rodcone.ChannelReading(...)")
         ),
-        "readings": _each(_value("sensor.chip:Reading", "give rodcone.Reading(...)"), least=1),
+        "readings": _each(_value("sensor.pixel:Reading", "give rodcone.Reading(...)"), least=1),
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),

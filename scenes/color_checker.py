@@ -11,7 +11,7 @@ from render.scene import Node, Scene
 from render.spectrum import Floats, Spectrum
 from rodcone.errors import InputError, require_range
 from scenes.materials import matte, panel, under_sky
-from scenes.reflectances import color_checker as patches
+from scenes.reflectances import color_checker_reflectances as patches
 from scenes.reflectances import grey, held, read_reflectances
 
 PATCH_M, GAP_M = 0.040, 0.005  # the classic chart's 40 mm patches

@@ -12,7 +12,7 @@ from render.spectrum import Floats, Spectrum
 from rodcone.errors import require_whole
 from scenes.generated import LARGEST_SEED
 from scenes.materials import ball, block, checks, disk, far_disk, floor, glossy, matte, metal, panel, printed, rod
-from scenes.reflectances import color_checker, grey
+from scenes.reflectances import color_checker_reflectances, grey
 
 # Grey pictures in scikit-image's wheel on which no page judges. CC0: brick and gravel (CC0Textures), grass
 # (linolafett), camera (L. Varshney), horse (A. Preuss); public domain: text; no known restrictions: coins (Brooklyn
@@ -199,7 +199,7 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
 
 def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
     """A measured patch's reflectance, mixed with grey and darkened."""
-    _, patch = color_checker()[rng.integers(24)]
+    _, patch = color_checker_reflectances()[rng.integers(24)]
     share, level = purest * rng.uniform(0.6, 1), rng.uniform(0.03, 0.8)
     return Spectrum(patch.wavelength_nm, rng.uniform(0.5, 1) * (share * patch.values + (1 - share) * level))
 

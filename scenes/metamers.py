@@ -8,7 +8,7 @@ from render.illuminants import illuminant
 from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, colour_matching_functions
 from scenes.color_checker import chart_scene
-from scenes.reflectances import color_checker, grey
+from scenes.reflectances import color_checker_reflectances, grey
 
 TWINS_UNDER = "D65"
 OTHER_LIGHT = "A"  # the light under which the two of a pair are made to differ most
@@ -41,7 +41,7 @@ def pairs() -> tuple[tuple[Spectrum, Spectrum], ...]:
     """
     nm = grey(0.0).wavelength_nm
     black = _black(nm)
-    return tuple(_pair(nm, base.values, black) for base in (color_checker()[index][1] for index in _BASES))
+    return tuple(_pair(nm, base.values, black) for base in (color_checker_reflectances()[index][1] for index in _BASES))
 
 
 def _pair(nm: Floats, base: Floats, black: Floats) -> tuple[Spectrum, Spectrum]:

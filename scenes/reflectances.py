@@ -14,7 +14,7 @@ _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all mat
 
 
 @cache
-def color_checker() -> tuple[tuple[str, Spectrum], ...]:
+def color_checker_reflectances() -> tuple[tuple[str, Spectrum], ...]:
     """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997)."""
     tables = published_spectra("color_checker")
     return tuple((name, Spectrum(nm, np.clip(values, 0, 1))) for name, (nm, values) in tables.items())

@@ -12,8 +12,8 @@ from rodcone.display import brief
 from rodcone.errors import InputError, require_range
 from sensor.calibration import ChannelNoise, NoiseStep
 from sensor.cfa import mask
-from sensor.chip import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import SensorConfig
+from sensor.pixel import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.raw import RawImage
 from sensor.readings.noise import CLEAR_SIGMAS
 
@@ -64,7 +64,7 @@ class _Group:
     clear_e: _Sites
 
 
-def merge(frames: Sequence[RawImage]) -> Merged:
+def merge_frames(frames: Sequence[RawImage]) -> Merged:
     """Weigh each pixel's exposures by the inverse of their temporal noise, and leave the saturated ones out.
 
     Weights and saturation both follow the merged rate itself, never one frame's own noisy value: among linear
@@ -113,16 +113,16 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
     Parameters
     ----------
     frames : sequence of RawImage
-        As `merge`; one alone is given back as it is.
+        As `merge_frames`; one alone is given back as it is.
 
     Raises
     ------
     InputError
-        As `merge`; for frames of several readings each and different times.
+        As `merge_frames`; for frames of several readings each and different times.
     """
     if len(frames) == 1:
         return frames[0]
-    merged, first = merge(frames), frames[0]
+    merged, first = merge_frames(frames), frames[0]
     times = np.array([frame.exposure_s for frame in frames])
     if first.noise_steps and np.ptp(times) > 0:
         raise InputError(

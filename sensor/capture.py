@@ -16,7 +16,7 @@ from sensor.response import behind_filters, channel_electrons, electrons_per_irr
 from sensor.shake import shaken
 
 
-def capture(
+def photograph_radiance(
     radiance: SpectralRadiance | SpectralIrradiance,
     sensor: SensorConfig,
     exposure_s: float | None = None,
@@ -101,7 +101,7 @@ def expose(
     *,
     exact: bool = False,
 ) -> RawImage:
-    """Expose and read the chip once, from expected electrons: the second half of `capture`.
+    """Expose and read the chip once, from expected electrons: the second half of `photograph_radiance`.
 
     Dr.Jit draws the frame on LLVM or CUDA, in single precision; NumPy's `read_out` does otherwise, and with `exact`.
 
@@ -110,7 +110,7 @@ def expose(
     expected_e : (h, w) array
         Expected photo-electrons of each pixel in `exposure_s`, without dark current.
     sensor, exposure_s, device, rng, exact
-        As `capture` takes them.
+        As `photograph_radiance` takes them.
 
     Raises
     ------

@@ -13,8 +13,8 @@ from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_keys, require_kind, require_range, require_whole
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
-from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.curves import Responses, rgbw
+from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
 BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping at 0 doesn't bias darks
 METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it

@@ -12,10 +12,10 @@ from render.spectrum import Spectrum
 from rodcone.errors import InputError, in_place, read_errors, require_name
 from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
-from sensor.chip import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
 from sensor.photodiodes import binned
+from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
 _SETTINGS = (*("bits", "black_level_dn", "white_level_dn", "window_nm"), *("gain", "converter_noise_dn", "gain_limit"))
 MOST_PRNU = 0.1  # of a signal: sensors have 0.003 to 0.02

@@ -14,8 +14,8 @@ import numpy as np
 
 from rodcone.errors import InputError, require_name
 from sensor.cfa import Tile, channel_map
-from sensor.chip import BINNINGS, CHARGE, DIGITAL, Binning
 from sensor.config import SensorConfig
+from sensor.pixel import BINNINGS, CHARGE, DIGITAL, Binning
 
 MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
 

@@ -21,7 +21,7 @@ _NAMES = (
 )
 
 
-def names() -> tuple[str, ...]:
+def preset_names() -> tuple[str, ...]:
     """Names that `preset` knows.
 
     Examples
@@ -57,7 +57,7 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
     Parameters
     ----------
     name : str or Path
-        One of `names`, or a path that ends in ``.toml``.
+        One of `preset_names`, or a path that ends in ``.toml``.
     cfa : str or sequence of str, optional
         Mosaic: a name of `sensor.cfa.MOSAICS`, or rows of channels. None takes the file's own, RGBW in every preset.
 

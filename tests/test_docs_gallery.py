@@ -8,7 +8,7 @@ import pytest
 from PIL import Image
 
 from render import illuminants
-from scenes import catalog
+from scenes import catalogue
 from sensor import cfa, presets
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -26,17 +26,20 @@ def test_a_page_is_what_its_command_writes() -> None:
 
 def test_every_name_of_the_catalogues_is_shown() -> None:
     pages = {name: (gallery.FOLDER / name).read_text("utf-8") for name in gallery.PAGES}
-    assert tuple(gallery.SHOWN) == catalog.names()
-    assert all(f"## {name}\n" in pages["scenes.md"] for name in catalog.names())
-    assert all(f"| `{name}` |" in pages["lights.md"] for name in illuminants.names())
-    assert all(f">{name}</text>" in (gallery.FOLDER / "lights.svg").read_text("utf-8") for name in illuminants.names())
-    assert all(f"| `{name}` |" in pages["sensors.md"] for name in (*presets.names(), *cfa.mosaics()))
+    assert tuple(gallery.SHOWN) == catalogue.scene_names()
+    assert all(f"## {name}\n" in pages["scenes.md"] for name in catalogue.scene_names())
+    assert all(f"| `{name}` |" in pages["lights.md"] for name in illuminants.illuminant_names())
+    assert all(
+        f">{name}</text>" in (gallery.FOLDER / "lights.svg").read_text("utf-8")
+        for name in illuminants.illuminant_names()
+    )
+    assert all(f"| `{name}` |" in pages["sensors.md"] for name in (*presets.preset_names(), *cfa.mosaics()))
 
 
 def test_pictures_are_there_and_small_and_show_something() -> None:
     sizes = [path.stat().st_size for path in gallery.FOLDER.iterdir()]
     assert sum(sizes) < MOST_BYTES
-    for name in catalog.names():
+    for name in catalogue.scene_names():
         with Image.open(gallery.FOLDER / f"{name}.webp") as picture:
             assert picture.format == "WEBP"
             assert picture.width == 320
@@ -46,7 +49,7 @@ def test_pictures_are_there_and_small_and_show_something() -> None:
 
 
 def test_one_response_stands_for_all_presets() -> None:
-    first, *others = (presets.preset(name).responses.curves for name in presets.names())
+    first, *others = (presets.preset(name).responses.curves for name in presets.preset_names())
     for other in others:
         for channel, curve in first.items():
             np.testing.assert_array_equal(curve.values, other[channel].values)

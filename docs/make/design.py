@@ -37,7 +37,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb, xyz_to_srgb
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.curves import Responses

@@ -26,9 +26,9 @@ from rodcone.colour_spaces import luminance_of_srgb
 from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.presets import preset, vary
+from studies.metrics.appearance import picture_quality, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.flip import flip
-from studies.metrics.quality import measure, true_picture
 
 FOUND = {name: Path(__file__).resolve().parents[1] / "filters" / f"{name}.toml" for name in ("strict", "loose")}
 FOLDER = Path("out/filters")
@@ -77,7 +77,7 @@ def rows_of(commit: str, number: int) -> list[dict[str, Any]]:
         if level.name in LEVELS:  # brighter ones have the electrons of the last
             shown, truth = pictures(transport, camera, level.luminance_cd_m2, number)
             figures = {
-                **asdict(measure(shown, truth)), "flip_mean": float(flip(shown, truth).mean()),
+                **asdict(picture_quality(shown, truth)), "flip_mean": float(flip(shown, truth).mean()),
                 "luminance_db": -10 * log10(np.mean(luminance_of_srgb(shown - truth) ** 2)),
             }  # fmt: skip
         rows.append({**row, **figures})

@@ -13,7 +13,7 @@ from page_parts import RESULTS, Parts, csv_text, run, write_page
 from real_cameras import REPORTS
 
 from rodcone.errors import InputError
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.cameras.emva_report import read_report
 from sensor.config import SensorConfig
 from sensor.presets import preset, vary

@@ -9,9 +9,9 @@ from page_parts import RESULTS, Parts, csv_text, write_page
 
 from sensor.cameras.emva_report import EmvaReport, numbers_of, read_report
 from sensor.cameras.numbers import PixelNumbers, missing
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.emva1288.characterise import characterise
+from sensor.pixel import PixelConfig
 from studies.pages.report_text import MISSING, table
 
 PAGE = RESULTS.parent / "real_cameras.md"

@@ -75,7 +75,7 @@ class Noise:
 
 
 @cache
-def pooled(prior: Gaussians) -> Gaussians:
+def single_gaussian(prior: Gaussians) -> Gaussians:
     """One Gaussian with the mean and covariance of the whole mixture."""
     mean, root = np.tensordot(prior.weights, prior.means, 1), np.sqrt(prior.weights)[:, None, None]
     # b^2 mu mu' of the components is b^2 of the pooled mean's square, and b^2 of the deviations' squares: hence 1 + b^2

@@ -121,7 +121,7 @@ class Frame:
 
 
 def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Shares of the surroundings, by tile (rows, columns, channel), and guide [standard deviations of W's noise], (h, w).
+    """Shares of the surroundings, by tile (rows, columns, channel), and guide, (h, w) [deviations of W's noise].
 
     As `isp.panchromatic.read_as_white` states them.
     """

@@ -181,7 +181,7 @@ def default_processor(tile: Tile) -> str:
     return "ple" if takes(tile) else "any_mosaic"
 
 
-def names() -> tuple[str, ...]:
+def processor_names() -> tuple[str, ...]:
     """Names of all processors, installed or not.
 
     Examples

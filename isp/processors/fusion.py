@@ -58,7 +58,7 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
         behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
         balance = replace(balance, neutral=raw.channel_mixing @ (neutral_response(CHANNELS) * behind_density))
     mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
-    planes = np.stack([combine(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
+    planes = np.stack([tent_means(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
     rgb = to_rgb(raw, planes, level, colours, MATCHED_RADIUS)
     return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
@@ -88,11 +88,11 @@ def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) 
     mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
     white = fill(mosaic, raw.cfa, "W")
     differences = mosaic - white
-    planes = np.stack([white + combine(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
+    planes = np.stack([white + tent_means(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
     return Picture(to_rgb(raw, planes, level, colours, MATCHED_RADIUS), sources)
 
 
-def combine(values: Plane, cfa: Tile, channel: str) -> Plane:
+def tent_means(values: Plane, cfa: Tile, channel: str) -> Plane:
     """Plane of tent-weighted means of one channel's samples, at its own sites too, of a mosaic, shape (h, w).
 
     The tent reaches `MATCHED_RADIUS` pixels: at least one sample is in reach everywhere.

@@ -77,10 +77,10 @@ def read_weights(wheel: bytes) -> Weights:
             content = member.read(most)
     except Exception as error:  # damaged members fail in many ways, each compression in its own
         raise ValueError(f"it is no wheel of demosaicnet ({one_line(error)})") from error
-    return read_arrays(content, shapes)
+    return read_network(content, shapes)
 
 
-def read_arrays(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weights:
+def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weights:
     """Arrays of 32-bit floats by name out of a file of torch's first format.
 
     The pickle that names them is walked for its texts; nothing that it would call is looked at.

@@ -9,8 +9,8 @@ from render.spectrum import VISIBLE_NM, Spectrum
 from rodcone.errors import InputError, require_keys
 from sensor.cameras.library import MeasuredCamera
 from sensor.cfa import Tile, channels
-from sensor.chip import PixelConfig
 from sensor.config import SensorConfig
+from sensor.pixel import PixelConfig
 
 _STEP_NM = 4.0  # of lent curves
 _LEAST_SHARE = 0.05  # of the greatest response, at an anchor's wavelength

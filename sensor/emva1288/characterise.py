@@ -13,7 +13,7 @@ from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
-from sensor.emva1288.photon_transfer import Expose, Transfer, bench, dark_slopes, take_stack, take_transfer
+from sensor.emva1288.photon_transfer import Expose, Transfer, dark_slopes, light_bench, take_stack, take_transfer
 
 # Under this variance [DN^2] rounding is no longer an added 1/12, and the standard gives an upper limit alone.
 LEAST_VARIANCE_DN2 = 0.24
@@ -105,7 +105,7 @@ def characterise(
     exposure_s: float = 0.01,
     exact: bool = False,
 ) -> Characterisation:
-    """Draw one chip, take its frames (`exact` as in `sensor.emva1288.photon_transfer.bench`) and report.
+    """Draw one chip, take its frames (`exact` as in `sensor.emva1288.photon_transfer.light_bench`) and report.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def characterise(
             "give one of them (--reading 1, sensor.readings.resolve.chip_readings)"
         )
     require_range("exposure_s", exposure_s, 0.0, 1e6, "give seconds, 0 or more")
-    result = measure(bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
+    result = measure_camera(light_bench(sensor, shape, seed, exact), plan_for(sensor, exposure_s), sensor)
     engine = "numpy" if exact else backend()
     binning = sensor.chip.binning
     binned = (f"figures are of 2x2 pixels, binned: {binning.way}",) if binning else ()
@@ -140,7 +140,7 @@ def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
     return ExposurePlan(light_e=light_e, exposure_s=exposure_s, frames=32, dark_times_s=dark_times_s)
 
 
-def measure(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
+def measure_camera(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> Characterisation:
     """Run the procedure on any chip; `sensor` gives the well to aim at and the values to compare with."""
     # Frames
     dark = take_stack(expose, 0.0, plan.exposure_s, plan.frames)

@@ -17,7 +17,7 @@ from sensor.device import draw_device
 Expose: TypeAlias = Callable[[float, float], NDArray[np.uint16]]
 
 
-def bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
+def light_bench(sensor: SensorConfig, shape: tuple[int, int], seed: int, exact: bool = False) -> Expose:
     """Put one chip under uniform light that is set in electrons: the quantum efficiency is 1 by construction.
 
     The electrons are those of a raw image's pixel: four that bin share them. Its frames are drawn as

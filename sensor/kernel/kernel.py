@@ -16,7 +16,7 @@ from rodcone.jit import arrays, dr
 from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
-from sensor.kernel.poisson import alias_table, poisson
+from sensor.kernel.poisson import alias_table, poisson_single
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
 from sensor.readout import convert, spread_charge
 
@@ -138,10 +138,12 @@ def read_frame(
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))
     row, column = divide(dr.arange(jit.UInt, expected_e.size), divisor(expected_e.shape[1]))
     halves = dr.opaque(jit.UInt, key & 0xFFFFFFFF), dr.opaque(jit.UInt, key >> 32)
-    words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
+    words = philox_single((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), jit.UInt(0)), halves)
     shot, read_normal = normal_pair(words[0], words[1])
     if reading:  # shot noise is the charge's, read noise the reading's own
-        reading_words = philox((column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), dr.opaque(jit.UInt, reading)), halves)
+        reading_words = philox_single(
+            (column, row, jit.UInt(int(NoiseTerm.EXPOSURE)), dr.opaque(jit.UInt, reading)), halves
+        )
         _, read_normal = normal_pair(reading_words[0], reading_words[1])
 
     # The Poisson mean, PRNU on the light alone. Far above the well the draw is the well with certainty: the bound of
@@ -153,7 +155,7 @@ def read_frame(
     light_e = dr.minimum(upload(expected_e, copy_under=COPY_UNDER), _FINITE_E)
     mean_e = dr.fma(light_e, jit.Float(upload(device.photo_response, copy_under=COPY_UNDER)), dark_e)
     most_e = dr.opaque(jit.Float, 2 * pixel.full_well_e + 1e4)
-    collected_e = poisson(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
+    collected_e = poisson_single(dr.minimum(mean_e, most_e), shot, words[2:], upload(alias_table()))
 
     collected_e = dr.minimum(collected_e, dr.opaque(jit.Float, pixel.full_well_e))
     if sensor.in_charge:
@@ -170,7 +172,7 @@ def read_frame(
     return sensor.pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
 
 
-def philox(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:
+def philox_single(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:
     """Philox4x32-10, as `sensor.random.philox`: four random words for each counter."""
     (c0, c1, c2, c3), (k0, k1) = counter, key
     first, second = (arrays().UInt(int(multiplier)) for multiplier in MULTIPLIERS)

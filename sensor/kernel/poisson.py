@@ -53,7 +53,7 @@ def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     return share, other
 
 
-def poisson(mean_e: Any, normal: Any, words: tuple[Any, Any], table: Any) -> Any:
+def poisson_single(mean_e: Any, normal: Any, words: tuple[Any, Any], table: Any) -> Any:
     """Poisson draw of each thread, whole numbers in Float.
 
     Parameters

@@ -24,7 +24,7 @@ from rodcone.files import replacing
 from sensor.cfa import Tile, is_bayer, is_rgbw, plain
 from sensor.raw import RawImage
 from sensor.raw_files.brightness import stops_to_white
-from sensor.raw_files.raw_json import parse_json, raw_image, to_json
+from sensor.raw_files.raw_json import parse_json, raw_image, raw_to_json
 from sensor.raw_files.tiff import (
     CFA,
     COMPRESSION,
@@ -219,7 +219,7 @@ def dng_tags(raw: RawImage) -> Tags:
         phase = ("RG", "GR", "GB", "BG").index(raw.cfa[0])
         parameters = struct.pack(">3I", phase, len(raw.defects), 0) + raw.defects.astype(">u4").tobytes()
         tags[OPCODES] = ("U", struct.pack(">IIIII", 1, 5, 0x01030000, 1, len(parameters)) + parameters)
-    tags[PRIVATE_DATA] = ("B", PRIVATE + to_json(raw).encode("ascii"))
+    tags[PRIVATE_DATA] = ("B", PRIVATE + raw_to_json(raw).encode("ascii"))
     return dict(sorted(tags.items()))
 
 

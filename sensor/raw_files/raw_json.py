@@ -19,7 +19,7 @@ _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file 
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 
 
-def to_json(raw: RawImage, **more: Any) -> str:
+def raw_to_json(raw: RawImage, **more: Any) -> str:
     """Everything of a raw image but its pixels, and the keys of `more`.
 
     Python writes the shortest decimals that read back as the same float64. Keys of `_OPTIONAL` are left out
@@ -48,7 +48,7 @@ def to_json(raw: RawImage, **more: Any) -> str:
 
 
 def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Calibration as `to_json` wrote it, its keys checked: `KEYS` and `more`.
+    """Calibration as `raw_to_json` wrote it, its keys checked: `KEYS` and `more`.
 
     Raises
     ------

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError, read_errors
 from rodcone.files import read_bounded, replacing
 from sensor.raw import RawImage
-from sensor.raw_files.raw_json import MOST_BYTES, parse_json, raw_image, to_json
+from sensor.raw_files.raw_json import MOST_BYTES, parse_json, raw_image, raw_to_json
 from sensor.raw_files.tiff import MIN_IS_BLACK, read_mosaic, write_mosaic
 
 DIGEST = "pixels_sha256"
@@ -34,7 +34,7 @@ def write_tiff(raw: RawImage, path: Path) -> tuple[Path, Path]:
         )
     with replacing(sidecar, path) as (note, picture):
         write_mosaic(picture, raw.dn, MIN_IS_BLACK, {})
-        note.write_text(to_json(raw, **{DIGEST: _digest(raw.dn)}) + "\n", encoding="utf-8")
+        note.write_text(raw_to_json(raw, **{DIGEST: _digest(raw.dn)}) + "\n", encoding="utf-8")
     return path, sidecar
 
 

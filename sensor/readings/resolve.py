@@ -21,9 +21,9 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError
 from sensor.cfa import mask
-from sensor.chip import ChannelReading, Chip, PixelConfig
 from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.noise_law import NoiseLaw, total
+from sensor.pixel import ChannelReading, Chip, PixelConfig
 
 Values: TypeAlias = NDArray[Any]
 _STEPS = 16.0  # of a metered time to an octave: frames of one scene take the same one

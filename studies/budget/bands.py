@@ -18,12 +18,12 @@ FINE_NM = 10.0  # of the reference's bands (design: 380-780 nm in 10 nm bands)
 COUNTS = (4, 8, 12, 16, 20, 28, 40)
 
 
-def counts(width_nm: Floats) -> tuple[int, ...]:
+def possible_counts(width_nm: Floats) -> tuple[int, ...]:
     """Return the numbers of bands that a plan may choose; where the range is wider, also all of its fine bands."""
     return (*COUNTS, width_nm.size) if width_nm.size > COUNTS[-1] else COUNTS
 
 
-def groups_of(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
+def band_groups(width_nm: Floats, count: int) -> list[NDArray[np.intp]]:
     """Divide the fine bands into about `count` groups of neighbours, as equal as they can be; return their indices.
 
     The narrow band of a line is a group of its own, so that lamps with lines have some more.

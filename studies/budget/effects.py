@@ -95,7 +95,7 @@ def find_effects(
     lens : LensConfig
         With everything that the reference models.
     groups : mapping of int to sequence of index arrays
-        Choices of wide bands, as `studies.budget.bands.groups_of` makes them.
+        Choices of wide bands, as `studies.budget.bands.band_groups` makes them.
     rng : numpy.random.Generator
         For the draws of Monte Carlo noise.
     """

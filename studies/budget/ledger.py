@@ -100,11 +100,11 @@ def term_names(ledgers: Sequence[Ledger]) -> list[str]:
 
 def figures(row: Ledger, names: Sequence[str]) -> list[str]:
     """Return the noise and the error [e-], the error's share, and each term's share, in brackets if it is modelled."""
-    shares = {x.name: f"({percent(x.share)})" if x.modelled else percent(x.share) for x in row.terms}
-    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", percent(row.share), *(shares.get(name, "") for name in names)]
+    shares = {x.name: f"({share_text(x.share)})" if x.modelled else share_text(x.share) for x in row.terms}
+    return [f"{row.noise_e:.3g}", f"{row.rms_e:.3g}", share_text(row.share), *(shares.get(name, "") for name in names)]
 
 
-def percent(share: float) -> str:
+def share_text(share: float) -> str:
     """Write a share as per cent, or as a factor if it is two or more."""
     if share >= 2:
         return f"{share:.1f}x" if share < 10 else f"{share:.0f}x"

@@ -17,7 +17,7 @@ from sensor.burst import merged_sensor
 from sensor.config import LensConfig
 from sensor.exposure import AUTO, amplified, at_level_s
 from sensor.presets import preset, vary
-from studies.budget.bands import groups_of
+from studies.budget.bands import band_groups
 from studies.budget.effects import SHAKE, find_effects, shake_effect
 from studies.budget.scaled_effects import PilotNoise, ScaledEffects, scale_effects
 from studies.study.gain import at_gain
@@ -25,7 +25,7 @@ from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, level_luminance, lux_per_cd_m2, under, white_spectrum
 from studies.study.model import unit_exposure_s
 from studies.study.scene_source import open_radiance_file
-from studies.study.study import OWN, Study, conditions, mosaics, most_spp
+from studies.study.study import OWN, Study, conditions, most_spp, study_mosaics
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
@@ -75,7 +75,7 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
         max_spp=min(most_spp(study, opened.choice), PILOT_SPP),
         cache=cache,
     )
-    return Pilot(opened, transport, {count: groups_of(width_nm, count) for count in counts})
+    return Pilot(opened, transport, {count: band_groups(width_nm, count) for count in counts})
 
 
 def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
@@ -108,7 +108,7 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
         noise, radiance = _pilot_noise(pilot, lit), lit.relight(luminance_cd_m2=1.0)
         for name in study.sensors:
             auto_s = unit_exposure_s(radiance, preset(name).undivided)
-            for mosaic in mosaics(study):
+            for mosaic in study_mosaics(study):
                 sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)
                 sensor = replace(sensor, lens=lens)

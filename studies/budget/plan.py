@@ -7,7 +7,7 @@ from pathlib import Path
 from rodcone.errors import InputError
 from rodcone.progress import Step
 from sensor.presets import preset
-from studies.budget.bands import counts, wide_bands
+from studies.budget.bands import possible_counts, wide_bands
 from studies.budget.effects import KERNEL, LENS_TERMS
 from studies.budget.how_many_bands import Choice, choose
 from studies.budget.ledger import Ledger, Plan, ledger
@@ -57,7 +57,9 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
     for index, (scene, opened) in enumerate(opened_scenes.items()):
         if step:
             step(f"pilot of {scene.source}", index / len(opened_scenes))
-        possible = counts(reference_bands(opened, study)[1]) if named is None else (band_count(study, name, opened),)
+        possible = (
+            possible_counts(reference_bands(opened, study)[1]) if named is None else (band_count(study, name, opened),)
+        )
         pilot = make_pilot(opened, study, possible, None if cache is None else Path(cache))
         rows = list(scaled_effects_of(pilot, study))
         if named is None:

@@ -9,7 +9,7 @@ from dataclasses import replace
 from render.illuminants import illuminant
 from render.spectrum import fine_bands
 from sensor.presets import preset
-from studies.budget.bands import groups_of, wide_bands
+from studies.budget.bands import band_groups, wide_bands
 from studies.budget.effects import LENS_TERMS
 from studies.budget.ledger import Plan
 from studies.budget.pilot import full_lens, reference_bands
@@ -33,7 +33,7 @@ def fast_plan(study: Study) -> Plan:
     for opened in open_all(study).values():
         if opened.scene is not None:
             nm, width_nm = reference_bands(opened, study)
-            bands = wide_bands(nm, width_nm, groups_of(width_nm, FAST_BANDS))
+            bands = wide_bands(nm, width_nm, band_groups(width_nm, FAST_BANDS))
             spp = min(FAST_SPP, most_spp(study, opened.choice))
             renders[opened.choice] = in_bands(bands, spp, study.render.denoise)
         for condition in conditions(study, opened.choice):

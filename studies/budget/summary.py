@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 from studies.budget.costs import cost_over_reference
 from studies.budget.effects import KERNEL, LENS_TERMS
-from studies.budget.ledger import MONTE_CARLO, Ledger, Plan, condition_words, percent
+from studies.budget.ledger import MONTE_CARLO, Ledger, Plan, condition_words, share_text
 from studies.study.model import RenderModel
 from studies.study.study import AUTOMATIC, SceneChoice, Study, most_spp
 
@@ -74,17 +74,17 @@ def _cost(study: Study, rows: Sequence[Ledger]) -> list[str]:
     """Say how large the error is where it is largest, and what it is made of."""
     worst = max(rows, key=lambda row: row.share)
     parts = sorted((term for term in worst.terms if not term.modelled), key=lambda term: -term.share)
-    made_of = f"{parts[0].name} ({percent(parts[0].share)}) and {parts[1].name} ({percent(parts[1].share)})"
+    made_of = f"{parts[0].name} ({share_text(parts[0].share)}) and {parts[1].name} ({share_text(parts[1].share)})"
     kept = "within" if worst.share <= study.budget.total else "above"
     return [
         f"This adds at most {_share(worst.share)} the sensor's own noise variance, {kept} the budget of "
-        f"{percent(study.budget.total)}.",
+        f"{share_text(study.budget.total)}.",
         f"The error is largest under {' '.join(condition_words(worst)[1:])}, where the largest parts are {made_of}.",
     ]
 
 
 def _share(share: float) -> str:
-    text = percent(share)
+    text = share_text(share)
     return f"{text[:-1]} times" if text.endswith("x") else f"{text} of"
 
 
@@ -93,8 +93,8 @@ def _too_few_samples(study: Study, spp: int, rows: Sequence[Ledger]) -> list[str
     share = max(term.share for row in rows for term in row.terms if term.name == MONTE_CARLO)
     if share <= study.budget.monte_carlo:
         return []
-    needed = float(f"{spp * share / study.budget.monte_carlo:.2g}")
+    needed, allowed = float(f"{spp * share / study.budget.monte_carlo:.2g}"), share_text(study.budget.monte_carlo)
     return [
-        f"Monte Carlo noise exceeds its share of {percent(study.budget.monte_carlo)}: {needed:.0f} samples per pixel "
+        f"Monte Carlo noise exceeds its share of {allowed}: {needed:.0f} samples per pixel "
         f"would keep it, and the study allows {most_spp(study, rows[0].condition.scene)}."
     ]

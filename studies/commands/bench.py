@@ -11,7 +11,7 @@ from cyclopts import Parameter
 from rodcone.errors import InputError
 from rodcone.files import write_files
 from rodcone.progress import progress
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.presets import preset
 from studies.commands.console import print_table
 from studies.pages.report_sweep import environment

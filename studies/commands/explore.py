@@ -7,7 +7,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from scenes.catalog import names
+from scenes.catalogue import scene_names
 from studies.commands.console import say
 from studies.explore.server import listen, make_server, require_server
 from studies.explore.session import Session
@@ -42,7 +42,7 @@ def explore(
     require_server()
     opened = open_source(source, options)
     by_name = replace(options, trust_scene=False, define=())  # a scene of the catalogue takes neither
-    scenes = {name: partial(open_source, name, by_name) for name in names()} | {opened.title: lambda: opened}
+    scenes = {name: partial(open_source, name, by_name) for name in scene_names()} | {opened.title: lambda: opened}
     with listen(port) as listener:
         say(*opened.notes)
         session = Session(opened, scenes)

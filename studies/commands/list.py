@@ -81,7 +81,7 @@ def _sensors() -> dict[str, str]:
     from sensor.cameras.library import measured_cameras
 
     lines = {}
-    for name in presets.names():
+    for name in presets.preset_names():
         remark, _ = presets.preset_file(name).read_text("utf-8").split("\n\n", 1)
         lines[name] = " ".join(remark.replace("#", " ").split())
     for name, camera in measured_cameras().items():

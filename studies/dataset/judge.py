@@ -18,12 +18,12 @@ from isp.processors.catalogue import NAMED
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError, read_errors
 from rodcone.optional import quietly_imported
-from sensor.presets import names, preset, vary
+from sensor.presets import preset, preset_names, vary
 from studies.dataset.shards import Lines, Runner, Shard, is_intact, read_manifest, read_shard, shards_of
 from studies.design.expect import expect
+from studies.metrics.appearance import appearance, picture_quality, psnr_db, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.metric import METRICS, ON_TARGETS
-from studies.metrics.quality import appearance, measure, psnr_db, true_picture
 from studies.pages import report_text as text
 from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, COLOURS, STYLE, blank, name_at_ends, plain_ticks, svg_text
@@ -126,7 +126,7 @@ def _condition(row: Row) -> tuple[str, str]:
 
 def expected(samples: Lines, study: str) -> list[Score]:
     """PSNR that `rodcone expect` computes of each condition: of presets, and of the frozen list's sensor files."""
-    known = {name: name for name in names()}
+    known = {name: name for name in preset_names()}
     if study == FROZEN_LIST:  # another study's file of the same name is another sensor
         known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
     conditions = {_condition(line): line for line in samples if line["sensor"] in known}
@@ -149,7 +149,7 @@ def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
         if facts["key"] in files:
             truth = true_picture(arrays["rgb"].astype(np.float64))
             encoded = read_picture(files[facts["key"]], truth.encoded.shape[:2])
-            figures = vars(measure(encoded, truth.encoded, truth.lab))
+            figures = vars(picture_quality(encoded, truth.encoded, truth.lab))
             linear = decode_srgb(encoded)
             figures |= vars(appearance(linear, encode_srgb(linear), truth, facts["white_cd_m2"]))
             mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}

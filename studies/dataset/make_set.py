@@ -25,7 +25,7 @@ from studies.pages.page import write_out
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note
 from studies.study.scene_source import open_radiance_file
-from studies.study.study import Condition, Study, conditions, label, mosaics
+from studies.study.study import Condition, Study, conditions, label, study_mosaics
 from studies.sweep.cells import Cell
 from studies.sweep.database import open_results
 from studies.sweep.prepare import SET, Job, scene_cells
@@ -112,7 +112,7 @@ def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> s
         For two frames of one name.
     """
     alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # which develop one frame
-    names = [_name(*frame) for frame in product(alike, mosaics(study), study.seeds)]
+    names = [_name(*frame) for frame in product(alike, study_mosaics(study), study.seeds)]
     name, count = Counter(names).most_common(1)[0]
     if count > 1:
         raise InputError(f"study: two frames would be named {name!r}; allowed: names that differ; rename one")

@@ -16,7 +16,7 @@ from sensor.readings.resolve import chip_readings, several
 from studies.budget.ledger import Plan
 from studies.dataset.sample import TRUTH
 from studies.study.lit_scene import OpenedScene
-from studies.study.study import SceneChoice, Study, mosaics
+from studies.study.study import SceneChoice, Study, study_mosaics
 
 _SCENES = 0, 100_000, "give a number of scenes"
 _BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # a pixel; others by channel, group
@@ -122,4 +122,4 @@ def require_room(needed: float, out: Path) -> None:
 
 
 def _cameras(study: Study) -> list[SensorConfig]:
-    return [vary(preset(name), mosaic) for name in study.sensors for mosaic in mosaics(study)]
+    return [vary(preset(name), mosaic) for name in study.sensors for mosaic in study_mosaics(study)]

@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.design.expected_error import Noise, expected_error, pooled, sampled
+from isp.design.expected_error import Noise, expected_error, sampled, single_gaussian
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
 from render.spectrum import Floats, tristimulus
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
@@ -23,7 +23,7 @@ from sensor.optics import WAVELENGTH_NM, camera_equation
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
-from studies.metrics.truth import Light, light_of
+from studies.metrics.truth import Light, named_light
 
 # Numbers of the pixels whose error counts, row by row: a patch's others lack neighbours.
 MIDDLE = np.arange(PATCH**2).reshape(PATCH, PATCH)[2:-2, 2:-2].ravel()
@@ -80,7 +80,7 @@ class LitPrior:
 @cache
 def view_of(prior_name: str, light_name: str) -> LitPrior:
     """The prior's coefficients under an illuminant, in bands of 1 nm."""
-    prior, light = load_prior(prior_name), light_of(light_name)
+    prior, light = load_prior(prior_name), named_light(light_name)
     basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, light.wavelength_nm) - 1, 0, len(prior.spectra) - 1)]
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
     xyz = tristimulus(light.spectrum * basis.T, light.wavelength_nm, light.width_nm)
@@ -186,7 +186,7 @@ def expect(
     sampling, frame_e = sampling_of(sensor, responses, lens), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
     # Component known, and one Gaussian in the mixture's place.
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
-    mixtures = ((spectral.patches, forms), (pooled(spectral.patches), pooled_forms))
+    mixtures = ((spectral.patches, forms), (single_gaussian(spectral.patches), pooled_forms))
     by_mixture = [(sampled(patches, sampling, MIDDLE, lens), metrics) for patches, metrics in mixtures]
 
     def at(level_cd_m2: float) -> ExpectedError:

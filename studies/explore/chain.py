@@ -31,7 +31,7 @@ from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
 from studies.explore.controls import TIME, Controls, Lamp, alone, camera_of, lit_transport, options_of
 from studies.explore.memo import Memo
-from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of
+from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_pixels
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.study import AS_SHOT
 
@@ -252,7 +252,7 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
     shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
     planes = [memo.of("scattered", lamp, alone(lit, lamp[0]).scattered_luminance) for lamp in shining]
-    return white_of(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
+    return white_of_pixels(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
 
 
 def _weighted(weights: Any, planes: list[Image]) -> Image:

@@ -25,7 +25,7 @@ from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.config import LONGEST_S, MOST_GAIN, SensorConfig
 from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.photodiodes import with_gain
-from sensor.presets import VARIATIONS, names
+from sensor.presets import VARIATIONS, preset_names
 from studies.metrics.truth import Light, light_in_bands
 from studies.study.scene_source import LIGHT, first_light
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
@@ -206,7 +206,7 @@ def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
                 "file on the page, as a table"
             )
     controls = controls_of(content, "send what the page is told first")
-    require_name("sensor", controls.sensor, (*names(), *dropped))
+    require_name("sensor", controls.sensor, (*preset_names(), *dropped))
     for name, lamp in controls.lamps.items():
         if len(lamp.table) > MOST_POINTS:
             raise InputError(f"lamps[{name!r}].table: {len(lamp.table)} points; allowed: {MOST_POINTS}; thin it out")

@@ -14,7 +14,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from isp.processors.catalogue import PROCESSORS, libraries
-from render.illuminants import names as illuminants
+from render.illuminants import illuminant_names as illuminants
 from rodcone.curve_file import ENDINGS
 from rodcone.errors import InputError, read_errors, require_keys, require_name, require_whole
 from rodcone.toml_file import parse_toml
@@ -22,8 +22,8 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.config_file import OF_TABLES
 from sensor.exposure import RULES
-from sensor.presets import names as sensors
 from sensor.presets import preset
+from sensor.presets import preset_names as sensors
 from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source

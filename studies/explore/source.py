@@ -19,7 +19,7 @@ from render.spectrum import VISIBLE_NM, Floats, even_bands
 from render.transport import Transport
 from rodcone.errors import require_absent, require_fields
 from rodcone.memory import memory, require_memory
-from scenes.catalog import names
+from scenes.catalogue import scene_names
 from studies.photograph.ready_light import Ready, find_ready, load_ready
 from studies.study.scene_source import (
     LIGHT,
@@ -158,7 +158,7 @@ def _ready(
     source: str, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], options: RenderOptions
 ) -> Ready | None:
     """Light of a scene of the catalogue that is there already, where nothing asks for a render."""
-    if options.render or options.spp is not None or options.seed or source not in names():
+    if options.render or options.spp is not None or options.seed or source not in scene_names():
         return None
     return find_ready(scene, size, size, [group.spectrum for group in scene.groups.values()], bands)
 

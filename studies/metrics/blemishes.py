@@ -13,7 +13,7 @@ from scipy.ndimage import median_filter
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import decode_srgb, luminance_of_srgb
-from studies.metrics.quality import require_finite
+from studies.metrics.appearance import require_finite
 
 SPOT = 20.0  # CIEDE2000 to every neighbour's truth: another colour by name
 LIGHT, HOLE = 0.5, 0.2  # a light is half as bright as white or more; its hole a fifth of that, or less

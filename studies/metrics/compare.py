@@ -15,9 +15,9 @@ from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.display import brief, preview_png
 from rodcone.errors import InputError
 from rodcone.types import Image, real_array
-from studies.metrics.quality import TruePicture, appearance, true_picture
-from studies.metrics.quality import measure as quality_of
-from studies.metrics.truth import light_in_bands, true_srgb, white_of
+from studies.metrics.appearance import TruePicture, appearance, true_picture
+from studies.metrics.appearance import picture_quality as quality_of
+from studies.metrics.truth import light_in_bands, true_srgb, white_of_pixels
 
 _CELL_PX = 8
 _MOST_DOUBLED = 40  # times that a lamp's light may exceed what white leaves of it, as a power of 2
@@ -66,7 +66,7 @@ def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None)
         White is the luminance of which the 99th percentile of pixels has 90 %.
     """
     lamp = light or radiance.light or illuminant("D65")
-    white_cd_m2 = white_of(radiance.luminance(), np.zeros(radiance.shape))
+    white_cd_m2 = white_of_pixels(radiance.luminance(), np.zeros(radiance.shape))
     if not white_cd_m2 > 0:
         raise InputError("radiance: it is dark; allowed: light in a hundredth of its pixels; give a level above 0")
     in_bands = light_in_bands(lamp, radiance.wavelength_nm, radiance.widths_nm)

@@ -15,9 +15,9 @@ from render.scene import Scene
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import SRGB_TO_XYZ, WHITE_AT, adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.errors import InputError
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.metamers import pairs
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from studies.metrics.mtf import edge_response
 
 Masks = NDArray[np.bool_]
@@ -106,7 +106,7 @@ def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64]
     return np.asarray(deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
 
 
-EDGE, CHART = "slanted_edge", "color_checker"  # names in `scenes.catalog`
+EDGE, CHART = "slanted_edge", "color_checker"  # names in `scenes.catalogue`
 
 
 @dataclass(frozen=True)
@@ -202,7 +202,7 @@ def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.fl
 @cache
 def daylight_srgb() -> NDArray[np.float64]:
     """Linear sRGB of the ColorChecker's patches under D65, shape (patch, 3)."""
-    xyz, _ = _xyz("D65", [curve for _, curve in color_checker()])
+    xyz, _ = _xyz("D65", [curve for _, curve in color_checker_reflectances()])
     linear = xyz_to_srgb(xyz)
     return np.asarray(linear * (WHITE_AT / luminance_of_srgb(linear)[WHITE_PATCH]))
 

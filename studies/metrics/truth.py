@@ -45,7 +45,7 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
     )
 
 
-def light_of(name: str) -> Light:
+def named_light(name: str) -> Light:
     """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm."""
     nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
     return light_in_bands(illuminant(name), nm, np.ones_like(nm))
@@ -56,10 +56,10 @@ def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> fl
 
     Light that is seen directly doesn't count, nor the part of a pixel that it covers.
     """
-    return white_of(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)
+    return white_of_pixels(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)
 
 
-def white_of(luminance: NDArray[np.float64], coverage: NDArray[np.floating]) -> float:
+def white_of_pixels(luminance: NDArray[np.float64], coverage: NDArray[np.floating]) -> float:
     """Luminance that is shown as white, from that of each pixel without light that is seen directly, shape (h, w).
 
     Parameters

@@ -139,7 +139,7 @@ def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, An
     }
 
 
-def alone(report: ReportData) -> str:
+def single_group(report: ReportData) -> str:
     """Say how a study does in which nothing competes: its PSNR from the first level to the last."""
     cells = [cell for cell in report.by_group[0] if isfinite(cell.mean("psnr_db"))]
     ends = [
@@ -241,7 +241,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         headline=HEADLINE,
         said_by=MEANINGS,
         seen_by=SEEN_BY,
-        alone=alone(report),
+        alone=single_group(report),
         answer=data["comparisons"][of.compared]["answers"].get(f"{of.a} {of.b}", [None])[0],
         warning=render_warning(report, groups),
         sources=[addresses[cell.picture] if cell.picture else "" for cell in report.cells],

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.catalog import DRAWN
+from scenes.catalogue import DRAWN
 from studies.metrics.metric import METRICS, Metric
 from studies.pages import report_text as text
 from studies.pages.headline import WHITE_PIXEL, Group, Pair, answer, balance_words, best_words, in_light, pair_words

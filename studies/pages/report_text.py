@@ -5,7 +5,7 @@ from math import floor, isfinite, isinf, isnan, log10
 
 from isp.processors.own import user_file
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W
-from sensor.presets import names
+from sensor.presets import preset_names
 from studies.metrics.metric import Metric
 from studies.pages.report_data import ReportCell
 from studies.study.gain import ISO
@@ -96,7 +96,7 @@ def camera_name(camera: str) -> str:
 def plain_name(name: str) -> str:
     """Return a sensor's name without its file's ending, which parts a preset's copy from the preset."""
     plain = name.removesuffix(".toml")
-    return name if plain in names() else plain
+    return name if plain in preset_names() else plain
 
 
 def with_signs(words: str) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from sensor.config import SensorConfig
 from sensor.shake import blur_variance
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.pages.plots import light_charts
 from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure, with_default
 from studies.paper.setup import (
@@ -24,7 +24,7 @@ from studies.paper.setup import (
     View,
     at_level,
     close_up,
-    develop,
+    develop_view,
     exposures,
     quality_db,
     view,
@@ -79,7 +79,10 @@ def measure_best(setup: Setup, subject: View, camera: Camera) -> Mapping[float, 
         quality = np.stack(
             [
                 quality_db(
-                    [develop(camera, raw, lit)[0] for raw in exposures(camera, lit, f"{time * 1e3:g}ms", setup.seeds)],
+                    [
+                        develop_view(camera, raw, lit)[0]
+                        for raw in exposures(camera, lit, f"{time * 1e3:g}ms", setup.seeds)
+                    ],
                     lit.truth,
                 )
                 for time in TIMES_S
@@ -129,7 +132,7 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Best exposures by hand of Bayer, the paper's camera and the default, and the claims about them."""
     subject = close_up(view(setup, "still_life", 1.0))
     best = {name: measure_best(setup, subject, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
-    light = light_of("D65")
+    light = named_light("D65")
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
     more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice
     claims = with_default(lambda of: claims_held(best[BAYER], of, more_light), best)

@@ -12,16 +12,16 @@ import scipy
 
 from isp.planes import tent
 from isp.processors.catalogue import NAMED
-from isp.processors.fusion import MATCHED_RADIUS, combine
+from isp.processors.fusion import MATCHED_RADIUS, tent_means
 from rodcone.colour_spaces import SRGB_TO_XYZ
 from sensor.cfa import MOSAICS, Tile, mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.readout import noise_variance, read_out
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.paper.claims import Claim, judge_claim
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, Camera, Setup, decibels, develop, exposures, sensor_of, view
+from studies.paper.setup import READINGS, Camera, Setup, decibels, develop_view, exposures, table1_sensor, view
 from studies.paper.white_in_low_light import LOW_CD_M2
 from studies.paper.white_partly_full import BRIGHT_CD_M2, PITCH_UM, measure_bright
 from studies.photograph.camera import colour_fit
@@ -42,7 +42,7 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 
     Read out, the first is where half of the pixels are full, and the second follows from the SNR that W has there.
     """
-    light, names = light_of("D65"), sensor.channels
+    light, names = named_light("D65"), sensor.channels
     per_cd_m2 = channel_e(sensor, light, 1.0, EXPOSURE_S)
     white, colour = per_cd_m2[names.index("W")], per_cd_m2[[name != "W" for name in names]].max()
     dark_cd_m2 = electrons_at_snr(1.0, sensor, EXPOSURE_S) / white
@@ -60,7 +60,7 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
     """Noise of linear sRGB about its luminance, grey 1, on an even field: closed form, and read out."""
     sensor = Camera(reading, processor).sensor
-    light, colours = light_of("D65"), NAMED[processor].colours
+    light, colours = named_light("D65"), NAMED[processor].colours
     electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[sensor.channels.index(x) for x in colours]]
     matrix = colour_fit(sensor, NAMED[processor], light).matrix(colours) / electrons
     chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB less its luminance
@@ -76,11 +76,11 @@ def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[
 
 def ranges_lost_db(reading: str) -> Mapping[str, float]:
     """Dynamic range of RGBW less that of each of `MATCHED` [dB], in closed form and read out."""
-    whole = range_db(sensor_of(reading))
+    whole = range_db(table1_sensor(reading))
     return {
         f"{reading}, {mosaic}, {how}": ours - theirs
         for mosaic in MATCHED
-        for how, ours, theirs in zip(HOW, whole, range_db(sensor_of(reading, mosaic)), strict=True)
+        for how, ours, theirs in zip(HOW, whole, range_db(table1_sensor(reading, mosaic)), strict=True)
     }
 
 
@@ -95,14 +95,14 @@ def colour_noise_ratios(reading: str) -> Mapping[str, float]:
 
 def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
     """Light of Kijima's combined colour sample over that of W's, by colour: closed form, and by read out shot noise."""
-    per_cd_m2 = channel_e(sensor_of("table1_output"), light_of("D65"), 1.0, 1.0)
+    per_cd_m2 = channel_e(table1_sensor("table1_output"), named_light("D65"), 1.0, 1.0)
     weights = np.outer(tent(MATCHED_RADIUS), tent(MATCHED_RADIUS))
     shape, rng, lights = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0), dict[str, tuple[float, float]]()
     for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
         sites = mask(tile, channel, shape).astype(np.float64)
         total, squares = (scipy.ndimage.convolve(sites, kernel, mode="wrap") for kernel in (weights, weights**2))
         samples = 1 / float((squares / total**2).mean())  # that a weighted mean is worth
-        combined = combine(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
+        combined = tent_means(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
         lights[channel] = samples * mean_e / WHITE_E, float(combined.mean() ** 2 / combined.var()) / WHITE_E
     return lights
 
@@ -153,7 +153,7 @@ def section_2(setup: Setup) -> tuple[Claim, ...]:
     for name, reading in product(DESIGNS, READINGS):
         camera = Camera(reading, name, PITCH_UM)
         raw = exposures(camera, subject, "66ms")[0]
-        bright[name][reading] = measure_bright(raw, develop(camera, raw, subject)[0], subject).result_correlation
+        bright[name][reading] = measure_bright(raw, develop_view(camera, raw, subject)[0], subject).result_correlation
     lost_db, ratios = (
         {name: value for reading in READINGS for name, value in of(reading).items()}
         for of in (ranges_lost_db, colour_noise_ratios)

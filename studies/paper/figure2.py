@@ -14,11 +14,11 @@ from matplotlib.figure import Figure
 from render.spectrum import Floats
 from sensor.curves import rgbw
 from sensor.readout import noise_variance
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.pages.plots import BLUE, CHART, COLOURS, GREEN, INK, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.paper.claims import Claim, PaperFigure, about, claim, judge_claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, TODAY, sensor_of, without_prnu
+from studies.paper.setup import READINGS, TODAY, table1_sensor, with_even_response
 from studies.photograph.snr import channel_e, snr
 
 NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
@@ -47,14 +47,14 @@ Gains = Mapping[str, Mapping[str, Gain]]  # by sensor and colour
 
 def signal_ratios(light: str) -> Ratios:
     """Electrons of W over those of R, G and B in a light, 380-780 nm."""
-    electrons = channel_e(sensor_of("table1_output"), light_of(light), 1.0, 1.0)
+    electrons = channel_e(table1_sensor("table1_output"), named_light(light), 1.0, 1.0)
     return dict(zip("RGB", (electrons[3] / electrons[:3]).tolist(), strict=True))
 
 
 def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) -> Mapping[str, Gain]:
     """W's gain over R, G and B: one pixel of each on a uniform neutral field under D65."""
-    sensor = sensor_of(name) if fixed_pattern else without_prnu(sensor_of(name))
-    electrons = channel_e(sensor, light_of("D65"), luminance_cd_m2, SNR_EXPOSURE_S)
+    sensor = table1_sensor(name) if fixed_pattern else with_even_response(table1_sensor(name))
+    electrons = channel_e(sensor, named_light("D65"), luminance_cd_m2, SNR_EXPOSURE_S)
     values, variance = snr(electrons, sensor, SNR_EXPOSURE_S), noise_variance(electrons, sensor, SNR_EXPOSURE_S)
     dark = float(noise_variance(np.zeros(1), sensor, SNR_EXPOSURE_S)[0] / variance[3])
     return {
@@ -65,8 +65,8 @@ def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) 
 
 def bright_cd_m2(name: str) -> float:
     """Luminance at which W is nearly full."""
-    sensor = sensor_of(name)
-    return float(BRIGHT * sensor.pixel.full_well_e / channel_e(sensor, light_of("D65"), 1.0, SNR_EXPOSURE_S)[3])
+    sensor = table1_sensor(name)
+    return float(BRIGHT * sensor.pixel.full_well_e / channel_e(sensor, named_light("D65"), 1.0, SNR_EXPOSURE_S)[3])
 
 
 def coverage() -> float:

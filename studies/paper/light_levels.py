@@ -16,9 +16,9 @@ from sensor.config import LONGEST_S
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.raw import RawImage
+from studies.metrics.appearance import picture_quality, psnr_db
 from studies.metrics.confidence import half_width
 from studies.metrics.flip import flip
-from studies.metrics.quality import measure, psnr_db
 from studies.pages.plots import light_charts
 from studies.paper.claims import Claim, PaperFigure, at_least, at_most, claim, paper_figure, with_default, within
 from studies.paper.setup import (
@@ -31,7 +31,7 @@ from studies.paper.setup import (
     View,
     at_level,
     close_up,
-    develop,
+    develop_view,
     exposures,
     view,
 )
@@ -88,9 +88,9 @@ def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
 def _row(camera: Camera, raw: RawImage, subject: View) -> tuple[float, ...]:
     """Fields of `LevelCurves` of one exposure."""
     truth = encode_srgb(subject.truth)
-    linear, picture = develop(camera, raw, subject)
-    encoded, bare = (encode_srgb(x) for x in (linear, develop(camera, without_white(raw), subject, 0.0)[0]))
-    quality = measure(encoded, truth)
+    linear, picture = develop_view(camera, raw, subject)
+    encoded, bare = (encode_srgb(x) for x in (linear, develop_view(camera, without_white(raw), subject, 0.0)[0]))
+    quality = picture_quality(encoded, truth)
     return (
         picture.substitution or 0.0,
         1 - float(saturated_fraction(raw).mean()),

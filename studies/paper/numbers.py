@@ -11,9 +11,9 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
 from sensor.device import Device
 from sensor.readout import read_out
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.paper.claims import Claim, claim, judge_claim, within_margin
-from studies.paper.setup import READINGS, View, decibels, photons, sensor_of, shot_noise_alone
+from studies.paper.setup import READINGS, View, decibels, photons, shot_noise_alone, table1_sensor
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
 FULL_SUN_LUX = 1e5  # as `DEMO_LEVELS`
@@ -24,14 +24,14 @@ FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
     """Photons of a range of wavelengths from moonlight on the sensor, through f/5.6 [um^-2 s^-1]."""
-    sensor, light = replace(sensor_of("table1_output"), lens=LensConfig(5.6)), light_of("D65")
+    sensor, light = replace(table1_sensor("table1_output"), lens=LensConfig(5.6)), named_light("D65")
     inside = (light.wavelength_nm > first_nm) & (light.wavelength_nm < last_nm)
     return photons(replace(light, spectrum=np.where(inside, light.spectrum, 0.0)), MOONLIGHT_CD_M2, sensor)
 
 
 def measured_snr_db() -> float:
     """SNR of a uniform field of 1000 electrons that is read out twice with no noise but that of light [dB]."""
-    sensor = shot_noise_alone(sensor_of("table1_output"))
+    sensor = shot_noise_alone(table1_sensor("table1_output"))
     shape, rng = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0)
     chip, field = Device(np.ones(shape), np.zeros(shape)), np.full((FLAT_SIDE, FLAT_SIDE), 1000.0)
     first, second = (read_out(field, sensor, chip, 0.01, rng).electrons for _ in range(2))
@@ -84,6 +84,6 @@ def table_claim(swing_wells: Mapping[str, float]) -> Claim:
 def number_claims(view: View) -> tuple[Claim, ...]:
     """All claims of this module; `view` is the scene whose range counts."""
     per_um2_s = {f"{low:g}-{high:g} nm": moonlight_photons(low, high) for low, high in ((400.0, 700.0), VISIBLE_NM)}
-    pixels = {name: sensor_of(name).pixel for name in READINGS}
+    pixels = {name: table1_sensor(name).pixel for name in READINGS}
     swing_wells = {name: pixel.swing_e / pixel.full_well_e for name, pixel in pixels.items()}
     return *photon_claims(per_um2_s, measured_snr_db()), range_claim(range_spans(view)), table_claim(swing_wells)

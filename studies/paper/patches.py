@@ -25,7 +25,7 @@ from sensor.readout import read_out
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
 from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, sensor_of, view
+from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, table1_sensor, view
 
 PATCH = 5  # ours: the paper doesn't say
 ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
@@ -143,7 +143,7 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
 
 def noisy_edge(reading: str) -> RawImage:
     """A ramp with an edge on a sensor of W alone, so that every pixel is a sample, with noise."""
-    sensor = sensor_of(reading, "mono")
+    sensor = table1_sensor(reading, "mono")
     rng = np.random.default_rng(0)
     field = 500.0 + 60.0 * np.add.outer(np.arange(FRAME_SIDE), np.arange(FRAME_SIDE)) / FRAME_SIDE
     field[:, FRAME_SIDE // 2 :] += 800.0

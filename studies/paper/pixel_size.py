@@ -13,7 +13,7 @@ from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
 from sensor.config import LONGEST_S
 from sensor.optics import form_image
 from sensor.response import channel_electrons
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.pages import report_text as text
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure
@@ -25,11 +25,11 @@ from studies.paper.setup import (
     Setup,
     View,
     decibels,
-    develop,
+    develop_view,
     exposures,
     quality_db,
-    sensor_of,
     shot_noise_alone,
+    table1_sensor,
     view,
 )
 from studies.photograph.snr import channel_e, snr
@@ -43,7 +43,7 @@ LARGE_UM, SMALL_UM = 6, 2
 
 def half_snr_db(subject: View, reading: str, dark: bool) -> float:
     """Median SNR of a green pixel in the dark (left) or the lit half [dB]."""
-    sensor = sensor_of(reading, "bayer")
+    sensor = table1_sensor(reading, "bayer")
     half = subject.radiance.shape[1] // 2
     columns = slice(0, half) if dark else slice(half, None)
     part = replace(subject.radiance, values=subject.radiance.values[:, columns])
@@ -64,7 +64,7 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     rows, half = [], subject.radiance.shape[1] // 2
     for reading in READINGS:
         camera = Camera(reading, "bayer")
-        linear, _ = develop(camera, exposures(camera, subject, "66ms")[0], subject)
+        linear, _ = develop_view(camera, exposures(camera, subject, "66ms")[0], subject)
         raised = linear.copy()
         raised[:, :half] *= DARK_GAIN
         rows.append(
@@ -83,9 +83,9 @@ def gain_db(reading: str, *, shot_alone: bool = False) -> float:
     """SNR of a green pixel of 6 um over that of one of 2 um on a uniform field [dB]."""
     values = []
     for pitch_um in (LARGE_UM, SMALL_UM):
-        sensor = sensor_of(reading, "bayer", pitch_um)
+        sensor = table1_sensor(reading, "bayer", pitch_um)
         sensor = shot_noise_alone(sensor) if shot_alone else sensor
-        electrons = channel_e(sensor, light_of("D65"), LUMINANCE_CD_M2, EXPOSURE_S)
+        electrons = channel_e(sensor, named_light("D65"), LUMINANCE_CD_M2, EXPOSURE_S)
         # The converter's rounding belongs to noise too; with shot noise alone it is left out of the closed form.
         values.append(float(np.sqrt(electrons[1]) if shot_alone else snr(electrons, sensor, EXPOSURE_S)[1]))
     return decibels(values[0] / values[1])
@@ -116,7 +116,7 @@ def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     psnr, pictures = {}, []
     for pitch in (LARGE_UM, SMALL_UM):
         camera = Camera("table1_output", "bayer", pitch)
-        developed = [develop(camera, raw, subject)[0] for raw in exposures(camera, subject, "10ms", setup.seeds)]
+        developed = [develop_view(camera, raw, subject)[0] for raw in exposures(camera, subject, "10ms", setup.seeds)]
         psnr[pitch] = quality_db(developed, subject.truth)
         pictures.append((f"{pitch} µm, PSNR {psnr[pitch].mean():.1f} dB", encode_srgb(developed[0])))
     everything = {name: gain_db(name) for name in READINGS}

@@ -28,7 +28,7 @@ from sensor.raw import RawImage
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import held_lens, shaken
 from studies.budget.starting_points import plan_from_settings
-from studies.metrics.quality import psnr_db
+from studies.metrics.appearance import psnr_db
 from studies.metrics.truth import Light, light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.levels import parse_exposure
@@ -113,7 +113,7 @@ class View:
 
 
 @cache
-def sensor_of(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
+def table1_sensor(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
     """Table 1's camera under one reading, or the figures' variation of it with pixels of 2, 3 or 6 um."""
     sensor = preset(reading)
     if pitch_um is not None:
@@ -131,7 +131,7 @@ class Camera:
     ----------
     reading, processor : str
     pitch_um : int, optional
-        As `sensor_of` takes it.
+        As `table1_sensor` takes it.
     shake : str, optional
         As `sensor.shake.held_lens` takes it.
     """
@@ -144,7 +144,7 @@ class Camera:
     @property
     def sensor(self) -> SensorConfig:
         """Its sensor, with the processor's mosaic."""
-        sensor = sensor_of(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
+        sensor = table1_sensor(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
         return replace(sensor, lens=held_lens(sensor.lens, self.shake))
 
 
@@ -220,7 +220,7 @@ def colours_of(camera: Camera, subject: View) -> ColourFit:
     return colour_fit(camera.sensor, NAMED[camera.processor], subject.light)
 
 
-def develop(
+def develop_view(
     camera: Camera, raw: RawImage, subject: View, substitution_snr: float | None = None
 ) -> tuple[Image, Picture]:
     """Develop an exposure as `develop_to_scale` does, with the colours fitted under the view's light.
@@ -270,7 +270,7 @@ def decibels(ratio: float) -> float:
     return float(20 * np.log10(ratio)) if ratio > 0 else -np.inf
 
 
-def without_prnu(sensor: SensorConfig) -> SensorConfig:
+def with_even_response(sensor: SensorConfig) -> SensorConfig:
     """Sensor whose pixels respond alike: what a camera has that corrects its fixed pattern."""
     return replace(sensor, pixel=replace(sensor.pixel, prnu=0.0))
 

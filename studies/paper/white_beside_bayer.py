@@ -19,7 +19,7 @@ from studies.paper.setup import (
     Image,
     Setup,
     View,
-    develop,
+    develop_view,
     exposures,
     noise,
     quality_db,
@@ -107,14 +107,16 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
     """Substitution at `DARKEST`, always against never."""
     raws = exposures(camera, subject, DARKEST, setup.seeds)
-    without, with_white = ([develop(camera, raw, subject, threshold)[0] for raw in raws] for threshold in (0.0, np.inf))
+    without, with_white = (
+        [develop_view(camera, raw, subject, threshold)[0] for raw in raws] for threshold in (0.0, np.inf)
+    )
     means = (rgb2lab(encode_srgb(np.mean(pictures, axis=0))) for pictures in (without, with_white))
     return Swap(noise(without) / noise(with_white), float(np.median(deltaE_ciede2000(*means))))
 
 
 def _photograph(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
     """Outcome of one condition, and its first picture, encoded."""
-    developed = [develop(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
+    developed = [develop_view(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
     pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # as a screen shows them
     decisions = [picture.substituted for _, picture in developed if picture.substituted is not None]
     share = float(np.mean(decisions)) if decisions else None

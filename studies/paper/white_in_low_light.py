@@ -21,7 +21,7 @@ from studies.paper.setup import (
     Image,
     Setup,
     View,
-    develop,
+    develop_view,
     exposures,
     grey_picture,
     noise,
@@ -68,7 +68,7 @@ def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         colour, white = zip(*(colour_and_white(raw, subject, Camera(reading)) for raw in raws), strict=True)
         pictures = {f"{reading}: colour": colour[0], "W": white[0]}
         for name in CAMERAS:
-            result = [develop(Camera(reading, name), raw, subject)[0] for raw in raws]
+            result = [develop_view(Camera(reading, name), raw, subject)[0] for raw in raws]
             stages[name][reading] = Stages(
                 noise(colour), noise(white), quality_db(result, subject.truth) - quality_db(colour, subject.truth)
             )

@@ -21,7 +21,7 @@ from studies.paper.setup import (
     Image,
     Setup,
     View,
-    develop,
+    develop_view,
     exposures,
     grey_picture,
     view,
@@ -96,7 +96,7 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
         for name in CAMERAS:
             camera = Camera(reading, name, PITCH_UM)
             raw = exposures(camera, subject, "66ms")[0]
-            result = develop(camera, raw, subject)[0]
+            result = develop_view(camera, raw, subject)[0]
             bright[name][reading] = measure_bright(raw, result, subject)
             pictures[RESULT[name]] = encode_srgb(result)
         planes, full_e = bilinear(raw), camera.sensor.pixel.full_well_e

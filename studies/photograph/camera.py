@@ -19,9 +19,9 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Floats, Spectrum, fine_bands, photons_per_joule, tristimulus
 from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
-from scenes.reflectances import color_checker, held
+from scenes.reflectances import color_checker_reflectances, held
 from sensor.calibration import ColourCalibration
-from sensor.capture import capture as frame_of
+from sensor.capture import photograph_radiance as frame_of
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -94,7 +94,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
             f"responses: {names[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
             "allowed: a channel that sees light; give another curve, or colours under a broad light, such as D65"
         )
-    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker_reflectances()])
     signals, _ = training(response[three], nm, light.spectrum, surfaces, width, light.lamp)
     white = tristimulus(light.spectrum, nm, width, light.lamp)  # Y = 1
     colours = xyz_to_srgb(adapt_to_d65(tristimulus(surfaces * light.spectrum, nm, width, light.lamp), white))
@@ -149,7 +149,7 @@ def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
     """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
     nm, width = light.wavelength_nm, light.width_nm
-    surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker()])
+    surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker_reflectances()])
     colours = processor.colours or sensor.channels
     names = (*colours, *(x for x in sensor.channels if x not in colours))
     index = [sensor.channels.index(x) for x in names]
@@ -285,7 +285,7 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         0 or more [s], or a time such as ``"66ms"``; left out, by the rule ``auto:information`` of
         `sensor.exposure.exposed_by_rule`, which may raise the gain of a camera that states a `SensorConfig.gain_limit`.
     device, rng, exact, samples_per_pixel
-        As `sensor.capture.capture` takes them.
+        As `sensor.capture.photograph_radiance` takes them.
     light : Spectrum or str, optional
         That the camera's neutral and colour matrix are set to; left out, the lamp that the radiance states, else D65,
         as `reference_picture` has it. Where the mosaic tells no colours under it the raw image holds none, and
@@ -300,12 +300,12 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     Raises
     ------
     InputError
-        As `sensor.capture.capture`.
+        As `sensor.capture.photograph_radiance`.
 
     Warns
     -----
     UserWarning
-        For a frame that is nearly all full or all dark, and as `sensor.capture.capture`.
+        For a frame that is nearly all full or all dark, and as `sensor.capture.photograph_radiance`.
 
     Examples
     --------

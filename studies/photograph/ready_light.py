@@ -14,7 +14,7 @@ from render.spectrum import VISIBLE_NM, Spectrum, emission_lines_nm, even_bands
 from render.transport import Transport
 from rodcone.errors import InputError
 from rodcone.types import Floats
-from scenes.catalog import load
+from scenes.catalogue import load
 
 BANDS = even_bands(VISIBLE_NM, 20)  # of 20 nm, as `rodcone reference` renders
 SIDE = 512  # longer side of the pictures that are shipped

@@ -22,7 +22,7 @@ from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
@@ -268,7 +268,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
     device = draw_device(sensor, image.values.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
     rng = np.random.default_rng([order.seed, _FRAME])
-    taken = [capture(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
+    taken = [photograph_radiance(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)

@@ -12,7 +12,7 @@ from sensor.config import SensorConfig
 from sensor.readings.noise import dark_electrons, merged_variance
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
 from sensor.readout import frame_moments
-from studies.metrics.truth import GREY, Light, light_of, neutral_electrons
+from studies.metrics.truth import GREY, Light, named_light, neutral_electrons
 
 
 @dataclass(frozen=True)
@@ -81,7 +81,7 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
     >>> [row.channel for row in found]
     ['R', 'G', 'B', 'W']
     """
-    of = channel_e(sensor, light_of(light), 1.0, exposure_s)
+    of = channel_e(sensor, named_light(light), 1.0, exposure_s)
     names = sensor.channels
     electrons = [electrons_at_snr(ratio, sensor, exposure_s, name) for name in names]
     return [
@@ -92,7 +92,7 @@ def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: fl
 
 def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, Floats]:
     """SNR of each channel's pixel over light; NaN where its well is full."""
-    of = channel_e(sensor, light_of(light), 1.0, exposure_s)
+    of = channel_e(sensor, named_light(light), 1.0, exposure_s)
     electrons = dict(zip(sensor.channels, of[:, None] * luminance_cd_m2, strict=True))
     ratios = {}
     for name, e in electrons.items():

@@ -87,7 +87,7 @@ def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[
     return {name: (results[name], np.array(seconds[name])) for name in calls}
 
 
-def timed(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
+def time_calls(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
     """Last result and times of each call; without repeats the first call counts."""
     points = {}
     for name, (result, seconds) in laps(calls, repeats).items():

@@ -17,7 +17,7 @@ from render.scene import Scene
 from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
@@ -25,8 +25,8 @@ from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.budget.bands import groups_of, wide_bands
-from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, timed, yardstick
+from studies.budget.bands import band_groups, wide_bands
+from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, time_calls, yardstick
 from studies.study.levels import parse_level
 
 MOST_BANDS = 40
@@ -105,9 +105,9 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
     nm, width_nm = fine_bands(group.spectrum for group in scene.groups.values())
     calls = {}
     for count in sorted({*bench.bands, MOST_BANDS}):
-        bands = wide_bands(nm, width_nm, groups_of(width_nm, count))
+        bands = wide_bands(nm, width_nm, band_groups(width_nm, count))
         calls[f"{count} bands"] = _render(bench, scene, *bands, bench.samples[0], bench.seed)
-    results = timed(calls, bench.repeats)
+    results = time_calls(calls, bench.repeats)
     finest, _ = results[f"{MOST_BANDS} bands"]
     error_e, noise_e = _render_errors(bench, sensor, finest)
     question = f"How many bands? {bench.scene}, {bench.size}x{bench.size}, {bench.samples[0]} samples a pixel"
@@ -117,9 +117,9 @@ def _bands(bench: Bench, scene: Scene, sensor: SensorConfig) -> tuple[Transport,
 def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     """Render with ever more samples, against two references whose own noise falls out of the mean."""
     call = partial(_render, bench, scene, *even_bands(VISIBLE_NM, 8))
-    results = timed({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
+    results = time_calls({f"{spp} samples": call(spp, bench.seed) for spp in bench.samples}, bench.repeats)
     most = 2 * bench.samples[-1]
-    (first, reference_times), (second, _) = timed({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
+    (first, reference_times), (second, _) = time_calls({str(n): call(most, bench.seed + n) for n in (1, 2)}, 0).values()
     relit = [rendered.relight(luminance_cd_m2=bench.level_cd_m2) for rendered in (first, second)]
     yard = yardstick((relit[0], relit[1]), (first.coverage.mean > 0) | (second.coverage.mean > 0), sensor)
     points = []
@@ -145,7 +145,7 @@ def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposu
     }
     sensors = {name: replace(sensor, lens=lens) for name, lens in lenses.items()}
     calls = {name: _capture(bench, lens_sensor, radiance, exposure_s) for name, lens_sensor in sensors.items()}
-    times = {name: times for name, (_, times) in timed(calls, bench.repeats + 1).items()}
+    times = {name: times for name, (_, times) in time_calls(calls, bench.repeats + 1).items()}
     images = {name: _electrons(radiance, lens_sensor, exposure_s) for name, lens_sensor in sensors.items()}
     truth = list(images.values())[-1]
     results = {name: (image, times[name]) for name, image in images.items()}
@@ -157,7 +157,7 @@ def _lens(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposu
 def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
     """Compare the fast readout with the exact one."""
     calls = {name: _capture(bench, sensor, radiance, exposure_s, exact=name == "exact") for name in ("fast", "exact")}
-    frames = timed(calls, bench.repeats + 1)
+    frames = time_calls(calls, bench.repeats + 1)
     # The two draw different frames of the same statistics: only the mean over the frame can be compared.
     means = {name: (float(raw.electrons.mean()), times) for name, (raw, times) in frames.items()}
     question = "Which readout? Error: of the frame's mean, whose own random error both frames have"
@@ -179,7 +179,7 @@ def _reconstruction(bench: Bench, sensor: SensorConfig, radiance: SpectralRadian
     }
     question = f"How far does the reconstruction look? {bench.picture}x{bench.picture}"
     reference = "the noise-free channels; times: of the largest neighbourhood and patch"
-    results = timed(calls, bench.repeats)
+    results = time_calls(calls, bench.repeats)
     return _stage(
         "neighbourhood and patch", question, reference, noise_e, results, lambda image: _rms_e(image, truth, sensor)
     )
@@ -230,7 +230,9 @@ def _capture(
 ) -> Callable[[], RawImage]:
     """Return a call that takes one frame, the same each time."""
     device = draw_device(sensor, radiance.shape, np.random.default_rng(bench.seed))
-    return lambda: capture(radiance, sensor, exposure_s, device, np.random.default_rng(bench.seed), exact=exact)
+    return lambda: photograph_radiance(
+        radiance, sensor, exposure_s, device, np.random.default_rng(bench.seed), exact=exact
+    )
 
 
 def _auto_exposure_s(bench: Bench, sensor: SensorConfig, transport: Transport) -> float:

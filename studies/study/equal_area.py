@@ -44,10 +44,10 @@ class EqualArea:
 def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
     """Height and width of each sensor in pixels, for a picture's proportions."""
     opened = {name: preset(name) for name in sensors}
-    return {name: area.shape(picture, *grid(sensor)) for name, sensor in opened.items()}
+    return {name: area.shape(picture, *site_grid(sensor)) for name, sensor in opened.items()}
 
 
-def grid(sensor: SensorConfig) -> tuple[float, int]:
+def site_grid(sensor: SensorConfig) -> tuple[float, int]:
     """Pitch of a sensor's pixels [um], and along either side how many of them are a pixel of its raw image."""
     return sensor.site_pitch_um, sensor.sites
 

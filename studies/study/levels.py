@@ -94,7 +94,7 @@ def check_known(spectrum: str, range_nm: tuple[float, float]) -> None:
         )
 
 
-def check_range(range_nm: tuple[float, ...]) -> None:
+def check_rendered_range(range_nm: tuple[float, ...]) -> None:
     """Raise `InputError` for a range of wavelengths that no study renders."""
     if len(range_nm) != 2 or not LOWEST_NM <= range_nm[0] < range_nm[1] <= HIGHEST_NM:
         raise InputError(

@@ -22,7 +22,7 @@ from render.transport import Transport
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_range, require_whole
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.study.levels import parse_level
 
 _OTHER_FILES = {

@@ -29,7 +29,7 @@ from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
 from studies.study.gain import at_gain, gain_text
-from studies.study.levels import check_known, check_range, parse_exposure, parse_level
+from studies.study.levels import check_known, check_rendered_range, parse_exposure, parse_level
 from studies.study.model import LensTerms
 
 OWN = "own"  # the spectrum that the scene's lights have
@@ -290,7 +290,7 @@ def most_spp(study: Study, scene: SceneChoice) -> int:
     return scene.spp or study.render.spp
 
 
-def mosaics(study: Study) -> tuple[str, ...]:
+def study_mosaics(study: Study) -> tuple[str, ...]:
     """Mosaics that the study's processors take, each once."""
     return tuple(dict.fromkeys(processor_of(name).mosaic for name in study.processors))
 
@@ -324,7 +324,7 @@ def _check_axes(study: Study) -> None:
     for scene in study.scenes:
         if scene.light is not None:
             illuminant(scene.light)
-    check_range(study.render.range_nm)
+    check_rendered_range(study.render.range_nm)
     for spectrum in study.spectra:
         if spectrum != OWN:
             check_known(spectrum, study.render.range_nm)
@@ -365,7 +365,7 @@ def _check_cameras(study: Study) -> None:
                 f"sensors: of {name!r} and {study.sensors[0]!r} one bins, so that its pictures are half as large; "
                 "allowed: all bin, or none; give each a study of its own"
             )
-        for mosaic in mosaics(study):
+        for mosaic in study_mosaics(study):
             with in_place(f"sensor {label(name)} with the mosaic {mosaic}, which a processor takes"):
                 vary(sensor, mosaic)
 

@@ -17,7 +17,7 @@ from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.study.cost import START_S, cores, render_seconds
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, film_of, open_all
-from studies.study.study import REFERENCE, SceneChoice, Study, conditions, mosaics
+from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
 from studies.sweep.provenance import code_version
@@ -134,7 +134,7 @@ def estimate(
     frames: bool = False,
 ) -> Estimate:
     """Estimate a sweep of opened scenes, `kept` cells of which are there; others as of `estimated`."""
-    cells = len(conditions(study)) * len(study.seeds) * len(mosaics(study) if frames else study.processors)
+    cells = len(conditions(study)) * len(study.seeds) * len(study_mosaics(study) if frames else study.processors)
     parts = [_part(study, plan, opened) for opened in scenes.values()]
     needs = [memory(part.pixels, part.bands, part.groups, workers, denoised=part.denoised) for part in parts]
     at = partial(_seconds, study, parts, workers, planned, frames)
@@ -171,7 +171,7 @@ def _seconds(
     pixel_s, least_s = _FRAME_S if frames else _CELL_S
     report_s, of_cell_s = (0.0, 0.0) if frames else _REPORT_S
     first_s = _FIRST_S + sum(costs[1] for costs in own)
-    images = len(study.sensors) * len(study.spectra) * len(mosaics(study))
+    images = len(study.sensors) * len(study.spectra) * len(study_mosaics(study))
     seconds = START_S * (2 if workers > 1 else 1) + first_s * max(1.0, workers / cores()) + report_s
     for part in parts:
         pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale

@@ -20,7 +20,7 @@ from rodcone.csv_file import csv_text
 from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_keys, unknown
 from rodcone.files import finite, require_ending, write_files
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.metamers import TWINS_UNDER
 from studies.metrics.confidence import half_width
 from studies.metrics.target_figures import daylight_delta_e, pair_delta_e, patch_masks, true_pair_delta_e

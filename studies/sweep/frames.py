@@ -25,7 +25,7 @@ from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
-from studies.study.equal_area import grid
+from studies.study.equal_area import site_grid
 from studies.study.gain import at_gain
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
@@ -87,7 +87,7 @@ def frame_key(
     return digest_inputs([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
 
 
-def read_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
+def load_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
     """Frame made earlier; None where it or a file that it names is missing or damaged, so that it is made again."""
     facts = read_facts(folder, key)
     if facts is None:
@@ -136,7 +136,7 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         radiances: tuple[SpectralRadiance, ...] = views
         if area is not None:
-            radiances = tuple(area.view(view, *grid(sensor)) for view in views)
+            radiances = tuple(area.view(view, *site_grid(sensor)) for view in views)
         unmoved, *halves = (channel_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
         whole, first, second = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
         errors = [(first - second) / 2] if transport.denoised is None else [whole - first, whole - second]

@@ -34,10 +34,10 @@ from studies.study.lit_scene import (
 )
 from studies.study.render_facts import render_facts
 from studies.study.render_noise import render_share
-from studies.study.study import Study, conditions, label, mosaics
+from studies.study.study import Study, conditions, label, study_mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_key
 from studies.sweep.database import note_render, render_record
-from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, make_frames, read_frame
+from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, load_frame, make_frames
 from studies.sweep.provenance import provenance, versions
 
 Progress = Callable[[float, float], None]
@@ -140,7 +140,7 @@ def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
     sensors = {}
     for condition in conditions(job.study, opened.choice):
         unmodelled, lens = preset(condition.sensor), job.plan.images[condition].lens
-        for mosaic in mosaics(job.study):
+        for mosaic in study_mosaics(job.study):
             sensors[condition.spectrum, condition.sensor, lens, mosaic] = (
                 unmodelled,
                 replace(vary(unmodelled, mosaic), lens=lens),
@@ -158,7 +158,7 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
             for (under_spectrum, *_), sensors in _imaged(job, opened).items()
             if under_spectrum == spectrum
         }
-        absent = {key: sensors for key, sensors in keyed.items() if read_frame(folder, key, sensors[1]) is None}
+        absent = {key: sensors for key, sensors in keyed.items() if load_frame(folder, key, sensors[1]) is None}
         if absent:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
             make_frames(folder, under(transport, spectrum), light, absent, job.study)
@@ -169,7 +169,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
     frames, colours = dict[Imaged, UnitFrame](), dict[tuple[Imaged, str], ColourFit]()
     for imaged, sensors in _imaged(job, opened).items():
         key = frame_key(record.content, opened, imaged[0], job.study, *sensors)
-        frame = read_frame(job.out / FRAMES, key, sensors[1])
+        frame = load_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None
         frames[imaged] = frame

@@ -28,9 +28,9 @@ class Row:
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
     psnr_db, ssim, delta_e_median, delta_e_p95 : float
-        Of `studies.metrics.quality.Quality`.
+        Of `studies.metrics.appearance.Quality`.
     s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
-        Of `studies.metrics.quality.Appearance`.
+        Of `studies.metrics.appearance.Appearance`.
     mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
         Of `studies.metrics.target_figures.TargetFigures`.
     mc_share : float

@@ -23,7 +23,7 @@ from sensor.raw import RawImage
 from sensor.readings.resolve import resolve
 from sensor.response import behind_filters
 from sensor.shake import shaken
-from studies.metrics.quality import TruePicture, appearance, measure, true_picture
+from studies.metrics.appearance import TruePicture, appearance, picture_quality, true_picture
 from studies.metrics.target_figures import target_figures
 from studies.metrics.truth import neutral_electrons
 from studies.photograph.camera import balance_delta_e, develop_to_scale
@@ -95,7 +95,7 @@ def run_cell(cell: Cell) -> Row:
     # Measure.
     figures, measure_s, first_measure_s = timed(
         lambda: {
-            **vars(measure(encoded, truth.encoded, truth.lab)),
+            **vars(picture_quality(encoded, truth.encoded, truth.lab)),
             **vars(appearance(linear, encoded, truth, cell.white_cd_m2)),
             **vars(target_figures(names["scene"], linear, truth.linear)),
         },

@@ -62,7 +62,7 @@ class KnownLight:
         return np.asarray(reflectance @ self.weights.T)
 
 
-def neutral_electrons(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
+def neutral_ratios(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
     """Electrons of R, G, B and W from white under each light, relative to G, shape (light, 4)."""
     collected = np.array([_collected(sensor, light).sum(axis=1) for light in lights])
     return np.asarray(collected / collected[:, 1:2])
@@ -177,7 +177,7 @@ def _finished(rng: np.random.Generator, fine: Floats) -> Floats:
     return np.asarray(picture * np.exp(slope[0] * y + slope[1] * x)[..., None])
 
 
-def photograph(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
+def photograph_signals(rng: np.random.Generator, light: KnownLight, name: str) -> Floats:
     """Photograph of `PHOTOGRAPHS` at half its size, as signals under the light, shape (h, w, channel).
 
     The basis gives each colour one spectrum; a factor a channel stands for the others that look the same.
@@ -205,7 +205,7 @@ def draw_pictures(
         elif kind == "gratings":
             picture = gratings(rng, light)
         else:
-            picture = photograph(rng, light, kind)
+            picture = photograph_signals(rng, light, kind)
         if rng.random() < 0.5:
             picture = picture * np.exp(rng.normal(0, rng.uniform(0.005, 0.03), picture.shape[:2]))[..., None]
         yield np.maximum(picture, _DARKEST).astype(np.float32)

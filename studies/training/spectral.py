@@ -27,7 +27,7 @@ from studies.training.pictures import (
     draw_pictures,
     draw_surface,
 )
-from studies.training.train import cut_patches, fit_prior, provenance
+from studies.training.train import cut_patches, fit_prior, training_provenance
 
 BANDS, COEFFICIENTS, DIRECTIONS = 20, 8, 144
 KINDS_OF = {"drawn": KINDS, "photographs": 3 * PHOTOGRAPHS}
@@ -66,7 +66,9 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
         rows.append((relative @ spectra / BANDS).reshape(bright.sum(), -1).astype(np.float32))
     patches = np.concatenate(rows)
     rng.shuffle(patches)
-    source = provenance(f"rodcone train --spectral {kind} --seed {seed}", seed, digest.hexdigest(), len(patches))
+    source = training_provenance(
+        f"rodcone train --spectral {kind} --seed {seed}", seed, digest.hexdigest(), len(patches)
+    )
     fit = fit_prior(patches, np.ones((1, 4)), rng, source, DIRECTIONS)
     _save(fit, edges_nm, spectra, path)
     return source

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from isp.ple.prior import PATCH, Prior
 from sensor.config import SensorConfig
-from studies.training.pictures import LIGHTS, Planes, draw_light, draw_pictures, neutral_electrons, photograph_hashes
+from studies.training.pictures import LIGHTS, Planes, draw_light, draw_pictures, neutral_ratios, photograph_hashes
 
 Matrix = NDArray[np.float32]
 
@@ -138,11 +138,11 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
         pictures.append(picture)
     rng = np.random.default_rng([seed, 1])
     patches = draw_patches(pictures, rng)
-    source = provenance(f"rodcone train --sensor {name} --seed {seed}", seed, digest.hexdigest(), len(patches))
-    return fit_prior(patches, neutral_electrons(sensor, LIGHTS), rng, source)
+    source = training_provenance(f"rodcone train --sensor {name} --seed {seed}", seed, digest.hexdigest(), len(patches))
+    return fit_prior(patches, neutral_ratios(sensor, LIGHTS), rng, source)
 
 
-def provenance(command: str, seed: int, pictures_sha256: str, patches: int) -> str:
+def training_provenance(command: str, seed: int, pictures_sha256: str, patches: int) -> str:
     """What a prior was trained from, as JSON."""
     source = {
         "command": command,

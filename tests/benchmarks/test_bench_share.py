@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from render.transport import Transport
-from scenes.catalog import load
+from scenes.catalogue import load
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "benchmarks"))

@@ -6,8 +6,8 @@ import warnings
 import numpy as np
 import pytest
 
-from sensor.emva1288.characterise import measure, plan_for
-from sensor.emva1288.photon_transfer import bench
+from sensor.emva1288.characterise import measure_camera, plan_for
+from sensor.emva1288.photon_transfer import light_bench
 from sensor.presets import preset
 
 SHAPE = (240, 320)
@@ -44,14 +44,14 @@ def number(result):
 def test_our_procedure_finds_what_the_stranger_finds_in_the_same_frames(name, emva):
     data_1288, results_1288, sums = emva
     sensor = preset(name)
-    chip, taken = bench(sensor, SHAPE, 2), {}
+    chip, taken = light_bench(sensor, SHAPE, 2), {}
 
     def expose(light_e, exposure_s):
         taken.setdefault((light_e, exposure_s), []).append(chip(light_e, exposure_s))
         return taken[light_e, exposure_s][-1]
 
     plan = plan_for(sensor, EXPOSURE_S)
-    own = measure(expose, plan, sensor)
+    own = measure_camera(expose, plan, sensor)
     half_e = 0.5 * sensor.pixel.full_well_e
     stacks = {light_e: np.array(taken[light_e, EXPOSURE_S][: plan.frames], dtype=np.int64) for light_e in (0.0, half_e)}
     pairs = {float(light_e): np.array(taken[light_e, EXPOSURE_S][-2:], dtype=np.int64) for light_e in plan.light_e}

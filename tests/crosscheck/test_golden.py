@@ -7,10 +7,10 @@ from outside_truth import ELECTRONS, IRRADIANCE, MAGNIFICATION, MOONLIGHT_CD_M2,
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import rgbw
 from sensor.optics import camera_equation, form_image
+from sensor.pixel import PixelConfig
 from sensor.response import expected_electrons
 
 NM = np.arange(400.0, 701.0, 10.0)

@@ -21,7 +21,7 @@ from isp.planes import bilinear
 from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import mask
 from sensor.device import draw_device
 from sensor.presets import low_noise, preset
@@ -43,7 +43,7 @@ Image = NDArray[np.float64]
 
 
 def surfaces() -> Image:
-    return np.array([curve.band_average(NM, WIDTH) for _, curve in color_checker()])
+    return np.array([curve.band_average(NM, WIDTH) for _, curve in color_checker_reflectances()])
 
 
 def chart(cfa: str, light: str) -> tuple[RawImage, Image]:

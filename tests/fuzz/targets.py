@@ -17,7 +17,7 @@ from mutate import Mutator, any_bytes, any_text, json_in, json_values, mat_eleme
 from isp.ple.prior import OWN, load_prior
 from isp.processors.network import network_processor
 from isp.processors.own import processor_of
-from render.cache import load_transport, save_transport
+from render.cache import read_transport, save_transport
 from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.loader import INTEGRATOR, Film, variant
@@ -28,7 +28,7 @@ from render.radiance_files.radiance_source import load_radiance
 from render.radiance_files.surface_spectra import srgb_basis
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from render.user_scene.scene_file import load_scene_file
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.reflectances import read_reflectances
 from sensor.cameras.emva_report import numbers_of, read_report
 from sensor.cameras.library import read_camera
@@ -324,14 +324,14 @@ def _cache_samples() -> list[Sample]:
 
 
 def _read_cached(path: Path) -> object:
-    found = load_transport(path.parent, _scene(), _film(), 0)
+    found = read_transport(path.parent, _scene(), _film(), 0)
     if found is None:
         raise InputErrorlessRefusal
     return found.relight()
 
 
 class InputErrorlessRefusal(Exception):
-    """What `load_transport` says by None: there is no such render."""
+    """What `read_transport` says by None: there is no such render."""
 
 
 def _row(key: str) -> Row:

@@ -18,7 +18,7 @@ from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.jit import backend
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.cfa import Tile, channels
 from sensor.device import draw_device
 from sensor.kernel.kernel import expected_electrons_single
@@ -52,7 +52,7 @@ def behind(situation: Situation, name: str) -> Situation:
 
 
 def expected(situation: Situation) -> Image:
-    """Expected photo-electrons as `sensor.capture.capture` forms them, (h, w) [e-]; at most `MOST_E`, as there."""
+    """Expected photo-electrons, (h, w) [e-], as `photograph_radiance` forms them; at most `MOST_E`, as there."""
     radiance, sensor, samples = situation.radiance, situation.sensor, situation.samples_per_pixel
     if backend() == "numpy":
         return np.minimum(
@@ -74,7 +74,9 @@ def shoot(situation: Situation, name: str, seed: int = 0) -> RawImage:
     """One exposure by one chip, both drawn by `seed`."""
     of = behind(situation, name)
     device, rng = draw_device(of.sensor, of.shape, np.random.default_rng([seed, 0])), np.random.default_rng([seed, 1])
-    return capture(of.radiance, of.sensor, of.exposure_s, device, rng, samples_per_pixel=of.samples_per_pixel)
+    return photograph_radiance(
+        of.radiance, of.sensor, of.exposure_s, device, rng, samples_per_pixel=of.samples_per_pixel
+    )
 
 
 def keywords(develop: Mapping[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from render.illuminants import illuminant, lines_nm
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM, Floats, line_bands
 from render.transport import Transport
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.config import SensorConfig
 
 SCENE = "cornell_box"

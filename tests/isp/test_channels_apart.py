@@ -16,9 +16,9 @@ from isp.reference import reference_with_noise
 from isp.remosaic import remosaic
 from isp.settings import DEFAULTS
 from sensor.cfa import RGBW, channels, mask
-from sensor.chip import ChannelReading
 from sensor.config import with_channel_readings
 from sensor.device import draw_device
+from sensor.pixel import ChannelReading
 from sensor.presets import low_noise
 from sensor.raw import RawImage, channel_variance
 from sensor.readout import noise_variance, read_out

@@ -8,16 +8,16 @@ from loop import loop
 from render.band_weights import band_weights
 from render.bands.error import curve_error
 from render.bands.mixed_light import band_light
-from render.illuminants import illuminant, names
+from render.illuminants import illuminant, illuminant_names
 from render.scene import LightGroup
 from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, even_bands, line_spectrum, observer, tristimulus
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.presets import low_noise
 from sensor.response import electrons_per_irradiance
 
 STEP_NM = 0.02
 FINE_NM = np.arange(380.0, 780.0, STEP_NM) + STEP_NM / 2
-PATCHES = [spectrum for _, spectrum in color_checker()]
+PATCHES = [spectrum for _, spectrum in color_checker_reflectances()]
 REFLECTANCES = np.array([np.interp(FINE_NM, x.wavelength_nm, x.values) for x in PATCHES])
 SENSOR = low_noise()
 CURVES = [SENSOR.responses.curves[name] for name in SENSOR.channels]
@@ -84,7 +84,7 @@ def test_each_light_group_keeps_its_own_light_within_the_bands(lamps, most):
     assert np.abs(seen[..., :2].mean(axis=(0, 1)) - 1).max() < most
 
 
-@loop("name", names())
+@loop("name", illuminant_names())
 @loop("count", [20, 40])
 def test_weights_turn_the_noise_of_a_render_up_by_5_percent_at_most(name, count):
     """Beside products of averages, whose bands have independent relative errors of one size."""

@@ -12,7 +12,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.scene import LightGroup
 from render.spectrum import flat
-from scenes.catalog import load
+from scenes.catalogue import load
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 NARROWER_NM = np.linspace(410.0, 750.0, 8)

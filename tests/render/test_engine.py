@@ -30,7 +30,7 @@ from render.scene import LightGroup, Scene, spectrum_node
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
 from rodcone.jit import dr
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import floor, glossy, matte, panel
 from scenes.reflectances import edge, grey
 

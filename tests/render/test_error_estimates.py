@@ -7,7 +7,7 @@ from loop import loop
 from render.engine import render
 from render.error_estimates import SAMPLE_PIXELS, Halves, SharedPaths, group_errors, relative_error
 from render.spectrum import band_widths
-from scenes.catalog import load
+from scenes.catalogue import load
 
 ONE = np.ones((1, 3))
 NM = np.arange(505.0, 600.0, 10.0)

@@ -14,8 +14,8 @@ from render.engine import render
 from render.user_scene.scene_file import load_scene_file
 from rodcone.errors import InputError
 from render.radiance import SpectralRadiance
-from scenes.catalog import load
-from sensor.capture import capture
+from scenes.catalogue import load
+from sensor.capture import photograph_radiance
 from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw import RawImage
@@ -33,7 +33,10 @@ raw = RawImage(np.full((8, 10), 1000, np.uint16), RGBW, 100.0, 4000.0, 1.0, 2.0,
 result = reconstruct_with_noise(raw, Settings(neighbourhood=7))
 light = SpectralRadiance(np.full((8, 10, 40), 0.003, np.float32), np.arange(385.0, 780.0, 10.0))
 device = draw_device(low_noise(), (8, 10), np.random.default_rng(2))
-shots = [capture(light, low_noise(), 0.02, device, np.random.default_rng(3), exact=exact) for exact in (False, True)]
+shots = [
+    photograph_radiance(light, low_noise(), 0.02, device, np.random.default_rng(3), exact=exact)
+    for exact in (False, True)
+]
 print(json.dumps({
     "backend": backend(),
     "variant": variant(),
@@ -81,7 +84,7 @@ def test_importing_mitsuba_first_works_or_is_refused_behind_one_warning(before):
         "import numpy as np\n"
         "from rodcone.jit import backend\n"
         "from render.engine import render\n"
-        "from scenes.catalog import load\n"
+        "from scenes.catalogue import load\n"
         "made = render(load('flat_field'), (2, 2), wavelength_nm=np.arange(405.0, 780.0, 50.0), spp=8)\n"
         "print(backend(), made.variant, made.radiance.shape)"
     )

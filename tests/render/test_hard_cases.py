@@ -18,7 +18,7 @@ from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from rodcone.errors import InputError
 from rodcone.jit import backend
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import ball, disk, floor, glass, glossy, matte, panel
 from scenes.reflectances import grey
 
@@ -153,7 +153,7 @@ from rodcone.jit import dr
 dr.set_thread_count(int(sys.argv[1]))
 from render.engine import render
 from operator import attrgetter
-from scenes.catalog import load
+from scenes.catalogue import load
 made = render(load("cornell_box"), (40, 56), wavelength_nm=np.arange(430.0, 780.0, 100.0), spp=32, seed=4)
 for name in ("radiance", "variance", "light.difference", "irradiance", "coverage.mean"):
     print(name, hashlib.sha256(np.ascontiguousarray(attrgetter(name)(made)).tobytes()).hexdigest())

@@ -9,7 +9,15 @@ from loop import loop
 from outside_truth import colour_science
 from refusal import refusal
 
-from render.illuminants import MOON_SLOPE_PER_NM, TABULATED_LINES, daylight, illuminant, lines_nm, names, unit_luminance
+from render.illuminants import (
+    MOON_SLOPE_PER_NM,
+    TABULATED_LINES,
+    daylight,
+    illuminant,
+    illuminant_names,
+    lines_nm,
+    unit_luminance,
+)
 from render.spectrum import (
     PUBLISHED,
     Spectrum,
@@ -23,7 +31,7 @@ from render.spectrum import (
 NM, WIDTH_NM = np.arange(360.5, 830.0), np.ones(470)
 
 
-@loop("name", [*names(), "2700K", "D12000K"])
+@loop("name", [*illuminant_names(), "2700K", "D12000K"])
 def test_every_light_has_a_luminance_of_one(name):
     light, v = illuminant(name), colour_matching_functions()[1]
     fine = np.arange(360.0, 830.0, 0.05) + 0.025  # another quadrature: a point every 0.05 nm
@@ -100,7 +108,7 @@ def test_sodiums_lines_are_the_doublet_and_share_a_band_that_holds_all_their_lig
 
 def test_smooth_lights_have_no_lines_and_an_unknown_one_is_refused():
     of_lines = ("sodium_low", *TABULATED_LINES)
-    assert all(lines_nm(name) == () for name in (*names(), "3000K") if name not in of_lines)
+    assert all(lines_nm(name) == () for name in (*illuminant_names(), "3000K") if name not in of_lines)
     for name in TABULATED_LINES:
         with pytest.warns(UserWarning, match=f"lines_nm: {name} is a lamp of lines whose table holds steps of 5 nm"):
             assert lines_nm(name) == ()

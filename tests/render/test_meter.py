@@ -17,7 +17,7 @@ from render.engine import render
 from render.geometry import look_at, to_world
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import disk, floor, matte, panel
 from scenes.reflectances import grey
 

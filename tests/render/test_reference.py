@@ -25,7 +25,7 @@ from render.reference import (
 )
 from rodcone import load_radiance, load_transport
 from rodcone.errors import InputError
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.photograph.shot import Order, take
 from studies.study.lit_scene import open_choice
 from studies.study.study import SceneChoice, Study

@@ -8,7 +8,7 @@ from path_counter import count_paths, pixels_of_paths
 
 from render.engine import render
 from render.integrator.dense import Tracer
-from scenes.catalog import load, names
+from scenes.catalogue import load, scene_names
 
 SIZE = (3, 4)
 METER_PATHS = 64 * 64 * 2 * 16  # of a light group: its film, in two halves of 16 samples
@@ -30,7 +30,7 @@ def drawn(paths, groups):
 
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("plane", [True, False], ids=["plane", "no plane"])
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", scene_names())
 def test_every_scene_tells_the_samples_it_drew(name, plane, paths):
     scene = load(name)
     if not plane:

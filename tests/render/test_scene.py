@@ -19,7 +19,7 @@ from render.spectrum import Spectrum, flat
 from render.user_scene.scene_paths import search_path
 from rodcone.errors import InputError
 from rodcone.jit import Matrix4, dr
-from scenes.catalog import load, names
+from scenes.catalogue import load, scene_names
 
 CAMERA = {"type": "perspective", "fov": 40.0, "to_world": to_world(look_at((0, 0, 4), (0, 0, 0)))}
 GEOMETRY = {
@@ -51,13 +51,13 @@ def kinds(node):
     return {type(node)}
 
 
-@loop("name", names())
+@loop("name", scene_names())
 def test_a_description_holds_plain_values_alone(name):
     assert kinds(load(name).description) <= {str, int, float, bool, list, Matrix4}
 
 
 @pytest.mark.sample(1)
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", scene_names())
 def test_mitsuba_loads_a_description_in_the_scalar_and_the_active_variant(name):
     mi, description = mitsuba_module(), load(name).description
     resolver = mi.file_resolver()

@@ -16,8 +16,8 @@ from render.geometry import look_at, to_world
 from render.scene import LightGroup, Node, Scene, spectrum_node, uniform_node
 from render.scene_range import check_range, warn_of_coloured_lights, warn_of_dark_ends
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, flat
-from scenes.catalog import load
-from scenes.catalog import names as scenes
+from scenes.catalogue import load
+from scenes.catalogue import scene_names as scenes
 
 SHORT = Spectrum(np.array([400.0, 550.0, 700.0]), np.array([0.2, 0.8, 0.4]))
 EVEN, UNEVEN = spectrum_node(SHORT), spectrum_node(Spectrum(np.array([400.0, 500.0, 700.0]), SHORT.values))

@@ -19,8 +19,8 @@ from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.colour_spaces import WHITE_AT
 from rodcone.display import CHANNEL_COLOURS, MOST_NESTED, brief, preview_png
-from scenes.catalog import load
-from sensor.burst import merge
+from scenes.catalogue import load
+from sensor.burst import merge_frames
 from sensor.curves import rgbw
 from sensor.device import draw_device
 from sensor.emva1288.characterise import characterise
@@ -83,7 +83,7 @@ def test_values_of_the_chain_are_short_lines() -> None:
     raw = raw_image(np.full((8, 8), 64, np.uint16))
     values = (
         *(load("still_life"), load("still_life").groups["softbox"], transport, transport.relight()),
-        *(sensor, sensor.pixel, sensor.lens, rgbw(), illuminant("D65"), raw, merge([raw, raw])),
+        *(sensor, sensor.pixel, sensor.lens, rgbw(), illuminant("D65"), raw, merge_frames([raw, raw])),
         *(draw_device(sensor, (64, 64), np.random.default_rng(1)), calibrate(sensor, illuminant("D65"))),
         *(Picture(np.ones((8, 8, 3)), {"R": "given"}), SpectralRadiance(np.ones((4, 4, 3)), np.array([400, 500, 600]))),
         Study((SceneChoice("still_life"),), ("moonlight",)),
@@ -146,7 +146,7 @@ def test_a_raw_image_shows_electrons_above_black() -> None:
 
 def test_a_transport_shows_its_own_lights() -> None:
     from render.engine import render
-    from scenes.catalog import load
+    from scenes.catalogue import load
 
     made = render(load("flat_field"), (8, 8), wavelength_nm=np.arange(405.0, 780.0, 50.0), spp=2)
     assert np.array_equal(pixels(made._repr_png_()), pixels(made.relight()._repr_png_()))

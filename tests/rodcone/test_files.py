@@ -85,13 +85,13 @@ def test_a_name_that_leads_out_of_its_folder_is_refused_and_one_below_it_is_a_pl
 # Scenes, lamps and sensors by name, each with its hash: spectra from tables, resampled and scaled.
 CATALOGUE = """
 import json
-from render.illuminants import illuminant, names
+from render.illuminants import illuminant, illuminant_names
 from rodcone.digests import digest_inputs
-from scenes import catalog
+from scenes import catalogue
 from sensor import presets
-held = {f"scene {name}": catalog.load(name) for name in catalog.names()}
-held |= {f"lamp {name}": illuminant(name) for name in names()}
-held |= {f"sensor {name}": presets.preset(name) for name in presets.names()}
+held = {f"scene {name}": catalogue.load(name) for name in catalogue.scene_names()}
+held |= {f"lamp {name}": illuminant(name) for name in illuminant_names()}
+held |= {f"sensor {name}": presets.preset(name) for name in presets.preset_names()}
 print(json.dumps({name: digest_inputs(value) for name, value in held.items()}))
 """
 

@@ -15,7 +15,7 @@ from render.engine import render
 from rodcone import progress as module
 from rodcone.errors import InputError
 from rodcone.progress import compile_note, progress, progress_bar, render_words
-from scenes.catalog import load
+from scenes.catalogue import load
 
 
 @pytest.fixture

@@ -76,7 +76,7 @@ def test_a_name_loads_no_more_than_it_needs() -> None:
     assert in_new_python(code) == "[]"
 
 
-PACKAGES = ("rodcone.errors", "render.spectrum", "scenes.catalog", "sensor.presets", "isp.settings")
+PACKAGES = ("rodcone.errors", "render.spectrum", "scenes.catalogue", "sensor.presets", "isp.settings")
 
 
 @pytest.mark.sample(1)

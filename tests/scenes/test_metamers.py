@@ -13,9 +13,9 @@ from render.illuminants import illuminant
 from render.scene_range import check_range
 from render.spectrum import Floats, Spectrum, colour_matching_functions, tristimulus
 from rodcone.colour_spaces import adapt_to_d65
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.metamers import HIGH, LOW, OTHER_LIGHT, PAIRS, TWINS_UNDER, pairs
-from scenes.reflectances import color_checker, read_reflectances
+from scenes.reflectances import color_checker_reflectances, read_reflectances
 from sensor.curves import Responses, rgbw
 
 
@@ -105,7 +105,8 @@ def written(folder: Path, columns: dict[str, np.ndarray], nm: np.ndarray = NM) -
 
 def test_the_colorcheckers_own_reflectances_give_the_colorchecker(tmp_path: Path) -> None:
     chart = written(
-        tmp_path, {name: np.interp(NM, curve.wavelength_nm, curve.values) for name, curve in color_checker()}
+        tmp_path,
+        {name: np.interp(NM, curve.wavelength_nm, curve.values) for name, curve in color_checker_reflectances()},
     )
     asked = {"spp": 4, "wavelength_nm": (450.0, 550.0, 650.0), "seed": 1}
     own, known = (render(load("color_checker", **options), (12, 18), **asked) for options in ({"chart": chart}, {}))

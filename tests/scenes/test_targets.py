@@ -16,7 +16,7 @@ from render.engine import render
 from render.geometry import look_at, to_world
 from render.spectrum import Spectrum, luminance
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.cornell_box import paint
 from scenes.siemens_star import RADIUS_M
 

@@ -9,11 +9,11 @@ from loop import loop
 from refusal import refusal
 
 from render.radiance import SpectralRadiance
-from sensor.burst import merge, merged_raw, merged_sensor
-from sensor.capture import capture
-from sensor.chip import PixelConfig
+from sensor.burst import merge_frames, merged_raw, merged_sensor
+from sensor.capture import photograph_radiance
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
+from sensor.pixel import PixelConfig
 from sensor.presets import low_noise, preset, table1_pixel
 from sensor.readout import read_out
 
@@ -36,7 +36,7 @@ def shoot(sensor, rate, exposures_s, device=None, seed=0, shape=SHAPE):
 def test_a_burst_of_equal_frames_merges_to_their_mean_and_an_nth_of_the_variance():
     sensor = camera(read_noise_e=20.0)
     frames = shoot(sensor, 1e5, [0.01] * 5)
-    merged = merge(frames)
+    merged = merge_frames(frames)
     mean = np.mean([frame.electrons for frame in frames], axis=0)
     np.testing.assert_allclose(merged.rate_e_per_s, mean / 0.01, rtol=1e-12)
     expected = (mean + 400 + sensor.gain_e_per_dn**2 / 12) / (5 * 0.01**2)
@@ -55,7 +55,7 @@ TIMES = (0.001, 0.004, 0.016)
 @pytest.mark.parametrize("read_noise_e", [2.0, 30.0])
 def test_the_merge_has_no_bias_and_the_stated_variance_at_any_light(rate, read_noise_e):
     sensor = camera(read_noise_e=read_noise_e)
-    merged = merge(shoot(sensor, rate, TIMES, seed=int(rate)))
+    merged = merge_frames(shoot(sensor, rate, TIMES, seed=int(rate)))
     noise = merged.rate_e_per_s.std()
     # the mean of 65 536 pixels within 4 standard errors (32 levels: 2e-3 for fresh seeds) and the stated 1 %
     assert abs(merged.rate_e_per_s.mean() - rate) < noise * (4 / np.sqrt(PIXELS) + 0.01)
@@ -73,7 +73,7 @@ def theory(rate, times, read_noise_e, sensor):
 @loop(("rate", "clear"), [(100.0, TIMES), (2e5, TIMES), (1e6, TIMES[:2]), (2e6, TIMES[:2]), (5e6, TIMES[:1])])
 def test_the_variance_is_the_best_that_the_unsaturated_frames_allow(rate, clear):
     sensor = camera(read_noise_e=10.0)
-    merged = merge(shoot(sensor, rate, TIMES))
+    merged = merge_frames(shoot(sensor, rate, TIMES))
     best = theory(rate, clear, 10.0, sensor)
     # within 1 % and 4 standard errors of a variance (6.3e-5)
     assert merged.rate_e_per_s.var() == pytest.approx(best, rel=0.01 + 4 * np.sqrt(2 / PIXELS))
@@ -84,7 +84,7 @@ def test_the_variance_is_the_best_that_the_unsaturated_frames_allow(rate, clear)
 def test_beyond_the_shortest_frame_s_well_pixels_are_told_to_be_saturated():
     light = np.full(SHAPE, 1e5)
     light[:, ::2] = 1e9
-    merged = merge(shoot(camera(read_noise_e=10.0), light, TIMES))
+    merged = merge_frames(shoot(camera(read_noise_e=10.0), light, TIMES))
     np.testing.assert_array_equal(merged.saturated, light > 1e8)
     np.testing.assert_allclose(merged.rate_e_per_s[:, ::2], 1e7, rtol=0.01)  # the well in the shortest time
 
@@ -92,7 +92,7 @@ def test_beyond_the_shortest_frame_s_well_pixels_are_told_to_be_saturated():
 def test_frames_of_a_noisy_camera_that_are_full_are_left_out_although_many_read_under_the_top():
     sensor = table1_pixel()
     device = draw_device(sensor, SHAPE, np.random.default_rng(1))
-    merged = merge(shoot(sensor, 5e6, (0.001, 0.1), device))
+    merged = merge_frames(shoot(sensor, 5e6, (0.001, 0.1), device))
     spread = np.sqrt((merged.temporal_variance + merged.fixed_variance).mean())
     assert abs(merged.rate_e_per_s.mean() - 5e6) < 4 * spread / np.sqrt(PIXELS)
     assert not merged.saturated.any()
@@ -102,7 +102,7 @@ def test_fixed_patterns_have_the_stated_variance_over_a_chip():
     sensor = camera(read_noise_e=5.0, dsnu_e=10.0, prnu=0.02)
     device = draw_device(sensor, SHAPE, np.random.default_rng(2))
     for rate in (1e3, 3e5):
-        merged = merge(shoot(sensor, rate, TIMES, device))
+        merged = merge_frames(shoot(sensor, rate, TIMES, device))
         stated = (merged.temporal_variance + merged.fixed_variance).mean()
         # within 4 standard errors of a variance and 2 %: false-alarm rate 1.3e-4
         assert merged.rate_e_per_s.var() == pytest.approx(stated, rel=4 * np.sqrt(2 / PIXELS) + 0.02)
@@ -114,7 +114,7 @@ def test_frames_of_one_reading_or_several_and_dark_current_merge_over_times(name
     sensor = preset(name)
     sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=500.0))
     device = draw_device(sensor, SHAPE, np.random.default_rng(5))
-    merged = merge(shoot(sensor, 2e4, [0.01, 0.04], device))
+    merged = merge_frames(shoot(sensor, 2e4, [0.01, 0.04], device))
     noise = np.sqrt(merged.temporal_variance.mean() + merged.fixed_variance.mean())
     assert abs(merged.rate_e_per_s.mean() - 2e4) < noise * (4 / np.sqrt(PIXELS) + 0.02)
 
@@ -128,8 +128,8 @@ def test_a_bracket_of_photographs_gives_back_the_scene_from_shadow_to_light():
     device = draw_device(sensor, (64, 64), np.random.default_rng(3))
     radiance = SpectralRadiance(values, nm)
     rng = np.random.default_rng(4)
-    frames = [capture(radiance, sensor, exposure_s, device, rng) for exposure_s in times]
-    merged = merge(frames)
+    frames = [photograph_radiance(radiance, sensor, exposure_s, device, rng) for exposure_s in times]
+    merged = merge_frames(frames)
     dark, bright = merged.rate_e_per_s[1::2, 1:31:2].mean(), merged.rate_e_per_s[1::2, 33::2].mean()  # W
     assert bright / dark == pytest.approx(100.0, rel=0.01)
     assert not merged.saturated.any()
@@ -137,17 +137,17 @@ def test_a_bracket_of_photographs_gives_back_the_scene_from_shadow_to_light():
 
 @loop("full_well_e", [1.0, 50.0])
 def test_a_well_of_a_few_electrons_still_counts_until_half(full_well_e):
-    merged = merge(shoot(camera(full_well_e=full_well_e), 0.2 * full_well_e / 0.01, [0.01] * 3))
+    merged = merge_frames(shoot(camera(full_well_e=full_well_e), 0.2 * full_well_e / 0.01, [0.01] * 3))
     assert merged.saturated.mean() < 0.3
 
 
 def test_frames_that_do_not_belong_together_are_refused():
     one, other = shoot(camera(), 1e4, [0.01, 0.02], shape=(8, 8))
-    assert "frames: none were given" in refusal(merge, [])
-    assert "gain_e_per_dn of frame 1 is 2.0" in refusal(merge, [one, replace(other, gain_e_per_dn=2.0)])
-    assert "cfa of frame 1" in refusal(merge, [one, replace(other, cfa=("RG", "GB"))])
-    assert "shape of frame 1 is (8, 10)" in refusal(merge, [one, shoot(camera(), 1e4, [0.01], shape=(8, 10))[0]])
-    assert "exposure_s of frame 1" in refusal(merge, [one, replace(other, exposure_s=0.0)])
+    assert "frames: none were given" in refusal(merge_frames, [])
+    assert "gain_e_per_dn of frame 1 is 2.0" in refusal(merge_frames, [one, replace(other, gain_e_per_dn=2.0)])
+    assert "cfa of frame 1" in refusal(merge_frames, [one, replace(other, cfa=("RG", "GB"))])
+    assert "shape of frame 1 is (8, 10)" in refusal(merge_frames, [one, shoot(camera(), 1e4, [0.01], shape=(8, 10))[0]])
+    assert "exposure_s of frame 1" in refusal(merge_frames, [one, replace(other, exposure_s=0.0)])
 
 
 def test_a_merged_burst_is_one_exposure_of_all_its_time():

@@ -10,10 +10,10 @@ from scipy import stats
 
 from render.radiance import SpectralRadiance
 from rodcone.jit import backend
-from sensor.capture import capture, expose
+from sensor.capture import expose, photograph_radiance
 from sensor.device import draw_device
 from sensor.optics import form_image
-from sensor.presets import names, preset
+from sensor.presets import preset, preset_names
 from sensor.readout import read_out
 from sensor.response import expected_electrons
 
@@ -24,11 +24,14 @@ def scene(dtype=np.float32, shape=(33, 48)):
     return SpectralRadiance(np.random.default_rng(1).uniform(0, 0.006, (*shape, NM.size)).astype(dtype), NM)
 
 
-@loop(("name", "cfa", "dtype"), [*((name, "rgbw", np.float32) for name in names()), ("low_noise", "bayer", np.float64)])
+@loop(
+    ("name", "cfa", "dtype"),
+    [*((name, "rgbw", np.float32) for name in preset_names()), ("low_noise", "bayer", np.float64)],
+)
 def test_an_exact_capture_is_the_chain_of_its_parts_bit_for_bit(name, cfa, dtype):
     radiance, sensor = scene(dtype), preset(name, cfa)
     device = draw_device(sensor, radiance.shape, np.random.default_rng(2))
-    raw = capture(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=True)
+    raw = photograph_radiance(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=True)
     expected_e = expected_electrons(form_image(radiance, sensor), sensor, 0.02)
     parts = read_out(expected_e, sensor, device, 0.02, np.random.default_rng(3))
     np.testing.assert_array_equal(raw.dn, parts.dn)
@@ -46,7 +49,7 @@ def test_expected_electrons_are_read_out_as_a_capture_reads_them(exact):
     device = draw_device(sensor, radiance.shape, np.random.default_rng(2))
     expected_e = expected_electrons(form_image(radiance, sensor), sensor, 0.02)
     raw = expose(expected_e, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
-    whole = capture(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
+    whole = photograph_radiance(radiance, sensor, 0.02, device, np.random.default_rng(3), exact=exact)
     assert raw.engine == whole.engine == ("numpy" if exact else backend())
     if exact:
         np.testing.assert_array_equal(raw.dn, whole.dn)
@@ -58,14 +61,18 @@ def test_expected_electrons_are_read_out_as_a_capture_reads_them(exact):
 def test_one_capture_takes_one_key_from_the_generator(exact):
     radiance, sensor = scene(), preset("low_noise")
     rng, twin = np.random.default_rng(4), np.random.default_rng(4)
-    capture(radiance, sensor, 0.02, draw_device(sensor, radiance.shape, np.random.default_rng(2)), rng, exact=exact)
+    photograph_radiance(
+        radiance, sensor, 0.02, draw_device(sensor, radiance.shape, np.random.default_rng(2)), rng, exact=exact
+    )
     twin.integers(0, 2**64, dtype=np.uint64)
     assert rng.bit_generator.state == twin.bit_generator.state
 
 
 @loop("samples", [0, -1])
 def test_a_number_of_samples_that_is_none_is_refused(samples):
-    refusal(capture, scene(), preset("low_noise"), 0.02, samples_per_pixel=samples, match="samples_per_pixel: ")
+    refusal(
+        photograph_radiance, scene(), preset("low_noise"), 0.02, samples_per_pixel=samples, match="samples_per_pixel: "
+    )
 
 
 @loop("exact", [False, True])
@@ -73,7 +80,7 @@ def test_a_chip_of_another_size_is_refused_in_one_line(exact):
     sensor = preset("low_noise")
     device = draw_device(sensor, (33, 47), np.random.default_rng(2))
     refusal(
-        capture,
+        photograph_radiance,
         scene(),
         sensor,
         0.02,
@@ -86,7 +93,7 @@ def test_a_chip_of_another_size_is_refused_in_one_line(exact):
 
 def shoot(radiance, sensor, seed=3, exact=False, **options):
     device = draw_device(sensor, (33, 48), np.random.default_rng(2))
-    return capture(radiance, sensor, 0.02, device, np.random.default_rng(seed), exact=exact, **options)
+    return photograph_radiance(radiance, sensor, 0.02, device, np.random.default_rng(seed), exact=exact, **options)
 
 
 def mean_electrons(radiance, sensor, frames, **options):

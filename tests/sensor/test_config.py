@@ -8,9 +8,9 @@ from loop import loop
 from refusal import refusal
 
 from render.spectrum import flat
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
+from sensor.pixel import PixelConfig
 from sensor.presets import table1_pixel
 from sensor.response import check_window
 

@@ -5,9 +5,9 @@ import pytest
 from loop import loop
 from scipy import stats
 
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
+from sensor.pixel import PixelConfig
 from sensor.random import NoiseTerm, draw_key, normals, philox, poisson
 
 

@@ -9,7 +9,6 @@ from loop import loop
 from refusal import refusal
 
 from sensor.cfa import mask
-from sensor.chip import ChannelReading, Chip
 from sensor.config import LONGEST_S
 from sensor.exposure import (
     at_level_s,
@@ -21,6 +20,7 @@ from sensor.exposure import (
 )
 from sensor.optics import SpectralIrradiance
 from sensor.photodiodes import binned
+from sensor.pixel import ChannelReading, Chip
 from sensor.presets import preset
 from sensor.response import behind_filters, channel_electrons
 

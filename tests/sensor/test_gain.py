@@ -10,13 +10,13 @@ from refusal import refusal
 from scipy.special import ndtr
 
 from sensor.capture import expose
-from sensor.chip import Reading
 from sensor.config import SensorConfig, with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
 from sensor.emva1288.characterise import characterise
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule
 from sensor.photodiodes import binned, with_gain
+from sensor.pixel import Reading
 from sensor.presets import low_noise, preset, preset_file
 from sensor.raw import noise_at_sites
 from sensor.readout import noise_sources, noise_variance

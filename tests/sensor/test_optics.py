@@ -10,11 +10,11 @@ from loop import loop
 
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import diffraction_otf
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, least_samples, left_out, mtf50_error
-from sensor.presets import names, preset
+from sensor.pixel import PixelConfig
+from sensor.presets import preset, preset_names
 from studies.metrics.mtf import edge_response
 
 ISET_NM = np.arange(400.0, 701.0, 10.0)  # samples 10 nm apart, summed as rectangles
@@ -87,7 +87,7 @@ def numbers(text):
     return [float(x) for x in re.findall(r"\d+\.\d+", text)]
 
 
-@loop("name", names())
+@loop("name", preset_names())
 def test_every_preset_says_in_one_line_each_what_it_leaves_out(name):
     lines = left_out(preset(name))
     starts = [text.split(":")[0] for text in lines]

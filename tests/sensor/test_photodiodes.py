@@ -12,13 +12,13 @@ from rodcone.errors import InputError
 from rodcone.jit import backend
 from sensor.capture import expose
 from sensor.cfa import BAYER, MOSAICS, RGBW, block_sums, quad, tile_of
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import built_in
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.photodiodes import binned, binned_tile
+from sensor.pixel import PixelConfig
 from sensor.presets import vary
 from sensor.readout import noise_sources, noise_variance
 from sensor.shake import shaken

@@ -13,14 +13,14 @@ from isp.colour.white_balance import neutral_response
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, photons_per_joule, tristimulus
 from rodcone.errors import InputError
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import BAYER, MOSAICS, RGBW, channels
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import read_sensor
 from sensor.curves import Responses, complementary, matched_transmittance, neutral_density, read_csv, read_curve, rgbw
 from sensor.photodiodes import binned
-from sensor.presets import VARIATIONS, low_noise, names, preset, preset_file, table1_output, table1_pixel, vary
+from sensor.pixel import PixelConfig
+from sensor.presets import VARIATIONS, low_noise, preset, preset_file, preset_names, table1_output, table1_pixel, vary
 from studies.commands import new as new_command
 
 LEAST = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nfull_well_e = 15000\nread_noise_e = 3\ndsnu_e = 4\nprnu = 0.01\n"
@@ -33,7 +33,7 @@ def write(folder, text, name="camera.toml"):
     return path
 
 
-@loop("name", names())
+@loop("name", preset_names())
 def test_every_preset_is_a_file_that_says_what_it_is_and_names_every_pixel_term(name):
     text = preset_file(name).read_text("utf-8")
     assert text.startswith("# ")
@@ -227,7 +227,7 @@ def test_complementary_filters_pass_what_two_primaries_do() -> None:
 
 def test_complementary_colours_lead_to_the_same_colours_as_the_primaries() -> None:
     # balanced C, Y and M are mixtures of balanced R, G and B, so the fitted matrices differ by exactly that mixture
-    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker_reflectances()])
     light = illuminant("D65").band_average(NM, WIDTH)
     primary = fit_matrix(rgbw().band_average(("R", "G", "B"), NM, WIDTH), NM, light, surfaces)
     curves = complementary(rgbw())

@@ -13,9 +13,9 @@ from hypothesis import strategies as st
 from loop import loop
 from scipy import stats
 
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
+from sensor.pixel import PixelConfig
 from sensor.readout import draw_frame, draw_mean_frame, noise_sources, noise_variance, read_out, spread_charge
 
 QUIET = PixelConfig(2.2, 0.9, full_well_e=1000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)

@@ -10,14 +10,14 @@ from loop import loop
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.cfa import BAYER, RGBW, mask
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import Responses
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
+from sensor.pixel import PixelConfig
 from sensor.presets import low_noise
 from sensor.response import expected_electrons, lost_shares
 
@@ -143,7 +143,7 @@ def test_the_shares_are_what_the_electrons_of_equal_energy_light_lose(low_nm, hi
 
 def shoot(radiance, **options):
     device = draw_device(SENSOR, radiance.shape, np.random.default_rng(1))
-    return capture(radiance, SENSOR, 0.01, device, np.random.default_rng(2), **options)
+    return photograph_radiance(radiance, SENSOR, 0.01, device, np.random.default_rng(2), **options)
 
 
 DOORS = {

@@ -10,7 +10,7 @@ from refusal import refusal
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from sensor.capture import capture
+from sensor.capture import photograph_radiance
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import draw_device
 from sensor.presets import preset
@@ -118,14 +118,17 @@ def test_a_hand_s_blur_of_the_whole_time_is_given_to_no_shorter_reading(name, ti
     still = preset(name)
     light = SpectralRadiance(np.full((8, 8, NM.size), 0.01), NM)
     shaky = LensConfig(2.8, shake_um=5.0)
-    refusal(lambda: capture(light, replace(still, lens=shaky), time_s), match="shake_um: 5 .*after a part of the time")
-    capture(light, replace(still, lens=LensConfig(2.8)), time_s)
+    refusal(
+        lambda: photograph_radiance(light, replace(still, lens=shaky), time_s),
+        match="shake_um: 5 .*after a part of the time",
+    )
+    photograph_radiance(light, replace(still, lens=LensConfig(2.8)), time_s)
 
 
 def test_a_channel_that_takes_the_whole_time_shakes_as_the_others_do():
     light = SpectralRadiance(np.full((8, 8, NM.size), 1e-6), NM)
     sensor = replace(preset("white_apart"), lens=LensConfig(2.8, shake_um=5.0))
-    assert capture(light, sensor, 0.01).noise_of("W").shot == 1.0
+    assert photograph_radiance(light, sensor, 0.01).noise_of("W").shot == 1.0
 
 
 def test_frames_of_a_held_camera_differ_by_their_paths_and_repeat_with_the_seed():
@@ -135,10 +138,10 @@ def test_frames_of_a_held_camera_differ_by_their_paths_and_repeat_with_the_seed(
     sensor = replace(by_hand(), pixel=replace(by_hand().pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0))
     device = draw_device(sensor, (48, 48), np.random.default_rng(0))
     rng = np.random.default_rng(5)
-    one, other = (capture(radiance, sensor, 0.05, device, rng) for _ in range(2))
-    again = capture(radiance, sensor, 0.05, device, np.random.default_rng(5))
+    one, other = (photograph_radiance(radiance, sensor, 0.05, device, rng) for _ in range(2))
+    again = photograph_radiance(radiance, sensor, 0.05, device, np.random.default_rng(5))
     np.testing.assert_array_equal(one.dn, again.dn)
     assert not np.array_equal(one.dn, other.dn)
-    still = capture(radiance, replace(sensor, lens=LensConfig(2.8)), 0.05, device, np.random.default_rng(5))
+    still = photograph_radiance(radiance, replace(sensor, lens=LensConfig(2.8)), 0.05, device, np.random.default_rng(5))
     white = np.s_[1::2, 1::2]  # the edges are softer by hand: less spread in the samples of one channel
     assert one.electrons[white].std() < still.electrons[white].std()

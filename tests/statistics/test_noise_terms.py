@@ -14,14 +14,14 @@ import pytest
 from exact_law import assert_moments, exact_probabilities
 from loop import loop
 
-from sensor.burst import merge, merged_raw, merged_sensor
+from sensor.burst import merge_frames, merged_raw, merged_sensor
 from sensor.cfa import MOSAICS
-from sensor.chip import PixelConfig, Reading
 from sensor.config import LensConfig, SensorConfig, with_readings
 from sensor.device import Device, draw_device
-from sensor.emva1288.characterise import configured, measure, plan_for
-from sensor.emva1288.photon_transfer import bench
+from sensor.emva1288.characterise import configured, measure_camera, plan_for
+from sensor.emva1288.photon_transfer import light_bench
 from sensor.photodiodes import binned
+from sensor.pixel import PixelConfig, Reading
 from sensor.raw import noise_at_sites
 from sensor.readings.noise import dark_electrons, whole_share
 from sensor.readings.resolve import chip_readings
@@ -129,7 +129,7 @@ def test_a_bracket_and_a_burst_have_the_variance_that_their_merge_says(names):
     shape = SHAPE
     device, rng = draw_device(sensor, shape, np.random.default_rng([5, 0])), np.random.default_rng([5, 1])
     times = (0.05, 0.1, 0.2)
-    merged = merge([read_out(np.full(shape, rate * t), sensor, device, t, rng) for t in times])
+    merged = merge_frames([read_out(np.full(shape, rate * t), sensor, device, t, rng) for t in times])
     stated = float((merged.temporal_variance + merged.fixed_variance).mean())
     assert_variance(merged.rate_e_per_s, stated, names)
     # a burst of four equal times: what the merged raw image says of itself, and the camera of its whole exposure
@@ -165,7 +165,7 @@ def test_a_laboratory_finds_what_emva_1288_s_closed_forms_say_at_a_long_exposure
     """Dark electrons of the light's size: what PRNU, columns and hot pixels make of them is in the dark frames."""
     sensor = camera("one reading", **{"read_noise_e": 20.0, "dark_current_e_per_s": 10_000.0, **terms_of(names)})
     plan = replace(plan_for(sensor, TIME_S), frames=8)
-    found = measure(bench(sensor, (64, 1024), 3), plan, sensor)
+    found = measure_camera(light_bench(sensor, (64, 1024), 3), plan, sensor)
     stated = configured(sensor, TIME_S)
     for figure in found.figures:
         if figure.error:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from render.engine import render
-from scenes.catalog import load
+from scenes.catalogue import load
 
 FALSE_ALARM, DRAWS = 1e-4, 400_000
 PASSES, SPP, MOST_ERROR = 8, 32, 0.03

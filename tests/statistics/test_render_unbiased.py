@@ -21,7 +21,7 @@ from render.illuminants import illuminant, lines_nm
 from render.scene import LightGroup, Scene
 from render.spectrum import Spectrum, line_bands
 from rodcone.jit import backend
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import ball, disk, floor, glass, matte, panel
 from scenes.reflectances import band, edge, grey
 

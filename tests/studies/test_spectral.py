@@ -12,14 +12,14 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.spectrum import VISIBLE_NM, Floats, fine_bands, photons_per_joule
 from render.transport import Transport
-from scenes.catalog import load
-from scenes.reflectances import color_checker
+from scenes.catalogue import load
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import expected_electrons
-from studies.budget.bands import counts, groups_of
+from studies.budget.bands import band_groups, possible_counts
 from studies.budget.starting_points import plan_from_settings
 from studies.commands import new as new_command
 from studies.metrics.target_figures import patch_masks
@@ -111,16 +111,16 @@ def test_a_study_renders_the_range_that_it_asks_for() -> None:
 def test_a_plan_of_a_wider_range_may_choose_all_of_its_bands() -> None:
     _, width = fine_bands([], (380.0, 1070.0))
     assert width.size == 69
-    assert counts(width)[-1] == 69
-    assert len(groups_of(width, 69)) == 69
-    assert counts(np.full(40, 10.0))[-1] == 40
+    assert possible_counts(width)[-1] == 69
+    assert len(band_groups(width, 69)) == 69
+    assert possible_counts(np.full(40, 10.0))[-1] == 40
 
 
 def test_surfaces_keep_their_last_reflectance_in_the_infrared() -> None:
     nm = np.array([770.0, 900.0, 1050.0])
     made = render(load("color_checker"), (64, 64), wavelength_nm=nm, width_nm=10.0, spp=16).radiance[0]
     masks = patch_masks(load("color_checker"), (64, 64))
-    for (name, curve), inside in zip(color_checker(), masks, strict=True):
+    for (name, curve), inside in zip(color_checker_reflectances(), masks, strict=True):
         found = made[:, inside].mean(axis=1)
         assert found[1] == pytest.approx(curve.values[-1], rel=0.02), name
         assert found[2] == pytest.approx(found[1], rel=1e-3)
@@ -138,6 +138,6 @@ def test_a_camera_is_calibrated_with_the_infrared_that_it_sees() -> None:
     assert 0.2 < share < 0.6
     seen = colours_under(replace(camera, window_nm=VISIBLE_NM), PROCESSORS["interleaved"], illuminant("2856K"))
     white = fit.channels.index("W")
-    beyond = np.mean([each.values[-1] for _, each in color_checker()])
+    beyond = np.mean([each.values[-1] for _, each in color_checker_reflectances()])
     mixed = (1 - share) * seen.mean[white] + share * beyond
     assert fit.mean[white] == pytest.approx(mixed, rel=2e-3)

@@ -13,7 +13,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, colour_matching_functions, even_bands, photons_per_joule
 from rodcone.colour_spaces import adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.curves import matched_transmittance, rgbw
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -23,7 +23,7 @@ from studies.photograph.camera import calibrate, colour_fit
 NM = DEFAULT_WAVELENGTH_NM
 WIDTH = band_widths(NM)
 LIGHT = illuminant("D65").band_average(NM, WIDTH)
-SURFACES = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+SURFACES = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker_reflectances()])
 CHANNELS = ("R", "G", "B", "W")
 RESPONSES = rgbw().band_average(CHANNELS, NM, WIDTH)
 

@@ -12,14 +12,14 @@ from isp.processors.network import NAMES
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.toml_file import read_toml
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import BAYER
 from sensor.curves import rgbw
 from sensor.raw import RawImage
 
 NM = DEFAULT_WAVELENGTH_NM
 LIGHT = illuminant("D65").band_average(NM, np.full(NM.size, 10.0))
-SURFACES = np.array([np.interp(NM, curve.wavelength_nm, curve.values) for _, curve in color_checker()])
+SURFACES = np.array([np.interp(NM, curve.wavelength_nm, curve.values) for _, curve in color_checker_reflectances()])
 NEUTRAL = np.array([0.5, 1.0, 0.4])  # of R, G, B
 DARK2 = 1.0 + 1.0 + 1 / 12  # of `raw_image` [e-^2]
 FLAT = NoiseGains(np.array([0.0]), np.array([[0.5, 0.6, 0.7]]))

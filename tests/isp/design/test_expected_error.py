@@ -6,7 +6,7 @@ from design_slope import error_slopes
 from numpy.testing import assert_allclose
 from scipy.special import ndtr
 
-from isp.design.expected_error import Gaussians, Noise, expected_error, pooled, sample_variance, sampled
+from isp.design.expected_error import Gaussians, Noise, expected_error, sample_variance, sampled, single_gaussian
 from sensor.noise_law import NoiseLaw
 
 PIXELS, COEFFICIENTS, DIRECTIONS = 6, 3, 5
@@ -87,7 +87,7 @@ def test_draws_have_the_error_of_a_known_component_and_no_estimator_a_smaller_on
     parts /= parts.sum(axis=0)
     squares = ((np.einsum("jn,jni->ni", parts, estimates) - x) ** 2).reshape(draws, PIXELS, -1).sum(axis=2)[:, MIDDLE]
     one_sided = 4.0 * squares.mean(axis=1).std() / np.sqrt(draws)  # a false alarm in 30 000 runs
-    linear = error(pooled(prior), scale, noise)
+    linear = error(single_gaussian(prior), scale, noise)
     assert squares.mean() > known - one_sided
     assert squares.mean() < linear + one_sided
 
@@ -98,8 +98,8 @@ def test_pooling_keeps_mean_and_covariance() -> None:
     second = sum(
         w * (covariance(prior, k) + np.outer(m, m)) for k, (w, m) in enumerate(zip(prior.weights, means, strict=True))
     )
-    assert_allclose(pooled(prior).means.ravel(), mean, rtol=1e-12)
-    assert_allclose(covariance(pooled(prior), 0), second - np.outer(mean, mean), atol=1e-12)
+    assert_allclose(single_gaussian(prior).means.ravel(), mean, rtol=1e-12)
+    assert_allclose(covariance(single_gaussian(prior), 0), second - np.outer(mean, mean), atol=1e-12)
 
 
 def test_an_endless_well_has_a_smaller_error() -> None:

@@ -10,12 +10,12 @@ import pytest
 from isp.ple.prior import OWN, load_prior, mixture, own_prior, save_prior
 from rodcone.errors import InputError
 from sensor.presets import preset
-from studies.training.pictures import LIGHTS, neutral_electrons, photograph_hashes
+from studies.training.pictures import LIGHTS, neutral_ratios, photograph_hashes
 
 
 def test_the_shipped_prior_is_for_the_projects_own_curves_and_says_where_it_is_from():
     prior = own_prior()
-    assert prior.neutrals_e == pytest.approx(neutral_electrons(preset("low_noise"), LIGHTS), rel=1e-6)
+    assert prior.neutrals_e == pytest.approx(neutral_ratios(preset("low_noise"), LIGHTS), rel=1e-6)
     assert prior.weights.sum() == pytest.approx(1, abs=1e-4)
     source = json.loads(prior.source)
     assert source["command"].startswith("rodcone train --sensor low_noise --seed ")

@@ -19,7 +19,7 @@ from isp.processors.residual import REACH, residual_interpolation
 from isp.processors.sub_images import Mix, bm3d_mosaic, hadamard, principal_components
 from sensor.cfa import BAYER, Tile
 from sensor.raw import RawImage
-from studies.metrics.quality import psnr_db
+from studies.metrics.appearance import psnr_db
 
 SHARES = {"R": 0.5, "G": 1.0, "B": 0.4}
 

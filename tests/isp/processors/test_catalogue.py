@@ -17,7 +17,7 @@ from isp.processors.catalogue import NAMED, PROCESSORS, libraries
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.colour_spaces import luminance_of_srgb
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import BAYER, MOSAICS, OWN, RGBW, Tile, channels, unit_channel
 from sensor.presets import VARIATIONS, preset
 from sensor.raw import RawImage
@@ -178,7 +178,7 @@ ODD = ("rccb", "rccc", "ryyb", "mono")
 def patch(mosaic: str, number: int) -> tuple[RawImage, np.ndarray, np.ndarray]:
     """Noise-free exposure of an even patch of the ColorChecker under D65, its neutral, and the fit's own prediction."""
     sensor = preset("low_noise", mosaic)
-    light = replace(D65, spectrum=D65.spectrum * color_checker()[number][1].band_average(*vars_of(D65)))
+    light = replace(D65, spectrum=D65.spectrum * color_checker_reflectances()[number][1].band_average(*vars_of(D65)))
     neutral, seen = neutral_electrons(sensor, D65, 1.0), neutral_electrons(sensor, light, 1.0)
     unit = sensor.channels.index(sensor.unit_channel)
     level_e = 1e6 / neutral[unit]

@@ -9,7 +9,7 @@ from builders import RGBW_PHASES, mosaic_of, raw_image
 from isp.colour.white_balance import neutral_response
 from isp.planes import fill
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.fusion import MATCHED_RADIUS, combine, with_luminance
+from isp.processors.fusion import MATCHED_RADIUS, tent_means, with_luminance
 from isp.processors.gindele import REACH, adams_planes, luminance_plane
 from rodcone.colour_spaces import luminance_of_srgb
 from sensor.cfa import RGBW, Tile, channel_map, mask
@@ -52,7 +52,7 @@ def test_the_luminance_is_ws_in_full_bandwidth() -> None:
 def test_combining_weighs_samples_by_a_tent() -> None:
     mosaic = np.zeros((24, 24))
     mosaic[12, 12] = 1.0  # a red site
-    spread = combine(mosaic, RGBW, "R")
+    spread = tent_means(mosaic, RGBW, "R")
     # samples at distances 0 and 2 of a red site: (4 and twice 2) along each axis, 64 in all; next to it twice (3, 1)
     assert spread[12, 12] == pytest.approx(16 / 64)
     assert spread[12, 14] == pytest.approx(8 / 64)
@@ -68,7 +68,9 @@ def test_kijima_gives_a_grey_scene_all_of_ws_detail() -> None:
     rgb = PROCESSORS["rgbw_kijima"].develop(white, np.eye(3), balance=BALANCE).rgb
     plane = fill(white.electrons / 5, RGBW, "W")
     for index, channel in enumerate("RGB"):
-        expected = plane + combine(np.where(channel_map(RGBW, (24, 24)) == channel, 500.0 - plane, 0.0), RGBW, channel)
+        expected = plane + tent_means(
+            np.where(channel_map(RGBW, (24, 24)) == channel, 500.0 - plane, 0.0), RGBW, channel
+        )
         assert rgb[..., index] == pytest.approx(expected, rel=1e-9)
 
 

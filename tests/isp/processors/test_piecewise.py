@@ -13,7 +13,7 @@ from isp.processors.piecewise import curves_differ
 from rodcone.errors import InputError
 from sensor.cfa import MOSAICS, channels
 from sensor.presets import preset
-from studies.training.pictures import neutral_electrons
+from studies.training.pictures import neutral_ratios
 
 FULL_E, INDEX = 15_000.0, {"ple_rgbw": [0, 1, 2, 3], "ple_bayer": [0, 1, 2]}
 PHASES = [*(("ple_rgbw", tile) for tile in RGBW_PHASES), *(("ple_bayer", tile) for tile in BAYER_PHASES)]
@@ -49,14 +49,14 @@ def test_highlights_stay_grey_and_end_at_greens_full_well(name):
 
 def test_the_own_curves_are_known_under_any_light():
     for name, light in product(INDEX, ["D65", "2856K", "sodium_high", "sodium_low", "LED-B3", "LED-V1", "moonlight"]):
-        (neutral,) = neutral_electrons(preset("low_noise"), [light])
+        (neutral,) = neutral_ratios(preset("low_noise"), [light])
         assert not curves_differ(own_prior(), neutral[INDEX[name]], INDEX[name]), (light, name)
 
 
 # `wide` under 2856 K reads as the own curves do under LEDs: that one isn't seen.
 def test_other_curves_are_warned_of_in_one_line():
     for name, light in [("narrow", "D65"), ("narrow", "2856K"), ("wide", "D65")]:
-        (neutral,) = neutral_electrons(preset(f"studies/configs/sensors/{name}.toml"), [light])
+        (neutral,) = neutral_ratios(preset(f"studies/configs/sensors/{name}.toml"), [light])
         raw = grey(RGBW_PHASES[0], np.full((16, 16), 1000.0))
         with pytest.warns(UserWarning, match=r"^curves: a neutral reads .*`rodcone train`$"):
             PROCESSORS["ple_rgbw"].develop(raw, np.eye(3), neutral=neutral)

@@ -12,7 +12,7 @@ from render.denoised.denoise import denoised, first_surfaces
 from render.denoised.relight import measured_error
 from render.engine import _checked_film
 from render.loader import load_groups
-from scenes.catalog import load
+from scenes.catalogue import load
 
 SIZE = (40, 48)
 BANDS_NM = np.arange(400.0, 780.0, 20.0)

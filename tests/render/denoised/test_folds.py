@@ -8,7 +8,7 @@ from refusal import refusal
 
 from render.denoised.relight import measured_error, relight_denoised
 from render.engine import render
-from scenes.catalog import load
+from scenes.catalogue import load
 
 pytest.importorskip("mitsuba_oidn", reason="rodcone[denoise] is not installed")
 SIZE = (32, 32)

@@ -8,7 +8,7 @@ from render import engine
 from render.combine import combine, emission
 from render.engine import render
 from render.integrator.allocation import LEAST_SHARE, POOL, rates_of
-from scenes.catalog import load
+from scenes.catalogue import load
 
 NM = np.arange(450.0, 700.0, 60.0)
 

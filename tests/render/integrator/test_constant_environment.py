@@ -15,7 +15,7 @@ from render.loader import is_environment, load_groups
 from render.runs import Means, add_run, no_means
 from render.scene import LightGroup, Scene
 from render.spectrum import flat
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import ball, checks, floor, glass, matte, panel
 from scenes.reflectances import edge, grey
 

@@ -13,7 +13,7 @@ from render.loader import mitsuba_module, own_mitsuba_variant
 from render.scene import spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat, line_spectrum
 from rodcone.jit import dr
-from scenes.catalog import load
+from scenes.catalogue import load
 from scenes.materials import checks, printed
 from scenes.reflectances import edge, grey
 

@@ -17,7 +17,7 @@ from render.radiance_files.file_checks import MOST_BYTES, MOST_EXPANSION, MOST_S
 from render.radiance_files.radiance_source import is_reflectance, load_radiance
 from rodcone.errors import InputError
 from rodcone.jit import at_least_two_threads
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 
 FLOAT = np.finfo(np.float32)
 
@@ -151,7 +151,7 @@ def test_reflectances_of_colour_science_are_those_of_the_colorchecker(samples: P
     assert is_reflectance(path)
     read = read_exr(path)
     assert read.shape[:2] == (4, 6)
-    for patch, (_, curve) in zip(read.values.reshape(24, -1), color_checker(), strict=True):
+    for patch, (_, curve) in zip(read.values.reshape(24, -1), color_checker_reflectances(), strict=True):
         assert patch == pytest.approx(np.interp(read.wavelength_nm, curve.wavelength_nm, curve.values), abs=2e-3)
 
 

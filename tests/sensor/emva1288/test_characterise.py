@@ -9,11 +9,11 @@ from loop import loop
 from refusal import refusal
 
 from sensor.cfa import MOSAICS
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
-from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure, plan_for
-from sensor.emva1288.photon_transfer import bench
+from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure_camera, plan_for
+from sensor.emva1288.photon_transfer import light_bench
 from sensor.photodiodes import binned
+from sensor.pixel import PixelConfig
 
 # Every term at once, each large enough to be measured on a small chip.
 PIXEL = PixelConfig(
@@ -113,7 +113,7 @@ SEEDS = 20
 def run(sensor, seed):
     """Characterise a chip of `sensor`, with CHIP's numbers as those that should be there."""
     plan = ExposurePlan(np.linspace(0, 1.1 * STRONG.full_well_e, 13)[1:], 0.001, 8, plan_for(CHIP).dark_times_s)
-    return measure(bench(sensor, WIDE, seed), plan, CHIP)
+    return measure_camera(light_bench(sensor, WIDE, seed), plan, CHIP)
 
 
 def wrong(found):

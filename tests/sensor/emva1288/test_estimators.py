@@ -12,10 +12,10 @@ from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import (
     Stack,
     Transfer,
-    bench,
     column_variance,
     dark_slopes,
     hot_pixels,
+    light_bench,
     take_stack,
     take_transfer,
 )
@@ -216,7 +216,7 @@ def test_hot_pixels_stand_out_of_the_noise_and_none_of_the_others_does():
 def test_a_bench_of_another_seed_holds_another_chip(exact):
     still = replace(preset("low_noise").pixel, read_noise_e=0.0, dsnu_e=20.0)  # in the dark the pattern alone is read
     sensor = replace(preset("low_noise"), pixel=still)
-    one, same, other = (bench(sensor, (16, 16), seed, exact) for seed in (1, 1, 2))
+    one, same, other = (light_bench(sensor, (16, 16), seed, exact) for seed in (1, 1, 2))
     np.testing.assert_array_equal(one(0.0, 0.01), same(0.0, 0.01))
     np.testing.assert_array_equal(one(0.0, 0.01), one(0.0, 0.01))
     assert np.mean(one(0.0, 0.01) == other(0.0, 0.01)) < 0.2

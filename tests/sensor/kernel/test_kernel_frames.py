@@ -12,13 +12,13 @@ from scipy.special import ndtri
 
 from rodcone.jit import arrays, backend, dr
 from sensor.cfa import MOSAICS
-from sensor.chip import PixelConfig
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
 from sensor.kernel.kernel import expected_electrons_single, normal_pair, read_frame
-from sensor.kernel.kernel import philox as kernel_philox
-from sensor.kernel.poisson import EXACT_BELOW_E, LARGEST_ERROR, TABLE_ERROR, alias_table, poisson
+from sensor.kernel.kernel import philox_single as kernel_philox
+from sensor.kernel.poisson import EXACT_BELOW_E, LARGEST_ERROR, TABLE_ERROR, alias_table, poisson_single
 from sensor.optics import SpectralIrradiance
+from sensor.pixel import PixelConfig
 from sensor.presets import preset
 from sensor.random import NoiseTerm, philox
 from sensor.readout import read_out
@@ -270,7 +270,7 @@ def draws(mean_e, normal=None, words=None):
     first, second = (
         jit.UInt(np.ascontiguousarray(np.broadcast_to(word, count), dtype=np.uint32)) for word in words or (0, 0)
     )
-    made = poisson(
+    made = poisson_single(
         dr.full(jit.Float, mean_e, count), jit.Float(normal.astype(np.float32)), (first, second), table_on_device()
     )
     return made.numpy().astype(np.int64)

@@ -9,10 +9,10 @@ from scipy import integrate, stats
 
 from sensor.capture import expose
 from sensor.cfa import mask
-from sensor.chip import ChannelReading
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.device import draw_device
 from sensor.photodiodes import with_gain
+from sensor.pixel import ChannelReading
 from sensor.presets import low_noise, preset
 from sensor.readings.clipping import censored
 from sensor.readings.resolve import resolve

@@ -9,16 +9,16 @@ from refusal import refusal
 from scipy import stats
 
 from render.illuminants import illuminant
-from sensor.burst import merge, merged_raw, merged_sensor
+from sensor.burst import merge_frames, merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import RGBW, mask
-from sensor.chip import ChannelReading, Reading
 from sensor.config import SensorConfig, with_channel_readings, with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposure_of_electrons_s
 from sensor.kernel.kernel import read_frame
 from sensor.photodiodes import binned
+from sensor.pixel import ChannelReading, Reading
 from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.random import poisson
 from sensor.raw import RawImage, noise_at_sites
@@ -226,7 +226,7 @@ def test_a_burst_has_the_variance_of_the_raw_image_that_is_made_of_it(name):
     light = np.tile(np.geomspace(1.0, 0.8 * sensor.pixel.full_well_e, 128), (16, 1))
     device, rng = draw_device(sensor, light.shape, np.random.default_rng(1)), np.random.default_rng(2)
     frames = [expose(light, sensor, TIME_S, device, rng) for _ in range(4)]
-    merged, raw = merge(frames), merged_raw(frames)
+    merged, raw = merge_frames(frames), merged_raw(frames)
     stated = (merged.temporal_variance + merged.fixed_variance) * raw.exposure_s**2
     at = ~raw.saturated & (raw.electrons > 0)
     assert at.mean() > 0.9

@@ -10,11 +10,11 @@ from refusal import refusal
 
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
-from sensor.chip import Reading
 from sensor.config import with_readings
 from sensor.config_file import read_sensor
 from sensor.device import draw_device
 from sensor.exposure import exposure_of_electrons_s
+from sensor.pixel import Reading
 from sensor.presets import low_noise, preset, preset_file
 from sensor.readings.merge import noise_of_merged
 from sensor.readings.noise import best_weights, covariances, merged_variance, merged_variances, seams, whole_share

@@ -23,7 +23,7 @@ from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.shake import held_lens
-from studies.budget.bands import COUNTS, groups_of, merge_radiance, merge_transport
+from studies.budget.bands import COUNTS, band_groups, merge_radiance, merge_transport
 from studies.budget.costs import image_ns, render_ns
 from studies.budget.effects import IMAGING_TERMS, KERNEL, Effects, find_effects, kernel_rms_e, shake_effect
 from studies.budget.how_many_bands import choose
@@ -66,7 +66,7 @@ def halved(low=0.2, high=0.8) -> np.ndarray:
 
 def found(made: Transport, counts=(40,), **lens) -> Effects:
     sensor = low_noise()
-    groups = {count: groups_of(made.width_nm, count) for count in counts}
+    groups = {count: band_groups(made.width_nm, count) for count in counts}
     stated = replace(sensor.lens, **({"diffraction": 0.0} | lens))
     return find_effects(made, sensor, stated, groups, np.random.default_rng(0))
 
@@ -95,14 +95,14 @@ def test_a_lamps_lines_get_bands_of_their_own_that_no_plan_merges() -> None:
     line = int(np.argmin(width_nm))
     assert nm[line] == pytest.approx(589.29, abs=0.01)
     for count in COUNTS:
-        groups = groups_of(width_nm, count)
+        groups = band_groups(width_nm, count)
         assert [group.tolist() for group in groups if line in group] == [[line]]
         assert np.array_equal(np.concatenate(groups), np.arange(width_nm.size))
 
 
 def test_wide_bands_are_as_many_as_asked_for_and_as_even_as_can_be() -> None:
     for count in COUNTS:
-        sizes = [len(group) for group in groups_of(WIDTH_NM, count)]
+        sizes = [len(group) for group in band_groups(WIDTH_NM, count)]
         assert (len(sizes), sum(sizes)) == (count, 40)
         assert max(sizes) - min(sizes) <= 1
 
@@ -110,11 +110,11 @@ def test_wide_bands_are_as_many_as_asked_for_and_as_even_as_can_be() -> None:
 def test_merged_bands_hold_means_weighted_by_width() -> None:
     made = transport(np.arange(40.0)[:, None, None] * np.ones((1, 4, 4)))
     made = replace(made, width_nm=np.r_[5.0, np.full(39, 10.0)], wavelength_nm=np.r_[387.5, NM[1:]])
-    merged = merge_transport(made, groups_of(made.width_nm, 20))
+    merged = merge_transport(made, band_groups(made.width_nm, 20))
     assert merged.radiance[0, 0, 0, 0] == pytest.approx((0 * 5 + 1 * 10) / 15)
     assert merged.radiance[0, 1, 0, 0] == pytest.approx(2.5)
     assert (merged.wavelength_nm[0], merged.width_nm[0]) == (392.5, 15.0)
-    radiance = merge_radiance(made.relight(), groups_of(made.width_nm, 20))
+    radiance = merge_radiance(made.relight(), band_groups(made.width_nm, 20))
     values = made.relight().values[0, 0]
     assert radiance.values[0, 0, 0] == pytest.approx((values[0] * 5 + values[1] * 10) / 15, rel=1e-6)
 
@@ -127,7 +127,7 @@ def test_light_within_bands_is_the_covariance_of_light_and_scene() -> None:
     made = transport(ramp, spectrum=light)
     missed = rms(found(made, counts=(20,)).bands[20].light)
     sensor = low_noise()
-    groups = groups_of(WIDTH_NM, 20)
+    groups = band_groups(WIDTH_NM, 20)
     wide = merge_transport(made, groups)
     weights = electrons_per_irradiance(sensor, wide.wavelength_nm, wide.width_nm, 1.0, light) * camera_equation(
         sensor.lens

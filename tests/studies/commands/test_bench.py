@@ -11,11 +11,11 @@ from command_line import call, check_refusals
 from hypothesis import given
 from hypothesis import strategies as st
 
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.presets import preset
 from studies.commands.bench import _print_stage
 from studies.pages.speed_page import LEAST_SHARE, bench_page
-from studies.speed.points import Measured, Times, front, stage_json, timed
+from studies.speed.points import Measured, Times, front, stage_json, time_calls
 from studies.speed.stages import STAGES, Bench, stages
 
 TINY = Bench(
@@ -50,10 +50,10 @@ def test_calls_take_turns_the_first_does_not_count_and_the_median_does(monkeypat
         calls.append(name)
         return len(calls)
 
-    made = timed({"a": lambda: call("a", 9.0, 1.0, 5.0, 2.0), "b": lambda: call("b", 8.0, 3.0, 3.0, 4.0)}, 3)
+    made = time_calls({"a": lambda: call("a", 9.0, 1.0, 5.0, 2.0), "b": lambda: call("b", 8.0, 3.0, 3.0, 4.0)}, 3)
     assert calls == ["a", "b"] * 4
     assert made == {"a": (7, Times(9.0, 2.0, 20.0)), "b": (8, Times(8.0, 3.0, 30.0))}
-    assert timed({"once": lambda: call("c", 6.0)}, 0) == {"once": (9, Times(6.0, 6.0, 60.0))}
+    assert time_calls({"once": lambda: call("c", 6.0)}, 0) == {"once": (9, Times(6.0, 6.0, 60.0))}
 
 
 def test_ratios_stand_beside_seconds() -> None:

@@ -17,7 +17,7 @@ from isp.ple.prior import load_prior, own_prior
 from isp.processors.catalogue import PROCESSORS
 from render import illuminants
 from render.illuminants import illuminant
-from scenes import catalog
+from scenes import catalogue
 from sensor import cfa, presets
 from sensor.cameras.library import measured_cameras
 from studies.commands import train
@@ -62,9 +62,9 @@ def printed(*arguments: object) -> str:
 
 def test_every_name_of_every_catalogue_is_listed() -> None:
     found = json.loads(printed("--json"))
-    assert tuple(found["scenes"]) == catalog.names()
-    assert tuple(found["lights"]) == (*illuminants.names(), "3000K", "D7000K")
-    assert tuple(found["sensors"]) == (*presets.names(), *measured_cameras())
+    assert tuple(found["scenes"]) == catalogue.scene_names()
+    assert tuple(found["lights"]) == (*illuminants.illuminant_names(), "3000K", "D7000K")
+    assert tuple(found["sensors"]) == (*presets.preset_names(), *measured_cameras())
     assert tuple(found["mosaics"]) == cfa.mosaics()
     assert tuple(found["processors"]) == tuple(PROCESSORS)
     assert "flip_mean" in found["metrics"]
@@ -81,7 +81,7 @@ def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
 
 @pytest.mark.thorough
 def test_curves_are_drawn_with_every_name(tmp_path: Path) -> None:
-    for kind, names in (("lights", [*illuminants.names(), "3000K"]), ("sensors", ["the presets"])):
+    for kind, names in (("lights", [*illuminants.illuminant_names(), "3000K"]), ("sensors", ["the presets"])):
         printed(kind, "-o", tmp_path / "curves.svg")
         drawn = (tmp_path / "curves.svg").read_text("utf-8")
         assert [name for name in names if f">{name}</text>" not in drawn] == []

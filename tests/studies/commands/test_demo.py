@@ -33,7 +33,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 
 def test_seven_levels_run_from_moonlight_to_daylight() -> None:
-    """In order, as tests/scenes/test_catalog.py has them."""
+    """In order, as tests/scenes/test_catalogue.py has them."""
     levels = [parse_level(level) for level in read_study(STUDY).levels]
     assert levels == [(level.luminance_cd_m2, "cd/m2") for level in DEMO_LEVELS]
 

@@ -11,18 +11,18 @@ from file_samples import camera_json, library_copy, profiled
 from sensor.cameras.library import VARIABLE
 from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
-from sensor.presets import names, preset, preset_file
+from sensor.presets import preset, preset_file, preset_names
 from studies.commands import new as new_command
 from studies.study.study_file import read_study
 
 
 def test_the_copy_is_the_preset_with_its_comments_and_reads_as_it(tmp_path):
-    for name in names():
+    for name in preset_names():
         path = tmp_path / f"{name}_of_mine.toml"
         assert call(["new", "preset", name, "-o", path]) == (0, f"{path}\n", "")
         assert path.read_bytes() == preset_file(name).read_bytes(), name
         assert preset(path) == preset(name), name
-    assert len(list(tmp_path.iterdir())) == len(names())
+    assert len(list(tmp_path.iterdir())) == len(preset_names())
 
 
 def test_an_eye_comes_with_its_receptors_and_is_read_as_a_sensor(tmp_path):

@@ -13,7 +13,7 @@ from render.engine import render
 from render.error_estimates import Halves
 from render.reference import FOLDER, SHIPPED, find_reference, require_agreement, save_reference
 from rodcone.progress import duration
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.budget.starting_points import plan_from_settings
 from studies.commands.demo import STUDY
 from studies.study.lit_scene import film_of, open_choice

@@ -19,7 +19,7 @@ from refusal import refusal
 
 from render.surfaces import see_surfaces
 from rodcone.digests import digest
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.dataset import make_set as make_set_module
 from studies.dataset import order as order_module
 from studies.dataset import sample as sample_module

@@ -11,9 +11,9 @@ from loop import loop
 
 from render.engine import render
 from render.spectrum import luminance
-from scenes.catalog import load
-from sensor.chip import ChannelReading
+from scenes.catalogue import load
 from sensor.config import SensorConfig, with_channel_readings
+from sensor.pixel import ChannelReading
 from sensor.presets import low_noise
 from sensor.readings.resolve import chip_readings
 from studies.dataset.sample import Arrays, Sample, group_shares, make_sample, noise_coefficients, scene_hash

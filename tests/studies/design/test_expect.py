@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from numpy.testing import assert_allclose
 
-from isp.design.expected_error import Noise, expected_error, pooled, sampled
+from isp.design.expected_error import Noise, expected_error, sampled, single_gaussian
 from isp.design.spectral_prior import PRIORS, load_prior
 from isp.ple.prior import mixture, own_prior
 from render.illuminants import illuminant
@@ -16,11 +16,11 @@ from render.spectrum import Spectrum, tristimulus
 from rodcone.colour_spaces import adapt_to_d65, encode_srgb
 from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
-from sensor.chip import ChannelReading
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.config_file import read_sensor
 from sensor.noise_law import NoiseLaw
 from sensor.optics import form_image
+from sensor.pixel import ChannelReading
 from sensor.presets import low_noise, preset, vary
 from sensor.readings.resolve import chip_readings, resolve
 from sensor.response import behind_filters
@@ -317,7 +317,7 @@ def test_each_figure_is_that_of_its_own_metric_and_estimate() -> None:
     # a scene's level is the mean over its patches' reflectances
     white, noise = level / np.mean(spectral.reflectances), noise_of(chip_readings(BAYER, 0.02))
     found = []
-    for patches in (spectral.patches, pooled(spectral.patches)):
+    for patches in (spectral.patches, single_gaussian(spectral.patches)):
         samples, errors = sampled(patches, sampling, MIDDLE, np.eye(len(sampling))), []
         for mean in spectral.reflectances:
             forms = np.array([rows.swapaxes(-1, -2) @ rows for rows in metric_rows(spectral, seen, mean)])

@@ -9,8 +9,8 @@ from refusal import refusal
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb
+from studies.metrics.appearance import picture_quality as quality_of
 from studies.metrics.compare import ReferencePicture, measure, reference_picture
-from studies.metrics.quality import measure as quality_of
 from studies.photograph.camera import capture
 from studies.photograph.develop import develop
 

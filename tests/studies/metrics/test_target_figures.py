@@ -12,8 +12,8 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 
 from render.engine import render
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
-from scenes.catalog import load
-from scenes.reflectances import color_checker
+from scenes.catalogue import load
+from scenes.reflectances import color_checker_reflectances
 from studies.metrics.mtf import edge_response
 from studies.metrics.target_figures import (
     TargetFigures,
@@ -95,7 +95,7 @@ def test_each_patch_of_a_render_has_its_own_reflectance() -> None:
     bands_nm = np.array([480.0, 580.0, 680.0])
     made = render(load("color_checker", light="E"), CHART_SHAPE, wavelength_nm=bands_nm, spp=16, seed=1)
     picture = np.moveaxis(made.radiance[0].astype(np.float64), 0, -1)
-    truth = np.array([curve.band_average(bands_nm, np.full(3, 100.0)) for _, curve in color_checker()])
+    truth = np.array([curve.band_average(bands_nm, np.full(3, 100.0)) for _, curve in color_checker_reflectances()])
     error = np.sqrt(made.variance[0].astype(np.float64)).mean(axis=(1, 2)) / np.sqrt(MASKS.sum(axis=(1, 2)).min())
     assert error.max() < 0.01  # neighbours differ by far more, in some band
     # 72 comparisons; the variance comes from 8 passes, and a steep curve scatters more than the mean pixel: 8 errors.

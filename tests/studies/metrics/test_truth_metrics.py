@@ -16,7 +16,7 @@ from sensor.presets import low_noise
 from sensor.readings.resolve import chip_readings
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
-from studies.metrics.quality import measure, psnr_db
+from studies.metrics.appearance import picture_quality, psnr_db
 from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.study.render_noise import monte_carlo_bound, monte_carlo_share
 
@@ -53,8 +53,8 @@ def test_delta_e_agrees_with_colour_science() -> None:
     d65 = np.array([0.3127, 0.3290])
     labs = [colour.XYZ_to_Lab(colour.sRGB_to_XYZ(picture), d65) for picture in (first, second)]
     theirs = colour.delta_E(*labs, method="CIE 2000")
-    assert measure(first, second).delta_e_median == pytest.approx(float(np.median(theirs)), rel=2e-3)
-    assert measure(first, second).delta_e_p95 == pytest.approx(float(np.percentile(theirs, 95)), rel=2e-3)
+    assert picture_quality(first, second).delta_e_median == pytest.approx(float(np.median(theirs)), rel=2e-3)
+    assert picture_quality(first, second).delta_e_p95 == pytest.approx(float(np.percentile(theirs, 95)), rel=2e-3)
 
 
 def test_monte_carlo_share_is_the_ratio_of_variances() -> None:

@@ -23,7 +23,7 @@ from sensor.emva1288.photon_transfer import Transfer
 from sensor.presets import low_noise, preset
 from studies.dataset.judge import MEASURED, Score, judge_page, psnr_chart
 from studies.design.expect import ExpectedError
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.pages import gain_plot, plots
 from studies.pages.plots import (
     CHART,
@@ -63,7 +63,7 @@ def test_snr_is_in_decibels_over_light_and_its_mark_at_20(drawn: Drawn) -> None:
     assert axes.get_title("left") == "SNR of a pixel [dB], D65, 33 ms"
     for index, channel in enumerate("RGB"):
         light, snr_db = curves(axes)[f"quiet {channel}"]
-        electrons = channel_e(quiet, light_of("D65"), 1.0, 0.033)[index] * light
+        electrons = channel_e(quiet, named_light("D65"), 1.0, 0.033)[index] * light
         seen = (electrons > 10) & np.isfinite(snr_db)
         assert seen.sum() > 50
         np.testing.assert_allclose(snr_db[seen], 10 * np.log10(electrons[seen]), atol=0.05)

@@ -15,7 +15,7 @@ from studies.paper.best_exposure import best_time_s, blur_px
 from studies.paper.early import colour_noise, gathered, range_db
 from studies.paper.light_levels import LEVELS_CD_M2, largest_step, without_white
 from studies.paper.patches import noisy_edge
-from studies.paper.setup import sensor_of
+from studies.paper.setup import table1_sensor
 
 
 def test_largest_step_is_the_surest_one_and_counts_in_its_direction() -> None:
@@ -40,14 +40,14 @@ def test_a_frame_without_white_has_alpha_1_and_its_colours() -> None:
 @pytest.mark.sample(1)
 @pytest.mark.parametrize("mosaic", ["rgbw", "rgbw_nd", "cmyw"])
 def test_dynamic_range_read_out_is_that_of_the_closed_form(mosaic: str) -> None:
-    closed, measured = range_db(sensor_of("table1_output", mosaic))
+    closed, measured = range_db(table1_sensor("table1_output", mosaic))
     # SNR from 256^2 pixels at an SNR of 1: its error is 0.5 %, 5 of them 0.22 dB.
     assert measured == pytest.approx(closed, abs=0.3)
 
 
 @pytest.mark.thorough
 def test_matching_w_to_g_costs_just_what_w_gathers_more() -> None:
-    rgbw, matched = (range_db(sensor_of("table1_pixel", mosaic))[0] for mosaic in ("rgbw", "rgbw_nd"))
+    rgbw, matched = (range_db(table1_sensor("table1_pixel", mosaic))[0] for mosaic in ("rgbw", "rgbw_nd"))
     assert rgbw - matched == pytest.approx(20 * np.log10(4.88), abs=0.02)  # W over G under D65
 
 

@@ -13,7 +13,7 @@ from command_line import call, check_refusals
 from PIL import Image
 
 from sensor.curves import rgbw
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.paper import best_exposure, light_levels
 from studies.paper.claims import at_least, value_text, within
 from studies.paper.figure2 import figure_2
@@ -21,7 +21,7 @@ from studies.paper.numbers import moonlight_photons
 from studies.paper.paper import Paper, make, write
 from studies.paper.patches import edge_columns
 from studies.paper.pixel_size import gain_db
-from studies.paper.setup import READINGS, Setup, noise, sensor_of
+from studies.paper.setup import READINGS, Setup, noise, table1_sensor
 from studies.photograph.snr import channel_e
 
 pytestmark = pytest.mark.thorough
@@ -167,10 +167,10 @@ def test_the_curves_and_gains_of_figure_2_are_recounted_from_curves_and_data_she
         np.testing.assert_allclose(line.get_ydata(), expected, atol=0.01)  # a mean over 2 nm
     *gains, root = axes["W's SNR over G's, one pixel"]
     for name, line in zip((*READINGS, "low_noise"), gains, strict=True):
-        pixel = sensor_of(name).pixel
-        lit_e = channel_e(sensor_of(name), light_of("D65"), 1.0, 0.02)
+        pixel = table1_sensor(name).pixel
+        lit_e = channel_e(table1_sensor(name), named_light("D65"), 1.0, 0.02)
         electrons = np.multiply.outer(line.get_xdata(), lit_e[[1, 3]])
-        dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor_of(name).gain_e_per_dn ** 2 / 12
+        dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + table1_sensor(name).gain_e_per_dn ** 2 / 12
         ratio = electrons / np.sqrt(electrons + dark_e2 + (pixel.prnu * electrons) ** 2)
         np.testing.assert_allclose(line.get_ydata(), ratio[:, 1] / ratio[:, 0], rtol=1e-9)
         np.testing.assert_allclose(root.get_ydata(), np.sqrt(lit_e[3] / lit_e[1]), rtol=1e-9)
@@ -202,9 +202,9 @@ def test_bad_numbers_are_refused_before_anything_is_made(tmp_path: Path) -> None
 
 
 def test_readings_keep_table_1s_own_noise_behind_other_pixels() -> None:
-    assert sensor_of("table1_pixel", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30)
-    assert sensor_of("table1_output", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30 / 7.98)
-    assert sensor_of("table1_pixel", pitch_um=3).pixel.full_well_e == pytest.approx(15_000 * (3 / 2.2) ** 2)
+    assert table1_sensor("table1_pixel", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30)
+    assert table1_sensor("table1_output", pitch_um=3).pixel.read_noise_e == pytest.approx(4580 / 30 / 7.98)
+    assert table1_sensor("table1_pixel", pitch_um=3).pixel.full_well_e == pytest.approx(15_000 * (3 / 2.2) ** 2)
 
 
 def test_numbers_of_the_paper_in_closed_form() -> None:

@@ -24,8 +24,8 @@ from render.spectrum import (
     tristimulus,
 )
 from rodcone.colour_spaces import encode_srgb
-from scenes.reflectances import color_checker
-from sensor.capture import capture, expose
+from scenes.reflectances import color_checker_reflectances
+from sensor.capture import expose, photograph_radiance
 from sensor.cfa import MOSAICS
 from sensor.config import SensorConfig
 from sensor.curves import Responses
@@ -108,7 +108,7 @@ def test_the_falloff_that_a_lens_is_known_to_have_is_corrected() -> None:
 @pytest.mark.parametrize("name", [name for name in QUICK if NAMED[name].noise_gains is None])
 def test_every_camera_shows_the_colour_checkers_colours(name: str) -> None:
     require_library(name)
-    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker()])
+    surfaces = np.array([reflectance.band_average(NM, WIDTH) for _, reflectance in color_checker_reflectances()])
     shown, right = patches(name, chart(surfaces.reshape(4, 6, -1)))
     hues = [(one - one.mean(-1, keepdims=True)).ravel() for one in (shown, right)]
     # Gray World on a chart that isn't grey shifts all of them; a matrix with its columns mixed up turns them
@@ -183,7 +183,7 @@ def test_forward_matrices_take_a_balanced_neutral_to_d50() -> None:
 
 def test_as_shot_values_are_those_of_the_light_asked_for() -> None:
     sensor = low_noise("bayer")
-    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker()])
+    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker_reflectances()])
     for name in ("A", "D65", "moonlight"):
         colours = calibrate(sensor, illuminant(name))
         responses = sensor.responses.band_average(("R", "G", "B"), FINE_NM, 1.0)
@@ -202,7 +202,7 @@ def test_the_row_of_white_is_the_least_squares_fit_that_keeps_a_neutral() -> Non
     """Solved again with a Lagrange multiplier, in XYZ."""
     colours = calibrate(low_noise("rgbw"), illuminant("D65"))
     ones = np.ones_like(FINE_NM)
-    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker()])
+    surfaces = np.array([curve.band_average(FINE_NM, 1.0) for _, curve in color_checker_reflectances()])
     light = illuminant("D65").band_average(FINE_NM, 1.0)
     white = white_xyz("D65")
     xyz = tristimulus(surfaces * light, FINE_NM, ones) / tristimulus(light, FINE_NM, ones)[1]
@@ -262,7 +262,7 @@ def raw_of(cfa: str) -> RawImage:
     radiance = SpectralRadiance(np.broadcast_to(20 * spectrum, (24, 28, nm.size)).copy(), nm)
     sensor = low_noise(cfa)
     device = draw_device(sensor, radiance.shape, np.random.default_rng(1))
-    raw = capture(radiance, sensor, 0.01, device, np.random.default_rng(2), exact=True)
+    raw = photograph_radiance(radiance, sensor, 0.01, device, np.random.default_rng(2), exact=True)
     return replace(raw, colour=calibrate(sensor, illuminant("D65")))
 
 

@@ -55,7 +55,7 @@ def work(monkeypatch: pytest.MonkeyPatch) -> Work:
     slow = {name: replace(one, picture=made.taking(name, 10.0, one.picture)) for name, one in PROCESSORS.items()}
     monkeypatch.setattr(cell_run, "processor_of", lambda name, _: slow[name])
     monkeypatch.setattr(cell_run, "expose", made.taking("capture", 1.0, cell_run.expose))
-    monkeypatch.setattr(cell_run, "measure", made.taking("measure", 100.0, cell_run.measure))
+    monkeypatch.setattr(cell_run, "picture_quality", made.taking("measure", 100.0, cell_run.picture_quality))
     return made
 
 

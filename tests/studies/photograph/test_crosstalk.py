@@ -11,24 +11,24 @@ from isp.processors.catalogue import PROCESSORS
 from render.engine import render
 from render.illuminants import illuminant
 from rodcone.colour_spaces import SRGB_TO_XYZ
-from scenes.catalog import load
-from scenes.reflectances import color_checker
+from scenes.catalogue import load
+from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import MOSAICS, OWN
 from sensor.config import SensorConfig
 from sensor.device import draw_device
 from sensor.optics import camera_equation
-from sensor.presets import low_noise, names, preset, vary
+from sensor.presets import low_noise, preset, preset_names, vary
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import open_raw, write_raw
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, electrons_per_irradiance, mixing_of
 from studies.metrics.compare import reference_picture
 from studies.metrics.target_figures import patch_masks, patch_means
-from studies.metrics.truth import GREY, light_of, neutral_electrons
+from studies.metrics.truth import GREY, named_light, neutral_electrons
 from studies.photograph.camera import balance_delta_e, calibrate, capture, colour_fit, develop_to_scale
 from studies.photograph.develop import develop
 
-LIGHT = light_of("D65")
+LIGHT = named_light("D65")
 LEVEL_CD_M2 = 1000.0
 SHARES = (0.0, 0.005, 0.02, 0.05)
 SIDE, BORDER = 64, 16  # of the frame, and of what isn't looked at: at its edge the charge stays
@@ -107,7 +107,7 @@ def test_an_even_grey_field_of_every_tile_develops_to_grey(mosaic: str) -> None:
 
 
 @pytest.mark.thorough
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", preset_names())
 def test_an_even_grey_field_before_every_preset_develops_to_grey(name: str) -> None:
     for crosstalk in SHARES:
         for mosaic in ("bayer", "rgbw"):
@@ -130,7 +130,9 @@ def test_the_balances_error_is_measured_on_a_developed_card() -> None:
 @pytest.mark.parametrize("mosaic", ["bayer", "rgbw"])
 def test_colours_of_even_surfaces_stay_what_they_are(mosaic: str) -> None:
     """With W the matrix takes off each colour exactly what W's sites hand it: a noise-free chart stays the same."""
-    surfaces = [surface.band_average(LIGHT.wavelength_nm, LIGHT.width_nm) for _, surface in color_checker()]
+    surfaces = [
+        surface.band_average(LIGHT.wavelength_nm, LIGHT.width_nm) for _, surface in color_checker_reflectances()
+    ]
     off = []
     for crosstalk in (0.0, 0.02):
         sensor = camera(low_noise(), mosaic, crosstalk)

@@ -13,7 +13,7 @@ import rodcone as public
 from render.illuminants import illuminant
 from render.loader import Film
 from render.reference import SHIPPED, find_reference, ready_light
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.commands import cli, develop
 from studies.explore.memo import go_on
 from studies.explore.source import RenderOptions, open_source

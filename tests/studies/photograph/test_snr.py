@@ -8,13 +8,13 @@ import pytest
 from refusal import refusal
 
 from sensor.capture import expose
-from sensor.chip import ChannelReading
 from sensor.config import with_channel_readings
 from sensor.device import draw_device
 from sensor.photodiodes import binned
+from sensor.pixel import ChannelReading
 from sensor.presets import low_noise, preset, table1_output
 from sensor.readings.resolve import chip_readings
-from studies.metrics.truth import light_of
+from studies.metrics.truth import named_light
 from studies.paper.setup import shot_noise_alone
 from studies.photograph.snr import channel_e, electrons_at_snr, light_for_snr, snr, snr_at
 
@@ -47,7 +47,7 @@ def test_a_well_that_dark_current_fills_has_no_snr() -> None:
     sensor = low_noise("bayer")
     well_e = sensor.pixel.full_well_e
     hot = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=0.5 * well_e / EXPOSURE_S))
-    green_e = channel_e(sensor, light_of("D65"), 1.0, EXPOSURE_S)[1]
+    green_e = channel_e(sensor, named_light("D65"), 1.0, EXPOSURE_S)[1]
     light = np.array([0.4, 0.6]) * well_e / green_e
     assert np.isnan(snr_at(light, hot, "D65", EXPOSURE_S)["G"]).tolist() == [False, True]
     assert np.isnan(snr_at(light, sensor, "D65", EXPOSURE_S)["G"]).tolist() == [False, False]
@@ -68,7 +68,7 @@ def test_a_ratio_is_told_up_to_the_deepest_reading_and_the_least_light_is_taken(
     """A switched camera has its SNR in the gain that it reads such light with; of two such lights the dimmer one."""
     deep = preset("dual_gain")
     wells_e = sorted(reading.full_well_e for reading in deep.chip.readings)
-    green_e = channel_e(deep, light_of("D65"), 1.0, EXPOSURE_S)[1]
+    green_e = channel_e(deep, named_light("D65"), 1.0, EXPOSURE_S)[1]
     light = np.array([0.5 * wells_e[0], 2.0 * wells_e[0], 1.2 * wells_e[1]]) / green_e
     assert np.isnan(snr_at(light, deep, "D65", EXPOSURE_S)["G"]).tolist() == [False, False, True]
     switched = replace(deep, chip=replace(deep.chip, readout="switched"))
@@ -91,7 +91,7 @@ def test_light_and_electrons_belong_together() -> None:
     sensor = table1_output()
     found = {each.channel: each for each in light_for_snr(10.0, sensor, "A", EXPOSURE_S)}
     assert list(found) == ["R", "G", "B", "W"]
-    electrons = channel_e(sensor, light_of("A"), found["G"].luminance_cd_m2, EXPOSURE_S)
+    electrons = channel_e(sensor, named_light("A"), found["G"].luminance_cd_m2, EXPOSURE_S)
     assert electrons[1] == pytest.approx(found["G"].electrons, rel=1e-3)
     assert found["W"].illuminance_lux == pytest.approx(found["W"].luminance_cd_m2 * pi / 0.18)
     assert found["W"].luminance_cd_m2 < found["G"].luminance_cd_m2

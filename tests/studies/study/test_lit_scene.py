@@ -15,7 +15,7 @@ from render.radiance_files.exr import write_exr
 from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.scene import LightGroup
 from render.transport import Transport
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.budget.pilot import make_pilot
 from studies.budget.plan import plan
 from studies.budget.starting_points import plan_from_settings

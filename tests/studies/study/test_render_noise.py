@@ -9,7 +9,7 @@ from builders import transport_of
 from render.engine import render
 from render.illuminants import illuminant
 from render.scene import LightGroup
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.presets import low_noise, table1_output
 from sensor.readout import noise_variance
 from studies.study import render_noise

@@ -10,7 +10,7 @@ from sensor.presets import preset_file
 from studies.budget.starting_points import plan_from_settings
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import open_all
-from studies.study.study import SceneChoice, Study, conditions, mosaics
+from studies.study.study import SceneChoice, Study, conditions, study_mosaics
 from studies.study.study_file import read_study
 
 STUDY = Study((SceneChoice("still_life"), SceneChoice("flat_field", "A")), ("1cd/m2", "25cd/m2", "500lux"))
@@ -35,7 +35,7 @@ def test_sensors_of_one_size_are_compared_at_the_coarsest_pitch() -> None:
 
 
 def test_mosaics_are_those_of_the_processors_each_once() -> None:
-    assert mosaics(replace(STUDY, processors=("bayer", "interleaved"))) == ("bayer", "rgbw")
+    assert study_mosaics(replace(STUDY, processors=("bayer", "interleaved"))) == ("bayer", "rgbw")
 
 
 def test_exposures_are_times_with_a_unit_or_auto() -> None:

@@ -13,7 +13,7 @@ from sweep_sample import ROW, row
 
 from isp.colour.encoding import quantise
 from rodcone.colour_spaces import encode_srgb
-from scenes.catalog import load
+from scenes.catalogue import load
 from studies.metrics.target_figures import daylight_srgb, patch_masks
 from studies.photograph.picture_file import to_png
 from studies.sweep.database import COLUMNS
@@ -124,6 +124,6 @@ def test_what_the_observer_sees_of_pairs_depends_on_the_light_alone() -> None:
     rows = [replace(row, scene="metamers", spectrum=light) for light in ("D65", "own", "A") for row in ROWS]
     table = lines(rows, HERE, ["spectrum", "processor"], ["true_pair_delta_e"], {})
     found = np.array([line.means[0] for line in table])
-    assert found[:4] == pytest.approx(np.zeros(4), abs=0.05)  # as tests/studies/metrics/test_quality.py says
+    assert found[:4] == pytest.approx(np.zeros(4), abs=0.05)  # as tests/studies/metrics/test_appearance.py says
     assert found[4] == found[5]
     assert 1.0 < found[4] < 10.0

@@ -24,7 +24,7 @@ from render.radiance_files.radiance_source import as_transport, load_radiance
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, photons_per_joule
 from rodcone.colour_spaces import encode_srgb
 from rodcone.digests import digest, digest_file
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.device import draw_device
@@ -35,7 +35,7 @@ from sensor.readout import read_out
 from sensor.response import behind_filters, electrons_per_irradiance, expected_electrons
 from sensor.shake import SHAKES, shaken
 from studies.budget.ledger import Plan
-from studies.metrics.quality import appearance, measure, true_picture
+from studies.metrics.appearance import appearance, picture_quality, true_picture
 from studies.metrics.truth import light_in_bands, neutral_electrons, true_srgb
 from studies.pages.report_pictures import opened
 from studies.photograph.camera import develop_to_scale
@@ -64,7 +64,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     expected_e = expected_electrons(irradiance, sensor, exposure_s)
     light = light_in_bands(illuminant("E"), transport.wavelength_nm, transport.width_nm)
     nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
-    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker()])
+    surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker_reflectances()])
     fine = light_in_bands(illuminant("E"), nm, width)
     assert sensor.channels == ("R", "G", "B")
     responses = electrons_per_irradiance(sensor, nm, width, 1.0, fine.lamp) / (photons_per_joule(nm) * width)
@@ -76,7 +76,10 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     linear = NAMED["bayer"].develop(raw, colours, balance=neutral).rgb / (neutral[1] * white)
     truth = true_srgb(radiance, light, white)
     encoded = encode_srgb(linear)
-    quality, seen = measure(encoded, encode_srgb(truth)), appearance(linear, encoded, true_picture(truth), white)
+    quality, seen = (
+        picture_quality(encoded, encode_srgb(truth)),
+        appearance(linear, encoded, true_picture(truth), white),
+    )
 
     assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
     assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)

@@ -20,7 +20,7 @@ from refusal import refusal
 
 from render.denoised.relight import relight_denoised
 from render.engine import render
-from scenes.catalog import load
+from scenes.catalogue import load
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readings.resolve import chip_readings

@@ -12,13 +12,13 @@ from isp.ple.prior import mixture, own_prior
 from isp.ple.pyramid import reconstruct
 from render.engine import render
 from render.spectrum import luminous_efficiency
-from scenes.catalog import load
-from sensor.capture import capture
+from scenes.catalogue import load
+from sensor.capture import photograph_radiance
 from sensor.optics import form_image
 from sensor.presets import preset
 from sensor.response import channel_electrons
 from studies.training import pictures, spectral, train
-from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_electrons, photograph
+from studies.training.pictures import PHOTOGRAPHS, draw_light, draw_surface, neutral_ratios, photograph_signals
 from studies.training.train import draw_patches, fit_prior, train_prior
 
 
@@ -31,7 +31,7 @@ def test_white_reads_1_in_every_channel_where_the_camera_knows_the_light(monkeyp
 
 def test_a_photographs_grey_is_grey_but_for_the_metameric_factor():
     light = draw_light(np.random.default_rng(0), preset("low_noise"))
-    signals = photograph(np.random.default_rng(1), light, "camera")
+    signals = photograph_signals(np.random.default_rng(1), light, "camera")
     ratio = signals / signals[..., 3:]
     assert ratio.std(axis=(0, 1)).max() < 1e-3
     assert ratio.mean(axis=(0, 1)) == pytest.approx(np.ones(4), rel=0.4)
@@ -77,7 +77,7 @@ def test_the_mixtures_mean_and_covariance_are_the_patches(monkeypatch):
     centres = rng.standard_normal((3, 10)) * 2
     patches = 1 + (centres[rng.integers(0, 3, 6000)] + rng.standard_normal((6000, 10)) * 0.3) @ basis.T
     patches += rng.standard_normal(patches.shape) * 0.01
-    prior = fit_prior(patches.astype(np.float32), neutral_electrons(preset("low_noise"), ["D65"]), rng, "{}")
+    prior = fit_prior(patches.astype(np.float32), neutral_ratios(preset("low_noise"), ["D65"]), rng, "{}")
     held = mixture(prior)
     weights = np.exp(held.log_weights)
     assert weights.sum() == pytest.approx(1, abs=1e-4)
@@ -97,7 +97,7 @@ def test_a_prior_trained_anew_is_as_good_as_the_one_that_ships():
     gains_db = []
     for cfa, luminance_cd_m2 in (("rgbw", 0.2), ("rgbw", 25.0), ("bayer", 0.2), ("bayer", 25.0)):
         sensor, radiance = preset("low_noise", cfa), transport.relight(luminance_cd_m2=luminance_cd_m2)
-        raw = capture(radiance, sensor)
+        raw = photograph_radiance(radiance, sensor)
         truth = channel_electrons(form_image(radiance, sensor), sensor, raw.exposure_s)
         below = truth < 0.95 * sensor.pixel.full_well_e  # what is full no prior knows, and 20 such values decide a mean
         ours_e2, anew_e2 = (

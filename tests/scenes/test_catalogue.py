@@ -9,10 +9,10 @@ from render.engine import render
 from render.scene import Scene, walk
 from render.surfaces import see_surfaces
 from rodcone.digests import digest, digest_inputs
-from scenes.catalog import DRAWN, load, names
+from scenes.catalogue import DRAWN, load, scene_names
 from scenes.levels import DEMO_LEVELS
 from scenes.materials import metal
-from scenes.reflectances import color_checker
+from scenes.reflectances import color_checker_reflectances
 
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
@@ -22,7 +22,7 @@ LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "metamers", "siemen
 
 def test_names_are_the_scenes_in_order():
     others = ("diorama", "furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor")
-    assert names() == tuple(sorted((*LIT_BY_NAME, *others)))
+    assert scene_names() == tuple(sorted((*LIT_BY_NAME, *others)))
 
 
 def nodes(node):
@@ -33,7 +33,7 @@ def nodes(node):
             yield from nodes(value)
 
 
-@loop("name", names())
+@loop("name", scene_names())
 def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material(name):
     spectra = [node for node in nodes(load(name).geometry) if node.get("type") in ("regular", "irregular", "uniform")]
     grids = {
@@ -48,7 +48,7 @@ def test_every_scene_keeps_compiling_quick_by_one_grid_and_few_kinds_of_material
     assert kinds <= plugins | shapes | {"scene", "perspective", "hdrfilm", "regular", "area", "constant"}
 
 
-@loop("name", names())
+@loop("name", scene_names())
 def test_every_scene_loads_under_its_own_name_with_a_light_and_a_reference_plane(name):
     scene = load(name)
     assert isinstance(scene, Scene)
@@ -85,7 +85,7 @@ def test_a_generated_scene_is_the_one_that_the_benchmark_froze():
 @loop(("name", "nearest"), [("still_live", "still_life"), ("flatfield", "flat_field")])
 def test_an_unknown_scene_is_refused_and_the_nearest_named(name, nearest):
     text = refusal(load, name)
-    assert text.startswith(f"scene: {name!r} is unknown; allowed: {', '.join(names())}")
+    assert text.startswith(f"scene: {name!r} is unknown; allowed: {', '.join(scene_names())}")
     assert text.endswith(f"did you mean {nearest!r}?")
 
 
@@ -121,7 +121,7 @@ def test_an_option_out_of_range_is_refused_with_its_value(name, options, start):
 
 
 def test_the_chart_has_24_reflectances_that_rise_along_its_grey_row():
-    patches = color_checker()
+    patches = color_checker_reflectances()
     assert len({name for name, _ in patches}) == 24
     assert all(curve.values.min() >= 0 and curve.values.max() <= 1 for _, curve in patches)
     greys = np.array([curve.band_average(550.0, 100.0) for _, curve in patches[18:]])
@@ -140,7 +140,7 @@ def test_demo_levels_rise_from_moonlight_to_daylight_and_name_their_sources():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", names())
+@pytest.mark.parametrize("name", scene_names())
 def test_every_scene_renders_in_every_band_with_light_from_each_of_its_groups(name):
     made = render(load(name), (24, 24), wavelength_nm=BANDS_NM[::2], width_nm=50.0, spp=16)
     assert np.isfinite(made.radiance).all()

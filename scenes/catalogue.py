@@ -27,7 +27,7 @@ _NAMES = (
 DRAWN = ("diorama", "generated")  # from a number, in hexadecimal after a dash
 
 
-def names() -> tuple[str, ...]:
+def scene_names() -> tuple[str, ...]:
     """Names that `load` knows, in alphabetical order.
 
     Examples

@@ -51,7 +51,7 @@ def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     return float(-10 * np.log10(mean_square)) if mean_square > 0 else float("inf")
 
 
-def measure(
+def picture_quality(
     picture: NDArray[np.float64], truth: NDArray[np.float64], truth_lab: NDArray[np.float64] | None = None
 ) -> Quality:
     """Compare encoded sRGB pictures (h, w, 3) in [0, 1].

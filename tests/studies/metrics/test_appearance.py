@@ -10,9 +10,9 @@ from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
+from studies.metrics.appearance import appearance, picture_quality, psnr_db, pu21_encode, pu21_psnr_db, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.flip import flip
-from studies.metrics.quality import appearance, measure, psnr_db, pu21_encode, pu21_psnr_db, true_picture
 from studies.metrics.s_cielab import SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
 from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
@@ -37,14 +37,14 @@ def test_ssim_is_the_papers_equation() -> None:
     rng = np.random.default_rng(0)
     first = rng.uniform(0, 1, (28, 36, 3))
     second = np.clip(first + rng.normal(0, 0.2, first.shape), 0, 1)
-    assert measure(second, first).ssim == pytest.approx(ssim(second, first), rel=1e-9)
+    assert picture_quality(second, first).ssim == pytest.approx(ssim(second, first), rel=1e-9)
 
 
 def test_the_95th_percentile_sees_what_the_median_does_not() -> None:
     truth = np.full((20, 20, 3), 0.5)
     picture = truth.copy()
     picture[:2] = (0.9, 0.5, 0.1)  # a tenth of the pixels
-    quality = measure(picture, truth)
+    quality = picture_quality(picture, truth)
     plain = float(deltaE_ciede2000(rgb2lab(picture[0, 0]), rgb2lab(truth[0, 0])))
     assert plain > 20
     assert (quality.delta_e_median, quality.delta_e_p95) == (0.0, pytest.approx(plain))
@@ -54,7 +54,7 @@ def test_a_picture_that_is_not_finite_has_no_quality() -> None:
     for metric, value in product(
         [
             psnr_db,
-            measure,
+            picture_quality,
             lambda picture, truth: appearance(picture, picture, true_picture(truth), 40.0),
             lambda picture, truth: pu21_psnr_db(picture[..., 0], truth[..., 0]),
         ],
