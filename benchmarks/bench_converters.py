@@ -28,7 +28,6 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 import tifffile
-from numpy.typing import NDArray
 from skimage.color import deltaE_ciede2000, xyz2lab
 
 from isp.converters import write_with_bayer
@@ -36,6 +35,7 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import VISIBLE_NM, even_bands
 from rodcone.colour_spaces import SRGB_TO_XYZ, decode_srgb, luminance_of_srgb
+from rodcone.types import Image
 from scenes.reflectances import color_checker_reflectances
 from sensor.config import SensorConfig
 from sensor.presets import preset
@@ -45,8 +45,6 @@ from sensor.raw_files.raw_file import read_raw
 from studies.metrics.truth import light_in_bands, true_srgb
 from studies.photograph.camera import capture
 from studies.photograph.develop import develop
-
-Image = NDArray[np.float64]
 
 ROWS, COLUMNS = 4, 6
 INNER = 0.3  # of a patch's side is left out at each edge: what filters and crops reach

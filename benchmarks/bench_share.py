@@ -39,11 +39,12 @@ from references import SEEDS, Film, both, make
 from render.denoised.relight import measured_error
 from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
+from rodcone.types import Image
 from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.presets import low_noise
 from studies.pages.plots import CHART, COLOURS, SOFT, STYLE, blank, plain_ticks, svg_text
-from studies.speed.points import Image, Yardstick, electrons, front, pooled_share, share_map, yardstick
+from studies.speed.points import Yardstick, electrons, front, pooled_share, share_map, yardstick
 
 ROOT = Path(__file__).resolve().parents[1]
 THIS = "this checkout"

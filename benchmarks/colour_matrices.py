@@ -22,8 +22,9 @@ from scipy.optimize import minimize
 
 from isp.colour.colour_fit import fit_through_neutral, training
 from render.illuminants import illuminant
-from render.spectrum import Floats, photons_per_joule
+from render.spectrum import photons_per_joule
 from rodcone.colour_spaces import xyz_to_srgb
+from rodcone.types import Floats
 from scenes.reflectances import color_checker_reflectances
 from sensor.presets import low_noise
 

@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
 from isp.design.spectral_prior import load_prior
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.progress import Step
+from rodcone.types import Floats
 from sensor.cfa import Tile, channels
 from sensor.config import SensorConfig, with_tile
 from sensor.curves import Responses

@@ -9,9 +9,9 @@ from typing import Annotated
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError, require_fields, unknown
 from rodcone.progress import Step
+from rodcone.types import Floats
 from scenes.levels import DEMO_LEVELS
 from sensor.cfa import MOSAICS, Tile
 from sensor.config import SensorConfig, with_tile

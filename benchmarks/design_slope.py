@@ -13,10 +13,11 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.design.expected_error import FAR, Doubles, Gaussians, Noise, best_estimate, opening, sampled
+from isp.design.expected_error import FAR, Gaussians, Noise, best_estimate, opening, sampled
+from rodcone.types import Floats
 
 
-def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[Doubles, Doubles]:
+def variance_slopes(mean_e: Floats, spread_e2: Floats, noise: Noise) -> tuple[Floats, Floats]:
     """Slopes of `sample_variance` by the mean and by the spread of expected electrons."""
     lit, mean_e = mean_e > 0, np.maximum(mean_e, 0.0)
     total = noise.law.variance(mean_e) + spread_e2
@@ -31,11 +32,11 @@ def variance_slopes(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> tuple[
 
 def error_slopes(
     patches: Gaussians,
-    sampling: Doubles,
+    sampling: Floats,
     middle: NDArray[np.intp],
-    lights: Sequence[tuple[Doubles, Noise]],
-    rows: Sequence[Sequence[Doubles]],
-) -> tuple[Doubles, Doubles]:
+    lights: Sequence[tuple[Floats, Noise]],
+    rows: Sequence[Sequence[Floats]],
+) -> tuple[Floats, Floats]:
     """Mean over scenes of the expected squared error of a middle pixel, component known, and its slope by `sampling`.
 
     Parameters

@@ -20,14 +20,14 @@ import rawpy
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Image, Picture
-from isp.planes import Plane
+from isp.picture import Picture
 from isp.processors.bayer_denoised import OPPONENT
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.processors.demosaic import MALVAR_REACH, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.network import read_network
 from render.illuminants import illuminant
+from rodcone.types import Image, Plane
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.dng import write_dng

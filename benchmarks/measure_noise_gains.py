@@ -20,9 +20,9 @@ from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.catalogue import PROCESSORS, Processor
 from isp.processors.own import processor_of
-from render.spectrum import Floats
 from rodcone.colour_spaces import encode_srgb
 from rodcone.toml_file import read_toml
+from rodcone.types import Floats
 from sensor.capture import expose
 from sensor.cfa import channels
 from sensor.config import SensorConfig

@@ -19,9 +19,10 @@ from isp.colour.colour_fit import fit_colours, training
 from render.illuminants import illuminant
 from render.radiance_files.surface_spectra import srgb_basis, surface_reflectances
 from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.csv_file import csv_text
+from rodcone.types import Floats
 from scenes.reflectances import color_checker_reflectances, held
 from sensor.presets import low_noise
 

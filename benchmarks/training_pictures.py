@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import Floats, band_widths
+from render.spectrum import band_widths
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Floats
 from scenes.reflectances import band, edge, grey
 from studies.metrics.truth import Light, light_in_bands, true_srgb
 

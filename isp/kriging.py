@@ -12,15 +12,13 @@ from functools import lru_cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from isp.anscombe import stabilise_raw, unstabilise, without_prnu
 from isp.settings import Reconstruction
+from rodcone.types import Plane
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
-
-Plane = NDArray[np.float64]
 
 # Of 3 radii, 6 correlations and 4 lengths on three scenes in two lights (docs/decisions/0048).
 RADIUS = 6  # of the window that samples are taken from [pixels]: a corner shows every channel on three lines or more

@@ -10,7 +10,7 @@ from math import hypot, sqrt
 
 import numpy as np
 
-from render.spectrum import Floats
+from rodcone.types import Floats
 from sensor.cfa import unmixed
 from sensor.raw import RawImage, full_at_sites
 

@@ -15,10 +15,8 @@ from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
 from rodcone.jit import Backend
-from rodcone.types import real_array
+from rodcone.types import Image, real_array
 from sensor.raw import RawImage
-
-Image = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.types import Mosaic, Plane
 from sensor.cfa import Tile
 from sensor.raw import RawImage
-
-Plane = NDArray[np.float64]
 
 BLOCK_ROWS = 128  # rows that go through several sums together, for what lies between to stay in the cache
 
@@ -134,6 +133,6 @@ def bilinear(raw: RawImage) -> NDArray[np.float64]:
     return fill_channels(raw.electrons, raw.cfa, raw.channels)
 
 
-def fill_channels(mosaic: Plane, tile: Tile, names: Sequence[str]) -> NDArray[np.float64]:
+def fill_channels(mosaic: Mosaic, tile: Tile, names: Sequence[str]) -> NDArray[np.float64]:
     """As `bilinear`, of a mosaic's channels `names`."""
     return np.stack([fill(mosaic, tile, name) for name in names], axis=-1)

@@ -11,10 +11,11 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.planes import Plane, fill
+from isp.planes import fill
 from isp.settings import PAPER, Reconstruction, Settings
 from isp.similarity.brightest import brightest_allowed
 from isp.similarity.guide import saturated_fraction
+from rodcone.types import Mosaic, Plane
 from sensor.cfa import mask
 from sensor.raw import RawImage
 
@@ -29,7 +30,7 @@ class _Inputs:
     count, W's plane.
     """
 
-    electrons: Plane
+    electrons: Mosaic
     channel: NDArray[np.intp]
     h: Plane
     alpha: Plane

@@ -29,8 +29,7 @@ from render.transport import Transport
 from rodcone.errors import InputError, is_out_of_memory, one_line, require_whole
 from rodcone.jit import compiling
 from rodcone.progress import Step, progress_bar, render_words
-
-Progress = Callable[[float, float], None]  # share of the work done (0..1), relative error so far
+from rodcone.types import Progress
 
 
 @own_mitsuba_variant()

@@ -1,5 +1,6 @@
-"""Arrays that every package uses: their names, and what stands in one."""
+"""Arrays and callbacks that every package uses: their names and axes, and checks of what an array holds."""
 
+from collections.abc import Callable
 from typing import Any, TypeAlias
 
 import numpy as np
@@ -7,9 +8,13 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError
 
-Floats: TypeAlias = NDArray[np.float64]
-Image: TypeAlias = NDArray[np.float64]  # (h, w) or (h, w, channel)
+Floats: TypeAlias = NDArray[np.float64]  # of any shape
+Singles: TypeAlias = NDArray[np.float32]  # of any shape
+Image: TypeAlias = NDArray[np.float64]  # (h, w, channel), or (h, w) of one channel
+Plane: TypeAlias = NDArray[np.float64]  # (h, w): one channel at every pixel
 Planes: TypeAlias = NDArray[np.float32]  # (band, h, w), or (group, band, h, w)
+Mosaic: TypeAlias = NDArray[np.float64]  # (h, w): at every pixel the one channel that its site reads
+Progress: TypeAlias = Callable[[float, float], None]  # share of the work done, 0 to 1, and relative error so far
 
 
 def require_unmasked(name: str, value: Any) -> None:

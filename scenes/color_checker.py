@@ -8,8 +8,9 @@ import numpy as np
 
 from render.geometry import camera, look_at, translate
 from render.scene import Node, Scene
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import InputError, require_range
+from rodcone.types import Floats
 from scenes.materials import matte, panel, under_sky
 from scenes.reflectances import color_checker_reflectances as patches
 from scenes.reflectances import grey, held, read_reflectances

@@ -8,8 +8,9 @@ import numpy as np
 from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
 from rodcone.errors import require_whole
+from rodcone.types import Floats
 from scenes.generated import LARGEST_SEED
 from scenes.materials import ball, block, checks, disk, far_disk, floor, glossy, matte, metal, panel, printed, rod
 from scenes.reflectances import color_checker_reflectances, grey

@@ -6,8 +6,8 @@ After Figure 1a of Parmar and Wandell 2009: a photograph whose left part is scot
 from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from render.spectrum import Floats
 from rodcone.errors import require_range
+from rodcone.types import Floats
 from scenes.color_checker import color_checker_nodes
 from scenes.materials import ball, block, checks, disk, floor, glossy, matte, metal, panel, rod, star
 from scenes.reflectances import band, edge, grey

@@ -6,8 +6,9 @@ from math import radians, tan
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene, spectrum_node
-from render.spectrum import Floats, Spectrum, optical_constant
+from render.spectrum import Spectrum, optical_constant
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from scenes.reflectances import grey, resampled
 
 SKY_LUMINANCE_CD_M2 = 100.0

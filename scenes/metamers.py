@@ -6,7 +6,8 @@ import numpy as np
 
 from render.illuminants import illuminant
 from render.scene import Scene
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Floats, Spectrum, band_widths, colour_matching_functions
+from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, band_widths, colour_matching_functions
+from rodcone.types import Floats
 from scenes.color_checker import chart_scene
 from scenes.reflectances import color_checker_reflectances, grey
 

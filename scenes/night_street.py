@@ -5,7 +5,8 @@ from math import cos, pi, radians, sin
 from render.geometry import camera, rotate, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene
-from render.spectrum import Floats, Spectrum
+from render.spectrum import Spectrum
+from rodcone.types import Floats
 from scenes.materials import block, disk, far_disk, floor, glossy, matte, panel, rod
 from scenes.reflectances import band, edge, grey
 

@@ -5,9 +5,10 @@ from pathlib import Path
 
 import numpy as np
 
-from render.spectrum import Floats, Spectrum, published_spectra
+from render.spectrum import Spectrum, published_spectra
 from rodcone.curve_file import read_columns
 from rodcone.errors import InputError, in_place
+from rodcone.types import Floats
 
 LONGEST_NM = 1100.0  # as far as lights are known (`render.spectrum.flat`), beyond any response here
 _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all materials keeps scenes quick to compile

@@ -7,10 +7,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from render.spectrum import Floats
 from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
+from rodcone.types import Floats
 from sensor.noise_law import NoiseLaw
 
 

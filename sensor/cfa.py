@@ -16,8 +16,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError, unknown
+from rodcone.types import Floats
 
 Tile: TypeAlias = tuple[str, ...]
 

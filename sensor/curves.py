@@ -11,11 +11,12 @@ from numpy.typing import ArrayLike
 
 from render.band_weights import band_weights
 from render.illuminants import illuminant
-from render.spectrum import ELECTRON_C, VISIBLE_NM, Floats, Spectrum, even_bands, per_joule, photons_per_joule
+from render.spectrum import ELECTRON_C, VISIBLE_NM, Spectrum, even_bands, per_joule, photons_per_joule
 from rodcone.curve_file import read_columns
 from rodcone.display import Axes, brief, draw_curves
 from rodcone.doors import method
 from rodcone.errors import InputError, require_keys, require_range
+from rodcone.types import Floats
 
 # Smooth curves of the project's own: peak * exp(-|(nm - centre) / width|^power), another width and power on each side.
 # Peaks and centres are those of ISETCam's interleaved RGBW sensor; widths and powers were fitted so that electrons per

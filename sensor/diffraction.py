@@ -9,7 +9,7 @@ import scipy
 from numpy.polynomial import Polynomial
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
+from rodcone.types import Floats
 from sensor.config import LensConfig
 
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.special import ndtr
 
 from rodcone.errors import require_name, require_range
+from rodcone.types import Mosaic
 from sensor.cfa import mask
 from sensor.config import LONGEST_S, METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.optics import SpectralIrradiance
@@ -221,7 +222,7 @@ def best_exposure(
     return min(apart, key=error)
 
 
-def _few_tiles(mosaic: NDArray[np.float64], height: int, width: int) -> NDArray[np.float64]:
+def _few_tiles(mosaic: Mosaic, height: int, width: int) -> NDArray[np.float64]:
     """A mosaic of at most `_METERED_TILES` of a mosaic's tiles, evenly spread over it."""
     rows, columns = mosaic.shape[0] // height, mosaic.shape[1] // width
     if rows * columns <= _METERED_TILES:

@@ -15,9 +15,10 @@ import scipy
 from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance, check_values
-from render.spectrum import Floats, Spectrum, band_widths, luminance, photons_per_joule
+from render.spectrum import Spectrum, band_widths, luminance, photons_per_joule
 from rodcone.display import brief
 from rodcone.errors import InputError, require_whole
+from rodcone.types import Floats
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
 from sensor.shake import SHAKES, blur_variance

@@ -8,11 +8,10 @@ from typing import Annotated, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.spectrum import Floats
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields
-from rodcone.types import require_unmasked
+from rodcone.types import Floats, require_unmasked
 from sensor.calibration import ChannelNoise, ColourCalibration, NoiseStep
 from sensor.cfa import Tile, channel_mixing, channels, check_covers, check_tile, mask, site_mixing, unit_channel
 

@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.band_weights import band_weights
-from render.spectrum import VISIBLE_NM, Floats, Spectrum, per_joule, photons_per_joule
+from render.spectrum import VISIBLE_NM, Spectrum, per_joule, photons_per_joule
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.cfa import channel_mixing, channels, check_covers, mask
 from sensor.config import SensorConfig
 from sensor.optics import SpectralIrradiance

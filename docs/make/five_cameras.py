@@ -13,6 +13,7 @@ from page_parts import RESULTS, Parts, csv_text, run, write_page
 from real_cameras import REPORTS
 
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from scenes.catalogue import load
 from sensor.cameras.emva_report import read_report
 from sensor.config import SensorConfig
@@ -22,7 +23,7 @@ from studies.metrics.metric import DELTA_E, METRICS, ON_TARGETS, PSNR, Metric
 from studies.metrics.truth import light_in_bands
 from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 from studies.pages.report_text import duration, fixed, lead_text, level_text, percent, plain_name, significant, table
-from studies.pages.verdict import Floats, leads
+from studies.pages.verdict import leads
 from studies.photograph.snr import channel_e, snr
 from studies.study.equal_area import EqualArea
 from studies.study.study import label

@@ -38,10 +38,10 @@ from photograph_spectra import exact_psnr
 from PIL import Image
 
 from render.radiance_files.surface_spectra import surface_reflectances
-from render.spectrum import Floats
 from rodcone.colour_spaces import SRGB_TO_XYZ, decode_srgb
 from rodcone.errors import InputError
 from rodcone.files import write_files
+from rodcone.types import Floats
 from studies.metrics.confidence import half_width
 from studies.pages.report_text import level_text
 from studies.pages.report_text import table as markdown

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
-from render.spectrum import Floats
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 LIST = Path(__file__).with_suffix(".csv")
 PIXELS = ("left", "top", "side")

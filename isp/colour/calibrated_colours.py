@@ -4,8 +4,9 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit, grey_of
 from render.spectrum import DEFAULT_WAVELENGTH_NM as NM
-from render.spectrum import Floats, Spectrum, band_widths, tristimulus
+from render.spectrum import Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import A_XY, D65_XY, adapt_to_d65, xyz_from_xy, xyz_to_srgb
+from rodcone.types import Floats
 from sensor.calibration import ColourCalibration
 from sensor.cfa import unmixed
 

@@ -15,17 +15,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import rows_at
-from render.spectrum import (
-    Floats,
-    Spectrum,
-    band_widths,
-    colour_matching_functions,
-    observer_weights,
-    photons_per_joule,
-)
+from render.spectrum import Spectrum, band_widths, colour_matching_functions, observer_weights, photons_per_joule
 from rodcone.colour_spaces import adapt_to_d65, luminance_of_srgb, xyz_to_srgb
 from rodcone.display import brief
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.raw import RawImage, channel_variance
 
 # Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all

@@ -14,8 +14,8 @@ import numpy as np
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit
 from isp.colour.white_balance import WhiteBalance, neutral_response
-from render.spectrum import Floats
 from rodcone.toml_file import read_toml
+from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.curves import complementary, rgbw
 from sensor.raw import RawImage, channel_variance

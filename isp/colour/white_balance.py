@@ -15,9 +15,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from isp.planes import box_sums, rows_at
 from render.illuminants import illuminant
-from render.spectrum import Floats
 from rodcone.display import brief
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.curves import Responses, built_in, electrons_from_neutral
 from sensor.raw import RawImage, channel_variance

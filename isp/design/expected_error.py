@@ -22,9 +22,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfcx, ndtr
 
+from rodcone.types import Floats
 from sensor.noise_law import NoiseLaw
 
-Doubles = NDArray[np.float64]
 LEAST_SHARE = 1e-8  # of a sample's variance that reading it explains, at the least
 FAR = 8.0  # standard deviations below the well: never full
 
@@ -46,14 +46,14 @@ class Gaussians:
         b: relative standard deviation of a patch's brightness.
     """
 
-    weights: Doubles
-    means: Doubles
-    factors: Doubles
-    rest: Doubles
+    weights: Floats
+    means: Floats
+    factors: Floats
+    rest: Floats
     brightness: float
 
     @property
-    def directions(self) -> Doubles:
+    def directions(self) -> Floats:
         """F and b mu, as `factors`."""
         return np.concatenate([self.factors, self.brightness * self.means[..., None]], axis=-1)
 
@@ -71,7 +71,7 @@ class Noise:
     """
 
     law: NoiseLaw
-    full_e: float | Doubles
+    full_e: float | Floats
 
 
 @cache
@@ -86,7 +86,7 @@ def single_gaussian(prior: Gaussians) -> Gaussians:
     return Gaussians(np.ones(1), mean[None], factors, prior.weights @ prior.rest[:, None], prior.brightness)
 
 
-def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
+def opening(distance: Floats) -> tuple[Floats, Floats]:
     """Share o of a sample's variance that reading it explains, by how far its mean is from the well; and its slope.
 
     That is the Fisher information of a Gaussian censored at the well, over that of one that isn't. With
@@ -99,7 +99,7 @@ def opening(distance: Doubles) -> tuple[Doubles, Doubles]:
     return np.maximum(share, LEAST_SHARE), np.where(share > LEAST_SHARE, density * over**2, 0.0)
 
 
-def sample_variance(mean_e: Doubles, spread_e2: Doubles, noise: Noise) -> Doubles:
+def sample_variance(mean_e: Floats, spread_e2: Floats, noise: Noise) -> Floats:
     """Variance of the Gaussian noise that leaves as much unknown as a sample does that may be full [e-^2].
 
     A full sample is a lower bound. Of the variance w of signal and noise together, a sample explains the share o of
@@ -139,16 +139,16 @@ class Samples:
         C_k of each middle pixel's coefficients, and (L mu_k - mu_k)(L mu_k - mu_k)' there.
     """
 
-    weights: Doubles
-    means: Doubles
-    signal: Doubles
-    spread: Doubles
-    cross: Doubles
-    error_cross: Doubles
-    within: Doubles
+    weights: Floats
+    means: Floats
+    signal: Floats
+    spread: Floats
+    cross: Floats
+    error_cross: Floats
+    within: Floats
 
 
-def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens: Doubles) -> Samples:
+def sampled(prior: Gaussians, sampling: Floats, middle: NDArray[np.intp], lens: Floats) -> Samples:
     """Sample a prior's patches.
 
     Parameters
@@ -179,7 +179,7 @@ def sampled(prior: Gaussians, sampling: Doubles, middle: NDArray[np.intp], lens:
     )
 
 
-def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Doubles, Doubles]:
+def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Floats, Floats]:
     """G of the best linear estimate, (component, sample, pixel, coefficient), and its error's matrix, as `within`.
 
     With a lens that matrix isn't symmetric; a quadratic form takes its symmetric part.
@@ -197,7 +197,7 @@ def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Doubles
     return gain, samples.within - np.einsum("kspc,kspe->kpce", scale * samples.error_cross, gain, optimize=True)
 
 
-def expected_error(samples: Samples, scale: float, noise: Noise, forms: Doubles) -> Doubles:
+def expected_error(samples: Samples, scale: float, noise: Noise, forms: Floats) -> Floats:
     """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
 
     Parameters

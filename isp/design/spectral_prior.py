@@ -6,7 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
-from isp.design.expected_error import Doubles, Gaussians
+from isp.design.expected_error import Gaussians
+from rodcone.types import Floats
 
 PATCH = 8  # pixels a side
 PRIORS = {"drawn": Path(__file__).with_name("drawn.npz"), "photographs": Path(__file__).with_name("photographs.npz")}
@@ -30,10 +31,10 @@ class SpectralPrior:
         Command, versions, seed and hashes of what it was trained from, as JSON.
     """
 
-    edges_nm: Doubles
-    spectra: Doubles
+    edges_nm: Floats
+    spectra: Floats
     patches: Gaussians
-    reflectances: Doubles
+    reflectances: Floats
     source: str
 
 

@@ -10,8 +10,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.ple.tables import Singles, Table
+from isp.ple.tables import Table
 from isp.ple.units import readings
+from rodcone.types import Singles
 
 ROUNDS = 4
 TOGETHER = 100  # patches, so that arrays are small ones to malloc: others are fresh memory each time

@@ -30,7 +30,8 @@ from isp.ple.curve import TOGETHER, on_the_curve
 from isp.ple.overlap import STRIDE, Patches, overlapped
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
-from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Singles, Table, table, window
+from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Table, table, window
+from rodcone.types import Singles
 
 STRIP = 100_000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons

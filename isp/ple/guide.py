@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.ple.tables import Singles
+from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels
 
 GUIDES = ("W", "G")  # the first that a mosaic has

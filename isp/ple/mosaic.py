@@ -16,8 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 from isp.ple.estimate import Scale
 from isp.ple.overlap import STRIDE, border, padded
 from isp.ple.prior import LETTERS, PATCH
-from isp.ple.tables import Sampling, Singles
+from isp.ple.tables import Sampling
 from isp.ple.units import transform
+from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels, mask
 from sensor.raw import RawImage
 

@@ -7,7 +7,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.ple.pick import BLOCK
-from isp.ple.tables import Singles, taper
+from isp.ple.tables import taper
+from rodcone.types import Singles
 
 STRIDE = 2  # pixels from patch to patch
 

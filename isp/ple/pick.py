@@ -5,7 +5,8 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.ple.tables import Singles, Table
+from isp.ple.tables import Table
+from rodcone.types import Singles
 
 BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of two apart would share its places
 MOST = 12  # components that a patch is held against, of the likeliest in a few directions

@@ -24,9 +24,10 @@ from isp.ple.mosaic import (
 )
 from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
-from isp.ple.tables import PILOT_ERROR, Sampling, Singles
+from isp.ple.tables import PILOT_ERROR, Sampling
 from isp.ple.twicing import twice_colours
 from isp.ple.units import readings
+from rodcone.types import Singles
 from sensor.raw import RawImage
 
 TOGETHER = 32  # rows that stay in a core's cache while they are worked on

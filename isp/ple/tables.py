@@ -12,13 +12,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from isp.ple.prior import Mixture, Prior, mixture
 from isp.ple.units import readings
-
-Doubles = NDArray[np.float64]
-Singles = NDArray[np.float32]
+from rodcone.types import Floats, Singles
 
 STEP = 1.25  # of light, from one table to the next
 LIGHT_ERROR = 0.12  # relative standard deviation of a patch's light, the step's included
@@ -80,11 +77,11 @@ class Estimator:
     """
 
     linear: Singles
-    variance: Doubles
-    noise: Doubles
-    inner: Doubles
-    pilot_variance: Doubles
-    pilot_inner: Doubles
+    variance: Floats
+    noise: Floats
+    inner: Floats
+    pilot_variance: Floats
+    pilot_inner: Floats
 
 
 def taper(size: int) -> Singles:
@@ -116,8 +113,8 @@ class Whitening:
 
     reads: Singles
     log_scale: float
-    spread: Doubles
-    turn: Doubles
+    spread: Floats
+    turn: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,8 +131,8 @@ class Among:
         Covariances of all values, those of a channel together.
     """
 
-    squares: Doubles
-    samples: Doubles
+    squares: Floats
+    samples: Floats
     by_channel: Singles
 
 
@@ -186,7 +183,7 @@ class Table:
         self._whitenings: dict[int, Whitening] = {}
         self._estimators: dict[int, Estimator] = {}
 
-    def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Doubles]:
+    def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
         """Log likelihood of samples and pilot in `DIRECTIONS` directions and the rest's length.
 
         It is one matrix on products of coordinates.
@@ -256,7 +253,7 @@ class Table:
         self._whitenings |= {k: Whitening(*made) for k, *made in parts}
 
     @cached_property
-    def inner(self) -> Doubles:
+    def inner(self) -> Floats:
         """Averages over the patch's middle by channel, shape (4, value)."""
         size = self.mix.size
         middle = np.zeros((size, size))

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
 from isp.ple.guide import GUIDES
-from isp.ple.tables import Singles
+from rodcone.types import Singles
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 

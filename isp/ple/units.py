@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from scipy.special import gammaln, xlogy
 
 from isp.anscombe import stabilise
+from rodcone.types import Floats
 
-Doubles = NDArray[np.float64]
 # For dark noise of its own size the transform makes outliers of dark samples; for twice of it, it is nearly straight.
 LIFT = 2.0
 FLOOR = 0.7  # dark noises under 0
@@ -50,30 +50,30 @@ class Readings:
 
     dark_e: float
     most: tuple[float, float]
-    offset: Doubles
-    steepness: Doubles
-    variances: Doubles
-    excess: Doubles
+    offset: Floats
+    steepness: Floats
+    variances: Floats
+    excess: Floats
 
-    def mean(self, electrons: NDArray[Any]) -> Doubles:
+    def mean(self, electrons: NDArray[Any]) -> Floats:
         """Mean reading of expected electrons, 0 or more."""
         return 2.0 * _limit(electrons, self.dark_e) + self.offset[self._step(electrons)]
 
-    def slope(self, electrons: NDArray[Any]) -> Doubles:
+    def slope(self, electrons: NDArray[Any]) -> Floats:
         """Slope of the mean reading [1/e-]."""
         return self.steepness[self._step(electrons)] / _limit(electrons, self.dark_e)
 
-    def variance(self, electrons: NDArray[Any]) -> Doubles:
+    def variance(self, electrons: NDArray[Any]) -> Floats:
         """Variance of a reading by shot and dark noise."""
         return np.asarray(self.variances[self._step(electrons)] * _straight(electrons, self.dark_e))
 
-    def moments(self, electrons: NDArray[Any]) -> tuple[Doubles, Doubles, Doubles]:
+    def moments(self, electrons: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
         """Mean, slope and variance together."""
         limit, step = _limit(electrons, self.dark_e), self._step(electrons)
         straight = _straight(electrons, self.dark_e)
         return 2.0 * limit + self.offset[step], self.steepness[step] / limit, self.variances[step] * straight
 
-    def electrons(self, readings: NDArray[Any]) -> Doubles:
+    def electrons(self, readings: NDArray[Any]) -> Floats:
         """Electrons whose mean reading this is; under 0 where it is under the mean reading of 0."""
         values = np.maximum(readings, 0.0)
         plain = 0.25 * np.square(values, dtype=np.float64) - ((LIFT * self.dark_e) ** 2 + 0.125)
@@ -119,7 +119,7 @@ def readings(dark_e: float) -> Readings:
     return Readings(dark_e, most, offset, steepness, variances, np.interp(at_readings, mean, electrons[:, 0] - plain))
 
 
-def _limit(electrons: NDArray[Any], dark_e: float) -> Doubles:
+def _limit(electrons: NDArray[Any], dark_e: float) -> Floats:
     """Half of the mean reading in light."""
     return np.asarray(np.sqrt(np.asarray(electrons, np.float64) + ((LIFT * dark_e) ** 2 + 0.125)))
 

@@ -1,7 +1,6 @@
 """Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved."""
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
@@ -9,11 +8,9 @@ from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Settings
 from isp.substitution import COLOUR_ERROR
-from render.spectrum import Floats
+from rodcone.types import Floats, Plane
 from sensor.cfa import channels, tile_of
 from sensor.raw import RawImage
-
-Plane = NDArray[np.float64]
 
 
 def picture_any_mosaic(

@@ -13,11 +13,12 @@ from isp.anscombe import stabilise, unstabilise
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
-from isp.picture import Image, Picture, finish
-from isp.planes import Plane, bilinear
+from isp.picture import Picture, finish
+from isp.planes import bilinear
 from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.sub_images import Mix, bm3d, bm3d_mosaic
+from rodcone.types import Image, Plane
 from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 

@@ -16,11 +16,11 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
-from isp.picture import Image, Picture
-from isp.planes import Plane
+from isp.picture import Picture
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.errors import InputError
 from rodcone.optional import optional_library
+from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import BAYER, Tile, is_bayer
 from sensor.raw import RawImage
 
@@ -30,7 +30,7 @@ EXTRA = "opponents"
 MALVAR_REACH, MENON_REACH = 2, 12
 
 
-def malvar(mosaic: Plane, cfa: Tile) -> Image:
+def malvar(mosaic: Mosaic, cfa: Tile) -> Image:
     """Planes of R, G and B by Malvar's 5x5 filters, shape (h, w, 3).
 
     Parameters
@@ -46,7 +46,7 @@ def malvar(mosaic: Plane, cfa: Tile) -> Image:
     return _demosaic("demosaicing_CFA_Bayer_Malvar2004", mosaic, cfa, MALVAR_REACH)
 
 
-def menon(mosaic: Plane, cfa: Tile) -> Image:
+def menon(mosaic: Mosaic, cfa: Tile) -> Image:
     """Planes of R, G and B by Menon's directional filters with refinement, shape (h, w, 3); as `malvar`."""
     return _demosaic("demosaicing_CFA_Bayer_Menon2007", mosaic, cfa, MENON_REACH)
 
@@ -57,7 +57,7 @@ def picture_demosaicked(
     *,
     balance: WhiteBalance,
     demosaic: Callable[[Plane, Tile], Image],
-    electrons: Plane | None = None,
+    electrons: Mosaic | None = None,
 ) -> Picture:
     """Develop a Bayer raw image with `malvar` or `menon`: its mosaic, or a denoised one [e-], is balanced first."""
     require_bayer(raw.cfa)
@@ -71,7 +71,7 @@ def require_bayer(cfa: Tile) -> None:
         raise InputError(f"raw: mosaic {cfa} is not Bayer; allowed here: {BAYER} in any phase; use another processor")
 
 
-def _demosaic(function: str, mosaic: Plane, cfa: Tile, reach: int) -> Image:
+def _demosaic(function: str, mosaic: Mosaic, cfa: Tile, reach: int) -> Image:
     require_bayer(cfa)
     pad = reach + reach % 2  # whole tiles: the pattern stays what it is
     library = optional_library("colour_demosaicing", EXTRA)

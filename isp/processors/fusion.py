@@ -24,11 +24,12 @@ from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance, neutral_response, saturated_nearby
-from isp.picture import Image, Picture, require_letters
-from isp.planes import Plane, fill, fill_channels, tent
+from isp.picture import Picture, require_letters
+from isp.planes import fill, fill_channels, tent
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
+from rodcone.types import Image, Plane
 from sensor.cfa import Tile, channels, mask
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage, renamed

@@ -19,12 +19,13 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance, saturated_nearby
-from isp.picture import Image, Picture, require_letters
-from isp.planes import Plane, fill_channels
+from isp.picture import Picture, require_letters
+from isp.planes import fill_channels
 from isp.processors.fusion import CHANNELS
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.sub_images import bm3d_mosaic, principal_components
 from rodcone.errors import InputError
+from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage
 
@@ -35,7 +36,7 @@ _AXES = ((0, 1), (1, 0))
 
 
 def picture_gindele(
-    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, electrons: Plane | None = None
+    raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, electrons: Mosaic | None = None
 ) -> Picture:
     """Develop a 2x2 RGBW raw image: its mosaic, or a denoised one [e-]."""
     require_letters(raw, CHANNELS)
@@ -45,7 +46,7 @@ def picture_gindele(
     return Picture(to_rgb(raw, planes, level, colours, REACH), sources)
 
 
-def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
+def adams_planes(mosaic: Mosaic, cfa: Tile) -> Image:
     """First interpolation: R, G and B through W, shape (h, w, 3) [as `mosaic`, which is balanced].
 
     Raises
@@ -57,7 +58,7 @@ def adams_planes(mosaic: Plane, cfa: Tile) -> Image:
     return white[..., None] + fill_channels(mosaic - white, cfa, "RGB")
 
 
-def luminance_plane(mosaic: Plane, cfa: Tile) -> Plane:
+def luminance_plane(mosaic: Mosaic, cfa: Tile) -> Plane:
     """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
     require_rgbw(cfa)
     padded = np.pad(mosaic, _PAD, mode="reflect")

@@ -6,14 +6,14 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level, saturated_nearby
-from isp.picture import Image
-from isp.planes import Plane, bilinear
+from isp.planes import bilinear
+from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
 def balance_mosaic(
-    raw: RawImage, electrons: Plane, balance: WhiteBalance
+    raw: RawImage, electrons: Mosaic, balance: WhiteBalance
 ) -> tuple[Plane, float, Mapping[str, BalanceSource]]:
     """Balance a mosaic before it is demosaicked, as raw converters do.
 

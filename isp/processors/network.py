@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.noise_gains import measured
-from isp.picture import Image
-from isp.planes import Plane
 from isp.processors.bayer_denoised import picture_demosaicked_first
 from isp.processors.catalogue import Processor
 from isp.processors.demosaic import require_bayer
 from isp.processors.sub_images import EXTRA as BM3D
 from isp.processors.sub_images import bm3d
 from rodcone.errors import one_line
+from rodcone.types import Image, Mosaic
 from sensor.cfa import Tile
 
 MEMBER = "demosaicnet/data/bayer.pth"
@@ -112,7 +111,7 @@ def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weigh
     return weights
 
 
-def demosaic(mosaic: Plane, cfa: Tile, weights: Weights) -> Image:
+def demosaic(mosaic: Mosaic, cfa: Tile, weights: Weights) -> Image:
     """Planes of R, G and B, shape (h, w, 3).
 
     Parameters

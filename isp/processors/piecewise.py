@@ -21,8 +21,8 @@ from isp.ple.prior import LETTERS, Prior, mixed_prior, own_prior
 from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.cfa import RGBW, Tile, channels, is_rgbw
 from sensor.raw import RawImage
 

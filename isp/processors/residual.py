@@ -15,9 +15,9 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from isp.picture import Image
-from isp.planes import Plane, fill_channels
+from isp.planes import fill_channels
 from isp.processors.demosaic import require_bayer
+from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import Tile, mask
 
 REACH = 28  # pixels that a value depends on along one axis: 15 for a green, 13 more for R and B
@@ -29,7 +29,7 @@ _ROUNDING = 1e-6  # of a mean square: differences of such under this say nothing
 _LEAST = 1e-10  # under any gradient or Laplacian of noise, to divide by
 
 
-def residual_interpolation(mosaic: Plane, cfa: Tile) -> Image:
+def residual_interpolation(mosaic: Mosaic, cfa: Tile) -> Image:
     """Planes of R, G and B, shape (h, w, 3); parameters as `isp.processors.demosaic.menon`."""
     require_bayer(cfa)
     padded = np.pad(mosaic, REACH, mode="reflect")
@@ -43,7 +43,7 @@ def residual_interpolation(mosaic: Plane, cfa: Tile) -> Image:
     return np.stack([planes[colour] for colour in "RGB"], axis=-1)[REACH:-REACH, REACH:-REACH]
 
 
-def _green(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
+def _green(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
     """Green everywhere: at another colour's site its sample and the difference that the four sides tell."""
     total, weights = np.zeros_like(mosaic), np.zeros_like(mosaic)
     for axis, difference in ((1, _differences(mosaic, green)), (0, _differences(mosaic.T, green.T).T)):
@@ -58,7 +58,7 @@ def _green(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
     return np.where(green, mosaic, mosaic + total / weights)
 
 
-def _differences(mosaic: Plane, green: NDArray[np.bool_]) -> Plane:
+def _differences(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
     """Green less the other colour of the same row, at every pixel, by residual interpolation along the rows."""
     between = scipy.ndimage.convolve1d(mosaic, [0.5, 0.0, 0.5], axis=1)
     as_green, as_colour = np.where(green, mosaic, between), np.where(green, between, mosaic)

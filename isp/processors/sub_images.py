@@ -17,9 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_raw, unstabilise_raw, without_prnu
-from isp.picture import Image
-from isp.planes import Plane
 from rodcone.optional import optional_library
+from rodcone.types import Image, Plane
 from sensor.raw import RawImage
 
 Mix = Callable[[Image], NDArray[np.float64]]

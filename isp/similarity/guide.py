@@ -3,7 +3,8 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.planes import Plane, box_sums, fill
+from isp.planes import box_sums, fill
+from rodcone.types import Plane
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 

@@ -13,9 +13,10 @@ from pathlib import Path
 
 import numpy as np
 
-from render.spectrum import Floats, Spectrum, published_spectra
+from render.spectrum import Spectrum, published_spectra
 from rodcone.errors import InputError, one_line, unknown
 from rodcone.files import read_bounded
+from rodcone.types import Floats
 from sensor.curves import Responses
 
 VARIABLE = "RODCONE_CAMERAS"  # environment variable: folder of a copy of rawtoaces-data

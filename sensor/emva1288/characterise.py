@@ -6,11 +6,11 @@ from math import hypot, log10, sqrt
 
 import numpy as np
 
-from render.spectrum import Floats
 from rodcone.display import BLUE, ORANGE, Axes, brief, draw_curves
 from rodcone.doors import method
 from rodcone.errors import InputError, require_range, require_whole
 from rodcone.jit import backend
+from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.emva1288 import estimators as emva
 from sensor.emva1288.photon_transfer import Expose, Transfer, dark_slopes, light_bench, take_stack, take_transfer

@@ -9,8 +9,8 @@ from math import erfc, exp, hypot, inf, pi, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.emva1288.photon_transfer import Stack, Transfer, column_variance, hot_pixels
 
 QUANTISATION_DN2 = 1 / 12  # variance that rounding adds, where the noise is wide enough

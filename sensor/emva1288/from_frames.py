@@ -11,8 +11,8 @@ from math import hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.cfa import Tile
 from sensor.emva1288.estimators import FIT_SHARE, QUANTISATION_DN2, Estimate
 

@@ -7,8 +7,8 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from render.spectrum import Floats
 from rodcone.display import brief
+from rodcone.types import Floats
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device

@@ -12,10 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.radiance_files.file_checks import require_file
-from render.spectrum import Floats
 from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65
 from rodcone.errors import InputError, one_line
 from rodcone.optional import optional_library
+from rodcone.types import Floats
 from sensor.calibration import ColourCalibration
 from sensor.cfa import channel_map, is_bayer
 from sensor.raw import RawImage

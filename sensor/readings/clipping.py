@@ -18,14 +18,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr
 
+from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.noise_law import total
 from sensor.readings.resolve import PlainReading
 
-Floats = NDArray[np.float64]
 FAR = 7.0  # standard deviations from a bound, beyond which a sample is never clipped
 LOW = 4.9  # the same of black: five deviations, which a black level has by default, clip nothing
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)

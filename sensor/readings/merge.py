@@ -7,10 +7,11 @@ from math import ceil, hypot, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.types import Floats
 from sensor.calibration import NoiseStep
 from sensor.config import BLACK_SIGMAS
 from sensor.raw import RawImage
-from sensor.readings.noise import Floats, best_weights, covariances, seams, shares, whole_share
+from sensor.readings.noise import best_weights, covariances, seams, shares, whole_share
 from sensor.readings.resolve import PlainReading
 
 # Linear words of 24 bits, as chips that merge give them; single precision holds them all. Black and white are whole

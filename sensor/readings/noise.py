@@ -14,14 +14,13 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from rodcone.types import Floats
 from sensor.readings.resolve import PlainReading
 
 # A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
 # its well: its own noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
 _LEVELS = 8192  # between which the variance of larger frames is interpolated: 0.3 % of light apart
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from scipy.linalg import block_diag
 
 from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
-from render.spectrum import Floats
 from render.transport import Transport
+from rodcone.types import Floats
 
 FINE_NM = 10.0  # of the reference's bands (design: 380-780 nm in 10 nm bands)
 # Bands that a plan may choose, where no line asks for one of its own: the renderer works on four at a time, so that

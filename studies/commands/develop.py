@@ -14,13 +14,14 @@ from render.engine import render as render_transport
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.scene import Scene
-from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, Floats, even_bands, fine_bands
+from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, even_bands, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError
 from rodcone.files import check_place, require_ending
 from rodcone.memory import require_memory
 from rodcone.progress import compile_note, progress, render_words
+from rodcone.types import Floats
 from studies.commands.console import INTERRUPTED, Seconds, print_result, say, told
 from studies.photograph.develop import develop_file
 from studies.photograph.picture_file import check_picture_file, default_path, write_picture

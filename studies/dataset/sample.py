@@ -19,6 +19,7 @@ from render.spectrum import luminance, tristimulus
 from render.surfaces import see_surfaces
 from render.transport import Transport
 from rodcone.digests import digest, digest_file, digest_inputs
+from rodcone.types import Progress
 from sensor.cfa import mask
 from sensor.device import draw_device
 from sensor.optics import form_image
@@ -30,7 +31,7 @@ from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, monte_carlo_bound
 from studies.study.study import OWN, Condition
 from studies.sweep.cells import Cell, device_stream, exposure_stream, labels
-from studies.sweep.prepare import PLANES, Job, Progress, scene_transport
+from studies.sweep.prepare import PLANES, Job, scene_transport
 from studies.sweep.provenance import deciding_modules, versions
 from studies.sweep.stored import is_whole, keep_array, keep_facts, read_facts
 

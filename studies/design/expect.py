@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from isp.design.expected_error import Noise, expected_error, sampled, single_gaussian
 from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
-from render.spectrum import Floats, tristimulus
+from render.spectrum import tristimulus
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import InputError, require_name
+from rodcone.types import Floats
 from sensor.cfa import Tile, channel_map, channels
 from sensor.config import SensorConfig
 from sensor.diffraction import sampled_otf

@@ -18,6 +18,7 @@ from render.radiance import SpectralRadiance
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
+from rodcone.types import Image
 from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.config import SensorConfig
@@ -35,7 +36,6 @@ from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.study import AS_SHOT
 
-Image = NDArray[np.float64]
 Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, the processor's own result
 _CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
 _LONGEST_S = 1e7

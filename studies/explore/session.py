@@ -19,8 +19,9 @@ from typing import Any, TypeAlias
 
 from isp.picture import Picture
 from rodcone.errors import InputError, cut, one_line, require_name
+from rodcone.types import Image
 from studies.explore.answers import Answer, shown, take_sensor, written
-from studies.explore.chain import Image, development_of, expose_scene
+from studies.explore.chain import development_of, expose_scene
 from studies.explore.controls import Controls, controls_from
 from studies.explore.memo import Memo, Overtaken, give_memory_back, go_on
 from studies.explore.messages import KINDS, Header, gives_way, hello, read_message, read_views, unsent

@@ -12,7 +12,8 @@ from isp.processors.catalogue import PROCESSORS
 from isp.processors.sub_images import EXTRA as BM3D
 from rodcone.child_process import safe_environment
 from rodcone.errors import InputError
-from studies.explore.chain import Development, Image
+from rodcone.types import Image
+from studies.explore.chain import Development
 from studies.explore.controls import Controls, options_of
 
 MOST_SUMS = 65_536 * 4_000  # pixels x neighbourhood^2 x patch that aren't slow: half a second of processor time

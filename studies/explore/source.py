@@ -15,10 +15,11 @@ from render.radiance_files.radiance_source import (
     load_picture,
 )
 from render.scene import LightGroup, Scene, film_size
-from render.spectrum import VISIBLE_NM, Floats, even_bands
+from render.spectrum import VISIBLE_NM, even_bands
 from render.transport import Transport
 from rodcone.errors import require_absent, require_fields
 from rodcone.memory import memory, require_memory
+from rodcone.types import Floats
 from scenes.catalogue import scene_names
 from studies.photograph.ready_light import Ready, find_ready, load_ready
 from studies.study.scene_source import (

@@ -15,6 +15,7 @@ from render.spectrum import photons_per_joule
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_name, require_whole
+from rodcone.types import Image
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
 from sensor.readings.resolve import PlainReading, at_channel, resolve
@@ -26,7 +27,6 @@ from studies.explore.memo import Memo
 from studies.metrics.flip import flip
 
 Bytes = NDArray[np.uint8]
-Image = NDArray[np.float64]
 
 MOST_SIGMAS = 4.0  # of the noise that is black or white
 MOST_LUMINANCE_ERROR = 0.25  # of white

@@ -14,6 +14,7 @@ from skimage.metrics import structural_similarity
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import InputError
+from rodcone.types import Image
 from studies.metrics.flip import Seen, flip, seen
 from studies.metrics.s_cielab import eye_lab
 
@@ -77,9 +78,6 @@ def picture_quality(
     )
     delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth) if truth_lab is None else truth_lab)
     return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
-
-
-Image = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -2,9 +2,8 @@
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-Floats = NDArray[np.float64]
+from rodcone.types import Floats
 
 
 def half_width(samples: Floats, confidence: float = 0.95) -> Floats:

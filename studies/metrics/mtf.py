@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from render.spectrum import Floats
 from rodcone.errors import InputError
+from rodcone.types import Floats
 
 OVERSAMPLING = 4  # bins a pixel, as the standard has it
 LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % here

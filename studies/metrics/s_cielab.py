@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy.fft import dctn, idctn
 from skimage.color import deltaE_cie76, rgb2xyz, xyz2lab
 
-from render.spectrum import Floats
+from rodcone.types import Floats
 
 # A 3840 pixels wide, 0.7 m wide display seen from 0.7 m: FLIP's own default, so that both look from one place.
 PIXELS_PER_DEGREE = 3840 * np.pi / 180

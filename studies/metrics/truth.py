@@ -7,10 +7,11 @@ from numpy.typing import NDArray
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM, Floats, Spectrum, luminance, tristimulus
+from render.spectrum import VISIBLE_NM, Spectrum, luminance, tristimulus
 from render.transport import Transport
 from rodcone.colour_spaces import WHITE_AT, WHITE_PERCENTILE, adapt_to_d65, xyz_to_srgb
 from rodcone.display import brief
+from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.optics import camera_equation
 from sensor.response import electrons_per_irradiance, mixing_of

@@ -6,8 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from rodcone.types import Floats
 from sensor.config import SensorConfig
-from studies.metrics.confidence import Floats, half_width
+from studies.metrics.confidence import half_width
 from studies.sweep.row import Row
 
 

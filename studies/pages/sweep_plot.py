@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from rodcone.errors import InputError, require_keys, require_name
-from studies.metrics.confidence import Floats, half_width
+from rodcone.types import Floats
+from studies.metrics.confidence import half_width
 from studies.metrics.metric import Metric
 from studies.pages.plots import CHART, COLOURS, LINES, SOFT, STYLE, blank, name_at_ends, plain_ticks
 from studies.pages.report_text import camera_name, plain_name

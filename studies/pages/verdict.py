@@ -6,7 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from studies.metrics.confidence import Floats, half_width
+from rodcone.types import Floats
+from studies.metrics.confidence import half_width
 from studies.metrics.metric import DECIDING, METRICS, PSNR, Metric
 
 AHEAD, LEVEL, BEHIND, UNKNOWN = "ahead", "level", "behind", "unknown"

@@ -10,6 +10,7 @@ from math import log2
 import numpy as np
 from numpy.typing import NDArray
 
+from rodcone.types import Image
 from sensor.config import SensorConfig
 from sensor.shake import blur_variance
 from studies.metrics.truth import named_light
@@ -19,7 +20,6 @@ from studies.paper.setup import (
     DEFAULT,
     PAPER,
     Camera,
-    Image,
     Setup,
     View,
     at_level,

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 
-from render.spectrum import Floats
+from rodcone.types import Floats
 from sensor.curves import rgbw
 from sensor.readout import noise_variance
 from studies.metrics.truth import named_light

@@ -11,6 +11,7 @@ import numpy as np
 
 from isp.similarity.guide import saturated_fraction
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from sensor.cfa import mask
 from sensor.config import LONGEST_S
 from sensor.exposure import auto_exposure_s
@@ -26,7 +27,6 @@ from studies.paper.setup import (
     DEFAULT,
     PAPER,
     Camera,
-    Image,
     Setup,
     View,
     at_level,

@@ -19,13 +19,14 @@ from isp.interleaved import reconstruct
 from isp.planes import fill
 from isp.settings import Settings
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from sensor.device import draw_device
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from studies.pages.plots import ORANGE, SIDE, STYLE, blank, show_picture
 from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
-from studies.paper.setup import READINGS, Camera, Image, Setup, exposures, table1_sensor, view
+from studies.paper.setup import READINGS, Camera, Setup, exposures, table1_sensor, view
 
 PATCH = 5  # ours: the paper doesn't say
 ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile

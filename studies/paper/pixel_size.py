@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from scenes.lit_and_shadowed import DARK_CD_M2, LIT_CD_M2
 from sensor.config import LONGEST_S
 from sensor.optics import form_image
@@ -21,7 +22,6 @@ from studies.paper.setup import (
     READINGS,
     TODAY,
     Camera,
-    Image,
     Setup,
     View,
     decibels,

@@ -19,6 +19,7 @@ from render.spectrum import photons_per_joule
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import require_fields
 from rodcone.progress import Step, render_words
+from rodcone.types import Image
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -36,7 +37,6 @@ from studies.study.lit_scene import make_transport, open_choice
 from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
 from studies.sweep.cells import device_stream, exposure_stream, shake_stream
 
-Image = NDArray[np.float64]
 RENDERS = "renders"  # folder of them, below the command's own
 # Readings of Table 1, each with the SNR under which W replaces the luminance (docs/decisions/0005).
 READINGS: Mapping[str, float] = MappingProxyType(

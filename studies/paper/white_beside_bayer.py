@@ -8,6 +8,7 @@ import numpy as np
 from skimage.color import deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from studies.pages.plots import picture_rows
 from studies.paper.claims import Claim, PaperFigure, claim, judge_claim, paper_figure, with_default, within_margin
 from studies.paper.setup import (
@@ -16,7 +17,6 @@ from studies.paper.setup import (
     PAPER,
     READINGS,
     Camera,
-    Image,
     Setup,
     View,
     develop_view,

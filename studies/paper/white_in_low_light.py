@@ -8,6 +8,7 @@ import numpy as np
 from isp.planes import bilinear
 from isp.processors.catalogue import PROCESSORS
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from sensor.raw import RawImage
 from studies.metrics.truth import neutral_electrons
 from studies.pages.plots import picture_rows
@@ -18,7 +19,6 @@ from studies.paper.setup import (
     READINGS,
     RESULT,
     Camera,
-    Image,
     Setup,
     View,
     develop_view,

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from isp.colour.white_balance import saturated_nearby
 from isp.planes import bilinear
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from rodcone.types import Image
 from sensor.cfa import mask
 from sensor.raw import RawImage
 from studies.pages.plots import picture_rows
@@ -18,7 +19,6 @@ from studies.paper.setup import (
     READINGS,
     RESULT,
     Camera,
-    Image,
     Setup,
     View,
     develop_view,

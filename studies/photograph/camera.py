@@ -16,9 +16,10 @@ from isp.planes import bilinear
 from isp.processors.catalogue import Processor
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import Floats, Spectrum, fine_bands, photons_per_joule, tristimulus
+from render.spectrum import Spectrum, fine_bands, photons_per_joule, tristimulus
 from rodcone.colour_spaces import D50_XYZ, SRGB_TO_XYZ, adapt_to_d65, xyz_to_srgb
 from rodcone.errors import InputError
+from rodcone.types import Floats
 from scenes.reflectances import color_checker_reflectances, held
 from sensor.calibration import ColourCalibration
 from sensor.capture import photograph_radiance as frame_of

@@ -15,13 +15,14 @@ from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import film_size
-from render.spectrum import RENDER_BAND_NM, Floats, Spectrum, fine_bands
+from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
+from rodcone.types import Floats
 from sensor.capture import photograph_radiance
 from sensor.config import SensorConfig, check_frame
 from sensor.device import draw_device

@@ -6,8 +6,8 @@ from math import pi
 
 import numpy as np
 
-from render.spectrum import Floats
 from rodcone.errors import require_name
+from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.readings.noise import dark_electrons, merged_variance
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from render.error_estimates import pooled
 from render.radiance import SpectralRadiance
+from rodcone.types import Image
 from sensor.config import SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
@@ -132,9 +133,6 @@ def stage_json(
             for point, share, best in zip(points, shares, on_front, strict=True)
         ],
     }
-
-
-Image = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,10 @@ from render.engine import render
 from render.geometry import horizontal_view_deg
 from render.radiance import SpectralRadiance
 from render.scene import Scene
-from render.spectrum import VISIBLE_NM, Floats, even_bands, fine_bands
+from render.spectrum import VISIBLE_NM, even_bands, fine_bands
 from render.transport import Transport
 from rodcone.errors import require_fields
+from rodcone.types import Floats, Image
 from sensor.capture import photograph_radiance
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -31,7 +32,6 @@ from studies.study.levels import parse_level
 
 MOST_BANDS = 40
 STAGES = 5
-Image = NDArray[np.float64]
 Stage = dict[str, Any]  # of `studies.speed.points.stage_json`
 T = TypeVar("T")
 

@@ -25,6 +25,7 @@ from render.transport import Transport, replaceable_luminance
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys, require_name
 from rodcone.jit import backend
+from rodcone.types import Progress
 from sensor.config import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
@@ -43,7 +44,6 @@ from studies.study.scene_source import (
 )
 from studies.study.study import OWN, SceneChoice, Study
 
-Progress = Callable[[float, float], None]
 LIVE_SPP = 64  # of a render that is compared with a reference
 
 

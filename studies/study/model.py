@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Annotated
 
 from render.radiance import SpectralRadiance
-from render.spectrum import Floats
+from rodcone.types import Floats
 from sensor.config import LensConfig, SensorConfig
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image

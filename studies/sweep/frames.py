@@ -15,10 +15,11 @@ from isp.processors.catalogue import Processor
 from render.denoised.relight import relight_denoised
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Floats, Spectrum, band_widths
+from render.spectrum import DEFAULT_WAVELENGTH_NM, VISIBLE_NM, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.curve_file import is_curve_file
 from rodcone.digests import digest_inputs
+from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, amplified, at_level_s, best_exposure
 from sensor.optics import form_image

@@ -2,7 +2,6 @@
 
 import sqlite3
 import warnings
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
@@ -16,6 +15,7 @@ from render.bands.error import WideBandsWarning
 from render.transport import Transport
 from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend
+from rodcone.types import Progress
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.presets import preset, vary
@@ -40,7 +40,6 @@ from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, load_frame, make_frames
 from studies.sweep.provenance import provenance, versions
 
-Progress = Callable[[float, float], None]
 # Folders beside the results database: the fourth of a plan's renders, the last two of a data set's planes and shards.
 FOLDERS = RENDERS, FRAMES, PICTURES, PILOTS, PLANES, SET = "renders", "frames", "pictures", "pilots", "planes", "set"
 FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ran their NumPy forms.",)

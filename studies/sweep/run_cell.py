@@ -8,13 +8,13 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from isp.colour.encoding import quantise
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
+from rodcone.types import Image
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import block_sums, mask
@@ -37,8 +37,6 @@ from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, re
 from studies.sweep.provenance import in_words, provenance, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
-
-Image = NDArray[np.float64]
 
 
 def run_cell(cell: Cell) -> Row:

@@ -17,8 +17,9 @@ from skimage.draw import ellipse, polygon
 
 from render.illuminants import illuminant
 from render.radiance_files.surface_spectra import srgb_basis
-from render.spectrum import Floats, band_widths, photons_per_joule
+from render.spectrum import band_widths, photons_per_joule
 from rodcone.colour_spaces import decode_srgb
+from rodcone.types import Floats
 from scenes.reflectances import band, edge, grey
 from sensor.config import SensorConfig
 

@@ -15,12 +15,12 @@ import pytest
 import tifffile
 from builders import mosaic_of, raw_image
 from loop import loop
-from numpy.typing import NDArray
 
 from isp.planes import bilinear
 from isp.remosaic import remosaic
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
+from rodcone.types import Image
 from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import mask
 from sensor.device import draw_device
@@ -38,8 +38,6 @@ WIDTH = band_widths(NM)
 # Patches and their side [pixels]; left out of each is what the reconstruction, its patches and LibRaw together reach.
 ROWS, COLUMNS, SIDE, EDGE = 4, 6, 36, 14
 SRGB_TO_XYZ = [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]  # IEC 61966-2-1
-
-Image = NDArray[np.float64]
 
 
 def surfaces() -> Image:

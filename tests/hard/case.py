@@ -5,14 +5,12 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from render.radiance import SpectralRadiance
 from sensor.cfa import BAYER, Tile
 from sensor.config import SensorConfig
 from sensor.presets import preset
-
-Image = NDArray[np.float64]
 
 
 def low_noise() -> SensorConfig:

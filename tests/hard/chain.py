@@ -7,7 +7,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from hard.case import Image, Situation
+from hard.case import Situation
 
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import neutral_response
@@ -18,6 +18,7 @@ from isp.substitution import matrix_with_white
 from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths
 from rodcone.jit import backend
+from rodcone.types import Image
 from sensor.capture import photograph_radiance
 from sensor.cfa import Tile, channels
 from sensor.device import draw_device

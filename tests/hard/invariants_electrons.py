@@ -3,10 +3,11 @@
 from dataclasses import replace
 
 import numpy as np
-from hard.case import Image, Margin, Situation, worst_of
+from hard.case import Margin, Situation, worst_of
 from hard.chain import expected
 from numpy.typing import NDArray
 
+from rodcone.types import Image
 from sensor.optics import spreads
 
 UNIT = 2.0**-24  # roundoff of single precision

@@ -4,13 +4,14 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from hard.case import Image, Margin, Situation, worse, worst_of
+from hard.case import Margin, Situation, worse, worst_of
 from hard.chain import CAMERAS, behind, develop, develop_fixed, expected, plain_matrix, shoot, to_picture
 from numpy.typing import NDArray
 from scipy.stats import t
 
 from isp.colour.white_balance import neutral_response
 from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
 from sensor.cfa import channel_map
 from sensor.config import BLACK_SIGMAS, SensorConfig
 from sensor.raw import SATURATION_SIGMAS, RawImage

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from hard.case import Image, Margin, Situation, worse, worst_of
+from hard.case import Margin, Situation, worse, worst_of
 from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.colour.white_balance import neutral_response
@@ -11,6 +11,7 @@ from isp.kernel.edges import FAR
 from isp.panchromatic import read_as_white
 from isp.reference import sum_weights
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Settings
+from rodcone.types import Image
 from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 

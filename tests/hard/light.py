@@ -4,15 +4,16 @@ from dataclasses import replace
 from functools import cache
 
 import numpy as np
-from hard.case import Image, Situation
+from hard.case import Situation
 from hard.chain import expected
 from numpy.typing import NDArray
 
 from render.engine import render
 from render.illuminants import illuminant, lines_nm
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM, Floats, line_bands
+from render.spectrum import VISIBLE_NM, line_bands
 from render.transport import Transport
+from rodcone.types import Floats, Image
 from scenes.catalogue import load
 from sensor.config import SensorConfig
 

@@ -11,8 +11,9 @@ from skimage.color import deltaE_ciede2000, xyz2lab
 from render.engine import render
 from render.illuminants import illuminant
 from render.scene_range import check_range
-from render.spectrum import Floats, Spectrum, colour_matching_functions, tristimulus
+from render.spectrum import Spectrum, colour_matching_functions, tristimulus
 from rodcone.colour_spaces import adapt_to_d65
+from rodcone.types import Floats
 from scenes.catalogue import load
 from scenes.metamers import HIGH, LOW, OTHER_LIGHT, PAIRS, TWINS_UNDER, pairs
 from scenes.reflectances import color_checker_reflectances, read_reflectances

@@ -10,8 +10,9 @@ from refusal import refusal
 from isp.processors.catalogue import PROCESSORS
 from render.engine import render
 from render.illuminants import illuminant
-from render.spectrum import VISIBLE_NM, Floats, fine_bands, photons_per_joule
+from render.spectrum import VISIBLE_NM, fine_bands, photons_per_joule
 from render.transport import Transport
+from rodcone.types import Floats
 from scenes.catalogue import load
 from scenes.reflectances import color_checker_reflectances
 from sensor.cfa import mask
