@@ -44,7 +44,7 @@ from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.presets import low_noise
 from studies.pages.plots import CHART, COLOURS, SOFT, STYLE, blank, plain_ticks, svg_text
-from studies.speed.points import Yardstick, electrons, front, pooled_share, share_map, yardstick
+from studies.speed.points import NoiseReference, electrons, front, pooled_share, share_map, yardstick
 
 ROOT = Path(__file__).resolve().parents[1]
 THIS = "this checkout"
@@ -123,13 +123,13 @@ def scaled(radiance: SpectralRadiance, factor: float) -> SpectralRadiance:
     return SpectralRadiance(radiance.values * np.float32(factor), radiance.wavelength_nm)
 
 
-def own_share_map(yard: Yardstick) -> Image:
+def own_share_map(yard: NoiseReference) -> Image:
     """The same of the references themselves: the mean of what each is off, from the difference of the two."""
     one, other = yard.references
     return pooled_share((one - other) ** 2 / 2, yard)
 
 
-def least_uncertain(deviation_e: Image, yard: Yardstick) -> NDArray[np.bool_]:
+def least_uncertain(deviation_e: Image, yard: NoiseReference) -> NDArray[np.bool_]:
     """Find the 99.5 % of the pixels inside with the smallest variance over the sensor's, (channel, h, w).
 
     Parameters

@@ -107,7 +107,7 @@ class Film:
 
 
 @dataclass(frozen=True)
-class Loaded:
+class LoadedScene:
     """Mitsuba's scene of one light group, or of one and a constant environment.
 
     Attributes
@@ -136,7 +136,7 @@ class Loaded:
         return (bands + 4) * (len(self.groups) * (1 + split) + self.coloured)
 
 
-def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Loaded]:
+def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[LoadedScene]:
     """Load what is rendered one after the other: each light group, and a constant environment along with the first.
 
     With `metered` the reference plane carries an irradiance meter.
@@ -202,7 +202,7 @@ def _is(part: Any, kind: Any) -> bool:
     return bool(kind == (python_plugins.get(part["type"]) or mi.PluginManager.instance().plugin_type(part["type"])))
 
 
-def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> Loaded:
+def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ...], metered: bool) -> LoadedScene:
     """Load a scene with one light group at unit spectral emission (or its own colours).
 
     `curves` are those of the table that the scene's matte surfaces name the rows of.
@@ -221,7 +221,7 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
     # mixture with ones sampled for the light, and half of the rays are saved.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
-    return Loaded(
+    return LoadedScene(
         mi_scene=mi_scene,
         groups=index,
         coloured=coloured,

@@ -9,7 +9,7 @@ import numpy as np
 from render.cache import load_irradiance, save_irradiance
 from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import Irradiance
-from render.loader import METER_PIXELS, Film, Loaded, load_groups, own_mitsuba_variant
+from render.loader import METER_PIXELS, Film, LoadedScene, load_groups, own_mitsuba_variant
 from render.runs import clear_traceback
 from render.scene import Scene
 from rodcone.errors import InputError
@@ -74,7 +74,7 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
     return Irradiance(((even + odd) / 2).mean(axis=1).reshape(shape[1:3]), error @ error.T)
 
 
-def _half(loaded: Loaded, film: Film, seed: int) -> Planes:
+def _half(loaded: LoadedScene, film: Film, seed: int) -> Planes:
     """Irradiance of each of the film's pixels, (group, band, h, w)."""
     alike, span, threads = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1), HALF_SPP * METER_PIXELS**2
     images = [traced(x.meter, alike, span, threads, seed) for x in tracers(loaded, film, METER_BANDS, seed)]

@@ -19,7 +19,7 @@ from render.integrator.allocation import rates_of
 from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
-from render.loader import PART_BANDS, Film, Loaded
+from render.loader import PART_BANDS, Film, LoadedScene
 from render.scene import Scene
 from render.transport import Transport
 from rodcone.types import Floats, Planes
@@ -138,7 +138,7 @@ def scene_means_of(means: Means) -> SceneMeans:
     return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
 
 
-def add_run(scenes: list[Loaded], means: Means, film: Film, stop: int, seed: int) -> None:
+def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed: int) -> None:
     """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
@@ -167,7 +167,7 @@ def add_run(scenes: list[Loaded], means: Means, film: Film, stop: int, seed: int
         means.count += chunk
 
 
-def pilot_rates(scenes: list[Loaded], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
+def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
     """Rates of the pixels (h, w), from samples that are drawn for them alone.
 
     Parameters
@@ -191,13 +191,20 @@ def pilot_rates(scenes: list[Loaded], film: Film, lights: Floats, seed: int) -> 
     return rates_of(scattered, seen)
 
 
-def launch_threads(scenes: list[Loaded], film: Film, *, split: bool = False) -> int:
+def launch_threads(scenes: list[LoadedScene], film: Film, *, split: bool = False) -> int:
     """Threads of a launch, by the memory that their channels need."""
     return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in scenes)
 
 
 def _drawn(
-    loaded: Loaded, film: Film, rates: NDArray[np.uint32], span: Span, threads: int, seed: int, *, split: bool = False
+    loaded: LoadedScene,
+    film: Film,
+    rates: NDArray[np.uint32],
+    span: Span,
+    threads: int,
+    seed: int,
+    *,
+    split: bool = False,
 ) -> tuple[Drawn, Drawn]:
     """Draw a span of both halves of the paths of one loaded scene: the even half and the odd."""
     halves, groups = [], len(loaded.groups)

@@ -72,7 +72,7 @@ from studies.study.study import SceneChoice as SceneChoice
 from studies.study.study import Study as Study
 from studies.study.study_file import read_study as read_study
 from studies.sweep.export import read_rows as read_rows
-from studies.sweep.run_sweep import Runner, Swept
+from studies.sweep.run_sweep import Runner, SweepResult
 from studies.sweep.workers import run_in_processes as run_in_processes
 
 __all__ = [
@@ -241,7 +241,7 @@ def sweep(
     step: Step | None = None,
     *,
     clock: Clock | None = None,
-) -> Swept: ...
+) -> SweepResult: ...
 def with_channel_readings(sensor: _Sensor, readings: Sequence[ChannelReading]) -> SensorConfig: ...
 def with_gain(sensor: _Sensor, gain: float) -> SensorConfig: ...
 def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...

@@ -20,7 +20,7 @@ from studies.sweep.cells import Cell
 from studies.sweep.database import COLUMNS, FILE, open_results
 from studies.sweep.prepare import Job, scene_cells
 from studies.sweep.row import Row
-from studies.sweep.run_sweep import MARKER, Runner, Swept, sweep
+from studies.sweep.run_sweep import MARKER, Runner, SweepResult, sweep
 from studies.sweep.workers import InThisProcess, run
 
 RENDER = (
@@ -71,7 +71,7 @@ def ended_after(count: int, cells: Sequence[Cell], error: type[BaseException] = 
         raise error
 
 
-def swept(study: Study, out: Path, runner: Runner = here) -> Swept:
+def swept(study: Study, out: Path, runner: Runner = here) -> SweepResult:
     return sweep(study, out, stated(study), runner)
 
 

@@ -31,7 +31,7 @@ class Launch:
 
 
 @dataclass(frozen=True)
-class Started:
+class StartedStrip:
     """A strip whose kernels run: rows of the frame, where their sums go, and the launches."""
 
     rows: Span
@@ -47,7 +47,7 @@ def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | 
     jit, pattern, (height, width) = arrays(), make_pattern(raw.cfa), raw.dn.shape
     shape = height, width, len(pattern.channels)
     results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(2)]
-    step, started = strip_rows((height, width), pattern, settings.patch), list[Started]()
+    step, started = strip_rows((height, width), pattern, settings.patch), list[StartedStrip]()
     for first in range(0, height, step):
         started.append(_start(jit, raw, (first, min(first + step, height)), pattern, settings, guide))
         if len(started) > 1:
@@ -58,7 +58,7 @@ def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | 
 
 def _start(
     jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, shared: NDArray[Any] | None
-) -> Started:
+) -> StartedStrip:
     """Start the kernels of some rows of the frame; the first row is a whole number of blocks."""
     columns, launches = (0, raw.dn.shape[1]), list[Launch]()
     strip, sums = cut_strip(raw, rows, pattern, settings, shared), _empty_sums(jit, rows, columns[1], pattern)
@@ -81,7 +81,7 @@ def _start(
             threads = Threads(**{name: upload(values) for name, values in vars(work[guide]).items()})
             failed = launch(jit, inputs, threads, shape, sums)
             launches.append(Launch(inputs=inputs, threads=threads, shape=shape, failed=failed))
-    return Started(rows=rows, sums=sums, launches=launches)
+    return StartedStrip(rows=rows, sums=sums, launches=launches)
 
 
 def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern) -> KernelSums:
@@ -103,7 +103,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern) -> KernelSum
     )
 
 
-def _finish(jit: Any, started: Started, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
+def _finish(jit: Any, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
     """Put estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
         again: Any = dr.compress(one.failed)  # waits for the launch

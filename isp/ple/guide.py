@@ -26,18 +26,18 @@ from rodcone.types import Singles
 from sensor.cfa import Tile, channel_map, channels
 
 GUIDES = ("W", "G")  # the first that a mosaic has
-FLAT = 1e-4  # of the guide's squared mean: of variances under this, a is the ratio of the means
-MISSES = 0.25  # of the squared difference of b from its four neighbours' mean: what b misses between samples
+MIN_REL_VARIANCE = 1e-4  # of the guide's squared mean: of variances under this, a is the ratio of the means
+MISS_FACTOR = 0.25  # of the squared difference of b from its four neighbours' mean: what b misses between samples
 LEAST_MISS = 0.05  # of b between samples, where these say as much as noise [units of noise^2]
-NEAR = 0.62  # weight of a sample's own difference, beside that of the next pixel
+OWN_WEIGHT = 0.62  # weight of a sample's own difference, beside that of the next pixel
 GREY, COLOURED = 0.04, 0.14  # of R, G or B over their mean: where lines begin to count, and where they count in full
-REACH = 18  # pixels that a value depends on
+MARGIN_PX = 18  # pixels that a value depends on
 TOGETHER = 128  # rows, even: they stay in a core's cache
 _LEAST = np.float32(1e-12)  # units of noise^2, to divide by
 Phase = tuple[int, int]  # row and column within 2x2 pixels
 
 
-def follow(
+def blend_with_lines(
     planes: Singles,
     tile: Tile,
     noise: NDArray[np.float64],
@@ -66,17 +66,17 @@ def follow(
     if guide is None or not colours:
         return
     height, width = planes.shape[:2]
-    rows = np.pad(np.arange(height), (REACH, REACH + height % 2), mode="reflect")
-    sides = ((0, 0), (REACH, REACH + width % 2), (0, 0))
-    edge, before = REACH // 2, list[tuple[slice, Singles]]()
+    rows = np.pad(np.arange(height), (MARGIN_PX, MARGIN_PX + height % 2), mode="reflect")
+    sides = ((0, 0), (MARGIN_PX, MARGIN_PX + width % 2), (0, 0))
+    edge, before = MARGIN_PX // 2, list[tuple[slice, Singles]]()
     for first in range(0, height, TOGETHER):
-        strip = np.pad(planes[rows[first : first + TOGETHER + 2 * REACH]], sides, mode="reflect")
+        strip = np.pad(planes[rows[first : first + TOGETHER + 2 * MARGIN_PX]], sides, mode="reflect")
         # By row and column within 2x2 pixels: (2, 2, channel, row, column).
         parts = strip.reshape(len(strip) // 2, 2, -1, 2, len(names)).transpose(1, 3, 4, 0, 2).copy()
         lines, share = parts[:, :, names.index(guide)].copy(), _colourfulness(parts, names, balanced)
         for c in colours if sites[guide] in ([(0, 0), (1, 1)], [(0, 1), (1, 0)]) else ():
             (site,) = sites[names[c]]
-            lines[site] = 0.5 * (lines[site] + _carried(parts[*site, c], site, lines, sites[guide]))
+            lines[site] = 0.5 * (lines[site] + _guide_at_samples(parts[*site, c], site, lines, sites[guide]))
         for c in colours:
             least = LEAST_MISS / float(noise[c]) ** 2
             _follow(parts[:, :, c], lines, sites[names[c]][0], least, black[c], share)
@@ -105,7 +105,7 @@ def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: fl
     others = [phase for phase in np.ndindex(2, 2) if phase != site]
     b, a, middle, variance = _line(plane[site], guide[site])
     around = sum(np.roll(b, step, axis) for step in (1, -1) for axis in (0, 1))
-    missed = MISSES * _means((b - 0.25 * around) ** 2) + least
+    missed = MISS_FACTOR * _means((b - 0.25 * around) ** 2) + least
     missed *= np.maximum(1.0, _means(np.mean([(guide[phase] - middle) ** 2 for phase in others], axis=0)) / variance)
     lines = [_between(b, site, phase) + _between(a, site, phase) * guide[phase] for phase in others]
     lines = [np.maximum(line, np.float32(black)) for line in lines]
@@ -115,26 +115,26 @@ def _follow(plane: Singles, guide: Singles, site: Phase, least: float, black: fl
         plane[phase] -= share * (squares / (missed + squares)) * difference
 
 
-def _carried(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:
+def _guide_at_samples(c: Singles, site: Phase, guide: Singles, besides: list[Phase]) -> Singles:
     """Guide at a colour's samples c, from its samples beside them in a row and in a column."""
     total, weights = np.zeros_like(c), np.zeros_like(c)
     for beside in besides:
         axis = int(beside[0] == site[0])
         step = site[axis] - beside[axis]
         # Guide less colour: at the colour's samples, and at the guide's on either side.
-        here = _forecast(c, site, guide[beside], beside) - c
-        there = guide[beside] - _forecast(guide[beside], beside, c, site)
+        here = _predict(c, site, guide[beside], beside) - c
+        there = guide[beside] - _predict(guide[beside], beside, c, site)
         sides = there, np.roll(there, -step, axis)
         across = np.abs(sides[0] - sides[1])
         for side, towards in zip(sides, (-step, step), strict=True):
             rough = across + np.abs(np.roll(here, -towards, axis) - here)
             weight = 1.0 / (rough**2 + _LEAST)
-            total += weight * (NEAR * here + (1.0 - NEAR) * side)
+            total += weight * (OWN_WEIGHT * here + (1.0 - OWN_WEIGHT) * side)
             weights += weight
     return c + total / weights
 
 
-def _forecast(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles:
+def _predict(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles:
     """Another channel at the samples c, from its samples `beside` them."""
     b, a, _, _ = _line(other, _between(c, site, beside))
     return _between(b, beside, site) + _between(a, beside, site) * c
@@ -142,7 +142,7 @@ def _forecast(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles
 
 def _line(c: Singles, g: Singles) -> tuple[Singles, Singles, Singles, Singles]:
     """Offset b and slope a of c over g around each sample; mean and variance of g."""
-    mean, middle, share = _means(c), _means(g), np.float32(1.0 - FLAT)
+    mean, middle, share = _means(c), _means(g), np.float32(1.0 - MIN_REL_VARIANCE)
     variance = _means(g * g) - share * middle * middle + _LEAST
     a = _means((_means(c * g) - share * mean * middle) / variance)
     return c - a * g, a, middle, variance

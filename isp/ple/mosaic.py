@@ -62,7 +62,7 @@ def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray
     white_e : (4,) array_like
         Electrons of R, G, B and W from white, relative to G.
     electrons : (h, w) float32
-        `counted_electrons` of the raw image; ``white_e`` is divided by the same factor.
+        `site_electrons` of the raw image; ``white_e`` is divided by the same factor.
     full : (h, w) bool
         `full_white` of it.
     """
@@ -137,7 +137,7 @@ def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float6
     return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
 
 
-def counted_electrons(raw: RawImage) -> Singles:
+def site_electrons(raw: RawImage) -> Singles:
     """Electrons that the sites of a mosaic count, (h, w) float32: over k, so that their shot noise is Poisson's."""
     electrons = raw.electrons.astype(np.float32)
     counted = electrons / np.float32(raw.plain_noise.shot)
@@ -184,7 +184,7 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
     for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
         at = mask(raw.cfa, noise.channel, raw.shape)
         samples[at] = transform(electrons[at], noise.dark_noise_e / noise.shot)
-    samples, full = continued(raw.cfa, samples, full)
+    samples, full = pad_mosaic(raw.cfa, samples, full)
     return Scale(raw.shape, samples, full, samplings)
 
 
@@ -197,7 +197,7 @@ def _sites(tile: Tile, top: int, left: int) -> tuple[int, ...]:
     )
 
 
-def continued(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
+def pad_mosaic(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
     """Samples (h, w) of a mosaic, continued beyond the frame by reflection; the tile goes on too.
 
     Where the reflected pixel is of another channel, the nearest pixel beside it of the right one stands for it.

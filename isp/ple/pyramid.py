@@ -11,16 +11,16 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import PatchPilot, ScaleEstimate, estimate
-from isp.ple.guide import follow
+from isp.ple.guide import blend_with_lines
 from isp.ple.mosaic import (
     CELLS,
     Cells,
-    counted_electrons,
     counted_noise,
     full_white,
     pyramid,
     scale_of_cells,
     scale_of_pixels,
+    site_electrons,
 )
 from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
@@ -62,7 +62,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     (channel,) float64
         Posterior variance of a pixel over a sample's noise, median over the patches.
     """
-    electrons, full = counted_electrons(raw), full_white(raw)
+    electrons, full = site_electrons(raw), full_white(raw)
     shot, dark_e = counted_noise(raw)
     white_e = np.asarray(white_e) / shot  # as counted
     levels = pyramid(raw, white_e, electrons, full)
@@ -91,7 +91,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
         return result
 
     black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in index]
-    follow(planes, raw.cfa, noise, black, lambda values: in_electrons(values) / (white_e * shot)[index])
+    blend_with_lines(planes, raw.cfa, noise, black, lambda values: in_electrons(values) / (white_e * shot)[index])
     in_noise, planes = planes, np.empty_like(planes)
     for first in range(0, len(planes), TOGETHER):
         planes[first : first + TOGETHER] = in_electrons(in_noise[first : first + TOGETHER])

@@ -11,7 +11,7 @@ import numpy as np
 
 from render.error_estimates import Halves
 from render.integrator.wavefront import Span, seed_of, traced, tracers
-from render.loader import PART_BANDS, Film, Loaded
+from render.loader import PART_BANDS, Film, LoadedScene
 from rodcone.display import brief
 from rodcone.optional import optional_library
 from rodcone.types import Planes
@@ -61,7 +61,7 @@ def denoiser() -> Any:
     return optional_library("mitsuba_oidn", EXTRA)
 
 
-def first_surfaces(loaded: Loaded, film: Film, seed: int) -> tuple[Planes, Planes]:
+def first_surfaces(loaded: LoadedScene, film: Film, seed: int) -> tuple[Planes, Planes]:
     """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels.
 
     Pass another seed than the light's paths have: with that one the two would share their noise.

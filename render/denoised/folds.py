@@ -4,7 +4,7 @@ import numpy as np
 
 from render.denoised.denoise import Denoised, denoised, first_surfaces
 from render.integrator.wavefront import seed_of
-from render.loader import Film, Loaded
+from render.loader import Film, LoadedScene
 from render.runs import Means, add_run, no_means
 from render.scene import Scene
 
@@ -13,7 +13,7 @@ _FOLDS, _SURFACES = 0xF01D, 0x5F0A  # what a seed is for, beside the render's ow
 
 
 def denoise_means(
-    scene: Scene, loaded: list[Loaded], film: Film, means: Means, seed: int, earlier: Denoised | None
+    scene: Scene, loaded: list[LoadedScene], film: Film, means: Means, seed: int, earlier: Denoised | None
 ) -> Denoised:
     """Denoise the means of a render and draw its folds, those of an earlier call continued.
 

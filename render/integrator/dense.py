@@ -31,7 +31,7 @@ class Tracer:
     Parameters
     ----------
     mi : module
-    loaded : Loaded
+    loaded : LoadedScene
         What is rendered: `coloured` emission is evaluated at all wavelengths, else once; directions towards lights are
         sampled with `sample_lights`; with a second group the light of a constant environment, which isn't in the
         scene, is carried by the paths that escape.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from render.integrator.dense import CHOSEN, Tracer
 from render.integrator.points import Points, pixel_keys
-from render.loader import Film, Loaded, mitsuba_module, mitsuba_words
+from render.loader import Film, LoadedScene, mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
@@ -35,7 +35,7 @@ def seed_of(*coordinates: int) -> int:
     return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
 
 
-def tracers(loaded: Loaded, film: Film, most_bands: int, seed: int, *, split: bool = False) -> Iterator[Tracer]:
+def tracers(loaded: LoadedScene, film: Film, most_bands: int, seed: int, *, split: bool = False) -> Iterator[Tracer]:
     """Give a tracer for each part of the bands, at most so many together; all parts see the same paths."""
     parts = -(-film.wavelength_nm.size // most_bands)
     for nm, width_nm in zip(*(np.array_split(x, parts) for x in (film.wavelength_nm, film.width_nm)), strict=True):

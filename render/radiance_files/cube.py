@@ -23,7 +23,7 @@ AXES = ("height", "width", "wavelength")
 
 
 @dataclass(frozen=True)
-class Stored:
+class StoredArray:
     """Numbers of a file as they stand in it: their axes, and where the file states them wavelengths, the gain and
     offset of each band, and which bands are of use.
     """
@@ -128,7 +128,7 @@ def _described(path: Path) -> Description:
         return structured(read_toml(beside), Description, _CONVERTER, fix)
 
 
-def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
+def _wavelengths(stored: StoredArray, described: Description, bands: int) -> Floats:
     given = stored.wavelength_nm if described.wavelength_nm is None else described.wavelength_nm
     if given is None:
         raise InputError("wavelength_nm: nothing states it; give one number a band, or the first and the last")
@@ -146,16 +146,16 @@ def _wavelengths(stored: Stored, described: Description, bands: int) -> Floats:
     return nm
 
 
-def _read_npy(path: Path, described: Description) -> Stored:
+def _read_npy(path: Path, described: Description) -> StoredArray:
     # its header is parsed as Python's literals, which fail in many ways
     with read_errors("NumPy can't read it", "give an array saved by numpy.save", Exception):
         values = np.load(path, mmap_mode="r", allow_pickle=False)
     if not isinstance(values, np.ndarray):
         raise InputError("it is no array; give one saved by numpy.save")
-    return Stored(values, described.axes or AXES)
+    return StoredArray(values, described.axes or AXES)
 
 
-def _open_envi(header: Path, described: Description) -> Stored:
+def _open_envi(header: Path, described: Description) -> StoredArray:
     """ENVI's picture, with the law from its numbers to what the description says that they hold."""
     picture = open_envi(header)
     law = picture.radiance
@@ -188,10 +188,10 @@ def _open_envi(header: Path, described: Description) -> Stored:
         raise InputError("bbl: it marks every band as bad; allowed: two good bands or more; correct it")
     if not picture.good.all():
         warnings.warn(f"{int((~picture.good).sum())} bands that its bbl marks as bad are left out", stacklevel=3)
-    return Stored(picture.values, picture.axes, picture.wavelength_nm, law, picture.good)
+    return StoredArray(picture.values, picture.axes, picture.wavelength_nm, law, picture.good)
 
 
-def _read_mat(path: Path, described: Description) -> Stored:
+def _read_mat(path: Path, described: Description) -> StoredArray:
     name, nm = described.variable, described.wavelength_nm
     if name is None or not described.axes:
         raise InputError(
@@ -202,7 +202,7 @@ def _read_mat(path: Path, described: Description) -> Stored:
     for key in (name, nm):
         if isinstance(key, str) and key not in numbers:
             raise InputError(f"it has no numbers {key!r}; give the name of a variable of the file")
-    return Stored(numbers[name], described.axes, numbers[nm] if isinstance(nm, str) else None)
+    return StoredArray(numbers[name], described.axes, numbers[nm] if isinstance(nm, str) else None)
 
 
 _READERS = {".npy": _read_npy, ".hdr": _open_envi, ".mat": _read_mat}

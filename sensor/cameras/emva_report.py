@@ -17,7 +17,7 @@ import scipy
 from rodcone.errors import InputError, in_place, read_errors, require_keys, require_range, require_whole
 from rodcone.toml_file import read_toml
 from sensor.cameras.emva_checks import doubts
-from sensor.cameras.numbers import PixelNumbers, Sourced
+from sensor.cameras.numbers import PixelNumbers, SourcedValue
 
 # Symbols, each with what is allowed and its unit. Those of RESULTS follow from the others: a check, and no input.
 _SYMBOLS: dict[str, dict[str, tuple[float, float, str]]] = tomllib.loads(
@@ -91,20 +91,22 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
     clip follows from its saturation capacity (`clip_over_saturation`).
     """
     source_note, figures = report.source_note, report.figures
-    pixel: dict[str, Sourced] = {}
-    settings: dict[str, Sourced] = {}
+    pixel: dict[str, SourcedValue] = {}
+    settings: dict[str, SourcedValue] = {}
     left_out: dict[str, str] = {}
     # settings
     for key, whole in (("bits", report.bits), ("black_level_dn", report.black_level_dn)):
         if whole is not None:
-            settings[key] = Sourced(whole, source_note)
+            settings[key] = SourcedValue(whole, source_note)
     # pixel
     if "pixel_pitch_um" in figures:
-        pixel["pitch_um"] = Sourced(figures["pixel_pitch_um"], f"pixel pitch; {source_note}")
-    pixel["fill_factor"] = Sourced(1.0, "an EMVA quantum efficiency is the whole pixel's, its fill factor included")
+        pixel["pitch_um"] = SourcedValue(figures["pixel_pitch_um"], f"pixel pitch; {source_note}")
+    pixel["fill_factor"] = SourcedValue(
+        1.0, "an EMVA quantum efficiency is the whole pixel's and includes the fill factor"
+    )
     if "K" in figures and report.bits is not None and report.black_level_dn is not None:
         top_dn = 2**report.bits - 1 - report.black_level_dn
-        pixel["full_well_e"] = Sourced(
+        pixel["full_well_e"] = SourcedValue(
             top_dn / figures["K"],
             f"where the converter ends: {top_dn} DN above black over K = {figures['K']:g} DN/e- (eq. 50); "
             f"{source_note}",
@@ -113,7 +115,7 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
         value = figures["mu_e_sat"]
         clip_e = clip_over_saturation(value, figures.get("sigma_d", 0.0), figures.get("PRNU1288", 0.0) / 100)
         words = f"the clip whose variance is greatest at the saturation capacity, mu_e.sat = {value:g} e-"
-        pixel["full_well_e"] = Sourced(clip_e, f"{words}; {source_note}")
+        pixel["full_well_e"] = SourcedValue(clip_e, f"{words}; {source_note}")
     if "K" in figures and "K =" not in str(pixel.get("full_well_e")):
         lacking = [name for name in _WHOLE if name not in settings]
         left_out["K"] = (
@@ -124,12 +126,12 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
         pixel["read_noise_e"], note = _read_noise(figures, source_note)
         left_out |= note
     if "DSNU1288" in figures:
-        pixel["dsnu_e"] = Sourced(figures["DSNU1288"], f"DSNU1288 (eq. 66); {source_note}")
+        pixel["dsnu_e"] = SourcedValue(figures["DSNU1288"], f"DSNU1288 (eq. 66); {source_note}")
     if "PRNU1288" in figures:
         value = figures["PRNU1288"]
-        pixel["prnu"] = Sourced(value / 100, f"PRNU1288 (eq. 67), {value:g} per cent; {source_note}")
+        pixel["prnu"] = SourcedValue(value / 100, f"PRNU1288 (eq. 67), {value:g} per cent; {source_note}")
     if "mu_I" in figures:
-        pixel["dark_current_e_per_s"] = Sourced(
+        pixel["dark_current_e_per_s"] = SourcedValue(
             figures["mu_I"], f"mu_I (eq. 29), at the report's temperature; {source_note}"
         )
     efficiency = None
@@ -168,13 +170,13 @@ def numbers_at_gains(low: EmvaReport, high: EmvaReport) -> PixelNumbers:
     read_e = sqrt(max(sigma_high_e**2 - (converter_dn / k_high) ** 2, 0.0))
     told = f"sigma_d = {sigma_e:.4g} e- at K = {k:g} DN/e- and {sigma_high_e:.4g} e- at {k_high:g}"
     both = f"of {told}; {low.source_note}"
-    pixel = {**numbers.pixel, "read_noise_e": Sourced(read_e, f"before the amplifier, {both}")}
+    pixel = {**numbers.pixel, "read_noise_e": SourcedValue(read_e, f"before the amplifier, {both}")}
     if "DSNU1288" in high.figures:
-        pixel["dsnu_e"] = Sourced(high.figures["DSNU1288"], f"DSNU1288 at the higher gain; {high.source_note}")
+        pixel["dsnu_e"] = SourcedValue(high.figures["DSNU1288"], f"DSNU1288 at the higher gain; {high.source_note}")
     settings = {
         **numbers.settings,
-        "converter_noise_dn": Sourced(converter_dn, f"after the amplifier, {both}"),
-        "gain_limit": Sourced(k_high / k, f"K of the higher gain over that of the lower; {high.source_note}"),
+        "converter_noise_dn": SourcedValue(converter_dn, f"after the amplifier, {both}"),
+        "gain_limit": SourcedValue(k_high / k, f"K of the higher gain over that of the lower; {high.source_note}"),
     }
     return replace(numbers, pixel=pixel, settings=settings)
 
@@ -199,17 +201,17 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
     return float(clip_e)
 
 
-def _read_noise(figures: Mapping[str, float], source_note: str) -> tuple[Sourced, dict[str, str]]:
+def _read_noise(figures: Mapping[str, float], source_note: str) -> tuple[SourcedValue, dict[str, str]]:
     """Read noise from sigma_d, which holds the dark current's shot noise too, and a word on what isn't told."""
     sigma_d, current, exposure_s = (figures.get(key) for key in ("sigma_d", "mu_I", "exposure_s"))
     sigma_d = float(sigma_d or 0.0)
     if current is None:
         why = "not told; its shot noise at the report's exposure is in read_noise_e"
-        return Sourced(sigma_d, f"temporal dark noise sigma_d; {source_note}"), {"dark_current_e_per_s": why}
+        return SourcedValue(sigma_d, f"temporal dark noise sigma_d; {source_note}"), {"dark_current_e_per_s": why}
     if exposure_s is None or sigma_d**2 <= current * exposure_s:
-        return Sourced(sigma_d, f"temporal dark noise sigma_d, mu_I's shot noise in it; {source_note}"), {}
+        return SourcedValue(sigma_d, f"temporal dark noise sigma_d, mu_I's shot noise in it; {source_note}"), {}
     value = float((sigma_d**2 - current * exposure_s) ** 0.5)
-    return Sourced(
+    return SourcedValue(
         value, f"root of sigma_d^2 = {sigma_d:g}^2 less mu_I t = {current * exposure_s:g} (eq. 30); {source_note}"
     ), {}
 

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
-from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
+from sensor.cameras.numbers import PixelNumbers, SourcedValue, bits_of
 from sensor.emva1288.from_frames import FrameFigures, Interval, figures_of_frames
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import read_raw
@@ -64,20 +64,20 @@ def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
     gain = figures.gain_dn_per_e
     white = figures.white_dn - figures.black_dn
     pixel = {
-        "full_well_e": Sourced(
+        "full_well_e": SourcedValue(
             white / gain.value,
             f"electrons at white, {white:.6g} DN over K = {_interval_text(gain)} DN/e- (eq. 50); "
             "the photodiode may hold more",
         ),
-        "read_noise_e": Sourced(
+        "read_noise_e": SourcedValue(
             figures.read_noise_e.value, f"temporal dark noise, {_interval_text(figures.read_noise_e)} e-"
         ),
-        "dsnu_e": Sourced(figures.dsnu_e.value, f"DSNU1288 (eq. 66), {_interval_text(figures.dsnu_e)} e-"),
-        "prnu": Sourced(figures.prnu.value, f"PRNU1288 (eq. 67), {_interval_text(figures.prnu)}"),
+        "dsnu_e": SourcedValue(figures.dsnu_e.value, f"DSNU1288 (eq. 66), {_interval_text(figures.dsnu_e)} e-"),
+        "prnu": SourcedValue(figures.prnu.value, f"PRNU1288 (eq. 67), {_interval_text(figures.prnu)}"),
     }
     settings = {
         "bits": bits_of(figures.white_dn, figures.black_dn, "the frames"),
-        "black_level_dn": Sourced(round(figures.black_dn), f"mean of the dark frames, {figures.black_dn:.5g} DN"),
+        "black_level_dn": SourcedValue(round(figures.black_dn), f"mean of the dark frames, {figures.black_dn:.5g} DN"),
     }
     return PixelNumbers(source_note, pixel, settings, _UNTOLD, cfa=figures.cfa)
 

@@ -4,7 +4,7 @@ from math import sqrt
 from pathlib import Path
 
 from rodcone.errors import InputError
-from sensor.cameras.numbers import PixelNumbers, Sourced, bits_of
+from sensor.cameras.numbers import PixelNumbers, SourcedValue, bits_of
 from sensor.raw_files.photograph import read_noise_profile
 from sensor.raw_files.raw_file import open_raw
 
@@ -43,10 +43,10 @@ def dng_numbers(path: Path) -> PixelNumbers:
     if read_e > rounding_e:
         read_e, words = sqrt(read_e**2 - rounding_e**2), f"sqrt(O) / S, less {rounding_e:.3g} e- of rounding"
     pixel = {
-        "full_well_e": Sourced(white_e, f"electrons at white, 1 / S; {source_note}; the photodiode may hold more"),
-        "read_noise_e": Sourced(read_e, f"{words}; {source_note}"),
+        "full_well_e": SourcedValue(white_e, f"electrons at white, 1 / S; {source_note}; the photodiode may hold more"),
+        "read_noise_e": SourcedValue(read_e, f"{words}; {source_note}"),
     }
     settings = {"bits": bits_of(raw.white_dn, raw.black_dn, path.name)}
     if raw.black_dn == int(raw.black_dn):
-        settings["black_level_dn"] = Sourced(raw.black_dn, f"BlackLevel of {path.name}")
+        settings["black_level_dn"] = SourcedValue(raw.black_dn, f"BlackLevel of {path.name}")
     return PixelNumbers(source_note, pixel, settings, _UNTOLD, cfa=raw.cfa)

@@ -25,7 +25,7 @@ _OFF = {  # what a term that a source says nothing of is, by key
 
 
 @dataclass(frozen=True)
-class Sourced:
+class SourcedValue:
     """A number, and on one line where it comes from."""
 
     value: float
@@ -40,7 +40,7 @@ class PixelNumbers:
     ----------
     source : str
         The source as a whole, on one line.
-    pixel, settings : mapping of str to Sourced
+    pixel, settings : mapping of str to SourcedValue
         By key of `PixelConfig`, and of `SensorConfig`: ``bits``, ``black_level_dn``.
     left_out : mapping of str to str
         Why a key can't be told; a source without a word for a key says nothing of it.
@@ -51,8 +51,8 @@ class PixelNumbers:
     """
 
     source: str
-    pixel: Mapping[str, Sourced] = field(default_factory=dict)
-    settings: Mapping[str, Sourced] = field(default_factory=dict)
+    pixel: Mapping[str, SourcedValue] = field(default_factory=dict)
+    settings: Mapping[str, SourcedValue] = field(default_factory=dict)
     left_out: Mapping[str, str] = field(default_factory=dict)
     efficiency: tuple[float, float] | None = None
     cfa: Tile = ()
@@ -132,7 +132,7 @@ def borrowed_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> C
     return Curves(name, f"shape of {name}'s curves, not of this camera", scaled, note, numbers.cfa or sensor.cfa)
 
 
-def bits_of(white_dn: float, black_dn: float, source: str) -> Sourced:
+def bits_of(white_dn: float, black_dn: float, source: str) -> SourcedValue:
     """Bits of the converter whose top is a white level, or next above it.
 
     White stays the same number of electrons, so K [DN/e-] rises as the range above black does: (top - black) / (white -
@@ -142,7 +142,7 @@ def bits_of(white_dn: float, black_dn: float, source: str) -> Sourced:
     top = 2**bits - 1
     factor = (top - black_dn) / (white_dn - black_dn)
     finer = "" if top == white_dn else f"; the simulated converter ends at {top}, so its K is {factor:.3f} times that"
-    return Sourced(bits, f"white level {white_dn:g} of {source}{finer}")
+    return SourcedValue(bits, f"white level {white_dn:g} of {source}{finer}")
 
 
 def missing(numbers: PixelNumbers) -> list[str]:
@@ -152,7 +152,7 @@ def missing(numbers: PixelNumbers) -> list[str]:
 
 def completed(numbers: PixelNumbers, sensor: SensorConfig, name: str) -> PixelNumbers:
     """Numbers with what is missing taken from another camera, and said so."""
-    lent = {key: Sourced(getattr(sensor.pixel, key), f"of {name}, not of this camera") for key in missing(numbers)}
+    lent = {key: SourcedValue(getattr(sensor.pixel, key), f"of {name}, not of this camera") for key in missing(numbers)}
     return replace(numbers, pixel={**numbers.pixel, **lent})
 
 
@@ -270,7 +270,7 @@ def _anchor(numbers: PixelNumbers) -> str:
     return f"{value:g} at {at_nm:g} nm, {_plain(numbers.source)}"
 
 
-def _line(key: str, number: Sourced) -> str:
+def _line(key: str, number: SourcedValue) -> str:
     whole = key in ("bits", "black_level_dn")
     return f"{key} = {int(number.value) if whole else repr(float(number.value))}  # {_plain(number.source)}"
 

@@ -11,7 +11,7 @@ from rodcone.types import Floats
 from sensor.calibration import NoiseStep
 from sensor.config import BLACK_SIGMAS
 from sensor.raw import RawImage
-from sensor.readings.noise import best_weights, covariances, seams, shares, whole_share
+from sensor.readings.noise import best_weights, collected_share, covariances, seams, shares
 from sensor.readings.resolve import PlainReading
 
 # Linear words of 24 bits, as chips that merge give them; single precision holds them all. Black and white are whole
@@ -26,7 +26,7 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
 
     The raw image's electrons are those of all charges together, so that shot noise is Poisson's as long as none is
     full; beyond each seam `RawImage.noise_steps` says what the rest knows. Its exposure time is the one that would
-    collect as many: the whole pixel's times `whole_share`.
+    collect as many: the whole pixel's times `collected_share`.
 
     Parameters
     ----------
@@ -35,11 +35,11 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
         What each of them read.
     """
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
-    whole, last = whole_share(readings), seams(readings).order[-1]
+    whole, last = collected_share(readings), seams(readings).order[-1]
     dark_current_e = pixel.dark_current_e_per_s * exposure_s
     estimates_e = [raw.electrons / share for raw, share in zip(raws, shares(readings), strict=True)]
     electrons = merged_electrons(np.stack(estimates_e), readings) * whole
-    base, *steps = noise_of_merged(readings)
+    base, *steps = merged_noise_steps(readings)
 
     full_e = max(pixel.full_well_e - dark_current_e, 1.0) * whole
     dark_e = BLACK_SIGMAS * hypot(base.read_noise_e, base.dsnu_e)
@@ -83,10 +83,10 @@ def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> F
     total = np.asarray(sum(covariances(levels, readings).values()))
     flat = estimates_e.reshape(len(estimates_e), -1)
     light, where = np.empty(flat.shape[1]), np.arange(flat.shape[1])
-    for number, above_e in enumerate(at.above_e):
+    for number, handover_e in enumerate(at.handover_e):
         weights = best_weights(total, at.order[number:])
         light[where] = _weighted(flat[:, where], weights, levels)
-        where = where[light[where] >= above_e]
+        where = where[light[where] >= handover_e]
         if where.size == 0:
             break
     return light.reshape(estimates_e.shape[1:])
@@ -108,18 +108,18 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
     return light
 
 
-def noise_of_merged(readings: Sequence[PlainReading]) -> list[NoiseStep]:
+def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
     """Noise of merged electrons from the dark on, and from each seam on.
 
     Each step states dark noise at its lower end and shot noise and PRNU at its upper end, where each dominates.
     """
-    at, whole = seams(readings), whole_share(readings)
+    at, whole = seams(readings), collected_share(readings)
     temporal = ("read noise", "converter noise", "quantisation", "dark current")
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
     of_columns_e2 = (pixel.column_gain_spread * pixel.dark_current_e_per_s * exposure_s) ** 2
-    starts_e = np.maximum([0.0, *at.above_e[:-1]], 0.0)
-    ends_e = np.maximum(at.above_e, 1.0)
-    first = min(int(np.sum(at.above_e <= 0.0)), len(ends_e) - 1)  # those before it are full of dark current
+    starts_e = np.maximum([0.0, *at.handover_e[:-1]], 0.0)
+    ends_e = np.maximum(at.handover_e, 1.0)
+    first = min(int(np.sum(at.handover_e <= 0.0)), len(ends_e) - 1)  # those before it are full of dark current
     steps = []
     for number, (start_e, end_e) in list(enumerate(zip(starts_e, ends_e, strict=True)))[first:]:
         dark, bright = (_variances_at(level_e, readings, at.order[number:]) for level_e in (start_e, end_e))

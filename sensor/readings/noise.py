@@ -30,13 +30,13 @@ class Seams:
     Attributes
     ----------
     order : (reading,) intp
-    above_e : (reading,) float64
+    handover_e : (reading,) float64
         Photo-electrons of the whole pixel, under 0 where dark current fills the reading; of the last the level from
         which it may clip.
     """
 
     order: NDArray[np.intp]
-    above_e: Floats
+    handover_e: Floats
 
 
 def shares(readings: Sequence[PlainReading]) -> Floats:
@@ -44,7 +44,7 @@ def shares(readings: Sequence[PlainReading]) -> Floats:
     return np.array([x.share for x in readings])
 
 
-def whole_share(readings: Sequence[PlainReading]) -> float:
+def collected_share(readings: Sequence[PlainReading]) -> float:
     """What all charges hold together, over the whole pixel's electrons: the unit of the merged electrons."""
     return float(sum({x.charge: x.share for x in readings}.values()))
 
@@ -114,9 +114,9 @@ def seams(readings: Sequence[PlainReading]) -> Seams:
     total = sum(covariances(full_e, readings).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
     clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-    above_e = clear_e - dark_electrons(readings)  # under 0 where dark current alone fills the reading
-    order = np.argsort(above_e, kind="stable")
-    return Seams(order, above_e[order])
+    handover_e = clear_e - dark_electrons(readings)  # under 0 where dark current alone fills the reading
+    order = np.argsort(handover_e, kind="stable")
+    return Seams(order, handover_e[order])
 
 
 def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Mapping[str, Floats]:
@@ -131,11 +131,11 @@ def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Ma
     at = seams(readings)
     merged_e2 = dict.fromkeys(by_source, np.zeros_like(light))
     pixel_share = np.ones_like(light)  # of pixels whose merged light is over the seams so far
-    for number, above_e in enumerate(at.above_e):
+    for number, handover_e in enumerate(at.handover_e):
         weights = best_weights(total, at.order[number:])
         noise_e = np.sqrt(np.einsum("ni,nij,nj->n", weights, total, weights))
         last = number == len(at.order) - 1
-        beyond = np.zeros_like(light) if last else scipy.special.ndtr((light - above_e) / noise_e)
+        beyond = np.zeros_like(light) if last else scipy.special.ndtr((light - handover_e) / noise_e)
         for name, covariance in by_source.items():
             variance_e2 = np.einsum("ni,nij,nj->n", weights, covariance, weights)
             merged_e2[name] = merged_e2[name] + pixel_share * (1 - beyond) * variance_e2

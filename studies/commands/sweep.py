@@ -28,7 +28,7 @@ from studies.sweep.cluster import on_cluster
 from studies.sweep.cost import Estimate, estimated
 from studies.sweep.database import FILE
 from studies.sweep.prepare import PILOTS
-from studies.sweep.run_sweep import Runner, Swept, locked_folder
+from studies.sweep.run_sweep import Runner, SweepResult, locked_folder
 from studies.sweep.run_sweep import sweep as run_sweep
 from studies.sweep.workers import InThisProcess, run, run_in_processes
 
@@ -159,7 +159,7 @@ def require_enough(study: Study, sizes: Estimate, *, force: bool) -> None:
 
 def make_all(
     study: Study, out: Path, planned: Callable[[Step], Plan], runner: Runner, clock: Clock
-) -> tuple[Swept, Path]:
+) -> tuple[SweepResult, Path]:
     """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
 
     Parameters
@@ -171,7 +171,7 @@ def make_all(
 
     Returns
     -------
-    Swept, Path
+    SweepResult, Path
         What was made, and the report.
     """
     # the folder first: one that can't be written fails before anything is rendered

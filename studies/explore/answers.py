@@ -14,12 +14,12 @@ from rodcone.errors import InputError
 from sensor.optics import form_image
 from sensor.raw_files.raw_file import write_raw
 from sensor.response import behind_filters, channel_electrons
-from studies.explore.chain import Exposed, Shot, development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import Controls, Lamp, alone, to_json
+from studies.explore.chain import Exposure, Shot, development_of, expose_scene, photograph, true_picture_of
+from studies.explore.controls import Controls, Lamp, only_group, to_json
 from studies.explore.memo import Memo
 from studies.explore.messages import Header, sensor_terms, write_dropped
 from studies.explore.slow import stand_in
-from studies.explore.source import Rendered
+from studies.explore.source import RenderState
 from studies.explore.views import VIEWS, Bytes, facts, histogram, pixel
 from studies.photograph.camera import calibrate, with_notes
 from studies.study.render_noise import monte_carlo_share, noise_note
@@ -28,7 +28,7 @@ from studies.study.scene_source import first_light
 Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
 
-def written(message: Header, controls: Controls, rendered: Rendered, memo: Memo, drops: Path) -> Answer:
+def written(message: Header, controls: Controls, rendered: RenderState, memo: Memo, drops: Path) -> Answer:
     """Figures and files of one camera."""
     kind = message["kind"]
     if kind == "dng":
@@ -47,7 +47,7 @@ def written(message: Header, controls: Controls, rendered: Rendered, memo: Memo,
 
 
 def shown(
-    cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: Rendered, memo: Memo, drops: Path
+    cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: RenderState, memo: Memo, drops: Path
 ) -> tuple[Header, list[Bytes], bool]:
     """Header and pictures of each view, and whether a slow processor is left for later."""
     shots, used = [], []
@@ -78,7 +78,7 @@ def shown(
     return header, pictures, used != list(cameras)
 
 
-def _shot(controls: Controls, exposed: Exposed, memo: Memo) -> Shot | None:
+def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
     """Shot of an exposure; None where its processor is slow and hasn't been at work."""
     if stand_in(controls, exposed.raw.dn.size) == controls:
         development = development_of(exposed, controls, memo)
@@ -94,7 +94,7 @@ def _shot(controls: Controls, exposed: Exposed, memo: Memo) -> Shot | None:
     return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
-def python_text(rendered: Rendered, controls: Controls, view: str, drops: Path) -> str:
+def python_text(rendered: RenderState, controls: Controls, view: str, drops: Path) -> str:
     """Python of a view or a figure; a file that was dropped has its name alone, as it lies where that runs."""
     text, path = python_of(rendered.code, controls, view), Path(controls.sensor)
     return text.replace(str(path), path.name) if drops in path.parents else text
@@ -106,7 +106,7 @@ def take_sensor(files: Any, drops: Path) -> Header:
     return {"sensor": str(path), "terms": sensor_terms(sensor)}
 
 
-def _dng(rendered: Rendered, controls: Controls, memo: Memo) -> bytes:
+def _dng(rendered: RenderState, controls: Controls, memo: Memo) -> bytes:
     """Digital negative of an exposure, its colours calibrated as `rodcone capture` does; of no burst."""
     if controls.frames > 1:  # merged samples are no whole numbers as a negative's are
         raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
@@ -125,7 +125,7 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     Parameters
     ----------
     render : str
-        Lines that make `transport` (`studies.explore.source.Rendered`), or `studies.explore.source.GIVEN`.
+        Lines that make `transport` (`studies.explore.source.RenderState`), or `studies.explore.source.GIVEN`.
     controls : Controls
     view : str
         Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
@@ -145,7 +145,7 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     return "\n".join([*imports, "import rodcone", "", *code, ""])
 
 
-def noise_share(exposed: Exposed, controls: Controls, memo: Memo) -> float:
+def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
     """Monte Carlo variance of the raw electrons over the sensor's own, as a sweep's `mc_share` of unbiased light.
 
     One draw of the error, half the difference of the render's halves, goes through lens and filters as the light does.
@@ -161,10 +161,10 @@ def noise_share(exposed: Exposed, controls: Controls, memo: Memo) -> float:
     return controls.frames * share
 
 
-def _error_e(exposed: Exposed, name: str) -> NDArray[np.float64]:
+def _error_e(exposed: Exposure, name: str) -> NDArray[np.float64]:
     """Error of one light group at power 1, behind the lens and the filters, in 1 s, (h, w, channel) [e-]."""
     even, odd = (
         channel_electrons(form_image(half, exposed.sensor), exposed.sensor, 1.0)
-        for half in alone(exposed.transport, name).relight_halves()
+        for half in only_group(exposed.transport, name).relight_halves()
     )
     return (even - odd) / 2

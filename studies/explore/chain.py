@@ -30,7 +30,7 @@ from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
-from studies.explore.controls import TIME, Controls, Lamp, alone, camera_of, lit_transport, options_of
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, lit_transport, only_group, options_of
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_pixels
 from studies.photograph.camera import colour_fit, develop_to_scale
@@ -56,7 +56,7 @@ class GroupFrame:
 
 
 @dataclass(frozen=True)
-class Exposed:
+class Exposure:
     """What the camera is given, and the raw image that it makes of it.
 
     Attributes
@@ -106,7 +106,7 @@ class Shot:
 
     Attributes
     ----------
-    exposed : Exposed
+    exposed : Exposure
     linear, true : (h, w, 3) float64
         Linear sRGB in which `exposed.white_cd_m2` is 1.
     truth : (h, w, 3) uint8
@@ -114,7 +114,7 @@ class Shot:
     developed : Picture
     """
 
-    exposed: Exposed
+    exposed: Exposure
     linear: Image
     true: Image
     truth: NDArray[np.uint8]
@@ -147,7 +147,7 @@ def photograph(transport: Transport, controls: Controls, memo: Memo | None = Non
     return Shot(exposed, linear, *true_picture_of(exposed, controls, memo), picture)
 
 
-def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposed:
+def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposure:
     """Light the scene, image it and read the chip out."""
     require_keys("lamps: light group", controls.lamps, transport.groups)
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
@@ -168,7 +168,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
-            radiance = memo.of("radiance", spectrum, alone(lit, name).relight)
+            radiance = memo.of("radiance", spectrum, only_group(lit, name).relight)
             frames[name] = memo.of("frame", (spectrum, optics), _group_frame, radiance, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
@@ -202,12 +202,12 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Expose
             frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
         exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
     raw = merged_raw(exposures)
-    return Exposed(
+    return Exposure(
         *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)
     )
 
 
-def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Development:
+def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Development:
     """What the processor is to do with an exposure, in this process or, pickled, in another."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes(), sensor.pixel.crosstalk)
@@ -219,7 +219,7 @@ def development_of(exposed: Exposed, controls: Controls, memo: Memo) -> Developm
     return partial(develop_to_scale, raw, processor, colours, sensor, neutral, exposed.white_cd_m2, **options)
 
 
-def true_picture_of(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
+def true_picture_of(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
     """Noise-free picture, linear and as shown: of any level the same, since white goes with it."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
     return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
@@ -238,12 +238,12 @@ def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 
-def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
+def _truth(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
     groups, light, planes = exposed.transport.groups, exposed.light, []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
         spectrum = (name, lamp.spectrum, lamp.table)
-        radiance = memo.of("radiance", spectrum, alone(exposed.transport, name).relight)
+        radiance = memo.of("radiance", spectrum, only_group(exposed.transport, name).relight)
         planes.append(memo.of("true", (spectrum, light.spectrum.tobytes()), true_srgb, radiance, light, 1.0))
     true = _weighted([groups[name].power / exposed.white_at_own_cd_m2 for name in exposed.frames], planes)
     return true, to_bytes(true)
@@ -251,7 +251,7 @@ def _truth(exposed: Exposed, controls: Controls, memo: Memo) -> tuple[Image, NDA
 
 def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo) -> float:
     shining = [spectrum for spectrum in spectra if lit.groups[spectrum[0]].power > 0]
-    planes = [memo.of("scattered", lamp, alone(lit, lamp[0]).scattered_luminance) for lamp in shining]
+    planes = [memo.of("scattered", lamp, only_group(lit, lamp[0]).scattered_luminance) for lamp in shining]
     return white_of_pixels(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
 
 

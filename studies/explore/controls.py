@@ -252,7 +252,7 @@ def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light:
     return lit, light, 1.0 / level
 
 
-def alone(lit: Transport, name: str) -> Transport:
+def only_group(lit: Transport, name: str) -> Transport:
     """Transport of which one light group shines, at power 1."""
     groups = {group_name: replace(group, power=float(group_name == name)) for group_name, group in lit.groups.items()}
     return replace(lit, groups=groups)

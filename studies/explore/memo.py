@@ -17,7 +17,7 @@ class Overtaken(Exception):
     """Nobody waits for this work any more: a newer request came, or the page was closed."""
 
 
-def go_on() -> None:
+def never_cancel() -> None:
     """Let work go on whatever happens."""
 
 
@@ -31,7 +31,7 @@ class Memo:
         Called before each stage; raises `Overtaken` where nobody waits for the result.
     """
 
-    check: Callable[[], None] = go_on
+    check: Callable[[], None] = never_cancel
     stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
 
     def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
@@ -56,7 +56,7 @@ class Memo:
         return self.stages[stage].get(key) if stage in self.stages else None
 
 
-def give_memory_back() -> None:
+def release_memory() -> None:
     """Give back free memory, Dr.Jit's and the C library's: without it 10 000 changes took a seventh more than 500."""
     if backend() != "numpy":
         dr.flush_malloc_cache()

@@ -50,7 +50,7 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 )
 
 
-def hello(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
+def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
     """What the page builds its controls from; `scenes` that it may choose, `dropped` files of sensors."""
     named = dict.fromkeys((*sensors(), *dropped))
     return {
@@ -125,7 +125,7 @@ def read_message(text: str) -> Header:
     return message
 
 
-def gives_way(message: Header, pending: Header) -> bool:
+def is_superseded_by(message: Header, pending: Header) -> bool:
     """Whether a message's answer waits, or ends, for a pending one: a newer one of its kind, or one answered first."""
     if pending["kind"] == message["kind"]:
         return bool(pending["number"] > message["number"])

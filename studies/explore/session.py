@@ -23,10 +23,10 @@ from rodcone.types import Image
 from studies.explore.answers import Answer, shown, take_sensor, written
 from studies.explore.chain import development_of, expose_scene
 from studies.explore.controls import Controls, controls_from
-from studies.explore.memo import Memo, Overtaken, give_memory_back, go_on
-from studies.explore.messages import KINDS, Header, gives_way, hello, read_message, read_views, unsent
+from studies.explore.memo import Memo, Overtaken, never_cancel, release_memory
+from studies.explore.messages import KINDS, Header, first_message, is_superseded_by, read_message, read_views, unsent
 from studies.explore.slow import begin, stand_in
-from studies.explore.source import Rendered, Source
+from studies.explore.source import RenderState, Source
 from studies.explore.views import Bytes
 
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
@@ -113,7 +113,7 @@ class Session:
 
     def _begin_source(self, source: Source) -> None:
         self._source, self._states, self._memo = source, source.states(self._between_runs), Memo(self._check)
-        self._rendered: Rendered | None = None
+        self._rendered: RenderState | None = None
         self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
 
     def _begin_page(self, page: str) -> None:
@@ -139,7 +139,7 @@ class Session:
         """Answer a message, or act; what goes wrong is told in a line, and the page goes on."""
         self._turns, self._message = self._turns + 1, message
         if self._turns % TRIM_AFTER == 0:
-            give_memory_back()
+            release_memory()
         with warnings.catch_warnings(record=True) as warned:
             warnings.simplefilter("always")
             try:
@@ -164,12 +164,12 @@ class Session:
         with self._changed:
             while not self._closed:
                 if kind := self._first_pending():
-                    return self._pending.pop(kind), go_on
+                    return self._pending.pop(kind), never_cancel
                 act, left_s = left_to_do(), self._asked_s + REST_S - time.monotonic()
                 if act is not None and not self._alone and (left_s <= 0 or self._rendered is None):
                     return None, act
                 self._changed.wait(None if act is None or self._alone else left_s)
-        return None, go_on
+        return None, never_cancel
 
     def _first_pending(self) -> str | None:
         """Kind of the message that is answered next; none while it waits for the first render."""
@@ -183,7 +183,7 @@ class Session:
             left = self._closed or self._alone or (message and message.get("page", "") != self._page)
             if left or (pending and not message):
                 raise Overtaken
-            if message and pending and gives_way(message, self._pending[pending]):
+            if message and pending and is_superseded_by(message, self._pending[pending]):
                 if pending != message["kind"]:
                     self._pending.setdefault(message["kind"], message)
                 raise Overtaken
@@ -215,8 +215,8 @@ class Session:
     def _between_runs(self) -> None:
         """Answer what is asked between two runs of a render, which goes on once the sliders rest."""
         source = self._source
-        while self._source is source and (message := self._next(lambda: go_on)[0]):
-            self._turn(message, go_on)
+        while self._source is source and (message := self._next(lambda: never_cancel)[0]):
+            self._turn(message, never_cancel)
         if self._closed or self._source is not source:
             raise Overtaken
 
@@ -225,7 +225,7 @@ class Session:
         if kind == "scene":
             self._choose_scene(message["name"])
         if kind in ("hello", "scene"):
-            return hello(self._source, self._scenes, self._dropped), ()
+            return first_message(self._source, self._scenes, self._dropped), ()
         if kind == "sensor":
             header = take_sensor(message["files"], self._drops)
             self._dropped.append(header["sensor"])
@@ -248,7 +248,7 @@ class Session:
             self._begin_page(self._page)
             self._begin_source(source)
 
-    def _show(self, message: Header, cameras: Sequence[Controls], rendered: Rendered) -> Answer:
+    def _show(self, message: Header, cameras: Sequence[Controls], rendered: RenderState) -> Answer:
         """Pictures of each view that is asked for; slow processors are left for later."""
         views = read_views(message["views"], len(cameras))
         with self._changed:

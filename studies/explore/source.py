@@ -37,7 +37,7 @@ _SPP, _LEAST_BANDS = 64, 4
 
 
 @dataclass(frozen=True)
-class Rendered:
+class RenderState:
     """One state of the render: its transport, the Python that makes it, and whether a finer one follows."""
 
     transport: Transport
@@ -53,7 +53,7 @@ class Source:
     ----------
     title : str
     states : callable
-        Gives `Rendered` ones, coarse to fine; calls its argument between two runs, which ends the render by raising.
+        Gives `RenderState` ones, coarse to fine; calls its argument between two runs, which ends the render by raising.
     groups : mapping of str to bool
         Light groups, and whether one has colours of its own.
     notes : tuple of str
@@ -61,7 +61,7 @@ class Source:
     """
 
     title: str
-    states: Callable[[Callable[[], None]], Iterator[Rendered]]
+    states: Callable[[Callable[[], None]], Iterator[RenderState]]
     groups: Mapping[str, bool]
     notes: tuple[str, ...] = ()
 
@@ -105,7 +105,7 @@ class RenderOptions:
 
 def of_transport(transport: Transport) -> Source:
     """A transport that is there already."""
-    return Source("transport", lambda _: iter((Rendered(transport, GIVEN, True),)), _coloured(transport.groups))
+    return Source("transport", lambda _: iter((RenderState(transport, GIVEN, True),)), _coloured(transport.groups))
 
 
 def open_source(source: str, options: RenderOptions) -> Source:
@@ -125,7 +125,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
         code = f"transport = rodcone.load_transport({source!r})\n"
         return Source(
             Path(source).name,
-            lambda _: iter((Rendered(transport, code, True),)),
+            lambda _: iter((RenderState(transport, code, True),)),
             _coloured(transport.groups),
             notes=tuple(notes),
         )
@@ -136,7 +136,10 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if ready := _ready(source, opened.scene, size, bands, options):
         code = f"transport = rodcone.load_transport({source!r}, size={size!r})\n"
         return Source(
-            opened.scene.name, lambda _: iter((Rendered(ready.transport, code, True),)), coloured, notes=(ready.line,)
+            opened.scene.name,
+            lambda _: iter((RenderState(ready.transport, code, True),)),
+            coloured,
+            notes=(ready.line,),
         )
     extras = ", trust=True" * options.trust_scene + f", define={defined(options.define)!r}" * bool(options.define)
     file = Path(source).suffix.lower() == ".xml"
@@ -204,7 +207,7 @@ def _states(
     options: RenderOptions,
     code: str,
     between_runs: Callable[[], None],
-) -> Iterator[Rendered]:
+) -> Iterator[RenderState]:
     """Render a few pixels, then all of them, then with all samples."""
     full_spp = options.spp or _SPP
     steps = [(size, full_spp)]
@@ -225,7 +228,7 @@ def _states(
             progress=lambda *_: between_runs(),
         )
         call = f"transport = rodcone.render(scene, {film!r}, spp={spp}, seed={options.seed}, **bands)\n"
-        yield Rendered(renders[film], code + call, number == len(steps))
+        yield RenderState(renders[film], code + call, number == len(steps))
 
 
 def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:

@@ -21,7 +21,7 @@ from sensor.raw import RawImage
 from sensor.readings.resolve import PlainReading, at_channel, resolve
 from sensor.readout import collected_e, sources_of, unclipped_variance
 from sensor.response import electrons_per_irradiance
-from studies.explore.chain import Exposed, GroupFrame, Shot, expose_scene, photograph
+from studies.explore.chain import Exposure, GroupFrame, Shot, expose_scene, photograph
 from studies.explore.controls import controls_of
 from studies.explore.memo import Memo
 from studies.metrics.flip import flip
@@ -130,22 +130,22 @@ def explorer_view(transport: Transport, view: str = "picture", **controls: Any) 
     return pixel(exposed, int(place[1]), int(place[2])) if place else histogram(exposed.raw)
 
 
-def noise_scale_e(exposed: Exposed) -> float:
+def noise_scale_e(exposed: Exposure) -> float:
     """Standard deviation of the noise of one frame [e-], root mean square over the pixels."""
     return float(np.sqrt(_variance_e2(exposed).mean()))
 
 
-def _readings(exposed: Exposed) -> tuple[PlainReading, ...]:
+def _readings(exposed: Exposure) -> tuple[PlainReading, ...]:
     readings = resolve(exposed.sensor, exposed.expected_e, exposed.exposure_s)
     return readings if exposed.shot_noise else tuple(replace(x, poisson=0.0) for x in readings)
 
 
-def _variance_e2(exposed: Exposed) -> Image:
+def _variance_e2(exposed: Exposure) -> Image:
     """Variance of each pixel of one frame as if nothing clipped [e-^2]."""
     return unclipped_variance(exposed.expected_e, _readings(exposed))
 
 
-def _collected_e(exposed: Exposed) -> Image:
+def _collected_e(exposed: Exposure) -> Image:
     """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
     return collected_e(exposed.expected_e, _readings(exposed))
 
@@ -193,7 +193,7 @@ def histogram(raw: RawImage) -> dict[str, Any]:
     return {"edges_e": edges.tolist(), "counts": counts, "well_e": raw.full_well_e, "floor_e": raw.dark_noise_e}
 
 
-def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
+def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
     """Light budget and spectrum of one pixel in one frame.
 
     Returns
@@ -247,7 +247,7 @@ def pixel(exposed: Exposed, row: int, column: int) -> dict[str, Any]:
     }
 
 
-def noise_sources_e(exposed: Exposed, row: int, column: int) -> dict[str, float]:
+def noise_sources_e(exposed: Exposure, row: int, column: int) -> dict[str, float]:
     """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
     channel = str(channel_map(exposed.sensor.cfa, exposed.raw.shape)[row, column])
     sources = sources_of(float(_collected_e(exposed)[row, column]), at_channel(_readings(exposed), channel))

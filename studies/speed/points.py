@@ -42,7 +42,7 @@ class Times:
 
 
 @dataclass(frozen=True)
-class Measured:
+class Timing:
     """One choice.
 
     Attributes
@@ -97,7 +97,7 @@ def time_calls(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, 
 
 
 def stage_json(
-    name: str, question: str, reference: str, noise_e: float, points: Sequence[Measured], reference_times: Times
+    name: str, question: str, reference: str, noise_e: float, points: Sequence[Timing], reference_times: Times
 ) -> dict[str, Any]:
     """Return a stage of the chain as JSON holds it: its choices' times and errors with their ratios.
 
@@ -136,7 +136,7 @@ def stage_json(
 
 
 @dataclass(frozen=True)
-class Yardstick:
+class NoiseReference:
     """Two references behind one sensor, and the sensor's own noise.
 
     Attributes
@@ -166,30 +166,30 @@ def electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: floa
 
 def yardstick(
     references: tuple[SpectralRadiance, SpectralRadiance], lamps: NDArray[np.bool_], sensor: SensorConfig
-) -> Yardstick:
+) -> NoiseReference:
     """Fix exposure, noise and pixels by two references; `lamps` (h, w) are pixels that see a light directly."""
     images = [form_image(reference, sensor) for reference in references]
     exposure_s = float(np.mean([auto_exposure_s(image, sensor) for image in images]))
     first, second = (electrons(reference, sensor, exposure_s) for reference in references)
     expected = (first + second) / 2
     noise_e2 = np.stack([noise_variance(plane, sensor, exposure_s) for plane in expected])
-    return Yardstick(sensor, exposure_s, (first, second), noise_e2, (expected < sensor.pixel.full_well_e) & ~lamps)
+    return NoiseReference(sensor, exposure_s, (first, second), noise_e2, (expected < sensor.pixel.full_well_e) & ~lamps)
 
 
-def share_map(image_e: Image, yard: Yardstick) -> Image:
+def share_map(image_e: Image, yard: NoiseReference) -> Image:
     """Squared error over the sensor's noise variance, (channel, h, w): pooled over 3x3 pixels, NaN outside."""
     first, second = yard.references
     return pooled_share((image_e - first) * (image_e - second), yard)
 
 
-def pooled_share(squared_e2: Image, yard: Yardstick) -> Image:
+def pooled_share(squared_e2: Image, yard: NoiseReference) -> Image:
     """Pool each pixel's own share, over the pixels inside alone: no bright error counts against a dark pixel."""
     weight = pooled(yard.inside.astype(np.float64))
     total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
     return np.where(yard.inside, total / np.maximum(weight, 1 / 9), np.nan)
 
 
-def mean_error(image_e: Image, yard: Yardstick) -> tuple[float, float]:
+def mean_error(image_e: Image, yard: NoiseReference) -> tuple[float, float]:
     """Return the RMS error [e-] and the mean share, over pixels and channels; 0 where noise leaves less than that."""
     first, second = yard.references
     squared_e2 = float(((image_e - first) * (image_e - second))[yard.inside].mean())

@@ -27,7 +27,7 @@ from sensor.raw import RawImage
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.budget.bands import band_groups, wide_bands
-from studies.speed.points import Measured, Times, electrons, mean_error, stage_json, time_calls, yardstick
+from studies.speed.points import Times, Timing, electrons, mean_error, stage_json, time_calls, yardstick
 from studies.study.levels import parse_level
 
 MOST_BANDS = 40
@@ -125,7 +125,7 @@ def _samples(bench: Bench, scene: Scene, sensor: SensorConfig) -> Stage:
     points = []
     for choice, (transport, times) in results.items():
         image_e = electrons(transport.relight(luminance_cd_m2=bench.level_cd_m2), sensor, yard.exposure_s)
-        points.append(Measured(choice, times, *mean_error(image_e, yard)))
+        points.append(Timing(choice, times, *mean_error(image_e, yard)))
     question = f"How many samples a pixel? {bench.scene}, {bench.size}x{bench.size}, 8 bands"
     reference = f"two renders of {most} samples and other seeds, whose own noise falls out of the mean"
     noise_e = float(np.sqrt(yard.noise_e2[yard.inside].mean()))
@@ -194,7 +194,7 @@ def _stage(
     error_e: Callable[[T], float],
 ) -> Stage:
     """Measure each choice's error; the last choice's times are the reference's."""
-    points = [Measured(choice, times, error_e(result)) for choice, (result, times) in timings.items()]
+    points = [Timing(choice, times, error_e(result)) for choice, (result, times) in timings.items()]
     return stage_json(name, question, reference, noise_e, points, points[-1].times)
 
 

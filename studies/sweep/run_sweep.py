@@ -79,7 +79,7 @@ RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long 
 
 
 @dataclass(frozen=True)
-class Swept:
+class SweepResult:
     """What a sweep did.
 
     Attributes
@@ -109,7 +109,7 @@ def sweep(
     step: Step | None = None,
     *,
     clock: Clock | None = None,
-) -> Swept:
+) -> SweepResult:
     """Make the missing cells of a study and store each in the results database of a folder.
 
     After Ctrl-C, a kill or a full disk the next call goes on with the cells that are still missing. Cells that other
@@ -168,7 +168,7 @@ def sweep(
         notes.update(dict.fromkeys(_noise_notes(rows(base))))
         stages = clock.stages()
         note_stages(base, number, stages)
-    return Swept(out, count * len(scenes), count_made, sum(stages.values()), tuple(notes))
+    return SweepResult(out, count * len(scenes), count_made, sum(stages.values()), tuple(notes))
 
 
 def _noise_notes(cells: Sequence[Row]) -> list[str]:

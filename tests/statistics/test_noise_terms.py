@@ -23,7 +23,7 @@ from sensor.emva1288.photon_transfer import light_bench
 from sensor.photodiodes import binned
 from sensor.pixel import PixelConfig, Reading
 from sensor.raw import noise_at_sites
-from sensor.readings.noise import dark_electrons, whole_share
+from sensor.readings.noise import collected_share, dark_electrons
 from sensor.readings.resolve import chip_readings
 from sensor.readout import noise_sources, noise_variance, read_out
 from studies.photograph.snr import electrons_at_snr
@@ -94,7 +94,7 @@ def assert_variance(samples, stated, what):
 def check_stated_variance(kind, names):
     sensor = camera(kind, **terms_of(names))
     (raw,) = frame(sensor, LIGHT_E)
-    samples = raw.electrons / whole_share(chip_readings(sensor, TIME_S))
+    samples = raw.electrons / collected_share(chip_readings(sensor, TIME_S))
     by_source = noise_sources(LIGHT_E, sensor, TIME_S)
     stated = float(noise_variance(np.array([[LIGHT_E]]), sensor, TIME_S)[0, 0])
     assert_variance(samples, stated, (kind, names))

@@ -26,7 +26,7 @@ def test_each_patch_of_pixels_has_the_sampling_of_its_phase():
         numbers = np.vectorize(LETTERS.index)(channel_map(tile, (20, 20)))
         raw = white(tile, (20, 20))
         scale = mosaic.scale_of_pixels(raw, WHITE_E, raw.electrons.astype(np.float32), np.zeros(raw.shape, bool))
-        wide, _ = mosaic.continued(tile, numbers, numbers)
+        wide, _ = mosaic.pad_mosaic(tile, numbers, numbers)
         for i, j in np.ndindex(10, 10):
             patch = wide[2 * i : 2 * i + PATCH, 2 * j : 2 * j + PATCH]
             rows = np.array(scale.samplings[i % len(scale.samplings)][j % len(scale.samplings[0])].rows)

@@ -16,7 +16,7 @@ from sensor.cameras.library import MeasuredCamera
 from sensor.cameras.noise_files import dng_numbers
 from sensor.cameras.numbers import (
     PixelNumbers,
-    Sourced,
+    SourcedValue,
     bits_of,
     borrowed_curves,
     completed,
@@ -93,7 +93,7 @@ def test_an_anchor_that_cannot_be_is_refused():
 
 
 def test_without_a_source_a_preset_names_every_key_that_is_missing(tmp_path):
-    path = written(tmp_path, PixelNumbers("nothing", settings={"bits": Sourced(12, "sheet")}))
+    path = written(tmp_path, PixelNumbers("nothing", settings={"bits": SourcedValue(12, "sheet")}))
     refusal(read_sensor, path, match="pitch_um is missing")
     text = path.read_text("utf-8")
     for key in ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu"):

@@ -23,7 +23,7 @@ from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.random import poisson
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.readings.noise import covariances, seams, shares, whole_share
+from sensor.readings.noise import collected_share, covariances, seams, shares
 from sensor.readings.resolve import at_channel, chip_readings, resolve, unsaturated
 from sensor.readout import draw_frame, noise_sources, noise_variance, read_out
 from studies.photograph.camera import calibrate
@@ -36,7 +36,7 @@ EXACT = pytest.mark.parametrize("exact", [False, True], ids=["engine", "exact"])
 
 def levels_of(sensor):
     """Light over six decades, and each seam in steps of a third of its noise."""
-    at = seams(chip_readings(sensor, TIME_S)).above_e
+    at = seams(chip_readings(sensor, TIME_S)).handover_e
     fine = [
         e + step * np.sqrt(noise_variance(np.array([e]), sensor, TIME_S)[0])
         for e in at[:-1]
@@ -50,7 +50,7 @@ def levels_of(sensor):
 @pytest.mark.parametrize("name", HDR)
 def test_the_merge_has_the_mean_of_the_light_and_the_noise_of_the_closed_form(name, exact):
     sensor = preset(name)
-    whole = whole_share(chip_readings(sensor, TIME_S))
+    whole = collected_share(chip_readings(sensor, TIME_S))
     chips, rng = np.random.default_rng(11), np.random.default_rng(12)
     levels = levels_of(sensor)[:: 3 if exact else 1]
     for light in levels:
@@ -81,7 +81,7 @@ def test_a_raw_image_states_what_columns_gains_make_of_light_and_dark_current_to
     sensor = replace(sensor, pixel=replace(sensor.pixel, prnu=0.0, column_gain_spread=0.03, dark_current_e_per_s=1e4))
     light, device = np.full((8, 8), 1000.0), draw_device(sensor, (8, 8), np.random.default_rng(3))
     raw = expose(light, sensor, 0.1, device, np.random.default_rng(4))
-    whole = whole_share(chip_readings(sensor, 0.1)) if name in HDR else 1.0
+    whole = collected_share(chip_readings(sensor, 0.1)) if name in HDR else 1.0
     stated = noise_at_sites(raw, whole * light) / whole**2
     np.testing.assert_allclose(stated, noise_variance(light, sensor, 0.1), rtol=0.01)
 
@@ -93,7 +93,7 @@ def test_a_reading_that_dark_current_fills_is_left_out(name, share):
     sensor, shape = preset(name), (128, 128)
     well_e = min(reading.full_well_e / reading.share for reading in sensor.chip.readings)
     sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=share * well_e / 0.1, prnu=0.0))
-    device, whole = draw_device(sensor, shape, np.random.default_rng(3)), whole_share(chip_readings(sensor, 0.1))
+    device, whole = draw_device(sensor, shape, np.random.default_rng(3)), collected_share(chip_readings(sensor, 0.1))
     for light in (0.0, 0.01 * sensor.pixel.full_well_e, 0.2 * sensor.pixel.full_well_e):
         raw = expose(np.full(shape, light), sensor, 0.1, device, np.random.default_rng(4))
         stated = noise_at_sites(raw, np.full(shape, whole * light)).mean()
@@ -184,7 +184,7 @@ def test_a_burst_is_merged_as_frames_of_one_reading_are():
         frames = [expose(np.full(SHAPE, 3000.0), sensor, TIME_S, device, rng) for _ in range(4)]
         merged = merged_raw(frames)
         assert merged.electrons.mean() == pytest.approx(sum(frame.electrons.mean() for frame in frames), rel=1e-6)
-        assert merged.exposure_s == pytest.approx(4 * whole_share(chip_readings(sensor, TIME_S)) * TIME_S)
+        assert merged.exposure_s == pytest.approx(4 * collected_share(chip_readings(sensor, TIME_S)) * TIME_S)
         assert [step.from_e for step in merged.noise_steps] == [4 * step.from_e for step in frames[0].noise_steps]
         refusal(merged_raw, [frames[0], replace(frames[1], exposure_s=1.0)], match="each of several readings")
 
@@ -213,7 +213,7 @@ def test_a_chip_of_other_patterns_has_shares_of_dark_current_and_hot_pixels():
     hot = np.zeros(SHAPE, bool)
     hot[tuple(raw.defects.T)] = True
     np.testing.assert_array_equal(hot, device.hot)
-    assert raw.electrons[hot].mean() / whole_share(chip_readings(sensor, TIME_S)) == pytest.approx(1000.0, rel=0.01)
+    assert raw.electrons[hot].mean() / collected_share(chip_readings(sensor, TIME_S)) == pytest.approx(1000.0, rel=0.01)
     assert shares(chip_readings(sensor, TIME_S)).tolist() == [1.0, 0.0625]
 
 

@@ -16,8 +16,8 @@ from sensor.device import draw_device
 from sensor.exposure import exposure_of_electrons_s
 from sensor.pixel import Reading
 from sensor.presets import low_noise, preset, preset_file
-from sensor.readings.merge import noise_of_merged
-from sensor.readings.noise import best_weights, covariances, merged_variance, merged_variances, seams, whole_share
+from sensor.readings.merge import merged_noise_steps
+from sensor.readings.noise import best_weights, collected_share, covariances, merged_variance, merged_variances, seams
 from sensor.readings.resolve import chip_readings, resolve
 from sensor.readout import noise_sources, noise_variance, unclipped_variance
 from studies.photograph.snr import electrons_at_snr, snr
@@ -70,7 +70,7 @@ def test_two_charges_without_dark_noise_add_their_photons():
     # the converter's step of 61 e- is all dark noise there is: 310 e-^2 of each over its share
     for sensor, whole in ((split, 0.8), (apart, 1.25)):
         fine = replace(sensor, bits=16)
-        assert whole_share(chip_readings(fine, 0.01)) == pytest.approx(whole)
+        assert collected_share(chip_readings(fine, 0.01)) == pytest.approx(whole)
         assert merged_variance(light, chip_readings(fine, 0.01))[1] == pytest.approx(1e5 / whole, rel=1e-3)
 
 
@@ -87,7 +87,7 @@ def test_sources_sum_to_the_variance_and_frames_are_interpolated_within_a_thousa
 
 def test_at_a_seam_half_of_the_pixels_have_lost_the_reading():
     sensor = dual()
-    seam = float(seams(chip_readings(sensor, 0.01)).above_e[0])
+    seam = float(seams(chip_readings(sensor, 0.01)).handover_e[0])
     assert seam == pytest.approx(2000.0 - 6.0 * np.sqrt(2000.0 + 4.0), rel=1e-5)
     below, at, above = merged_variance(seam * np.array([0.8, 1.0, 1.2]), chip_readings(sensor, 0.01))
     assert at == pytest.approx(seam + (below - 0.8 * seam + above - 1.2 * seam) / 2, rel=1e-6)
@@ -121,8 +121,8 @@ def test_the_light_for_an_snr_gives_back_the_snr(ratio, readout):
 def test_noise_steps_of_a_frame_and_of_a_burst_are_as_near_to_the_closed_form_as_stated(name, count, most):
     sensor, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")
     readings = chip_readings(sensor, 0.02)
-    whole, at = whole_share(readings), seams(readings).above_e
-    for number, step in enumerate(noise_of_merged(readings)):
+    whole, at = collected_share(readings), seams(readings).handover_e
+    for number, step in enumerate(merged_noise_steps(readings)):
         light = np.linspace(1.05 * at[number - 1] if number else 0.0, 0.97 * at[number], 200)
         by_source = merged_variances(light, readings).items()
         found = whole**2 * sum(value * (count if source in fixed else 1) for source, value in by_source)

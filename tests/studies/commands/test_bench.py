@@ -15,7 +15,7 @@ from scenes.catalogue import load
 from sensor.presets import preset
 from studies.commands.bench import _print_stage
 from studies.pages.speed_page import LEAST_SHARE, bench_page
-from studies.speed.points import Measured, Times, front, stage_json, time_calls
+from studies.speed.points import Times, Timing, front, stage_json, time_calls
 from studies.speed.stages import STAGES, Bench, stages
 
 TINY = Bench(
@@ -23,11 +23,11 @@ TINY = Bench(
 )
 
 
-def point(seconds: float, error_e: float, name: str = "x") -> Measured:
-    return Measured(name, Times(seconds, seconds, 2 * seconds), error_e)
+def point(seconds: float, error_e: float, name: str = "x") -> Timing:
+    return Timing(name, Times(seconds, seconds, 2 * seconds), error_e)
 
 
-def stage(*points: Measured) -> dict[str, Any]:
+def stage(*points: Timing) -> dict[str, Any]:
     return stage_json("bands", "How many?", "the last", 10.0, points, points[-1].times)
 
 

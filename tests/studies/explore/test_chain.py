@@ -21,7 +21,7 @@ from sensor.optics import form_image
 from studies.explore.answers import python_of
 from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, controls_from, mosaics_of
-from studies.explore.memo import Memo, go_on
+from studies.explore.memo import Memo, never_cancel
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.source import GIVEN, RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
@@ -276,7 +276,7 @@ def test_the_python_of_figures_makes_their_numbers():
 @pytest.mark.thorough
 def test_the_python_of_a_source_makes_its_transport():
     source = open_source("still_life", RenderOptions(size=20, spp=20, band_nm=80.0))
-    states = list(source.states(go_on))
+    states = list(source.states(never_cancel))
     assert [state.last for state in states] == [False, True]
     for state in states:
         names = ran(python_of(state.code, Controls()))
@@ -289,7 +289,7 @@ def test_the_python_of_a_file_opens_it_with_what_it_names_anywhere(tmp_path: Pat
     path.write_text(ROOM, "utf-8")
     (tmp_path / "lamp.spd").write_text("300 1\n900 2\n", "utf-8")
     options = RenderOptions(size=16, spp=1, band_nm=100.0, trust_scene=True, define=("lamp=lamp",))
-    (state,) = open_source(str(path), options).states(go_on)
+    (state,) = open_source(str(path), options).states(never_cancel)
     names = ran(python_of(state.code, Controls()))
     lit, wanted = (each.relight().values for each in (names["transport"], state.transport))
     assert np.array_equal(lit, wanted)
@@ -308,6 +308,6 @@ def test_a_wrong_view_or_control_is_refused_in_one_line():
 
 
 def test_a_transports_python_says_that_it_was_given():
-    (state,) = of_transport(small_transport()).states(go_on)
+    (state,) = of_transport(small_transport()).states(never_cancel)
     assert state.code == GIVEN
     assert "transport = ..." in python_of(state.code, Controls())

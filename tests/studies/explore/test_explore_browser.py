@@ -20,7 +20,7 @@ import render.engine as ENGINE
 import studies.explore.messages as MESSAGES
 from sensor.presets import preset_file
 from studies.explore.controls import Controls
-from studies.explore.messages import hello
+from studies.explore.messages import first_message
 from studies.explore.source import RenderOptions, open_source
 
 pytestmark = CHROME.NEEDED
@@ -167,7 +167,7 @@ def answered(page, views, script):
     `level` is a slider, and an answer is ``{...answer, number}`` with its pictures.
     """
     EXPLORE.settle(page)
-    said = hello(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
+    said = first_message(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
     answer = {
         "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}], "views": views,
         "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],

@@ -21,10 +21,10 @@ from studies.explore import chain
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import expose_scene, photograph
 from studies.explore.controls import Controls, Lamp
-from studies.explore.memo import Memo, go_on
+from studies.explore.memo import Memo, never_cancel
 from studies.explore.session import Session
 from studies.explore.slow import stand_in
-from studies.explore.source import FIRST_SIDE, Rendered, RenderOptions, of_transport, open_source
+from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
 from studies.photograph.picture_file import to_png
 
 
@@ -147,15 +147,15 @@ def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_o
 def test_a_render_that_fails_is_told_and_asked_for_once(good_states):
     failed, once = 0, threading.Event()
 
-    class Failing(Iterator[Rendered]):
+    class Failing(Iterator[RenderState]):
         def __init__(self, _: Callable[[], None]) -> None:
             self.left = good_states
 
-        def __next__(self) -> Rendered:
+        def __next__(self) -> RenderState:
             nonlocal failed
             if self.left:
                 self.left -= 1
-                return Rendered(small_transport(), "", False)
+                return RenderState(small_transport(), "", False)
             failed += 1
             once.set()
             raise InputError("wall: it has no material") if failed == 1 else StopIteration
@@ -231,8 +231,8 @@ def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
 def endless():
     """A render whose second state never comes: it looks up between its runs for ever."""
 
-    def states(between_runs: Callable[[], None]) -> Iterator[Rendered]:
-        yield Rendered(small_transport(), "", False)
+    def states(between_runs: Callable[[], None]) -> Iterator[RenderState]:
+        yield RenderState(small_transport(), "", False)
         while True:
             between_runs()
 
@@ -256,7 +256,7 @@ def test_a_render_lets_pictures_go_first_and_ends_for_another_scene(endless):
 def test_a_render_that_answered_between_its_runs_has_the_bits_of_one_go():
     source = open_source("still_life_outdoor", RenderOptions(size=32, spp=64, band_nm=100.0))
 
-    def states(between_runs: Callable[[], None]) -> Iterator[Rendered]:
+    def states(between_runs: Callable[[], None]) -> Iterator[RenderState]:
         photographed.append(chain.photograph(small_transport(), Controls(seed=len(photographed))))
         return source.states(lambda: photographed.append(chain.photograph(small_transport(), Controls())))
 
@@ -316,10 +316,10 @@ def test_what_another_page_asked_is_not_answered_to_the_new_one():
     """Neither what waits for the first picture nor, at the next state of the render, what was shown."""
     go = [threading.Event(), threading.Event()]
 
-    def states(_: Callable[[], None]) -> Iterator[Rendered]:
+    def states(_: Callable[[], None]) -> Iterator[RenderState]:
         for number, event in enumerate(go):
             assert event.wait(30)
-            yield Rendered(small_transport(), "", number == 1)
+            yield RenderState(small_transport(), "", number == 1)
 
     old, new = Page(), Page()
     session = Session(replace(of_transport(small_transport()), states=states))
@@ -346,7 +346,7 @@ def test_an_isetcam_scene_is_judged_under_the_light_of_the_page(tmp_path):
 
 
 def test_a_scene_is_shown_small_first_and_then_whole():
-    states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states(go_on)
+    states = open_source("flat_field", RenderOptions(size=136, spp=2, band_nm=100.0)).states(never_cancel)
     first, last = next(states), next(states)
     assert (first.transport.coverage.mean.shape, first.last) == ((FIRST_SIDE, FIRST_SIDE), False)
     assert (last.transport.coverage.mean.shape, last.last) == ((136, 136), True)
@@ -359,7 +359,7 @@ def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     path = tmp_path / "seen.exr"
     public.write_exr(radiance, path)
     source = open_source(str(path), RenderOptions())
-    (state,) = source.states(go_on)
+    (state,) = source.states(never_cancel)
     assert source.groups == {next(iter(state.transport.groups)): True}
     assert photograph(state.transport, Controls()).picture.shape == (16, 20, 3)
     picture = ran(python_of(state.code, Controls()))["picture"]
@@ -371,7 +371,7 @@ def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path
     rng = np.random.default_rng(1)
     path.write_bytes(to_png(rng.integers(130, 170, (16, 20, 3), np.uint8)))
     source = open_source(str(path), RenderOptions())
-    (state,) = source.states(go_on)
+    (state,) = source.states(never_cancel)
     assert source.groups == {"light": False}
     shot, own = (photograph(state.transport, Controls(lamps=lamps)) for lamps in ({"light": Lamp("A")}, {}))
     assert np.array_equal(ran(python_of(state.code, Controls()))["picture"], own.picture)

@@ -15,7 +15,7 @@ from render.loader import Film
 from render.reference import SHIPPED, find_reference, ready_light
 from scenes.catalogue import load
 from studies.commands import cli, develop
-from studies.explore.memo import go_on
+from studies.explore.memo import never_cancel
 from studies.explore.source import RenderOptions, open_source
 from studies.photograph import shot
 from studies.photograph.ready_light import BANDS, find_ready
@@ -113,7 +113,7 @@ def test_render_takes_it_too_and_each_limit_of_a_render_asks_for_one(
 
 def test_the_explorer_takes_it_and_its_python_opens_the_same_light() -> None:
     source = open_source("color_checker", RenderOptions(size=128))
-    (state,) = source.states(go_on)
+    (state,) = source.states(never_cancel)
     assert state.last
     assert "--render renders it anew" in source.notes[0]
     names: dict[str, Any] = {}
@@ -121,7 +121,7 @@ def test_the_explorer_takes_it_and_its_python_opens_the_same_light() -> None:
     assert np.array_equal(names["transport"].radiance, state.transport.radiance)
     for options in ({"spp": 2}, {"seed": 1}, {"render": True}, {"band_nm": 100.0}):
         states = open_source("color_checker", RenderOptions(size=128, **options))
-        assert "rodcone.render(" in next(states.states(go_on)).code
+        assert "rodcone.render(" in next(states.states(never_cancel)).code
 
 
 def test_a_scenes_light_goes_by_its_name() -> None:

@@ -9,7 +9,7 @@ import pytest
 
 from render.radiance import SpectralRadiance
 from sensor.presets import low_noise
-from studies.speed.points import Yardstick, electrons, mean_error, share_map, yardstick
+from studies.speed.points import NoiseReference, electrons, mean_error, share_map, yardstick
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[3] / "benchmarks"))
 
@@ -21,12 +21,12 @@ NOISE_E2 = 100.0
 BOUND = 4.4  # standard errors; exceeded once in 100 000
 
 
-def flat(deviation_e: float, seed: int = 0) -> tuple[Yardstick, np.ndarray]:
+def flat(deviation_e: float, seed: int = 0) -> tuple[NoiseReference, np.ndarray]:
     """Return references with noise of a known deviation around 1000 e-, and the truth."""
     truth = np.full((CHANNELS, SIDE, SIDE), 1000.0)
     noise = np.random.default_rng(seed).normal(0.0, deviation_e, (2, *truth.shape))
     inside = np.ones(truth.shape, dtype=bool)
-    return Yardstick(
+    return NoiseReference(
         low_noise(), 0.01, (truth + noise[0], truth + noise[1]), np.full_like(truth, NOISE_E2), inside
     ), truth
 
