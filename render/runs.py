@@ -24,22 +24,22 @@ from render.scene import Scene
 from render.transport import Transport
 from rodcone.types import Floats, Planes
 
-MOST_FLOATS = 1 << 24  # of all channels of a launch, 64 MiB: as many threads as that allows
-PILOT = Span(0, 8, 2)  # of each half: 32 samples a pixel, in four sets
+MOST_FLOATS = 1 << 24  # floats in all channels of one launch (64 MiB); they limit how many threads a launch has
+PILOT = Span(0, 8, 2)  # points of each half: 32 samples per pixel, in four sets
 _PILOT_STREAM = 8
 BLOCK = 1 << 16  # pixels whose errors are summed in double precision at once
 
 
 @dataclass
 class Means:
-    """Means over the points so far, at unit spectral emission; the only mutable state of a render.
+    """Means over the points drawn so far, at unit spectral emission. They are the only mutable state of a render.
 
     Attributes
     ----------
     count : int
         Points of each half in a pixel of rate 1.
     rates : (h, w) uint32
-        How many times as many points a pixel gets as one of rate 1: powers of two.
+        How many times as many points each pixel gets as a pixel of rate 1; powers of two.
     light : Halves of (group, band, h, w)
     seen : list of Halves of (1 or band, h, w)
         Light that is seen directly, of each group: one plane where emission doesn't depend on wavelength.
@@ -62,7 +62,7 @@ class Means:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What one half of the paths of a loaded scene gives in some chunks.
+    """Sums that one half of the paths of a loaded scene gives in some chunks.
 
     Attributes
     ----------
@@ -81,7 +81,7 @@ class Drawn:
 
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
-    """Means before the first run; with `split` indirect light is kept by itself."""
+    """Return the means before the first run. With `split`, indirect light is also kept by itself."""
     bands, groups = film.wavelength_nm.size, scene.groups.values()
     return Means(
         count=0,
@@ -94,7 +94,7 @@ def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool
 
 
 def means_of(transport: Transport, *, split: bool = False) -> Means:
-    """Means that an earlier render stopped at, to go on from: the same bits."""
+    """Return the means at which an earlier render stopped, so that this one continues with the same bits."""
     denoised = transport.denoised if split else None
     return Means(
         count=int(transport.counts.min()) // 2,
@@ -108,7 +108,7 @@ def means_of(transport: Transport, *, split: bool = False) -> Means:
 
 
 def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
-    """Fields of a `Transport` that hold the means and their Monte Carlo error under lights (group, band)."""
+    """Return the fields of a `Transport` that hold the means and their Monte Carlo error under lights (group, band)."""
     errors = group_errors(means.light, means.seen, means.coverage.mean, means.rates)
     variance = np.stack([group.covariance(group, means.rates) for group in errors])
     shared = shared_paths(means.shared, errors, variance, means.rates) if means.shared else None
@@ -118,7 +118,7 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def scene_means_of(means: Means) -> SceneMeans:
-    """Means over the picture of light that isn't emitted straight at the camera, and the share of it without a lamp.
+    """Return the picture's mean light but for lamps that are seen directly, and the share of pixels without a lamp.
 
     Pixels are independent of each other.
     """
@@ -130,7 +130,7 @@ def scene_means_of(means: Means) -> SceneMeans:
         errors.append((light.difference - seen.difference).reshape(bands, -1))
     error = np.concatenate([*errors, -means.coverage.difference.reshape(1, -1)])
     covariance = np.zeros((len(error),) * 2)
-    with ThreadpoolController().limit(limits=1, user_api="blas"):  # its threads would wait for Dr.Jit's
+    with ThreadpoolController().limit(limits=1, user_api="blas"):  # because its threads would wait for Dr.Jit's
         for first in range(0, error.shape[1], BLOCK):
             part = error[:, first : first + BLOCK].astype(np.float64)
             covariance += part @ part.T
@@ -144,7 +144,7 @@ def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
     start, chunk, split = means.count, chunk_from(means.count), means.indirect is not None
-    # Chunks until their length changes (it grows along the sequence), as many as the threads of a launch hold
+    # A launch takes as many chunks as its threads hold, but only of one length (chunks grow along the sequence).
     threads = launch_threads(scenes, film, split=split)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
     equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
@@ -155,7 +155,7 @@ def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed
         means.shared = scenes[0].groups[0], scenes[0].groups[1]
     for index in range(chunks):
         weight = np.float32(chunk / (means.count + chunk))
-        # A camera path meets one lamp first, of one group: coverage is the sum over the groups' paths.
+        # Each camera path first meets one lamp at most, which belongs to one group, so coverage adds up over groups.
         covered = [np.asarray(sum(half.coverage[index] for half in halves)) for halves in zip(*draws, strict=True)]
         means.coverage.add(covered[0], covered[1], weight)
         for loaded, (even, odd) in zip(scenes, draws, strict=True):
@@ -168,7 +168,7 @@ def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed
 
 
 def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
-    """Rates of the pixels (h, w), from samples that are drawn for them alone.
+    """Choose the rates of the pixels (h, w) by samples that are drawn for this choice alone.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
 
 
 def launch_threads(scenes: list[LoadedScene], film: Film, *, split: bool = False) -> int:
-    """Threads of a launch, by the memory that their channels need."""
+    """Return how many threads a launch has, as their channels' memory allows."""
     return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in scenes)
 
 
@@ -216,7 +216,7 @@ def _drawn(
             np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
             for name, count in (("scattered", groups), ("indirect", groups * split))
         )
-        coverage = parts[0]["shares"]  # of all parts of the bands: they see the same paths
+        coverage = parts[0]["shares"]  # the parts of the bands see the same paths
         seen = [coverage[:, slot, None] for slot in range(groups)]
         if loaded.coloured:
             seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
@@ -227,13 +227,13 @@ def _drawn(
 
 
 def _grouped(channels: Planes, groups: int, film: Film) -> Planes:
-    """Bands of several groups one after the other as (chunk, group, band, h, w)."""
+    """Reshape bands of several groups, which lie one after the other, to (chunk, group, band, h, w)."""
     chunks, count = channels.shape[:2]
     return channels.reshape(chunks, groups, count // max(groups, 1), *film.size)
 
 
 def clear_traceback(error: BaseException) -> None:
-    """Free the refused scene, which the traceback holds: Dr.Jit compiles every live material into the next render."""
+    """Free the refused scene, which the traceback holds: else Dr.Jit compiles its materials into the next render."""
     cause: BaseException | None = error
     while cause:
         if cause.__traceback__ and cause.__traceback__.tb_next:

@@ -17,13 +17,13 @@ from rodcone.optional import optional_library
 from rodcone.types import Planes
 
 EXTRA = "denoise"
-SPECTRA = 6  # two calls of three planes
-LEAST_ALBEDO = 0.02  # darker surfaces are taken as this: their light over albedo would be noise alone
+SPECTRA = 6  # so that each call of the denoiser has three planes and two calls do
+LEAST_ALBEDO = 0.02  # of darker surfaces too, because their light divided by albedo would be noise alone
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
 MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
 ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values: squares of single-precision numbers
-_PLANES = 3  # of a call
+_PLANES = 3  # that the denoiser takes in one call
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class Denoised:
 
 
 def denoiser() -> Any:
-    """Library of the denoiser.
+    """Import the library of the denoiser.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def denoiser() -> Any:
 
 
 def first_surfaces(loaded: LoadedScene, film: Film, seed: int) -> tuple[Planes, Planes]:
-    """Albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light, means over the pixels.
+    """Return each pixel's mean albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light.
 
     Pass another seed than the light's paths have: with that one the two would share their noise.
     """
@@ -74,7 +74,7 @@ def first_surfaces(loaded: LoadedScene, film: Film, seed: int) -> tuple[Planes, 
 
 
 def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Planes) -> Planes:
-    """Indirect light of one light group without most of its noise, shape (band, h, w).
+    """Denoise the indirect light of one light group, (band, h, w).
 
     The result is m = x + s (D(x) - x) for noisy light x and a denoiser D, which smooths detail as well as noise. s in 0
     to 1 minimises the expected squared error of m: the variance of x follows from half the difference of the halves,
@@ -95,15 +95,16 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
     library = denoiser()
     if not indirect.any():
         return indirect
-    # Few spectra of light over albedo, with a mean of 1
+    # Reduce light over albedo, scaled to a mean of 1, to few spectra.
     unit = np.maximum(albedo, np.float32(LEAST_ALBEDO))
     unit *= np.float32((indirect / unit).mean(dtype=np.float64))
     hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
     reduced, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
-    # Denoise the whole and each half
-    guide = _channels_last(normal)  # the light is divided by albedo already; without any the library takes no normals
+    # Denoise the whole picture and each half of it.
+    # The library takes normals only beside an albedo. Light is divided by albedo already, so a constant one is given.
+    guide = _channels_last(normal)
     options = {"hdr": True, "albedo": np.full_like(guide, 0.5), "normal": guide, "clean_aux": True}
-    options["device"] = library.Device(library.DeviceType.CPU)  # the same light on every machine
+    options["device"] = library.Device(library.DeviceType.CPU)  # so that every machine gives the same light
 
     def filtered(planes: Planes) -> Planes:
         indices = np.minimum(np.arange(-(-len(planes) // _PLANES) * _PLANES), len(planes) - 1)
@@ -128,11 +129,12 @@ def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
     residuals : pair of (spectrum, h, w) float32
         Each half, denoised, less the other: its error, and the noise of the other.
     """
-    from scipy.ndimage import gaussian_filter  # late: a render that isn't denoised does without
+    from scipy.ndimage import gaussian_filter  # imported here, because a render without denoiser doesn't need it
 
     variance, even, odd = (gaussian_filter(np.square(x).mean(axis=0), MIXING_PIXELS) for x in (error, *residuals))
-    # A half has twice the variance of the mean, so E is that of a half, an upper bound. The window averages 4 pi s^2
-    # independent pixels, and a variance of that many draws has the relative error sqrt(2 / pixels): E counts beyond it.
+    # E is estimated for a half, which has twice the variance of the mean: an upper bound for the mean's. The window
+    # averages 4 pi s^2 independent pixels, so a variance has the relative error sqrt(2 / pixels); only what exceeds
+    # that error counts as E.
     of_half, pixels = 2 * variance, 4 * np.pi * MIXING_PIXELS**2
     squared = np.maximum((even + odd) / 2 - of_half - of_half * (2 / pixels) ** 0.5, 0)
     total = variance + squared
@@ -148,11 +150,11 @@ def _hats(bands: int) -> Planes:
 
 
 def _spectra_to_bands(bands: Planes, reduced: Planes) -> Planes:
-    """Least-squares map from the few spectra to the bands, by the picture itself: (band, spectrum) float32."""
+    """Fit the least-squares matrix (band, spectrum) that leads from the few spectra back to the picture's bands."""
     source, target = (planes.reshape(len(planes), -1).astype(np.float64) for planes in (reduced, bands))
     return np.asarray(target @ source.T @ np.linalg.pinv(source @ source.T, rcond=ROUNDING), np.float32)
 
 
 def _channels_last(planes: Planes) -> Planes:
-    """Planes with their axis last, as the denoiser takes them."""
+    """Move the planes' axis to the end, where the denoiser expects it."""
     return np.ascontiguousarray(np.moveaxis(planes, 0, -1), np.float32)

@@ -1,4 +1,4 @@
-"""Denoised light of a render, and two folds: renders of their own, to measure its error against."""
+"""Denoise a render, and draw two folds: independent renders of fewer samples, against which its error is measured."""
 
 import numpy as np
 
@@ -8,14 +8,14 @@ from render.loader import Film, LoadedScene
 from render.runs import Means, add_run, no_means
 from render.scene import Scene
 
-FOLD_SHARE = 0.25  # samples of each fold over the render's
-_FOLDS, _SURFACES = 0xF01D, 0x5F0A  # what a seed is for, beside the render's own
+FOLD_SHARE = 0.25  # each fold's samples over the render's
+_FOLDS, _SURFACES = 0xF01D, 0x5F0A  # streams of the seed that the render itself doesn't use
 
 
 def denoise_means(
     scene: Scene, loaded: list[LoadedScene], film: Film, means: Means, seed: int, earlier: Denoised | None
 ) -> Denoised:
-    """Denoise the means of a render and draw its folds, those of an earlier call continued.
+    """Denoise the means of a render and draw its folds; those of an earlier call are continued.
 
     Raises
     ------
@@ -23,7 +23,7 @@ def denoise_means(
         Where the denoiser isn't installed.
     """
     assert means.indirect is not None
-    # split, as the render's own light: no other kernel is compiled
+    # Folds are split too, so that they run the kernel that is compiled for the render.
     folds = no_means(scene, film, means.rates, split=True)
     if earlier is not None:
         folds.count, folds.light = earlier.fold_points, earlier.folds.copy()
@@ -34,7 +34,7 @@ def denoise_means(
     halves = zip(means.indirect.mean, means.indirect.difference, strict=True)
     smooth = np.stack([denoised(light, difference, albedo, normal) for light, difference in halves])
     return Denoised(
-        radiance=np.maximum(means.light.mean - means.indirect.mean, 0) + smooth,  # the difference rounds
+        radiance=np.maximum(means.light.mean - means.indirect.mean, 0) + smooth,  # rounding may go under 0
         indirect=means.indirect,
         folds=folds.light,
         fold_points=folds.count,

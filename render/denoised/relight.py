@@ -1,4 +1,4 @@
-"""Denoised light under given lights, and what its error is measured by."""
+"""Light a denoised transport, and measure the error of the picture."""
 
 from dataclasses import dataclass, replace
 from typing import Any
@@ -23,11 +23,11 @@ def relight_denoised(
     illuminance_lux: float | None = None,
     lux: float | None = None,
 ) -> tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance]:
-    """Denoised light under given lights (as `Transport.relight`), and its two folds under the same.
+    """Return the denoised picture under given lights (as `Transport.relight`), and its two folds under the same lights.
 
     The folds are independent of the picture and of each other, and without bias: the mean over the frame of
     (picture - one)(picture - other) in any linear measure estimates the picture's whole squared error there, bias and
-    noise, by `render.denoised.relight`. Nothing is known of single pixels. The picture's `relative_mc_error` is
+    noise (`measured_error`). Of single pixels nothing is known. The picture's `relative_mc_error` is
     the root of that limit for its luminance, over its mean.
 
     Raises
@@ -49,14 +49,14 @@ def relight_denoised(
     return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), first, second
 
 
-BLOCK = 16  # pixels on a side: errors of a denoiser are alike in neighbours
-LEAST_BLOCKS = 4  # along the shorter side, smaller where they must be
+BLOCK = 16  # pixels on a side of a block; within one, errors of a denoiser are alike
+LEAST_BLOCKS = 4  # along the shorter side; in a small picture blocks are smaller
 LEVEL = 0.95
 
 
 @dataclass(frozen=True)
 class MeasuredError:
-    """Mean squared error over a frame, its standard error, and the limit that it lies under with `LEVEL`, 0 or more."""
+    """Mean squared error over a frame, its standard error, and its upper limit at confidence `LEVEL`, at least 0."""
 
     mean: float
     standard_error: float
@@ -66,7 +66,7 @@ class MeasuredError:
 def measured_error(
     one: NDArray[np.floating], other: NDArray[np.floating], weight: NDArray[np.floating]
 ) -> MeasuredError:
-    """Weighted mean square of a picture's error over the frame, bias and noise together.
+    """Estimate the weighted mean square of a picture's error over the frame; it holds bias and noise.
 
     The mean product of its differences from two pictures is the mean of its squared error, whatever the noise of the
     two: that is independent of the picture's and of each other's, and has no mean. Its standard error is that of blocks
@@ -91,13 +91,13 @@ def measured_error(
     mean = float(sums.sum() / planes.size)
     if sums.size == 1:
         return MeasuredError(mean, np.inf, np.inf)
-    # Blocks at the edge are smaller: deviations from the mean of as many pixels.
+    # Blocks at the edge have fewer pixels, so each is compared with the mean of as many.
     spread = float(np.square(sums - mean * pixels).sum())
     error = (spread * sums.size / (sums.size - 1)) ** 0.5 / planes.size
     return MeasuredError(mean, error, max(0.0, mean + float(scipy.special.stdtrit(sums.size - 1, LEVEL)) * error))
 
 
 def sums_over_blocks(planes: Floats, side: int) -> Floats:
-    """Sums over blocks of so many pixels on a side; what is left at the ends is a block of its own."""
+    """Sum over blocks of so many pixels on a side; pixels that are left over at the ends form smaller blocks."""
     rows, columns = (np.arange(0, length, side) for length in planes.shape)
     return np.asarray(np.add.reduceat(np.add.reduceat(planes, rows, axis=0), columns, axis=1))

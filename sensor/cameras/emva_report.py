@@ -101,9 +101,8 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
     # pixel
     if "pixel_pitch_um" in figures:
         pixel["pitch_um"] = SourcedValue(figures["pixel_pitch_um"], f"pixel pitch; {source_note}")
-    pixel["fill_factor"] = SourcedValue(
-        1.0, "an EMVA quantum efficiency is the whole pixel's and includes the fill factor"
-    )
+    included = "an EMVA quantum efficiency is the whole pixel's, its fill factor included"
+    pixel["fill_factor"] = SourcedValue(1.0, included)
     if "K" in figures and report.bits is not None and report.black_level_dn is not None:
         top_dn = 2**report.bits - 1 - report.black_level_dn
         pixel["full_well_e"] = SourcedValue(

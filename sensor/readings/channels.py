@@ -1,4 +1,4 @@
-"""One raw image of channels that are read apart, all in the electrons of the whole light and time."""
+"""Join channels that are read apart into one raw image, in electrons of the whole light and time."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -15,7 +15,7 @@ from sensor.readings.resolve import PlainReading
 
 
 def join(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage:
-    """Join frames of which each counts at its reading's sites; the first is on the converter's own scale.
+    """Join frames, each at the sites that its reading reads; the first frame is on the converter's own scale.
 
     The samples are floats on the scale of the first frame: whole numbers but for channels that are read apart.
     """

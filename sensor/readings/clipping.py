@@ -25,15 +25,15 @@ from sensor.cfa import mask
 from sensor.noise_law import total
 from sensor.readings.resolve import PlainReading
 
-FAR = 7.0  # standard deviations from a bound, beyond which a sample is never clipped
-LOW = 4.9  # the same of black: five deviations, which a black level has by default, clip nothing
+FAR = 7.0  # standard deviations; a sample farther from a bound never clips there
+LOW = 4.9  # the same for black: the default black level is five deviations high and clips nothing
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources before the well clips
+_COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources that the well clips
 
 
 @dataclass(frozen=True)
 class Moments:
-    """Moments of clipped samples, arrays of one shape.
+    """Mean and variance of clipped samples; arrays of one shape.
 
     Attributes
     ----------
@@ -51,7 +51,7 @@ class Moments:
 
 
 def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floats, Floats, Floats]:
-    """Mean and mean square, both less `mean`, of min(n, most) for a Gaussian n, and the share that isn't clipped."""
+    """Return E[min(n, most)] - mean, E[(min(n, most) - mean)^2] and the share P(n < most), for a Gaussian n."""
     sigma = np.sqrt(variance)
     z = np.clip((most - mean) / np.maximum(sigma, 1e-300), -1e8, 1e8)
     below, density = ndtr(z), np.exp(-np.square(np.clip(z, -40, 40)) / 2) / np.sqrt(2 * np.pi)
@@ -61,7 +61,7 @@ def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floa
 
 
 def clipped(light_e: Floats, reading: PlainReading) -> Moments:
-    """Moments of one reading's samples, in the raw image's electrons; `light_e` are their expected photo-electrons."""
+    """Return the moments of one reading's samples of `light_e` expected photo-electrons [the raw image's electrons]."""
     shape, light = np.shape(light_e), np.ravel(np.asarray(light_e, dtype=np.float64))
     sensor, share = reading.sensor, reading.share
     law = reading.law
@@ -70,7 +70,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     mean, variance, slope = light + hot_e, law.variance(light), np.ones_like(light)
     well_e, top_e = sensor.pixel.full_well_e / share - dark_e, reading.headroom_e
 
-    # Beside the well, and the converter's top
+    # Clip at the well and at the converter's top.
     near = mean + FAR * np.sqrt(variance) > top_e
     if near.any():
         counted = total(reading.sources[name] for name in _COUNTED).variance(light[near])
@@ -79,7 +79,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
         mean[near] += first
         variance[near], slope[near] = second - first**2, open_
 
-    # Under black: counted electrons never are, the noise of reading takes samples there; rounding clips nothing
+    # Clip at black: only the noise of reading takes samples there, for counted electrons aren't negative.
     bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - dark_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
     after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))
@@ -112,7 +112,7 @@ def _over_reading(
 
 
 def clipped_frame(mean_e: Floats, readings: Sequence[PlainReading]) -> Moments:
-    """Moments of a frame of which each reading has the sites that it reads; of a reading of every pixel, all."""
+    """Return the moments of a frame, in which each reading stands at the sites that it reads."""
     if readings[0].sites is None:
         return clipped(mean_e, readings[0])
     parts = np.empty((3, *mean_e.shape))

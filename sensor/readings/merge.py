@@ -1,4 +1,4 @@
-"""One linear raw image out of several readings of every pixel (docs/decisions/0047-several-readings.md)."""
+"""Merge several readings of every pixel into one linear raw image (docs/decisions/0047-several-readings.md)."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -14,11 +14,11 @@ from sensor.raw import RawImage
 from sensor.readings.noise import best_weights, collected_share, covariances, seams, shares
 from sensor.readings.resolve import PlainReading
 
-# Linear words of 24 bits, as chips that merge give them; single precision holds them all. Black and white are whole
-# numbers of 16 bits too, in which a negative states them.
+# The merged image has linear words of 24 bits, as chips that merge write them; single precision holds each exactly.
+# This white is also a whole number of 16 bits, because a digital negative states black and white in 16 bits.
 MERGED_WHITE_DN = 256 * 65_535
-_ROUNDS = 6  # of the weights, as of `sensor.burst`
-_LEVELS = 512  # of light, between which weights are interpolated
+_ROUNDS = 6  # in which the weights are refined, as in `sensor.burst`
+_LEVELS = 512  # of light at which weights are computed; between them they are interpolated
 
 
 def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage:
@@ -64,7 +64,7 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
 
 
 def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> Floats:
-    """Electrons of the whole pixel from each reading's estimate of them.
+    """Combine each reading's estimate of the whole pixel's electrons.
 
     Weights and the choice of readings follow the merged light, never one reading's own noisy value: the best linear
     estimate is uncorrelated with what the readings differ by, so that what is decided from it favours none of them.
@@ -93,7 +93,7 @@ def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> F
 
 
 def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
-    """Mean under the weights (level, reading) that belong to the mean itself, in a few rounds from the dark on."""
+    """Return the weighted mean, found in a few rounds, by the weights (level, reading) at its own level."""
     light = np.asarray(weights[0] @ estimates_e)
     if np.ptp(weights, axis=0).max() < 1e-9:
         return light
@@ -109,7 +109,7 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
 
 
 def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
-    """Noise of merged electrons from the dark on, and from each seam on.
+    """List the noise of merged electrons from the dark on, and from each seam on.
 
     Each step states dark noise at its lower end and shot noise and PRNU at its upper end, where each dominates.
     """
@@ -119,7 +119,7 @@ def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
     of_columns_e2 = (pixel.column_gain_spread * pixel.dark_current_e_per_s * exposure_s) ** 2
     starts_e = np.maximum([0.0, *at.handover_e[:-1]], 0.0)
     ends_e = np.maximum(at.handover_e, 1.0)
-    first = min(int(np.sum(at.handover_e <= 0.0)), len(ends_e) - 1)  # those before it are full of dark current
+    first = min(int(np.sum(at.handover_e <= 0.0)), len(ends_e) - 1)  # dark current alone fills those before it
     steps = []
     for number, (start_e, end_e) in list(enumerate(zip(starts_e, ends_e, strict=True)))[first:]:
         dark, bright = (_variances_at(level_e, readings, at.order[number:]) for level_e in (start_e, end_e))
@@ -132,11 +132,11 @@ def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
                 prnu=hypot(sqrt(bright["PRNU"]) / float(end_e), pixel.column_gain_spread),
             )
         )
-    return [*steps[:1], *steps] if first else steps  # what a raw image says of the dark supposes all charges
+    return [*steps[:1], *steps] if first else steps  # a raw image states the dark noise of all charges
 
 
 def _variances_at(expected_e: float, readings: Sequence[PlainReading], kept: NDArray[np.intp]) -> dict[str, float]:
-    """Variance of the best estimate from the readings `kept`, by source."""
+    """Return the variance of the best estimate from the readings `kept`, for each source of noise."""
     by_source = covariances(np.array([expected_e]), readings)
     weights = best_weights(np.asarray(sum(by_source.values())), kept)[0]
     return {name: float(weights @ covariance[0] @ weights) for name, covariance in by_source.items()}

@@ -1,8 +1,9 @@
 """Joint noise of several readings of one exposure, the best weights under it, and the merge's noise in closed form.
 
 A reading i holds the share s_i of the electrons E that the whole pixel would hold in the whole exposure, and estimates
-E by x_i / s_i. The covariance of these estimates says all: shot noise is common to readings of one charge, PRNU to
-those of one photodiode, a column's amplifier to all, read noise to none. The best linear estimate of E weighs them by
+E by x_i / s_i. The covariance C of these estimates holds all that is needed: readings of one charge share its shot
+noise, those of one photodiode its PRNU, all of them the column's amplifier; read noise is each reading's own. The best
+linear estimate of E weighs them by
 
     w = C^-1 1 / (1^T C^-1 1),    of variance w^T C w.
 """
@@ -20,12 +21,12 @@ from sensor.readings.resolve import PlainReading
 # A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
 # its well: its own noise then clips once in 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-_LEVELS = 8192  # between which the variance of larger frames is interpolated: 0.3 % of light apart
+_LEVELS = 8192  # of light, 0.3 % apart; a large frame's variance is interpolated between them
 
 
 @dataclass(frozen=True)
 class Seams:
-    """Readings in the order in which they fill, and the light from which each is left out.
+    """Readings in the order in which they fill, and the light at which the merge hands over from each to the next.
 
     Attributes
     ----------
@@ -40,12 +41,12 @@ class Seams:
 
 
 def shares(readings: Sequence[PlainReading]) -> Floats:
-    """Share of the whole pixel's electrons of the whole exposure in each reading."""
+    """Return the share of the whole pixel's electrons of the whole exposure that each reading holds."""
     return np.array([x.share for x in readings])
 
 
 def collected_share(readings: Sequence[PlainReading]) -> float:
-    """What all charges hold together, over the whole pixel's electrons: the unit of the merged electrons."""
+    """Return the electrons of all charges over those of the whole pixel; merged electrons are in units of it."""
     return float(sum({x.charge: x.share for x in readings}.values()))
 
 
@@ -57,7 +58,7 @@ def dark_electrons(readings: Sequence[PlainReading]) -> float:
 
 
 def covariances(expected_e: Floats, readings: Sequence[PlainReading]) -> dict[str, Floats]:
-    """Covariance of the readings' estimates of the whole pixel's electrons, by source of noise; without clipping.
+    """Return the covariance of the readings' estimates for each source of noise, without clipping.
 
     Parameters
     ----------
@@ -99,7 +100,7 @@ def covariances(expected_e: Floats, readings: Sequence[PlainReading]) -> dict[st
 
 
 def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
-    """Weights of the best linear estimate from the readings `kept`, 0 for the others; shape (n, reading)."""
+    """Return the weights of the best linear estimate from the readings `kept`, 0 for the others, (n, reading)."""
     weights = np.zeros(covariance.shape[:2])
     part = np.linalg.solve(covariance[:, kept[:, None], kept[None, :]], np.ones((len(covariance), kept.size, 1)))[
         ..., 0
@@ -109,18 +110,18 @@ def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
 
 
 def seams(readings: Sequence[PlainReading]) -> Seams:
-    """Where the merge leaves readings out: 6 standard deviations under the well, but not under half of it."""
+    """Find the light from which each reading is left out: 6 deviations under its well, half of it at least."""
     full_e = np.array([x.sensor.pixel.full_well_e for x in readings]) / shares(readings)
     total = sum(covariances(full_e, readings).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
     clear_e = np.maximum(full_e - CLEAR_SIGMAS * spread_e, full_e / 2)
-    handover_e = clear_e - dark_electrons(readings)  # under 0 where dark current alone fills the reading
+    handover_e = clear_e - dark_electrons(readings)  # negative where dark current alone fills the reading
     order = np.argsort(handover_e, kind="stable")
     return Seams(order, handover_e[order])
 
 
 def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Mapping[str, Floats]:
-    """Variance of the merge by source, over chips and exposures [e-^2 of the whole pixel], shape of `expected_e`.
+    """Return the merge's variance over chips and exposures for each source [e-^2 of the whole pixel].
 
     Around a seam some pixels keep the reading that fills and some leave it out, by their merged light; that is not
     correlated with what the readings differ by, so that the variances add by the shares of the pixels.
@@ -130,7 +131,7 @@ def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Ma
     total = np.asarray(sum(by_source.values()))
     at = seams(readings)
     merged_e2 = dict.fromkeys(by_source, np.zeros_like(light))
-    pixel_share = np.ones_like(light)  # of pixels whose merged light is over the seams so far
+    pixel_share = np.ones_like(light)  # share of pixels whose merged light is over the seams so far
     for number, handover_e in enumerate(at.handover_e):
         weights = best_weights(total, at.order[number:])
         noise_e = np.sqrt(np.einsum("ni,nij,nj->n", weights, total, weights))
@@ -144,7 +145,7 @@ def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Ma
 
 
 def merged_variance(expected_e: Floats, readings: Sequence[PlainReading]) -> Floats:
-    """Sum of `merged_variances`; for frames of many pixels interpolated between levels of light."""
+    """Return the sum of `merged_variances`; of a large frame it is interpolated between levels of light."""
     light = np.asarray(expected_e, dtype=np.float64)
     if light.size <= _LEVELS:
         return np.asarray(sum(merged_variances(light, readings).values()))

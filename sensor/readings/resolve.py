@@ -1,4 +1,4 @@
-"""A camera resolved for one exposure: the plain readings that its raw image is made of.
+"""Resolve a camera for one exposure into the plain readings of which its raw image is made.
 
 A plain reading is a camera that reads every pixel once, and what its samples stand for. A camera without several
 readings is a tuple of one, and so is one that bins. Of a pixel that is read at several gains, times or photodiodes each
@@ -26,7 +26,7 @@ from sensor.noise_law import NoiseLaw, total
 from sensor.pixel import ChannelReading, Chip, PixelConfig
 
 Values: TypeAlias = NDArray[Any]
-_STEPS = 16.0  # of a metered time to an octave: frames of one scene take the same one
+_STEPS = 16.0  # steps per octave of a metered time, so that frames of one scene take the same time
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class PlainReading:
 
     @property
     def charge(self) -> tuple[str, float, str | None]:
-        """What readings of the same charge, so of one shot noise, have in common."""
+        """Name of the charge: readings of one charge share its shot noise."""
         return self.photodiode, self.time_share, self.sites
 
     @property
@@ -84,7 +84,7 @@ class PlainReading:
 
     @property
     def full_well_e(self) -> float:
-        """Electrons that reach its converter's top, dark current's among them, in the raw image's electrons."""
+        """Electrons, dark current's among them, that reach the converter's top, in the raw image's electrons."""
         return self.sensor.top_e / self.share
 
     @property
@@ -105,7 +105,7 @@ class PlainReading:
 
 
 def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0) -> dict[str, NoiseLaw]:
-    """Law of each source of noise of a pixel that is read once; of a chip drawn at random, without clipping.
+    """Return the law of each noise source of a pixel that is read once, for a chip drawn at random, without clipping.
 
     Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
     and column offsets, read noise, what comes after the amplifier, and quantisation (a DN^2 / 12).
@@ -121,7 +121,7 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
         ),
         "PRNU": NoiseLaw(prnu=pixel.prnu),
     }
-    # A product of independent factors: E[gain^2] E[collected^2] - E[collected]^2, collected of mean e + m.
+    # Gain and collected electrons (mean e + m) are independent: variance E[gain^2] E[collected^2] - E[collected]^2.
     of_all, mean_dark_e, spread = total(collected.values()), dark_e + hot_share * hot_e, pixel.column_gain_spread
     column_gains = NoiseLaw(
         shot=spread**2 * (of_all.shot + 2 * mean_dark_e),
@@ -140,7 +140,7 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
 
 
 def chip_readings(sensor: SensorConfig, exposure_s: float) -> tuple[PlainReading, ...]:
-    """Every reading that the chip can take: each gain of one that switches, metered channels in their longest time."""
+    """List every reading that the chip can take: each gain, and metered channels at their longest time."""
     chip, pixel = sensor.chip, sensor.pixel
     if chip.readings:
         return tuple(
@@ -188,7 +188,7 @@ def chip_readings(sensor: SensorConfig, exposure_s: float) -> tuple[PlainReading
 def resolve(
     sensor: SensorConfig, expected_e: Values, exposure_s: float, channel: str | None = None
 ) -> tuple[PlainReading, ...]:
-    """Readings that a camera takes of a frame: the gain that it switches to, and the times that metered channels take.
+    """Return the readings that a camera takes of a frame, at the gain that it chooses and the times that it meters.
 
     Parameters
     ----------
@@ -215,7 +215,7 @@ def resolve(
 
 
 def _switched(readings: Sequence[PlainReading], expected_e: Values) -> int:
-    """Number of the reading that a camera which switches its gain takes: the quietest that holds the bright end."""
+    """Choose the reading of a camera that switches its gain: the number of the quietest that holds the bright end."""
     dark_e = readings[0].pixel.dark_current_e_per_s * readings[0].exposure_s
     bright_e = float(np.percentile(expected_e, METERED_PERCENTILE)) + dark_e
     wells_e = [x.sensor.pixel.full_well_e for x in readings]
@@ -227,7 +227,7 @@ def _switched(readings: Sequence[PlainReading], expected_e: Values) -> int:
 def _timed(
     reading: ChannelReading, sensor: SensorConfig, expected_e: Values, exposure_s: float, channel: str | None
 ) -> ChannelReading:
-    """Reading with the share of the time that puts its channel's bright end where an exposure puts it."""
+    """Return the reading with the time that puts its channel's bright end where the exposure rule puts it."""
     if not reading.metered or channel not in (None, reading.channel):
         return reading
     seen_e = expected_e[mask(sensor.cfa, reading.channel, expected_e.shape)] if channel is None else expected_e
@@ -239,7 +239,7 @@ def _timed(
 
 
 def at_channel(readings: Sequence[PlainReading], channel: str | None) -> tuple[PlainReading, ...]:
-    """Those of a frame's readings that read a channel's sites, as if they read every pixel.
+    """Return the readings that read a channel's sites, as if each read every pixel.
 
     Raises
     ------
@@ -268,7 +268,7 @@ def several(readings: Sequence[PlainReading]) -> bool:
 def by_site(
     values: Sequence[float], readings: Sequence[PlainReading], shape: tuple[int, ...]
 ) -> float | NDArray[np.float64]:
-    """One value of each reading at the sites that it reads, (h, w); a number where one reads every pixel."""
+    """Place one value of each reading at the sites that it reads, (h, w); a number where one reads every pixel."""
     if readings[0].sites is None:
         return values[0]
     result = np.empty(shape)
@@ -278,19 +278,19 @@ def by_site(
 
 
 def law_by_site(readings: Sequence[PlainReading], shape: tuple[int, ...]) -> NoiseLaw:
-    """Law of the samples of a frame whose pixels are read once: of numbers, or of arrays (h, w)."""
+    """Return the law of the samples of a frame whose pixels are read once; its terms are numbers or arrays (h, w)."""
     laws = [x.law for x in readings]
     names = [field.name for field in fields(NoiseLaw)]
     return NoiseLaw(**{name: by_site([getattr(law, name) for law in laws], readings, shape) for name in names})
 
 
 def behind_densities(expected_e: Values, readings: Sequence[PlainReading]) -> Values:
-    """Electrons of the whole time behind each site's density: they move between pixels as they come."""
+    """Attenuate the electrons of the whole time by each site's density, before crosstalk moves them between pixels."""
     return np.asarray(expected_e * by_site([x.light_share for x in readings], readings, expected_e.shape))
 
 
 def light_of(expected_e: Values, readings: Sequence[PlainReading]) -> tuple[Values, ...]:
-    """Expected photo-electrons of every pixel for each reading, in its own electrons."""
+    """Return the expected photo-electrons of every pixel for each reading, in that reading's own electrons."""
     if readings[0].sites is None:
         return tuple(expected_e if x.share == 1 else expected_e * x.share for x in readings)
     lit_e = behind_densities(expected_e, readings)
@@ -298,7 +298,7 @@ def light_of(expected_e: Values, readings: Sequence[PlainReading]) -> tuple[Valu
 
 
 def unsaturated(expected_e: Values, readings: Sequence[PlainReading]) -> NDArray[np.bool_]:
-    """Which pixels of a frame light and dark current do not fill."""
+    """Find the pixels of a frame that light and dark current together don't fill, (h, w)."""
     if readings[0].sites is None:
         return np.asarray(expected_e < max(x.headroom_e for x in readings))
     return np.asarray(expected_e < by_site([x.headroom_e for x in readings], readings, expected_e.shape))

@@ -75,7 +75,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
 
 def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
-    """Average radiance over wide bands: what bands would hold that follow light and scene within themselves."""
+    """Average radiance over wide bands, as bands would hold it that follow light and scene within themselves."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
     return SpectralRadiance(

@@ -1,4 +1,4 @@
-"""What a model costs: stated nanoseconds of one core per pixel, so that a plan is the same on every machine.
+"""Cost of a model in stated nanoseconds of one core per pixel, so that a plan is the same on every machine.
 
 Only their ratios count. `still_life` at 256x256 takes 1690, 2370 and 4410 ns per pixel and sample in 8, 16 and 40
 bands: 85 ns per band, and as much as 12 bands to trace a path.
@@ -19,23 +19,23 @@ EXACT_NS = 40.0
 
 
 def render_ns(bands: int, spp: int) -> float:
-    """Time that a render takes [ns per pixel]."""
+    """Return the time that a render takes [ns per pixel]."""
     return (-(-bands // BANDS_AT_ONCE) * BANDS_AT_ONCE + TRACING_BANDS) * spp * SAMPLE_BAND_NS
 
 
 def image_ns(bands: int, modelled: Iterable[str]) -> float:
-    """Time that the modelled effects of lens and readout take [ns per pixel]."""
+    """Return the time that the modelled effects of lens and readout take [ns per pixel]."""
     return sum(EXACT_NS if name == KERNEL else LENS_BAND_NS[name] * bands for name in modelled)
 
 
 def cost_over_reference(plan: Plan, reference: Plan, scene: SceneChoice) -> float:
-    """Estimated time of a scene's render and of all its images, over the time of the reference's."""
+    """Return the estimated time of a scene's render and images over that of the reference's."""
     planned_ns, reference_ns = (_scene_ns(model, plan, scene) for model in (plan, reference))
     return planned_ns / reference_ns
 
 
 def _scene_ns(model: Plan, plan: Plan, scene: SceneChoice) -> float:
-    """Time of a model's render and of the image for each row of the plan's ledger [ns per pixel]."""
+    """Return the time of a model's render and of the image for each row of the plan's ledger [ns per pixel]."""
     render = model.renders[scene]
     bands = len(render.width_nm)
     images_ns = []

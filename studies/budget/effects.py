@@ -25,7 +25,7 @@ Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e-
 DIFFRACTION = "diffraction"
 IMAGING_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
 KERNEL = "kernel"  # the fast readout in place of the exact one
-SHAKE = "camera shake"  # it alone depends on the exposure time
+SHAKE = "camera shake"  # the only one that depends on the exposure time
 LENS_TERMS = IMAGING_TERMS | {SHAKE: "shake_um"}
 DRAWS = 2  # of Monte Carlo noise
 PATHS = 8  # of a shaking camera
@@ -119,7 +119,7 @@ def find_effects(
 def shake_effect(
     transport: Transport, sensor: SensorConfig, lens: LensConfig, exposure_s: float, rng: np.random.Generator
 ) -> Pair:
-    """What a still camera changes, as `Effects.lens`: of the path that costs most of `PATHS`."""
+    """Return what a still camera changes, as `Effects.lens`, for the path among `PATHS` that costs most."""
     halves, held = transport.relight_halves(luminance_cd_m2=1.0), replace(sensor, lens=lens)
     still = [channel_electrons(form_image(half, held), held, 1.0) for half in halves]
     effects = []
@@ -130,7 +130,7 @@ def shake_effect(
 
 
 def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.float64]:
-    """Most that the fast readout's expected electrons are off, (h, w): a bound, since no machine need have Dr.Jit.
+    """Bound the error of the fast readout's expected electrons, (h, w); a bound, because a machine may lack Dr.Jit.
 
     A sum over bands in single precision rounds bands + 2 times. A draw's distribution function is off by at most
     `LARGEST_ERROR`, and so is its mean by that times the width of the distribution.
@@ -140,10 +140,10 @@ def kernel_rms_e(expected_e: NDArray[np.float64], bands: int) -> NDArray[np.floa
 
 
 def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator) -> NDArray[np.float64]:
-    """Draws of the transport's Monte Carlo noise in electrons: each pixel's bands rise and fall together."""
+    """Draw the transport's Monte Carlo noise in electrons; a pixel's bands rise and fall together."""
     deviation = np.moveaxis(np.sqrt(np.maximum(transport.relight_variance(luminance_cd_m2=1.0), 0.0)), 0, -1)
     signs = rng.choice(np.array([-1, 1], np.float32), (DRAWS, *deviation.shape[:2], 1))
-    lights = [deviation, *((1 + sign) * deviation for sign in signs)]  # a lens takes no negative light
+    lights = [deviation, *((1 + sign) * deviation for sign in signs)]  # because a lens takes no negative light
     lit = transport.relight_halves(luminance_cd_m2=1.0)[0]
     level, *draws = _electrons([replace(lit, values=light, signed=False) for light in lights], sensor)
     return np.asarray(np.stack(draws) - level)
@@ -176,7 +176,7 @@ def _band_errors(
 def _jitter(
     halves: Sequence[SpectralRadiance], sensor: SensorConfig, groups: Sequence[NDArray[np.intp]]
 ) -> NDArray[np.float64]:
-    """Variance over the positions within all wide bands at once: a path draws one offset for all of them."""
+    """Return the variance over the positions within all wide bands together, as a path draws one offset for all."""
     positions = max(len(group) for group in groups)
     if positions == 1:
         return np.zeros(halves[0].shape)

@@ -6,7 +6,7 @@ from math import ceil
 from studies.budget.scaled_effects import ScaledEffects
 from studies.study.study import BudgetShares, Condition
 
-FEWEST_SPP = 128  # fewer are less even than the pilot's, which says how noisy they are
+FEWEST_SPP = 128  # fewer samples are less even than the pilot's, by which their noise is predicted
 
 
 def samples_per_pixel(

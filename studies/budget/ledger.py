@@ -12,7 +12,7 @@ from studies.study.study import Condition, SceneChoice, label
 
 MONTE_CARLO, LEVEL = "Monte Carlo", "level"
 RESPONSE, LIGHT = "bands", "light within bands"
-LEAST_SHOWN = 1e-3  # share of the noise variance, of what a text shows
+LEAST_SHOWN = 1e-3  # share of the noise variance under which a text leaves a term out
 
 
 @dataclass(frozen=True)

@@ -79,7 +79,7 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
 
 
 def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
-    """Centres and widths of the finest bands [nm], with one for each line of a lamp that lights the scene."""
+    """Return centres and widths of the finest bands [nm], with a band for each line of a lamp that lights the scene."""
     own_spectra: list[Spectrum] = []
     if opened.scene is not None:
         own_spectra = [group.spectrum for group in opened.scene.groups.values()]
@@ -88,12 +88,12 @@ def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
 
 
 def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
-    """Lens of the reference: what the study states, then what the sensor's own has, then a good lens in the scene."""
+    """Return the reference's lens: the study's, else the sensor's own, else a good lens in the scene."""
     view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     whole = replace(
         lens,
-        diffraction=lens.diffraction or 1.0,  # an ideal aperture
-        veiling_glare=lens.veiling_glare or 0.01,  # a good photographic lens by the index of ISO 9358
+        diffraction=lens.diffraction or 1.0,  # for an ideal aperture
+        veiling_glare=lens.veiling_glare or 0.01,  # of a good photographic lens, by the index of ISO 9358
         horizontal_view_deg=lens.horizontal_view_deg or view,
     )
     return study.lens.on(whole)
@@ -109,7 +109,7 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
         for name in study.sensors:
             auto_s = unit_exposure_s(radiance, preset(name).undivided)
             for mosaic in study_mosaics(study):
-                sensor = vary(preset(name), mosaic).undivided  # a pilot is coarser anyway
+                sensor = vary(preset(name), mosaic).undivided  # because a pilot is coarser anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)
                 sensor = replace(sensor, lens=lens)
                 of_any_time = find_effects(lit, sensor, lens, pilot.groups, rng)
@@ -130,7 +130,7 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
 
 
 def _pilot_noise(pilot: Pilot, lit: Transport) -> PilotNoise:
-    """Monte Carlo noise of the pilot; a picture file states none."""
+    """Return the Monte Carlo noise of the pilot; a picture file states none."""
     if not pilot.rendered:
         return PilotNoise(spp=0, half_spp=1, level=0.0)
     fewer = lit.coverage.mean.size / (pilot.opened.size[0] * pilot.opened.size[1])

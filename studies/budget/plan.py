@@ -72,13 +72,14 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
             renders[scene] = models.renders[scene]
         images |= {condition: models.images[condition] for condition in conditions(study, scene)}
         ledgers += [ledger(row, choice.count, choice.spp, choice.left_out[row.condition]) for row in rows]
-    shares = {row.condition: row.share for row in sorted(ledgers, key=lambda row: row.share)}  # the worst mosaic's
+    by_share = sorted(ledgers, key=lambda row: row.share)  # so that the worst mosaic's share of a condition stays
+    shares = {row.condition: row.share for row in by_share}
     made = Plan(renders=renders, images=images, shares=shares, ledgers=tuple(ledgers))
     return replace(made, summary=summary(study, made, reference_plan(study)))
 
 
 def _chosen_models(choice: Choice, pilot: Pilot, study: Study) -> Plan:
-    """Models of one scene that hold what was chosen."""
+    """Return the models of one scene that hold what was chosen."""
     images = {}
     for condition, left_out in choice.left_out.items():
         lens = full_lens(study, preset(condition.sensor).lens, pilot.opened)

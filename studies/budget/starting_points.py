@@ -23,7 +23,7 @@ MOST_SPP = 1 << 16
 
 
 def starting_point(study: Study, name: str) -> Plan:
-    """Plan of a starting point, by its name in `studies.study.study.STARTING_POINTS`; nothing is rendered for it."""
+    """Return the plan of a starting point by its name in `studies.study.study.STARTING_POINTS`, without a render."""
     return {FAST: fast_plan, DEFAULT: plan_from_settings, REFERENCE: reference_plan}[name](study)
 
 
@@ -67,7 +67,7 @@ def reference_plan(study: Study) -> Plan:
 
 
 def band_count(study: Study, name: str, opened: OpenedScene) -> int:
-    """Number of bands that a starting point asks for; lines of lamps add some."""
+    """Return the number of bands that a starting point asks for; lines of lamps add some."""
     if name == FAST:
         return FAST_BANDS
     if name == DEFAULT:

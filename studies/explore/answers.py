@@ -29,7 +29,7 @@ Answer: TypeAlias = tuple[Header, Sequence[bytes]]
 
 
 def written(message: Header, controls: Controls, rendered: RenderState, memo: Memo, drops: Path) -> Answer:
-    """Figures and files of one camera."""
+    """Answer with figures and files of one camera."""
     kind = message["kind"]
     if kind == "dng":
         return {"name": "explored.dng"}, (_dng(rendered, controls, memo),)
@@ -49,7 +49,7 @@ def written(message: Header, controls: Controls, rendered: RenderState, memo: Me
 def shown(
     cameras: Sequence[Controls], views: Sequence[tuple[int, str]], rendered: RenderState, memo: Memo, drops: Path
 ) -> tuple[Header, list[Bytes], bool]:
-    """Header and pictures of each view, and whether a slow processor is left for later."""
+    """Return the header and pictures of each view, and whether a slow processor is left for later."""
     shots, used = [], []
     for controls in cameras:
         exposed = expose_scene(rendered.transport, controls, memo)
@@ -79,7 +79,7 @@ def shown(
 
 
 def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
-    """Shot of an exposure; None where its processor is slow and hasn't been at work."""
+    """Develop an exposure; None where its processor is slow and hasn't finished."""
     if stand_in(controls, exposed.raw.dn.size) == controls:
         development = development_of(exposed, controls, memo)
         memo.check()
@@ -95,20 +95,20 @@ def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
 
 
 def python_text(rendered: RenderState, controls: Controls, view: str, drops: Path) -> str:
-    """Python of a view or a figure; a file that was dropped has its name alone, as it lies where that runs."""
+    """Write the Python of a view or a figure; it names a dropped file without folder, to be run beside that file."""
     text, path = python_of(rendered.code, controls, view), Path(controls.sensor)
     return text.replace(str(path), path.name) if drops in path.parents else text
 
 
 def take_sensor(files: Any, drops: Path) -> Header:
-    """Keep a sensor that was dropped; what the page's sliders begin with."""
+    """Keep a sensor file that was dropped on the page; return where the page's sliders begin."""
     path, sensor = write_dropped(files, drops)
     return {"sensor": str(path), "terms": sensor_terms(sensor)}
 
 
 def _dng(rendered: RenderState, controls: Controls, memo: Memo) -> bytes:
-    """Digital negative of an exposure, its colours calibrated as `rodcone capture` does; of no burst."""
-    if controls.frames > 1:  # merged samples are no whole numbers as a negative's are
+    """Write an exposure as a digital negative, with colours calibrated as by `rodcone capture`; a burst is refused."""
+    if controls.frames > 1:  # because a negative holds whole numbers, which merged samples aren't
         raise InputError("dng: a merged burst is no raw file; allowed: 1 frame; save the exposures one by one")
     exposed = expose_scene(rendered.transport, controls, memo)
     light = first_light(exposed.transport.groups, illuminant(controls.reference_light))
@@ -120,7 +120,7 @@ def _dng(rendered: RenderState, controls: Controls, memo: Memo) -> bytes:
 
 
 def python_of(render: str, controls: Controls, view: str = "picture") -> str:
-    """Python that makes a picture of the page again, to the bit.
+    """Write the Python that makes a picture of the page again, to the bit.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
 
 
 def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
-    """Monte Carlo variance of the raw electrons over the sensor's own, as a sweep's `mc_share` of unbiased light.
+    """Return the Monte Carlo variance of the raw electrons over the sensor's own, as `mc_share` of a sweep.
 
     One draw of the error, half the difference of the render's halves, goes through lens and filters as the light does.
     """
@@ -162,7 +162,7 @@ def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
 
 
 def _error_e(exposed: Exposure, name: str) -> NDArray[np.float64]:
-    """Error of one light group at power 1, behind the lens and the filters, in 1 s, (h, w, channel) [e-]."""
+    """Return the Monte Carlo error of one light group at power 1 in 1 s, behind the filters, (h, w, channel) [e-]."""
     even, odd = (
         channel_electrons(form_image(half, exposed.sensor), exposed.sensor, 1.0)
         for half in only_group(exposed.transport, name).relight_halves()

@@ -1,4 +1,4 @@
-"""From a rendered scene and the controls to a picture, in stages of which each is computed again only when it has to.
+"""From a rendered scene and the controls to a picture, in stages; each is computed again only when its inputs change.
 
 Light adds up: every light group goes through lens and filters by itself, at power 1 and for 1 s, and is kept. Power,
 level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
@@ -36,8 +36,8 @@ from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.study import AS_SHOT
 
-Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, the processor's own result
-_CHIP, _FRAME = 0, 1  # second part of the seed, as `studies.photograph.shot` has it
+Development = Callable[[], tuple[Image, Picture]]  # the processor's own result: linear sRGB at the scale of the truth
+_CHIP, _FRAME = 0, 1  # second part of the seed, equal to that of `studies.photograph.shot`
 _LONGEST_S = 1e7
 
 
@@ -57,7 +57,7 @@ class GroupFrame:
 
 @dataclass(frozen=True)
 class Exposure:
-    """What the camera is given, and the raw image that it makes of it.
+    """Light that the camera is given, and the raw image that it makes of it.
 
     Attributes
     ----------
@@ -96,7 +96,7 @@ class Exposure:
 
     @property
     def white_cd_m2(self) -> float:
-        """Luminance that is shown as white."""
+        """Return the luminance that is shown as white."""
         return self.white_at_own_cd_m2 * self.scale
 
 
@@ -122,7 +122,7 @@ class Shot:
 
     @property
     def picture(self) -> NDArray[np.uint8]:
-        """The picture as the page shows it, sRGB of 8 bits, shape (h, w, 3)."""
+        """Encode the picture as the page shows it, sRGB of 8 bits, (h, w, 3)."""
         return to_bytes(self.linear)
 
 
@@ -180,7 +180,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     exposure_s = controls.exposure_s
     if controls.exposure != TIME:
         rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
-        # The rule looks at a percentile, which goes with the level.
+        # The rule looks at a percentile of the light, which is proportional to the level.
         metered = (lit_so, rule, sensor.top_e, sensor.pixel.dark_current_e_per_s, sensor.pixel.crosstalk)
         unit_s = memo.of("rule", metered, exposure_of_electrons_s, rule, per_second_e, sensor, _LONGEST_S)
         time_s = at_level_s(unit_s, scale, rule, sensor)
@@ -208,7 +208,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
 
 
 def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Development:
-    """What the processor is to do with an exposure, in this process or, pickled, in another."""
+    """State the processor's task for an exposure, which this process or another one (by pickle) can run."""
     raw, sensor, light = exposed.raw, exposed.sensor, exposed.light
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes(), sensor.pixel.crosstalk)
     processor = PROCESSORS[controls.processor]
@@ -220,13 +220,13 @@ def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Develop
 
 
 def true_picture_of(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
-    """Noise-free picture, linear and as shown: of any level the same, since white goes with it."""
+    """Return the noise-free picture, linear and as shown; it is the same at every level, as white follows the level."""
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in exposed.transport.groups)
     return memo.of("truth", (lamps, controls.reference_light), _truth, exposed, controls, memo)
 
 
 def to_bytes(linear: Image) -> NDArray[np.uint8]:
-    """Linear sRGB encoded in 8 bits."""
+    """Encode linear sRGB in 8 bits."""
     return np.asarray(np.rint(encode_srgb(linear) * 255), dtype=np.uint8)
 
 

@@ -1,6 +1,4 @@
-"""What the explorer's controls are set to, as one value; how it is read from a message; the lamps and the camera that
-it gives, and the light that colours are judged under.
-"""
+"""Settings of the explorer's controls as one value: how a message states it, and the lamps and camera that follow."""
 
 import json
 from collections.abc import Iterable, Mapping
@@ -30,22 +28,22 @@ from studies.metrics.truth import Light, light_in_bands
 from studies.study.scene_source import LIGHT, first_light
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
-TIME = "time"  # as an exposure: the time that `exposure_s` states
+TIME = "time"  # as an exposure rule, this means the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
 PIXEL = (
     *("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "column_gain_spread", "column_offset_e"),
     *("hot_pixel_share", "hot_pixel_dark_current_e_per_s", "crosstalk", "full_well_e"),
 )
 SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
-# Processors with settings of their own, and what these are by default.
+# Processors with settings of their own, and the defaults of these.
 ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
-MOST_POINTS = 2000  # of a spectrum from a file
-WIDEST = 41  # pixels of Omega: four times the default's time
+MOST_POINTS = 2000  # name of a spectrum from a file
+WIDEST = 41  # pixels on a side of Omega; they take four times the default's time
 
 
 @dataclass(frozen=True)
 class Lamp:
-    """What a light group emits.
+    """Emission of a light group.
 
     Attributes
     ----------
@@ -64,7 +62,7 @@ class Lamp:
 
 @dataclass(frozen=True)
 class Controls:
-    """All that decides a picture of a scene that is rendered already.
+    """All settings that decide a picture of a rendered scene.
 
     Attributes
     ----------
@@ -154,7 +152,7 @@ class Controls:
 
 
 def mosaics_of(processor: Processor) -> tuple[str, ...]:
-    """Mosaics that a processor develops: its own, and those of R, G, B and W for the ones that take any such tile."""
+    """List the mosaics that a processor develops: its own, or all of R, G, B and W where it takes any tile."""
     if processor.mosaic == OWN_MOSAIC:
         any_letters = processor is not PROCESSORS["ple"]
         return (*(name for name, tile in MOSAICS.items() if any_letters or takes(tile)), OWN_MOSAIC)
@@ -164,7 +162,7 @@ def mosaics_of(processor: Processor) -> tuple[str, ...]:
 
 
 def options_of(controls: Controls) -> dict[str, Any]:
-    """Options of the processor: its settings where they differ from its own."""
+    """Return the processor's options: the settings that differ from its defaults."""
     if not controls.settings:
         return {}
     changed: dict[str, Any] = {
@@ -199,7 +197,7 @@ def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
     lamps = content.get("lamps")
     emitters = lamps.values() if isinstance(lamps, dict) else ()
     spectra = [lamp.get("spectrum") for lamp in emitters if isinstance(lamp, dict)]
-    for light in (content.get("reference_light"), *spectra):  # before anything reads it
+    for light in (content.get("reference_light"), *spectra):  # is checked here, before anything reads it
         if isinstance(light, str) and is_curve_file(light):
             raise InputError(
                 f"light: {light!r} is a file on this machine; allowed: an illuminant's name; load the "
@@ -214,7 +212,7 @@ def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
 
 
 def controls_of(content: Mapping[str, Any], fix: str) -> Controls:
-    """Controls of plain values, lists and dicts by the fields' names, checked; those left out have their defaults.
+    """Build checked controls from plain values, lists and dicts by field name; absent ones have their defaults.
 
     Raises
     ------
@@ -225,7 +223,7 @@ def controls_of(content: Mapping[str, Any], fix: str) -> Controls:
 
 
 def to_json(controls: Controls) -> dict[str, Any]:
-    """Controls as `controls_from` reads them."""
+    """Write controls as `controls_from` reads them."""
     result: dict[str, Any] = json.loads(json.dumps(asdict(controls), allow_nan=False))
     return result
 
@@ -241,7 +239,7 @@ _CONVERTER.register_structure_hook(float, _number)
 
 
 def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light: str) -> tuple[Transport, Light, float]:
-    """Transport with the lamps, light of the camera's colours, and factor to 1 cd/m^2."""
+    """Return the transport with its lamps, the light to which colours are balanced, and the factor to 1 cd/m^2."""
     groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
     lit = replace(transport, groups=groups)
     level = lit.level().value
@@ -253,13 +251,13 @@ def lit_transport(transport: Transport, lamps: dict[str, Lamp], reference_light:
 
 
 def only_group(lit: Transport, name: str) -> Transport:
-    """Transport of which one light group shines, at power 1."""
+    """Return the transport in which one light group alone shines, at power 1."""
     groups = {group_name: replace(group, power=float(group_name == name)) for group_name, group in lit.groups.items()}
     return replace(lit, groups=groups)
 
 
 def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
-    """Light group with a lamp's spectrum, at the luminance of its own, and with its power.
+    """Give a light group a lamp's spectrum, at the luminance of its own one, and the lamp's power.
 
     Raises
     ------
@@ -278,7 +276,7 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
 
 
 def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
-    """Sensor with its lens as the controls have it; `base` is the sensor with the controls' mosaic.
+    """Return the sensor and lens that the controls state; `base` is the sensor with the controls' mosaic.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Results that are kept between changes, and where work may end that nobody waits for any more."""
+"""Keep results between changes of a control, and end work for which nobody waits any more."""
 
 import ctypes
 import sys
@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 from rodcone.jit import backend, dr
 
 T = TypeVar("T")
-_KEPT = 8  # results a stage: four light groups before two cameras
+_KEPT = 8  # results per stage: four light groups of two cameras
 
 
 class Overtaken(Exception):
@@ -18,12 +18,12 @@ class Overtaken(Exception):
 
 
 def never_cancel() -> None:
-    """Let work go on whatever happens."""
+    """Never raise `Overtaken`: the work always goes on."""
 
 
 @dataclass(frozen=True)
 class Memo:
-    """The last results of each stage, by what decides them.
+    """The last results of each stage, by the key of what decides them.
 
     Attributes
     ----------
@@ -57,7 +57,7 @@ class Memo:
 
 
 def release_memory() -> None:
-    """Give back free memory, Dr.Jit's and the C library's: without it 10 000 changes took a seventh more than 500."""
+    """Give free memory of Dr.Jit and the C library back; without it, 10 000 changes needed a seventh more than 500."""
     if backend() != "numpy":
         dr.flush_malloc_cache()
     if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's

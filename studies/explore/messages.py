@@ -1,4 +1,4 @@
-"""Messages of the page: what the program says of itself first, and what is checked of each question.
+"""Messages between program and page: the first one, which describes the program, and the checks of each question.
 
 A sensor's files that were dropped on the page are kept with the tables that it names in a folder of their own.
 """
@@ -32,8 +32,8 @@ from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
 
-MOST_CHARACTERS = 200_000  # of a message: three tables of spectra fit
-MOST_OF_A_PAGE = 40  # characters of its name
+MOST_CHARACTERS = 200_000  # bytes of a message; three tables of spectra fit
+MOST_OF_A_PAGE = 40  # characters of a file's name
 # Keys of each kind of message beside `kind`, `number` and, where pages share a connection, `page`; in this order they
 # are answered.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -51,7 +51,7 @@ KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
 
 
 def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[str] = ()) -> Header:
-    """What the page builds its controls from; `scenes` that it may choose, `dropped` files of sensors."""
+    """Describe what the page builds its controls from; it may choose `scenes`, and `dropped` are files of sensors."""
     named = dict.fromkeys((*sensors(), *dropped))
     return {
         "title": source.title,
@@ -79,7 +79,7 @@ def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[
 
 
 def sensor_terms(sensor: SensorConfig) -> Header:
-    """Terms of a sensor that the page's sliders begin with."""
+    """Return the terms of a sensor at which the page's sliders begin."""
     return {
         "lens": {term: getattr(sensor.lens, term) for term in LENS},
         "pixel": {term: getattr(sensor.pixel, term) for term in PIXEL},
@@ -94,7 +94,7 @@ def _missing(processor: str) -> bool:
 
 
 def unsent(pictures: Sequence[Bytes], sent: list[Bytes]) -> list[bytes]:
-    """Bytes of pictures, none of those that the page has already; `sent`, what it has, is brought up to date."""
+    """Leave out the pictures that the page has already (`sent`, which is brought up to date)."""
     repeats = [len(sent) > place and np.array_equal(sent[place], picture) for place, picture in enumerate(pictures)]
     sent[:] = pictures
     return [b"" if same else picture.tobytes() for same, picture in zip(repeats, pictures, strict=True)]
@@ -126,7 +126,7 @@ def read_message(text: str) -> Header:
 
 
 def is_superseded_by(message: Header, pending: Header) -> bool:
-    """Whether a message's answer waits, or ends, for a pending one: a newer one of its kind, or one answered first."""
+    """Whether a pending message, newer of the same kind or of a kind answered first, goes before this one."""
     if pending["kind"] == message["kind"]:
         return bool(pending["number"] > message["number"])
     kinds = list(KINDS)
@@ -138,7 +138,7 @@ def _refuse(constant: str) -> None:
 
 
 def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
-    """Camera and name of each view."""
+    """Read the camera and name of each view."""
     pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
     views = []
     for pair in pairs:

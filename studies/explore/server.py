@@ -45,7 +45,7 @@ App = Callable[[Scope, Any, Any], Awaitable[None]]
 
 
 def make_app(session: Session, port: int, token: str) -> App:
-    """ASGI application: what isn't asked for under the token, by this host's name and from its own page, is refused.
+    """Make the ASGI application; it refuses what isn't asked under the token, by this host's name, from its own page.
 
     Parameters
     ----------
@@ -81,7 +81,7 @@ def make_app(session: Session, port: int, token: str) -> App:
             while (message := await socket.receive())["type"] == "websocket.receive":
                 text = message.get("text") or ""
                 due_s = max(due_s, loop.time() - BURST_S) + 1 / MOST_A_SECOND + len(text) / MOST_CHARACTERS_A_SECOND
-                await asyncio.sleep(max(0.0, due_s - loop.time()))  # what a page sends meanwhile stays unread
+                await asyncio.sleep(max(0.0, due_s - loop.time()))  # messages that a page sends meanwhile stay unread
                 session.take(text, send)
         finally:
             sending.cancel()
@@ -106,7 +106,7 @@ def make_app(session: Session, port: int, token: str) -> App:
 
 
 def refusal(scope: Scope, hosts: Sequence[str], token: str) -> str | None:
-    """Why a request is refused; None where it isn't.
+    """Return why a request is refused; None where it isn't.
 
     A WebSocket has to state an origin: a browser always does, and another site's page can open one without asking.
     """
@@ -136,13 +136,13 @@ async def _refuse(scope: Scope, receive: Any, send: Any, response: Any) -> None:
 
 
 def packed(header: Header, buffers: Sequence[bytes]) -> bytes:
-    """One message: the header's length as 32 bits, the header with the buffers' lengths as JSON, the buffers."""
+    """Pack one message: the header's length in 32 bits, the header with the buffers' lengths as JSON, the buffers."""
     text = json.dumps(header | {"lengths": [len(buffer) for buffer in buffers]}, allow_nan=False).encode()
     return b"".join((struct.pack("<I", len(text)), text, *buffers))
 
 
 def listen(port: int) -> socket.socket:
-    """Socket of this machine alone; port 0 takes a free one.
+    """Open a socket that this machine alone can reach; port 0 takes a free port.
 
     Raises
     ------
@@ -154,7 +154,7 @@ def listen(port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((HOST, port))
-        listener.listen()  # before the address is told: a browser that comes at once waits, and isn't turned away
+        listener.listen()  # before the address is printed: a browser that comes at once waits, and isn't refused
     except OSError as error:
         listener.close()
         raise InputError(f"port: {port} can't be listened on ({error.strerror}); leave it out for a free one") from None
@@ -168,7 +168,7 @@ def require_server() -> None:
 
 
 def make_server(session: Session, listener: socket.socket) -> tuple[Any, str]:
-    """Server that `run(sockets=[listener])` starts, and the address to open.
+    """Return the server, which `run(sockets=[listener])` starts, and the address to open.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def make_server(session: Session, listener: socket.socket) -> tuple[Any, str]:
 
 
 def explore(transport: Transport) -> Any:
-    """Explorer of a rendered scene, to be shown as a notebook's last value.
+    """Return the explorer of a rendered scene, which a notebook shows as a cell's last value.
 
     Parameters
     ----------
@@ -218,12 +218,12 @@ def explore(transport: Transport) -> Any:
     def send(header: Header, buffers: Any) -> None:
         if loop is None:
             widget.send(header, list(buffers))
-        else:  # messages of a kernel are sent from its own thread
+        else:  # a notebook's kernel sends messages from its own thread alone
             loop.call_soon_threadsafe(widget.send, header, list(buffers))
 
     session.connect(send)
     widget.on_msg(lambda _, content, __: session.take(json.dumps(content), send))
-    widget.session = session  # lives as long as the widget
+    widget.session = session  # the session lives as long as the widget
     return widget
 
 

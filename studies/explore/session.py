@@ -1,9 +1,9 @@
 """What the page asks and what it is answered: messages in, pictures and figures out, on one thread of its own.
 
-A page has one request of a kind under way; of several that wait, only the newest is answered. One that comes while an
-older one of its kind is at work ends that one between two stages; one that is answered first (`KINDS`) makes the other
-wait, and a render too, between two runs. Where the page is closed nothing goes on. Every answer has the number of its
-request, the controls that it was made with, and the Python that makes it again.
+A page has one request of each kind under way. Of several that wait, only the newest is answered. A new request ends an
+older one of its kind between two stages. Kinds earlier in `KINDS` are answered first: other requests wait for them, and
+a render waits between two runs. When the page is closed, all work ends. Every answer holds the number of its request,
+the controls with which it was made, and the Python that makes it again.
 """
 
 import sys
@@ -31,8 +31,8 @@ from studies.explore.views import Bytes
 
 Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
-SOON = ("hello", "scene", "sensor")  # kinds of message that wait for no render
-REST_S = 0.4  # without a new setting, after which a slow processor begins
+SOON = ("hello", "scene", "sensor")  # kinds of message that don't wait for a render
+REST_S = 0.4  # seconds without a new setting, after which a slow processor begins
 TRIM_AFTER = 100  # turns of its thread
 MOST_NOTES = 8  # of an answer
 
@@ -50,11 +50,11 @@ class Session:
     def __init__(self, source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingProxyType({})) -> None:
         self._scenes = scenes
         self._folder = TemporaryDirectory(prefix="rodcone-")
-        self._drops = Path(self._folder.name)  # sensors' files that were dropped
+        self._drops = Path(self._folder.name)  # folder of sensors' files that were dropped on the page
         self._dropped: list[str] = []  # the sensors among them
         self._pending: dict[str, Header] = {}
-        self._message: Header | None = None  # that is being answered
-        self._slow: dict[str, Callable[[], None]] = {}  # what ends each job at work, by its camera
+        self._message: Header | None = None  # the message that is being answered
+        self._slow: dict[str, Callable[[], None]] = {}  # functions that end the jobs at work, by camera
         self._send: Send = lambda header, buffers: None
         self._begin_page("")
         self._begin_source(source)
@@ -65,7 +65,7 @@ class Session:
         self._thread.start()
 
     def connect(self, send: Send) -> None:
-        """Answer to another connection from now on; the one before is told."""
+        """Answer another connection from now on, and tell the one before."""
         with self._changed:
             self._send({"kind": "taken over"}, ())
             self._send, self._alone = send, False
@@ -73,16 +73,16 @@ class Session:
             self._changed.notify()
 
     def disconnect(self, send: Send) -> None:
-        """Rest until a page is opened: the one of this connection is closed."""
+        """Rest until a page is opened, because the page of this connection was closed."""
         with self._changed:
             if send is self._send:
                 self._alone = True
                 self._begin_page("")
 
     def take(self, text: str, send: Send) -> None:
-        """Take a message of the connection that `send` belongs to; one that was taken over is not listened to.
+        """Take a message of the connection of `send`; messages of a connection that was replaced are dropped.
 
-        It is answered from the session's thread. What isn't allowed is told at once.
+        The session's thread answers it. A message that isn't allowed is refused at once.
         """
         try:
             message = read_message(text)
@@ -93,7 +93,7 @@ class Session:
             page = message.get("page", "")
             if send is not self._send or (page != self._page and message["kind"] != "hello"):
                 return
-            if page != self._page:  # a notebook shows one widget as often as it is asked, over one connection
+            if page != self._page:  # a notebook may show one widget several times over one connection
                 send({"kind": "taken over", "page": page}, ())
                 self._begin_page(page)
             self._pending[message["kind"]] = message
@@ -103,7 +103,7 @@ class Session:
             self._changed.notify()
 
     def close(self) -> None:
-        """End the thread, and what it has begun."""
+        """End the thread and the work that it has begun."""
         with self._changed:
             self._closed = True
             self._end_slow()
@@ -120,7 +120,7 @@ class Session:
         """Forget what another page asked."""
         self._page = page  # that asks
         self._shown: Header | None = None
-        self._sent: list[Bytes] = []  # pictures that it has
+        self._sent: list[Bytes] = []  # pictures that the page has
         self._pending.clear()
         self._end_slow()
 
@@ -131,12 +131,12 @@ class Session:
         self._slow_wanted = False
 
     def _work(self) -> None:
-        """Answer what is asked; where nothing is, do what is left to do."""
+        """Answer messages; while none waits, do background tasks."""
         while not self._closed:
             self._turn(*self._next(self._left_to_do))
 
     def _turn(self, message: Header | None, act: Callable[[], None]) -> None:
-        """Answer a message, or act; what goes wrong is told in a line, and the page goes on."""
+        """Answer a message or do a task; an error becomes one line on the page, which goes on."""
         self._turns, self._message = self._turns + 1, message
         if self._turns % TRIM_AFTER == 0:
             release_memory()
@@ -153,7 +153,7 @@ class Session:
                 pass
             except InputError as error:
                 self._fail(message, str(error))
-            except Exception as error:  # the terminal has the place
+            except Exception as error:  # the traceback goes to the terminal
                 traceback.print_exc(file=sys.stderr)
                 words = f"the program failed: {type(error).__name__}: {error}; see its terminal"
                 self._fail(message, str(InputError(words)))
@@ -172,12 +172,12 @@ class Session:
         return None, never_cancel
 
     def _first_pending(self) -> str | None:
-        """Kind of the message that is answered next; none while it waits for the first render."""
+        """Return the kind of message to answer next; None while it has to wait for the first render."""
         kind = next((kind for kind in KINDS if kind in self._pending), None)
         return kind if self._rendered is not None or not self._rendering or kind in SOON else None
 
     def _check(self) -> None:
-        """Raise `Overtaken` where nobody waits for the work under way, or something else is answered first."""
+        """Raise `Overtaken` where nobody waits for the work under way any more, or another message goes first."""
         with self._changed:
             message, pending = self._message, self._first_pending()
             left = self._closed or self._alone or (message and message.get("page", "") != self._page)
@@ -189,7 +189,7 @@ class Session:
                 raise Overtaken
 
     def _left_to_do(self) -> Callable[[], None] | None:
-        """What waits for the sliders to rest: a finer render, slow processors."""
+        """Return the task that waits for the sliders to rest: a finer render or a slow processor."""
         if self._rendering:
             return self._render_on
         return self._begin_slow if self._slow_wanted else None
@@ -202,7 +202,7 @@ class Session:
         """Render the next state, and show what is in view again."""
         try:
             rendered = next(self._states)
-        except Exception as error:  # a generator that raised is at its end: none follows, or another scene's
+        except Exception as error:  # a generator that raised has ended: no state follows, or another scene's
             self._rendering = isinstance(error, Overtaken)
             words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
             self._failure = "" if self._rendering else words
@@ -249,7 +249,7 @@ class Session:
             self._begin_source(source)
 
     def _show(self, message: Header, cameras: Sequence[Controls], rendered: RenderState) -> Answer:
-        """Pictures of each view that is asked for; slow processors are left for later."""
+        """Answer with pictures of the views that are asked for; slow processors are left for later."""
         views = read_views(message["views"], len(cameras))
         with self._changed:
             sent: list[Bytes] = []
@@ -260,7 +260,7 @@ class Session:
         return header | {"last": not self._rendering}, unsent(pictures, sent)
 
     def _begin_slow(self) -> None:
-        """Set the slow processors of what is shown to work."""
+        """Start the slow processors of the shown views."""
         self._slow_wanted, message, rendered = False, self._shown, self._rendered
         if message is None or rendered is None:
             return
@@ -272,7 +272,7 @@ class Session:
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
                     with self._changed:
                         self._slow.pop(key, None)
-                        memo.keep("slow", key, result)  # as an answer is, errors too
+                        memo.keep("slow", key, result)  # checked as an answer is; errors are shown too
                         if self._shown is message:
                             self._pending.setdefault("show", message)
                         self._changed.notify()

@@ -26,7 +26,7 @@ def is_slow(processor: str) -> bool:
 
 
 def stand_in(controls: Controls, pixels: int) -> Controls:
-    """What the page shows, under its own name, until a slow processor is done; the controls themselves if it is quick.
+    """Return the controls whose picture stands in until a slow processor is done; those given if it is quick.
 
     In place of a slow processor ``any_mosaic``, which develops every mosaic: two cameras under one slow method stand in
     by one quick method. In place of wide settings the processor's own.
@@ -42,7 +42,7 @@ def stand_in(controls: Controls, pixels: int) -> Controls:
 def begin(
     name: str, development: Development, report: Callable[[tuple[Image, Picture] | InputError], None]
 ) -> Callable[[], None]:
-    """Develop in a process of its own; returns what ends it.
+    """Develop in a process of its own; return the function that ends it.
 
     Parameters
     ----------
@@ -76,7 +76,7 @@ def begin(
 
 
 def work() -> None:
-    """Develop what standard input holds; what comes of it goes to standard output."""
+    """Develop the task on standard input, and write the result to standard output."""
     development: Development = pickle.load(sys.stdin.buffer)
     try:
         result: tuple[Image, Picture] | InputError = development()

@@ -1,4 +1,4 @@
-"""What is explored: a scene or a file of radiance, and the Python that makes its transport."""
+"""Open what is explored, a scene or a file of radiance, and write the Python that makes its transport."""
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -32,7 +32,7 @@ from studies.study.scene_source import (
 )
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
-FIRST_SIDE, FIRST_SPP = 64, 16  # of the first picture, which is there at once
+FIRST_SIDE, FIRST_SPP = 64, 16  # pixels of the first picture, which is shown at once
 _SPP, _LEAST_BANDS = 64, 4
 
 
@@ -104,7 +104,7 @@ class RenderOptions:
 
 
 def of_transport(transport: Transport) -> Source:
-    """A transport that is there already."""
+    """Explore a transport that exists already."""
     return Source("transport", lambda _: iter((RenderState(transport, GIVEN, True),)), _coloured(transport.groups))
 
 
@@ -119,7 +119,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)
-        # not an ISETCam scene's illuminant: that has no name, as the page's lights have
+        # an ISETCam scene's illuminant isn't one, because it has no name, which the page's lights need
         transport, notes = open_radiance_file(source, default_white(source))
         transport = _with_its_light(transport, source)
         code = f"transport = rodcone.load_transport({source!r})\n"
@@ -161,14 +161,14 @@ def open_source(source: str, options: RenderOptions) -> Source:
 def _ready(
     source: str, scene: Scene, size: tuple[int, int], bands: tuple[Floats, Floats], options: RenderOptions
 ) -> Ready | None:
-    """Light of a scene of the catalogue that is there already, where nothing asks for a render."""
+    """Take the shipped light of a scene of the catalogue, where no option asks for a render."""
     if options.render or options.spp is not None or options.seed or source not in scene_names():
         return None
     return find_ready(scene, size, size, [group.spectrum for group in scene.groups.values()], bands)
 
 
 def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int] | int | None = None) -> Transport:
-    """Light transport that is there already, of a picture file or a scene, which `relight` and the explorer take.
+    """Load the light transport of a picture file or of a scene whose light is shipped, for `relight` and the explorer.
 
     Parameters
     ----------
@@ -193,7 +193,7 @@ def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int
 
 
 def _with_its_light(transport: Transport, path: str | Path) -> Transport:
-    """A file's transport, of which radiance's light group is marked to have colours of its own."""
+    """Return a file's transport, with the light group of a radiance marked as one that has colours of its own."""
     if is_reflectance(path) or is_reference(path):
         return transport
     groups = {name: replace(group, coloured=True) for name, group in transport.groups.items()}
@@ -236,6 +236,6 @@ def _coloured(groups: Mapping[str, LightGroup]) -> dict[str, bool]:
 
 
 def _bands(options: RenderOptions) -> tuple[Floats, Floats]:
-    """Centres and widths of even bands, as near the asked width as whole ones come."""
+    """Return centres and widths of equal bands, whose width is as near the requested one as a whole number allows."""
     first, last = VISIBLE_NM
     return even_bands(VISIBLE_NM, max(_LEAST_BANDS, round((last - first) / options.band_nm)))

@@ -1,4 +1,4 @@
-"""What a shot is shown as: pictures of 8 bits, and figures as plain numbers."""
+"""Views of a shot: pictures of 8 bits, and figures as plain numbers."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -28,7 +28,7 @@ from studies.metrics.flip import flip
 
 Bytes = NDArray[np.uint8]
 
-MOST_SIGMAS = 4.0  # of the noise that is black or white
+MOST_SIGMAS = 4.0  # standard deviations of noise that are shown as black or white
 MOST_LUMINANCE_ERROR = 0.25  # of white
 MOST_DELTA_E, MOST_SNR_DB = 10.0, 40.0
 BINS, LEAST_E = 80, 0.5  # of the histogram
@@ -40,7 +40,7 @@ _TINTS = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "C": (0, 
 
 
 def raw_picture(shot: Shot) -> Bytes:
-    """The mosaic, each pixel in its channel's colour, encoded as sRGB; a full well is white."""
+    """Show the mosaic with each pixel in its channel's colour, encoded as sRGB; a full well is white."""
     raw = shot.exposed.raw
     wells_e = np.array([raw.noise_of(channel).full_well_e for channel in raw.channels])
     tints = np.array([_TINTS.get(channel, (1, 1, 1)) for channel in raw.channels])
@@ -50,32 +50,32 @@ def raw_picture(shot: Shot) -> Bytes:
 
 
 def noise_picture(shot: Shot) -> Bytes:
-    """Raw image less the expected electrons: grey is none, black and white are four standard deviations."""
+    """Show the raw image less the expected electrons: grey is 0, black and white are four standard deviations."""
     exposed = shot.exposed
-    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or all that a pixel was read for
+    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or several readings' share
     noise_e = exposed.raw.electrons / light - _collected_e(exposed)
     return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
 
 def luminance_error_picture(shot: Shot) -> Bytes:
-    """Luminance of the picture less the truth's: grey is none, white and black are a quarter of white."""
+    """Show the picture's luminance less the truth's: grey is 0, white and black are a quarter of white."""
     error = luminance_of_srgb(shot.linear) - luminance_of_srgb(shot.true)
     return _grey(0.5 + 0.5 * error / MOST_LUMINANCE_ERROR)
 
 
 def colour_error_picture(shot: Shot) -> Bytes:
-    """CIEDE2000 between the encoded picture and the truth: 0 is dark, 10 and more are bright."""
+    """Show CIEDE2000 between the encoded picture and the truth: 0 is dark, 10 and more are bright."""
     error = deltaE_ciede2000(rgb2lab(encode_srgb(shot.linear)), rgb2lab(encode_srgb(shot.true)))
     return _coloured(error / MOST_DELTA_E)
 
 
 def flip_picture(shot: Shot) -> Bytes:
-    """FLIP between the encoded picture and the truth: 0 is dark, 1 is bright."""
+    """Show FLIP between the encoded picture and the truth: 0 is dark, 1 is bright."""
     return _coloured(flip(encode_srgb(shot.linear), encode_srgb(shot.true)))
 
 
 def snr_picture(shot: Shot) -> Bytes:
-    """Expected electrons over the noise of a pixel, of one frame: 0 dB is dark, 40 dB and more are bright."""
+    """Show the expected electrons over the noise of one frame's pixel: 0 dB is dark, 40 dB and more are bright."""
     exposed = shot.exposed
     with np.errstate(divide="ignore"):
         snr_db = 10 * np.log10(_collected_e(exposed) ** 2 / _variance_e2(exposed))
@@ -131,7 +131,7 @@ def explorer_view(transport: Transport, view: str = "picture", **controls: Any) 
 
 
 def noise_scale_e(exposed: Exposure) -> float:
-    """Standard deviation of the noise of one frame [e-], root mean square over the pixels."""
+    """Return the root mean square over the pixels of one frame's noise [e-]."""
     return float(np.sqrt(_variance_e2(exposed).mean()))
 
 
@@ -141,12 +141,12 @@ def _readings(exposed: Exposure) -> tuple[PlainReading, ...]:
 
 
 def _variance_e2(exposed: Exposure) -> Image:
-    """Variance of each pixel of one frame as if nothing clipped [e-^2]."""
+    """Return the variance of each pixel of one frame as if nothing clipped [e-^2]."""
     return unclipped_variance(exposed.expected_e, _readings(exposed))
 
 
 def _collected_e(exposed: Exposure) -> Image:
-    """Expected photo-electrons of a pixel of one frame, its neighbours' crosstalk among them."""
+    """Return the expected photo-electrons of each pixel of one frame, with crosstalk from its neighbours."""
     return collected_e(exposed.expected_e, _readings(exposed))
 
 
@@ -155,7 +155,7 @@ def _grey(share: Image) -> Bytes:
 
 
 def _coloured(share: Image) -> Bytes:
-    from matplotlib import colormaps  # late: it takes a while to load, and few views need it
+    from matplotlib import colormaps  # imported here, because it loads slowly and few views need it
 
     return np.asarray(colormaps["viridis"](np.clip(np.nan_to_num(share, neginf=0.0), 0.0, 1.0), bytes=True)[..., :3])
 
@@ -168,14 +168,14 @@ def _bytes(encoded: Image) -> Bytes:
 
 
 def facts(shot: Shot) -> dict[str, Any]:
-    """What the page says of a shot: time of an exposure, share of full pixels, green's SNR where it is measured."""
+    """Return the figures of a shot: exposure time, share of full pixels, green's SNR where it is measured."""
     exposed = shot.exposed
     saturated = float(exposed.raw.saturated.mean())
     return {"exposure_s": exposed.exposure_s, "saturated": saturated, "snr_db": shot.developed.snr_db}
 
 
 def histogram(raw: RawImage) -> dict[str, Any]:
-    """Samples of each channel by their electrons, in bins of equal width on a logarithmic scale.
+    """Count the samples of each channel by their electrons, in bins of equal width on a logarithmic scale.
 
     Returns
     -------
@@ -194,7 +194,7 @@ def histogram(raw: RawImage) -> dict[str, Any]:
 
 
 def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
-    """Light budget and spectrum of one pixel in one frame.
+    """Return the light budget and the spectrum of one pixel in one frame.
 
     Returns
     -------
@@ -248,7 +248,7 @@ def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
 
 
 def noise_sources_e(exposed: Exposure, row: int, column: int) -> dict[str, float]:
-    """Standard deviation of each noise source of one pixel of a chip drawn at random [e-], and of all together."""
+    """Return the standard deviation of each noise source of one pixel of a random chip, and of all together [e-]."""
     channel = str(channel_map(exposed.sensor.cfa, exposed.raw.shape)[row, column])
     sources = sources_of(float(_collected_e(exposed)[row, column]), at_channel(_readings(exposed), channel))
     return {**sources, "total": hypot(*sources.values())}
