@@ -1,6 +1,6 @@
 """The budget's terms against closed forms: bands, lens, noise and level on hand-made light; ledger and choice."""
 
-from dataclasses import replace
+from dataclasses import fields, replace
 from itertools import combinations, product
 from typing import Any
 
@@ -367,3 +367,35 @@ def test_samples_are_those_that_monte_carlos_share_asks_for_up_to_the_studys() -
     assert choose(rows, SIZES, BudgetShares(), 512).spp == 400
     assert choose(rows, SIZES, BudgetShares(), 256).spp == 256
     assert choose([weighed(paths=1.0)], SIZES, BudgetShares(), 512).spp == 128
+
+
+def test_every_term_scales_as_its_kind_does_with_light_and_with_time() -> None:
+    """Three times the light: errors three times, noise nine times; light for time changes nothing without dark current.
+
+    A field that is added has to be named here.
+    """
+    sensor = low_noise()
+    assert sensor.pixel.dark_current_e_per_s == 0
+    pilot = PilotNoise(128, 16, 1e-4)
+    planes = halved() * (1 + 0.3 * np.sin(np.arange(40.0)))[:, None, None]
+    some = found(transport(planes, noise=0.02), counts=(20, 40), veiling_glare=0.01, diffraction=1.0)
+    dim, bright, brief = (
+        scale_effects(CONDITION, "rgbw", sensor, some, level, time_s, pilot)
+        for level, time_s in ((2.0, 0.01), (6.0, 0.01), (20.0, 0.001))
+    )
+    assert min(*dim.lens.values(), dim.bands[20][0], dim.bands[20][1], dim.jitter[20]) > 0
+    assert bright.lens == pytest.approx({name: 3 * x for name, x in dim.lens.items()})
+    for count in (20, 40):
+        assert bright.bands[count] == pytest.approx(tuple(3 * x for x in dim.bands[count]), abs=1e-9), count
+        assert brief.bands[count] == pytest.approx(dim.bands[count], abs=1e-9), count
+    assert bright.jitter == pytest.approx({count: 9 * x for count, x in dim.jitter.items()})
+    for name in ("blurred", "sharp", "level"):
+        assert getattr(bright, name) == pytest.approx(9 * getattr(dim, name)), name
+    assert dim.blurred < dim.sharp
+    signal = 2.0 * 0.01 * some.full.mean(axis=0)
+    assert dim.kernel == pytest.approx(np.sqrt((kernel_rms_e(signal, 40) ** 2).mean()))
+    named = {"lens", "bands", "jitter", "blurred", "sharp", "level", "kernel", "noise_variance"}
+    for name in named - {"bands"}:
+        assert getattr(brief, name) == pytest.approx(getattr(dim, name)), name
+    assert (dim.exposure_s, brief.exposure_s, dim.condition, dim.mosaic) == (0.01, 0.001, CONDITION, "rgbw")
+    assert named | {"exposure_s", "condition", "mosaic"} == {field.name for field in fields(ScaledEffects)}

@@ -124,6 +124,75 @@ def test_coefficients_are_those_of_the_data_sheet(crosstalk: float) -> None:
         assert noise["c"] == pytest.approx(0.02**2, rel=1e-9)
 
 
+def test_every_fact_of_a_sample_is_counted_another_way(tmp_path: Path) -> None:
+    """By hand from its arrays, its cell and the data sheet; a new fact has to be named here."""
+    terms = {"read_noise_e": 3.0, "dsnu_e": 2.0, "prnu": 0.02, "dark_current_e_per_s": 500.0}
+    sensor, errors_e = with_pixel(**terms, hot_pixel_share=0.01, hot_pixel_dark_current_e_per_s=1e4), 2.0
+    sample = sample_of(tmp_path, replace(sensor, gain=2.0), 60.0)
+    cell = replace(sample.cell, seed=3)
+    np.save(cell.frame.errors, np.full((1, *SIZE), errors_e / (60.0 * cell.exposure_s)))
+    light = {"wavelength_nm": [550.0], "width_nm": [10.0], "groups": {"lamp": [1.0]}}
+    window = (2, 4, 64, 96)
+    arrays, facts = make_sample(
+        replace(sample, cell=cell, illuminants=light, part=1, window=window, key="k", split="test", scene_hash="abc")
+    )
+
+    pixel, time_s, gain = sensor.pixel, cell.exposure_s, facts["gain_e_per_dn"]
+    mean_dark_e, hot_e = 500.0 * time_s, 1e4 * time_s
+    hot_e2 = 0.01 * 0.99 * hot_e**2 + 0.01 * hot_e
+    dark_e2 = 3.0**2 + 2.0**2 + mean_dark_e + hot_e2 + gain**2 / 12
+    x = np.asarray(arrays["mosaic_e"], float)
+    sites = {"R": [(0, 0)], "G": [(0, 1), (1, 0)], "B": [(1, 1)]}
+    mean_e = {name: np.mean([x[row::2, column::2].mean() for row, column in at]) for name, at in sites.items()}
+    variance_e2 = x + dark_e2 + (0.02 * x) ** 2
+    light_e2 = errors_e**2 / variance_e2  # share of the render's noise
+    expected: dict[str, Any] = {
+        "key": "k", "split": "test", "scene_hash": "abc", "scene": "scene.exr", "spectrum": "own", "level": "1cd/m2",
+        "exposure": cell.condition.exposure, "sensor": "low_noise", "mosaic": "bayer", "tile": ["RG", "GB"],
+        "channels": ["R", "G", "B"], "seed": 3, "window": [2, 4, 64, 96], "luminance_cd_m2": 60.0,
+        "exposure_s": time_s, "white_cd_m2": cell.white_cd_m2, "white_dn": 2.0**sensor.bits - 1,
+        "gain": 2.0, "groups": ["lamp"], "illuminants": light,
+        "lens": vars(sensor.lens), "rodcone": facts["rodcone"],
+    }  # fmt: skip
+    for name, value in expected.items():
+        assert facts[name] == value, name
+    assert gain == pytest.approx(
+        pixel.full_well_e / 2 / (facts["white_dn"] - replace(sensor, gain=2.0).black_dn), rel=1e-9
+    )
+    assert facts["black_dn"] == pytest.approx(replace(sensor, gain=2.0).black_dn + mean_dark_e / gain, rel=1e-9)
+    for name in "RGB":
+        noise, sources = facts["noise"][name], facts["sources_e"][name]
+        assert facts["mean_e"][name] == pytest.approx(mean_e[name], rel=1e-6)
+        assert facts["full_well_e"][name] == pytest.approx(pixel.full_well_e / 2, rel=1e-9)
+        told = noise["a"] * gain, noise["b"] * gain**2, noise["c"] ** 0.5
+        assert told == pytest.approx((1.0, dark_e2, 0.02), rel=1e-9)
+        # the raw image's black holds dark current, not what few hot pixels raise the mean by
+        assert facts["dark_above_black_e"][name] == pytest.approx(0.01 * hot_e, rel=1e-9)
+        wanted = {
+            "shot noise": mean_e[name], "dark current": mean_dark_e, "hot pixels": hot_e2,
+            "PRNU": (0.02 * mean_e[name]) ** 2, "DSNU": 4.0, "read noise": 9.0, "quantisation": gain**2 / 12,
+        }  # fmt: skip
+        assert {key: value**2 for key, value in sources.items() if value} == pytest.approx(wanted, rel=1e-6)
+    assert facts["snr_db"] == pytest.approx(10 * np.log10((x**2).mean() / variance_e2.mean()), abs=1e-6)
+    assert facts["render_noise"]["mean"] == pytest.approx(errors_e**2 / variance_e2.mean(), rel=1e-5)
+    assert facts["render_noise"]["of_95_percent"] == pytest.approx(np.quantile(light_e2, 0.95), rel=0.02)
+    assert facts["saturated"] == 0.0
+    named = set(expected) | {
+        "black_dn",
+        "gain_e_per_dn",
+        "noise",
+        "sources_e",
+        "mean_e",
+        "dark_above_black_e",
+        "full_well_e",
+    }
+    assert named | {"snr_db", "saturated", "render_noise"} == set(facts)
+    bright, told = make_sample(replace(sample, cell=replace(cell, luminance_cd_m2=120.0)))
+    read_e = (bright["raw"].astype(float) - told["black_dn"]) * told["gain_e_per_dn"]
+    full = [(bright["raw"] == told["white_dn"]).mean(), (read_e > 0.9 * pixel.full_well_e / 2).mean()]
+    assert 0.1 < full[0] <= told["saturated"] <= full[1] < 0.9
+
+
 def test_parts_of_a_frame_have_noise_of_their_own_and_one_chip(tmp_path: Path) -> None:
     sample = sample_of(tmp_path, with_pixel(prnu=0.2), 20.0)
 

@@ -18,7 +18,7 @@ from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
 from sensor.optics import form_image
-from studies.explore.answers import python_of
+from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, controls_from, mosaics_of
 from studies.explore.memo import Memo, never_cancel
@@ -53,6 +53,7 @@ PIXEL_MOVED = {
     "column_offset_e": 30.0, "hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 1e5, "crosstalk": 0.1,
     "full_well_e": 3000.0,
 }  # fmt: skip
+LIGHT_AND_LENS = {"lamps", "sensor", "mosaic", "lens", "level_cd_m2"}
 LENS_MOVED = {"f_number": 8.0, "defocus_um": 10.0, "diffraction": 2.0, "veiling_glare": 0.1}
 
 
@@ -75,6 +76,10 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
         assert kept.exposure_s == fresh.exposure_s, change
         assert np.array_equal(kept.raw.dn, fresh.raw.dn), change
         assert np.array_equal(kept.light.spectrum, fresh.light.spectrum), change
+        if LIGHT_AND_LENS & change.keys():
+            assert noise_share(kept, controls, memo) == noise_share(fresh, controls, Memo()), change
+        at = pixel(kept, 3, 5), pixel(fresh, 3, 5)
+        assert at[0] == at[1], change
         true, true_anew = true_picture_of(kept, controls, memo), true_picture_of(fresh, controls, Memo())
         assert np.array_equal(true[0], true_anew[0]), change
         developed, anew = development_of(kept, controls, memo), development_of(fresh, controls, Memo())

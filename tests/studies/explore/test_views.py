@@ -9,8 +9,10 @@ from builders import EVERY_TERM
 from explore_sample import lamps_apart, small_transport
 from matplotlib import colormaps
 from refusal import refusal
+from skimage.color import deltaE_ciede2000, rgb2lab
 
 from render.spectrum import photons_per_joule
+from rodcone.colour_spaces import encode_srgb
 from sensor.readings.resolve import resolve
 from sensor.readout import noise_variance, spread_charge, unclipped_variance
 from studies.explore.chain import expose_scene, photograph
@@ -20,12 +22,14 @@ from studies.explore.views import (
     MOST_SIGMAS,
     MOST_SNR_DB,
     VIEWS,
+    facts,
     histogram,
     noise_picture,
     noise_scale_e,
     noise_sources_e,
     pixel,
 )
+from studies.metrics.flip import flip
 
 
 def test_the_sources_of_noise_add_up_to_the_noise_model():
@@ -138,3 +142,57 @@ def test_noise_of_a_burst_is_shown_on_the_scale_of_one_frame():
         spread.append(shown[exposed.expected_e < 0.5 * exposed.sensor.pixel.full_well_e].std())
     assert spread[0] > 10
     assert spread[1] / spread[0] == pytest.approx(1.0, abs=0.08)
+
+
+def test_each_view_of_a_planted_difference_in_closed_form():
+    """A grey that is a tenth of white too bright, a colour that is 5 off, a full, an empty and a half full well."""
+    shot = photograph(small_transport(), Controls(pixel={"dsnu_e": 0.0}))
+    shape, raw = shot.linear.shape, shot.exposed.raw
+    grey = np.full(shape, 0.2)
+    brighter, raised = replace(shot, true=grey, linear=grey + 0.1), encode_srgb(grey + 0.1)
+    bluer = replace(shot, true=grey, linear=grey + np.array([0.0, 0.0, 0.05]))
+    off = deltaE_ciede2000(rgb2lab(encode_srgb(bluer.linear[:1, :1])), rgb2lab(encode_srgb(grey[:1, :1]))).item()
+    assert 2 < off < 9
+    turned = flip(raised, encode_srgb(grey))
+    full_dn = raw.black_dn + raw.full_well_e / raw.gain_e_per_dn
+    dn = np.full(raw.shape, raw.black_dn)
+    dn[:20], dn[20:30] = full_dn, (full_dn + raw.black_dn) / 2
+    wells = replace(shot, exposed=replace(shot.exposed, raw=replace(raw, dn=dn)))
+    tint = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "W": (1, 1, 1)}
+    lit = np.repeat([1.0, 0.5, 0.0], [20, 10, 10])[:, None, None]
+    mosaic = np.array([[tint[name] for name in line] for line in raw.cfa])
+    viridis = colormaps["viridis"]
+    wanted = {
+        "picture": (brighter, raised),
+        "truth": (shot, encode_srgb(shot.true)),
+        "luminance error": (brighter, np.full(shape, 0.5 + 0.5 * 0.1 / 0.25)),
+        "colour error": (bluer, np.broadcast_to(viridis(off / 10)[:3], shape)),
+        "flip": (brighter, viridis(turned)[..., :3]),
+        "raw": (wells, encode_srgb(np.tile(mosaic, (20, 24, 1)) * lit)),
+    }
+    assert set(wanted) | {"noise", "snr"} == set(VIEWS)  # these two have tests of their own
+    for view, (seen, values) in wanted.items():
+        assert np.abs(VIEWS[view](seen) - 255 * values).max() <= 1.01, view
+
+
+def test_the_facts_of_a_shot_are_those_of_its_frame():
+    shot = photograph(small_transport(), Controls(exposure=TIME, exposure_s=0.03, level_cd_m2=60.0))
+    full = shot.exposed.raw.electrons > 0.97 * shot.exposed.raw.full_well_e
+    told = facts(shot)
+    assert told["exposure_s"] == 0.03
+    assert 0.05 < full.mean() < 0.95
+    assert told["saturated"] == pytest.approx(full.mean(), abs=0.03)
+    assert told["snr_db"] == shot.developed.snr_db
+
+
+def test_a_pixel_reads_its_own_sample_and_its_channels_well():
+    exposed = photograph(
+        small_transport(), Controls(sensor="white_apart", mosaic="own", processor="any_mosaic")
+    ).exposed
+    for row, column in ((0, 0), (0, 1), (1, 0), (1, 1), (17, 30)):
+        told, channel = pixel(exposed, row, column), exposed.sensor.cfa[row % 2][column % 2]
+        dn = float(exposed.raw.dn[row, column])
+        assert (told["row"], told["column"], told["channel"]) == (row, column, channel)
+        assert told["read_e"] == pytest.approx((dn - exposed.raw.black_dn) * exposed.raw.gain_e_per_dn, rel=1e-9)
+        assert told["well_e"] == pytest.approx(exposed.raw.noise_of(channel).full_well_e)
+        assert told["wavelength_nm"] == exposed.transport.wavelength_nm.tolist()

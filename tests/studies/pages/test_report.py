@@ -408,3 +408,45 @@ def test_light_has_the_unit_that_the_studys_levels_have() -> None:
     data = viewer_data(in_lux, group_views(in_lux))
     assert data["light"] == {"key": "lux", "name": "illuminance, lux"}
     assert [cell["lux"] for cell in data["cells"]] == [cell.illuminance_lux for cell in in_lux.cells]
+
+
+def test_the_pages_script_is_told_each_cells_own_figures_and_light() -> None:
+    """Counted again from the rows: means of three seeds, Student's interval (4.303 s / sqrt 3), light in both units."""
+    of = SAMPLE.sample_axes()
+    data = viewer_data(of, group_views(of))
+    keys = [metric["key"] for metric in data["metrics"]]
+    assert keys[:2] == ["psnr_db", "ssim"]
+    places = [(exposure, level, camera) for exposure in range(2) for level in range(3) for camera in of.cameras]
+    for shown, cell, (exposure, level, camera) in zip(data["cells"], of.cells, places, strict=True):
+        assert (cell.first.exposure, cell.first.level, cell.camera) == (
+            ("auto", "10ms")[exposure],
+            SAMPLE.LEVELS[level][0],
+            camera,
+        )
+        assert (shown["x"], shown["lux"]) == SAMPLE.LEVELS[level][1:3]
+        for key in keys:
+            values = [getattr(row, key) for row in cell.rows]
+            mean = sum(values) / 3
+            deviation = (sum((x - mean) ** 2 for x in values) / 2) ** 0.5
+            assert shown["figures"][key][0] == pytest.approx(mean, rel=1e-6), key
+            assert shown["figures"][key][1] == pytest.approx(4.303 * deviation / 3**0.5, rel=1e-3, abs=1e-9), key
+        assert shown["file"] == f"pictures/{cell.rows[0].picture}"
+        assert shown["over"] == (cell.rows[0].mc_share > 0.03)
+    levels = data["levels"][0]
+    assert [level["name"] for level in levels] == [name for name, *_ in SAMPLE.LEVELS[:3]]
+    for level, (_, cd_m2, lux, source) in zip(levels, SAMPLE.LEVELS, strict=False):
+        plain = level["light"].replace("\N{NO-BREAK SPACE}", " ")
+        assert plain == f"{cd_m2:g} cd/m² · {lux:g} lux on the scene's reference plane"
+        assert level["source"] == source
+    assert data["sizes"] == [[64, 64]]
+
+
+def test_each_view_of_several_scenes_has_its_own_levels_and_cells() -> None:
+    of = SAMPLE.sample_views()
+    data = viewer_data(of, group_views(of))
+    assert len(data["levels"]) == len(of.truths) == 4
+    assert [shown["figures"]["psnr_db"][0] for shown in data["cells"]] == [cell.mean("psnr_db") for cell in of.cells]
+    assert len({shown["figures"]["psnr_db"][0] for shown in data["cells"]}) == len(of.cells)
+    assert data["sizes"] == [[64, 64], [48, 96]]
+    assert [view.first for view in group_views(of)] == [4 * index for index in range(8)]
+    assert [view.truth for view in group_views(of)] == [0, 0, 1, 1, 2, 2, 3, 3]

@@ -9,12 +9,20 @@ import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 
+from sensor.exposure import auto_exposure_s
+from sensor.optics import form_image
 from sensor.presets import low_noise, preset
+from sensor.response import expected_electrons
+from studies.dataset import sample as sample_module
+from studies.metrics.truth import light_in_bands, shown_white_cd_m2
+from studies.study.lit_scene import open_all, under
 from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
 from studies.sweep import prepare as prepare_module
 from studies.sweep.cells import cell_key, device_stream, exposure_stream, shake_stream
+from studies.sweep.database import open_results
 from studies.sweep.frames import frame_key
+from studies.sweep.prepare import Job, scene_cells
 
 CONDITION = Condition(SceneChoice("still_life"), "D65", "25cd/m2", "10ms", "low_noise")
 
@@ -115,3 +123,78 @@ def test_a_stream_of_noise_has_a_draw_of_its_own_for_each_of_its_coordinates() -
         assert len(set(draws)) == len(draws)
     again = exposure_stream(*exposures[0]), exposure_stream(*exposures[0])
     assert np.array_equal(again[0].random(3), again[1].random(3))
+
+
+def test_the_files_of_a_data_sets_scene_are_made_anew_for_each_input_alone(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study = SAMPLE.small_study(tmp_path)
+    with open_results(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        (opened,) = open_all(study).values()
+        cells = scene_cells(job, opened, lambda *_: None)
+        (tmp_path / prepare_module.PLANES).mkdir(exist_ok=True)
+        made: list[int] = []
+
+        def facts(**changes: Any) -> None:
+            inputs = {"job": job, "opened": opened, "cells": cells} | changes
+            sample_module.scene_facts(**inputs, progress=lambda *_: None)  # type: ignore[arg-type]
+
+        monkeypatch.setattr(sample_module, "scene_transport", lambda *_: (None,))
+        monkeypatch.setattr(sample_module, "_make_files", lambda *_: made.append(1) or {"files": {}})
+        facts()
+        facts()
+        assert len(made) == 1
+        frame = cells[0].frame
+        other_tile = replace(frame, sensor=low_noise("rgbw"))
+        changes: list[dict[str, Any]] = [
+            {"cells": [replace(cells[0], render=replace(cells[0].render, content="another"))]},
+            {"opened": replace(opened, identity="another")},
+            {"job": replace(job, study=SimpleNamespace(spectra=("A",)))},
+            {"cells": [replace(cells[0], frame=replace(frame, electrons=tmp_path / "other.npy"))]},
+            {"cells": [replace(cells[0], frame=other_tile)]},
+        ]
+        for number, change in enumerate(changes, 2):
+            facts(**change)
+            assert len(made) == number, change
+        for name in ("versions", "code_digests"):
+            monkeypatch.setattr(sample_module, name, lambda: "another")
+            facts()
+        assert len(made) == len(changes) + 3
+
+
+def test_a_frame_that_is_read_back_is_the_frame_that_was_made(tmp_path: Path) -> None:
+    """Each fact of a rendered scene's frame: its own light, two rules' times, lux, and half the halves' difference."""
+    limits = RenderLimits(size=16, spp=8, band_nm=50.0)
+    study = SAMPLE.small_study(
+        tmp_path, scenes=(SceneChoice("still_life"),), levels=("10lux",), processors=("interleaved",), render=limits
+    )
+    with open_results(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        (opened,) = open_all(study).values()
+        frame = scene_cells(job, opened, lambda *_: None)[0].frame
+        transport = under(prepare_module.scene_transport(job, opened, lambda *_: None)[0], "own")
+    first = next(iter(transport.groups.values())).spectrum
+    light = light_in_bands(first, transport.wavelength_nm, transport.width_nm)
+    for name in ("wavelength_nm", "width_nm", "spectrum"):
+        assert np.array_equal(getattr(frame.light, name), getattr(light, name)), name
+    assert np.array_equal(frame.light.lamp.values, first.values)
+    assert frame.lux_per_cd_m2 == pytest.approx(1 / transport.relight(illuminance_lux=1.0).luminance().mean(), rel=0.05)
+    assert frame.white_cd_m2 == pytest.approx(shown_white_cd_m2(transport, 1.0))
+
+    def electrons(view: Any, sensor: Any = frame.sensor) -> np.ndarray:
+        return expected_electrons(form_image(view, sensor), sensor, 1.0)
+
+    halves = [electrons(half) for half in transport.relight_halves(luminance_cd_m2=1.0)]
+    (error,) = np.load(frame.errors)
+    assert np.allclose(error, (halves[0] - halves[1]) / 2, rtol=1e-4, atol=1e-4 * halves[0].max())
+    assert np.load(frame.electrons) == pytest.approx(electrons(transport.relight(luminance_cd_m2=1.0)), rel=1e-5)
+    image = form_image(transport.relight(luminance_cd_m2=1.0), replace_diffraction(frame.sensor))
+    assert frame.auto_s == pytest.approx(auto_exposure_s(image, frame.sensor, 1e6), rel=1e-3)
+    assert frame.auto_w_s == pytest.approx(auto_exposure_s(image, frame.sensor, 1e6, channel="W"), rel=1e-3)
+    assert frame.auto_w_s < 0.8 * frame.auto_s
+
+
+def replace_diffraction(sensor: Any) -> Any:
+    """One time for all models of the lens."""
+    return replace(sensor, lens=replace(sensor.lens, diffraction=0.0))
