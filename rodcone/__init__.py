@@ -10,6 +10,9 @@ from typing import Any
 
 from rodcone import llvm as _llvm  # noqa: F401  (run for its effect: it names the LLVM library to Dr.Jit)
 from rodcone.doors import door, imported
+from rodcone.doors import require_no_shadow as _require_no_shadow
+
+_require_no_shadow()
 
 # Public name: module and attribute. Its strings are the one exemption from the layers (rodcone is the ground that
 # the other packages stand on): import-linter sees no imports here, since nothing is imported until a user asks.

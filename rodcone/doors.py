@@ -9,6 +9,7 @@ import sys
 from collections.abc import Callable, Iterable, Mapping
 from functools import wraps
 from importlib import import_module
+from importlib.util import find_spec
 from inspect import Parameter, signature
 from math import inf
 from numbers import Integral
@@ -21,6 +22,7 @@ from rodcone.errors import InputError, require_kind, require_range
 from rodcone.time_text import parse_time
 
 F = TypeVar("F", bound=Callable[..., Any])
+PACKAGES = ("render", "scenes", "sensor", "isp", "studies")
 Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives what the function is called with
 
 
@@ -28,6 +30,28 @@ def at(place: str) -> Any:
     """Object at ``module:name``."""
     module, _, name = place.partition(":")
     return getattr(imported(module), name)
+
+
+def require_no_shadow() -> None:
+    """Raise `ImportError` in one line that names the file, where a file beside the user's script has a package's name.
+
+    Python finds a script `render.py` before the package `render`. Where another distribution's package stands in its
+    place, `rodcone doctor` says so.
+    """
+    for name in PACKAGES:
+        found = getattr(sys.modules.get(name), "__spec__", None) or (None if name in sys.modules else find_spec(name))
+        if found is None or found.submodule_search_locations is not None or not found.has_location:
+            continue
+        if "site-packages" not in Path(str(found.origin)).parts:
+            raise ImportError(_shadow_words(str(found.origin), name))
+
+
+def _shadow_words(file: str, package: str) -> str:
+    """Return the line that names a file in a package's place, and the remedy."""
+    return (
+        f"rodcone: {file} stands in the place of rodcone's package {package}; allowed: a file of another name "
+        "beside your script; rename it"
+    )
 
 
 def imported(module: str) -> ModuleType:
@@ -39,10 +63,7 @@ def imported(module: str) -> ModuleType:
         file = getattr(sys.modules.get(package), "__file__", None)
         if "." not in str(error.name) or file is None or Path(file).name == "__init__.py":
             raise
-        raise ImportError(
-            f"rodcone: {file} stands in the place of rodcone's package {package}; allowed: a file of another name "
-            "beside your script; rename it"
-        ) from None
+        raise ImportError(_shadow_words(file, package)) from None
 
 
 def _value(kind: str, fix: str, by_name: str = "") -> Check:

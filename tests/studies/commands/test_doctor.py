@@ -39,7 +39,7 @@ def test_a_file_with_a_packages_name_is_named_by_the_doctor_and_by_the_import(
     (found,) = [each for each in doctor.findings() if not each.ok]
     assert found.name == "file sensor.py"
     assert str(tmp_path / "sensor.py") in found.value
-    done = new_python("import rodcone\nrodcone.capture", folder=tmp_path)
+    done = new_python("import rodcone", folder=tmp_path)
     (last,) = done.stderr.splitlines()[-1:]
     assert last.startswith(f"ImportError: rodcone: {tmp_path / 'sensor.py'} stands in the place of rodcone's package")
 
