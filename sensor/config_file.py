@@ -92,7 +92,7 @@ def _warn_of_window(sensor: SensorConfig, range_nm: Sequence[float], path: str |
 
 
 @dataclass(frozen=True)
-class _ResponsesTable:
+class ResponsesTable:
     """Keys of ``[responses]``; what the file doesn't say about them is refused, not guessed."""
 
     csv: str
@@ -103,7 +103,7 @@ class _ResponsesTable:
 
 
 @dataclass(frozen=True)
-class _SensorTable:
+class SensorTable:
     """Keys of a sensor file; `SensorConfig` and `tile_of` check the values of those that are Any."""
 
     pixel: PixelConfig
@@ -120,7 +120,7 @@ class _SensorTable:
     readout: str = MERGED
     readings: tuple[Reading, ...] = ()
     channels: tuple[ChannelReading, ...] = ()
-    responses: _ResponsesTable | None = None
+    responses: ResponsesTable | None = None
 
 
 _CONVERTER = strict_converter()
@@ -131,7 +131,7 @@ _FIX = (
 
 
 def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
-    table = structured(_with_a_whole_pixel(content), _SensorTable, _CONVERTER, _FIX)
+    table = structured(_with_a_whole_pixel(content), SensorTable, _CONVERTER, _FIX)
     tile = tile_of(table.cfa) if cfa is None else cfa
     if table.responses is not None:
         responses = _responses(table.responses, folder)
@@ -164,7 +164,7 @@ def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:
     return content | {"pixel": pixel | {name: readings[0].get(name, 1.0) for name in _OF_READINGS}}
 
 
-def _responses(table: _ResponsesTable, folder: Path) -> Responses:
+def _responses(table: ResponsesTable, folder: Path) -> Responses:
     scale = table.quantum_efficiency
     efficiency = None if scale in ("included", "relative") else scale
     require_name("responses: unit", table.unit, ("per_photon", "per_watt"))

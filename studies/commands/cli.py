@@ -61,6 +61,7 @@ app.command("studies.commands.plot:plot", name="plot", help="Draw a metric of a 
 app.command("studies.commands.demo:reference", name="reference", help="Render the light that studies photograph.")
 app.command("studies.commands.develop:render", name="render", help="Render a scene into a spectral OpenEXR file.")
 app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
+app.command("studies.commands.schema:schema", name="schema", help="Print the JSON Schema of sensor or study files.")
 app.command("studies.commands.characterise:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
 app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
 app.command("studies.commands.export:export", name="export", help="Write a sweep's results as CSV.")
