@@ -3,12 +3,13 @@
 import ast
 import json
 import re
+import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-from badges import badges
+from badges import addressed, badges
 from PIL import Image
 
 from rodcone import __all__ as PUBLIC
@@ -53,8 +54,8 @@ def test_a_test_that_a_page_names_is_there() -> None:
 
 
 def test_the_first_screen_of_the_readme_answers_a_stranger_in_this_order() -> None:
-    marks = ("rodcone is for people who", "**What does a white pixel bring?**", "images/dim_light.webp", "make demo",
-             "import rodcone\n", "## Questions", "images/chain.svg", "## Held against", "## Without make")  # fmt: skip
+    marks = ("rodcone is for people who", "**What does a white pixel bring?**", "images/dim_light.webp", "pip install",
+             "import rodcone\n", "## Questions", "images/chain.svg", "## Held against", "## Install")  # fmt: skip
     places = [README.index(mark) for mark in marks]
     assert places == sorted(places)
 
@@ -78,6 +79,22 @@ def test_the_readmes_badges_are_those_of_the_project() -> None:
     for file, content in badges().items():
         assert (DOCS / "images" / file).read_text("utf-8") == content, f"{file}: run docs/make/badges.py"
         assert file in README
+
+
+def test_pages_install_from_the_projects_one_address_and_the_citation_has_its_version() -> None:
+    for path, text in addressed().items():
+        assert path.read_text("utf-8") == text, f"{path.name}: run docs/make/badges.py"
+        assert path.suffix == ".cff" or "git+https://" in text, f"{path.name} doesn't say how to install"
+
+
+def test_every_link_of_the_packages_description_is_absolute() -> None:
+    package_readme = pytest.importorskip("package_readme", reason="needs hatchling, which builds the package")
+    text = package_readme.with_absolute_links(README, "https://host/rodcone")
+    links = re.findall(r"\]\(([^)\s]+)\)", text)
+    assert len(links) > 20
+    assert [link for link in links if not link.startswith("https://")] == []
+    assert "![version](https://host/rodcone/raw/main/docs/images/badge_version.svg)" in text
+    assert "(https://host/rodcone/blob/main/docs/index.md#the-commands)" in text
 
 
 @pytest.mark.thorough
@@ -112,6 +129,21 @@ def test_kept_pictures_are_those_of_their_pages_commands() -> None:
         )
 
 
+def test_a_build_of_the_site_changes_no_kept_picture(tmp_path: Path) -> None:
+    page = DOCS / "how_to" / "burst.md"
+    kept = tmp_path / "burst"
+    shutil.copytree(DOCS / "pictures" / "burst", kept)
+    (ran := tmp_path / "ran").mkdir()
+    for name in pictures.shown(page.read_text("utf-8")):
+        Image.new("RGB", (8, 8), "red").save((ran / name).with_suffix(".png"))
+    before = {path.name: path.read_bytes() for path in kept.iterdir()}
+    pictures.keep(page, ran, kept)
+    assert {path.name: path.read_bytes() for path in kept.iterdir()} == before
+    (kept / pictures.MADE).write_text("another page's\n", "utf-8")
+    pictures.keep(page, ran, kept)
+    assert (kept / "one.webp").read_bytes() != before["one.webp"]
+
+
 def programs() -> Iterator[tuple[str, str]]:
     """Name and text of each piece of Python that a reader is shown: pages, notebooks, numbered scripts."""
     for page in PAGES:
@@ -126,7 +158,7 @@ def programs() -> Iterator[tuple[str, str]]:
 
 PROGRAMS = dict(programs())
 # What runs in tests: scripts, notebooks, and the pages that docs/run_page.py runs.
-RUN = {path.name for path in (*DOCS.glob("tutorial/*.md"), *DOCS.glob("how_to/*.md"))}
+RUN = {path.name for folder in ("tutorial", "how_to", "understand") for path in DOCS.glob(f"{folder}/*.md")}
 EXTRA = {"explore": "explore.md", "relight_denoised": "render.md"}
 INSIDE = {"render", "scenes", "sensor", "isp", "studies"}
 

@@ -1,11 +1,18 @@
-"""Write the README's badges from pyproject.toml: `python docs/make/badges.py`. They show without a network."""
+"""Write what pages take from pyproject.toml: `python docs/make/badges.py`.
 
+These are the README's badges, which show without a network, the repository's address in the lines that show how to
+install, and the version of CITATION.cff.
+"""
+
+import re
 import tomllib
 from collections.abc import Mapping
 from html import escape
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
+INSTALL = re.compile(r"git\+https?://\S+?\.git")
+VERSION = re.compile(r"^version: .*$", re.MULTILINE)
 IMAGES = ROOT / "docs" / "images"
 LETTER, PAD, HEIGHT = 6.6, 6, 20  # pixels
 
@@ -16,6 +23,16 @@ def badges() -> dict[str, str]:
     oldest = project["requires-python"].removeprefix(">=")
     texts = {"version": project["version"], "licence": str(project["license"]), "python": f"{oldest} or newer"}
     return {f"badge_{name}.svg": svg(name.capitalize(), text) for name, text in texts.items()}
+
+
+def addressed() -> dict[Path, str]:
+    """Return the pages that show how to install, with the repository's address, and CITATION.cff with the version."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
+    address = f"git+{project['urls']['Repository']}.git"
+    pages = [ROOT / "README.md", ROOT / "docs" / "how_to" / "install.md", ROOT / "docs" / "index.md"]
+    texts = {page: INSTALL.sub(address, page.read_text("utf-8")) for page in pages}
+    citation = ROOT / "CITATION.cff"
+    return texts | {citation: VERSION.sub(f"version: {project['version']}", citation.read_text("utf-8"))}
 
 
 def svg(name: str, text: str) -> str:
@@ -35,3 +52,5 @@ def svg(name: str, text: str) -> str:
 if __name__ == "__main__":
     for file, content in badges().items():
         (IMAGES / file).write_text(content, "utf-8")
+    for path, text in addressed().items():
+        path.write_text(text, "utf-8")
