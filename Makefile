@@ -79,12 +79,16 @@ results: $(VENV)/installed-dev
 faults: $(VENV)/installed-dev
 	@$(BIN)/python tests/faults/plant_faults.py
 
-# Pages open from the file, and their search works there too.
+# Pages open from the file, and their search works there too. Minutes are of two idle cores (docs/figures.mk).
+FIGURES_DUE = $(MAKE) --no-print-directory -n -f docs/figures.mk BIN=$(BIN)
 docs: $(VENV)/installed-docs
-	@echo "Figures that are older than the code are made anew: up to ten minutes on two cores. The pages take one."
-	@$(MAKE) --no-print-directory -f docs/figures.mk BIN=$(BIN)
-	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet
-	@echo "Documentation: $(abspath out/site)/index.html (open it in a browser)"
+	@due="$$($(FIGURES_DUE) 2>/dev/null)"; pages=$$(echo "$$due" | grep -c run_page.py); \
+	large=$$(echo "$$due" | grep -cE "rodcone (demo|paper) "); \
+	echo "$$pages pages' examples and $$large reports are older than the code and are made anew: about" \
+	"$$((1 + pages / 2 + 3 * large)) minutes on two idle cores; the pages themselves take one."
+	@begun=$$(date +%s); $(MAKE) --no-print-directory -f docs/figures.mk BIN=$(BIN) \
+	&& NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet \
+	&& echo "Documentation, made in $$((($$(date +%s) - begun + 59) / 60)) min: $(abspath out/site)/index.html (open it in a browser)"
 
 fuzz: $(VENV)/installed-dev
 	@nice -n 10 $(BIN)/python tests/fuzz/run.py --seconds 60

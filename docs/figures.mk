@@ -11,7 +11,7 @@ DEMO ?=
 PAPER ?=
 CODE := $(shell find rodcone render scenes sensor isp studies -type f -not -path '*/__pycache__/*')
 # Pages whose blocks run; each in a folder of its own, from which its pictures are taken.
-PAGES := $(wildcard docs/tutorial/*.md docs/how_to/*.md)
+PAGES := $(wildcard docs/tutorial/*.md docs/how_to/*.md docs/understand/*.md)
 RAN := $(PAGES:docs/%.md=$(FIGURES)/%/ran)
 
 .DELETE_ON_ERROR:

@@ -12,8 +12,12 @@ import tempfile
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 from PIL import Image
 
+import rodcone
+from isp.colour.encoding import encode
+from isp.processors.catalogue import PROCESSORS
 from scenes import catalogue
 from sensor import cfa, presets
 from studies.commands.list import texts
@@ -35,6 +39,16 @@ SHOWN = {
     "slanted_edge": "--level 200cd/m2",
     "still_life": "--level 500lux",
     "still_life_outdoor": "",
+}
+CROP_PX = 112
+CROP = slice(212, 212 + CROP_PX), slice(190, 190 + CROP_PX)  # star, chart and gold ball of still_life at 512 pixels
+UNSHOWN = {
+    **dict.fromkeys(
+        ("bayer_bm3d", "bayer_park", "bayer_residual_bm3d", "rgbw_park"),
+        "none: its library has a licence for non-commercial use alone",
+    ),
+    **dict.fromkeys(("ple", "any_mosaic"), "as its mosaic's"),
+    "cmyw_yamagami": "none: its raw images hold no R, G or B, so that it serves studies alone",
 }
 MADE = """Made by `python docs/gallery.py`: each picture by the command beneath
 it and `rodcone develop NAME.dng --width 320`."""
@@ -169,7 +183,36 @@ Any preset goes with any mosaic: `--cfa bayer`. The rows of one tile:
 """
 
 
-PAGES = {"scenes.md": scenes_page, "lights.md": lights_page, "sensors.md": sensors_page}
+def processors_page() -> str:
+    """Page of the processors, each with its picture of one crop."""
+    rows = "\n".join(
+        f"| {UNSHOWN.get(name, f'![{name}](processor_{name}.webp)')} | `{name}` | {text} |"
+        for name, text in texts("processors").items()
+    )
+    return f"""# Processors
+
+Ways to develop a raw frame, by name: `rodcone develop shot.dng --isp ple_rgbw` on the command line,
+`processors = ["ple_rgbw", "ple_bayer"]` in a study, `rodcone.develop(raw, processor="ple_rgbw")` in Python. Where none
+is named, `develop` uses `ple`, whatever the mosaic. How to write one:
+[a processor of your own](../how_to/own_processor.md).
+Which is best in which light: [all cameras ranked](../opponents.md).
+
+Each picture shows the same {CROP_PX} × {CROP_PX} pixels of `still_life` at 5 cd/m², photographed by `low_noise` behind
+the mosaic that the processor takes, with one exposure of 66 ms. Made by `python docs/gallery.py`.
+
+| picture | name | mosaic, method and source |
+|---|---|---|
+| ![the truth](processor_truth.webp) | | the noise-free picture, which all others are compared with |
+{rows}
+"""
+
+
+PAGES = {
+    "scenes.md": scenes_page,
+    "lights.md": lights_page,
+    "sensors.md": sensors_page,
+    "processors.md": processors_page,
+}
 DRAWINGS = (
     "rodcone list lights -o lights.svg",
     "rodcone list sensors -o sensors.svg",
@@ -192,7 +235,23 @@ def photograph(scene: str, folder: Path) -> None:
             picture.convert("RGB").save(folder / f"{scene}.webp", quality=QUALITY, method=6)
 
 
+def develop_all(folder: Path) -> None:
+    """Write ``processor_NAME.webp`` of each processor, and of the truth, into a folder."""
+    radiance = rodcone.load_transport("still_life").relight(luminance_cd_m2=5.0)
+    pictures = {"truth": encode(rodcone.reference_picture(radiance).linear, "srgb")}
+    for name, processor in PROCESSORS.items():
+        if name not in UNSHOWN:
+            camera = presets.vary(presets.preset("low_noise"), processor.mosaic)
+            raw = rodcone.capture(radiance, camera, "66ms", rng=np.random.default_rng(0))
+            developed = rodcone.develop(raw, rodcone.calibrate(camera, rodcone.illuminant("D65")), processor=name)
+            pictures[name] = developed.encode()
+    for name, picture in pictures.items():
+        crop = Image.fromarray(np.rint(255 * np.clip(picture[CROP], 0, 1)).astype(np.uint8))
+        crop.save(folder / f"processor_{name}.webp", quality=QUALITY, method=6)
+
+
 if __name__ == "__main__":
+    develop_all(FOLDER)
     for name, page in PAGES.items():
         (FOLDER / name).write_text(page(), "utf-8")
     for command in DRAWINGS:

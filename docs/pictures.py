@@ -1,7 +1,9 @@
 """Keep a page's pictures in the repository: `python docs/pictures.py PAGE RAN FOLDER`.
 
 RAN is the folder in which docs/run_page.py ran the page. Each picture of FOLDER that the page shows is made from the
-picture of that name there: PNG becomes WebP, SVG stays. FOLDER/made.txt keeps the digest of the page's commands.
+picture of that name there: PNG becomes WebP, SVG stays. FOLDER/made.txt keeps the digest of the page's commands. While
+it is theirs the pictures stay as they are, so that a build of the site changes no tracked file; remove it to have them
+made anew.
 """
 
 import re
@@ -29,10 +31,17 @@ def shown(text: str) -> list[str]:
     return list(dict.fromkeys(name for _, name in SHOWN.findall(text)))
 
 
+def is_kept(text: str, folder: Path) -> bool:
+    """Return whether a folder holds every picture that a page shows, made by the page's present commands."""
+    made = folder / MADE
+    current = made.is_file() and made.read_text("utf-8").strip() == digest(text)
+    return current and all((folder / name).is_file() for name in shown(text))
+
+
 def keep(page: Path, ran: Path, folder: Path) -> None:
-    """Write a page's pictures and its digest into `folder`; nothing where the page shows none."""
+    """Write a page's pictures and its digest into `folder`; nothing where it shows none, or its commands made them."""
     text = page.read_text("utf-8")
-    if not shown(text):
+    if not shown(text) or is_kept(text, folder):
         return
     folder.mkdir(parents=True, exist_ok=True)
     for name in shown(text):

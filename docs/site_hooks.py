@@ -4,6 +4,7 @@ import ast
 import csv
 import json
 import re
+import tomllib
 from html import escape, unescape
 from itertools import count
 from pathlib import Path
@@ -21,11 +22,24 @@ from studies.commands.cli import app
 ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 RESULTS = sorted((ROOT / "docs" / "results").glob("*.csv"))
-FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*")  # what docs/figures.mk makes
+FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*", "understand/*/*")  # what docs/figures.mk makes
 SHOWN = (".html", ".png", ".svg")
-# How much a word of a page counts in the search, by the page's folder; elsewhere 1. Who searches wants to do something:
-# how-tos come first, then what can be named; why it is so and the functions within come last.
-BOOSTS = {"how_to": 4.0, "tutorial": 4.0, "gallery": 2.0, "decisions": 0.25, "results": 0.25, "api": 0.5}
+# How much a word of a page counts in the search, by its folder; elsewhere 1. Who searches wants to do or to understand
+# something: these pages come first, then what can be named; records of decisions and the functions within come last.
+BOOSTS = {
+    "how_to": 3.0,
+    "tutorial": 3.0,
+    "understand": 3.0,
+    "gallery": 1.5,
+    "decisions": 0.1,
+    "results": 0.1,
+    "api": 0.1,
+}
+# By page the words under which readers look for it, beside those of its own text.
+WORDS = tomllib.loads((ROOT / "docs" / "search.toml").read_text("utf-8"))
+# Links to files of the repository outside docs: on the site they lead to copies.
+OUTSIDE = re.compile(r"\]\(((?:\.\./)+)((?:studies|examples|sensor|benchmarks)/[\w./-]+|[A-Z]+\.(?:md|cff))\)")
+LINK = re.compile(r'href="([^":#]*\.html|)#([^"]+)"')
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 MADE = re.compile(r"`out/(demo/report|paper/paper)\.html`")  # in words where no figures are, a link on the site
 CSV_LINK = re.compile(r"\(results/(\w+)\.csv\)")  # a file in the repository, a page of the site
@@ -36,16 +50,17 @@ def on_config(config: Any) -> Any:
     """Add to the navigation what its list lacks: pages about one part, decisions, the API."""
     sections = {name: pages for entry in config.nav if isinstance(entry, dict) for name, pages in entry.items()}
     listed = {*map(str, config.nav), *(page for pages in sections.values() for page in pages)}
-    sections["In depth"] += sorted({path.name for path in (ROOT / "docs").glob("*.md")} - listed)
+    sections["Look up"] += sorted({path.name for path in (ROOT / "docs").glob("*.md")} - listed)
     sections["Results"].append({"Tables": [f"results/{path.stem}.md" for path in RESULTS]})
     decisions = sorted(path.name for path in (ROOT / "docs" / "decisions").glob("*.md"))
     packages = [
         {name: [f"api/{name}/index.md", *({module: f"api/{name}/{module}.md"} for module in modules(name))]}
         for name in PACKAGES
     ]
-    config.nav += [
+    sections["Look up"] += [
+        "api/commands.md",
+        {"API": ["api/index.md", *packages]},
         {"Decisions": ["decisions/index.md", *(f"decisions/{name}" for name in decisions)]},
-        {"API": ["api/index.md", "api/commands.md", *packages]},
     ]
     return config
 
@@ -61,6 +76,10 @@ def on_files(files: Files, config: Any) -> Files:
             pages[f"api/{package}/{module}.md"] = f"# {package}.{module}\n\n::: {package}.{module}\n"
     for place, text in pages.items():
         files.append(File.generated(config, place, content=text))
+    for page in sorted((ROOT / "docs").rglob("*.md")):
+        for _, name in OUTSIDE.findall(page.read_text("utf-8")):
+            if f"files/{name}" not in files.src_uris:
+                files.append(File.generated(config, f"files/{name}", content=(ROOT / name).read_text("utf-8")))
     folder = ROOT / config.extra["figures"]
     for place in sorted(path for pattern in FIGURES for path in folder.glob(pattern) if path.suffix in SHOWN):
         name = f"figures/{place.relative_to(folder).as_posix()}"
@@ -70,8 +89,10 @@ def on_files(files: Files, config: Any) -> Files:
 
 def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> str:
     """Show beneath each block that docs/run_page.py ran what it printed; weigh the page for the search."""
-    page.meta["search"] = {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)}
+    page.meta.setdefault("search", {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)})
+    page.meta["tags"] = WORDS.get(page.file.src_uri, [])
     up = "../" * page.file.src_uri.count("/")
+    markdown = OUTSIDE.sub(rf"]({up}files/\2)", markdown)
     markdown = MADE.sub(rf"[`out/\1.html`]({up}figures/\1.html)", markdown)
     if not page.file.src_uri.startswith("results/"):
         markdown = CSV_LINK.sub(r"(results/\1.md)", markdown)
@@ -92,6 +113,24 @@ def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
     """Write formulas as MathML, which browsers show by themselves, and lead names of modules to their pages."""
     html = FORMULA.sub(lambda match: mathml(match[2], block=match[1] == "div"), html)
     return NAME.sub(lambda match: match[0] if match[1] else linked(match[2], match[0], page.url), html)
+
+
+def on_post_build(config: Any) -> None:
+    """Lead each link whose target lacks its anchor to what holds it: of a field the class, of a constant the module."""
+    pages = {path.resolve(): path.read_text("utf-8") for path in Path(config.site_dir).rglob("*.html")}
+    anchors = {path: set(re.findall(r'\bid="([^"]+)"', text)) for path, text in pages.items()}
+    for path, text in pages.items():
+
+        def mended(link: re.Match[str], path: Path = path) -> str:
+            place, anchor = link[1], link[2]
+            known = anchors.get((path.parent / place).resolve() if place else path)
+            while known is not None and anchor and anchor not in known:
+                anchor = anchor.rpartition(".")[0]
+            return f'href="{place}#{anchor}"' if anchor else f'href="{place or path.name}"'
+
+        new = LINK.sub(mended, text)
+        if new != text:
+            path.write_text(new, "utf-8")
 
 
 def modules(package: str) -> list[str]:

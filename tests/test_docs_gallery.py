@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
+from isp.processors.catalogue import PROCESSORS
 from render import illuminants
 from scenes import catalogue
 from sensor import cfa, presets
@@ -32,6 +33,10 @@ def test_every_name_of_the_catalogues_is_shown() -> None:
     assert all(
         f">{name}</text>" in (gallery.FOLDER / "lights.svg").read_text("utf-8")
         for name in illuminants.illuminant_names()
+    )
+    assert all(f"| `{name}` |" in pages["processors.md"] for name in PROCESSORS)
+    assert all(
+        (gallery.FOLDER / f"processor_{name}.webp").is_file() for name in PROCESSORS if name not in gallery.UNSHOWN
     )
     assert all(f"| `{name}` |" in pages["sensors.md"] for name in (*presets.preset_names(), *cfa.mosaics()))
 

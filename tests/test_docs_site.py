@@ -15,7 +15,15 @@ ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 # Pages that name modules and functions in backticks, `sensor.readout.noise_variance`, all of which have to exist.
-PAGES = sorted([DOCS / "index.md", DOCS / "model.md", *DOCS.glob("tutorial/*.md"), *DOCS.glob("how_to/*.md")])
+PAGES = sorted(
+    [
+        DOCS / "index.md",
+        DOCS / "model.md",
+        *DOCS.glob("tutorial/*.md"),
+        *DOCS.glob("how_to/*.md"),
+        *DOCS.glob("understand/*.md"),
+    ]
+)
 RUN = [page for page in PAGES if page.parent != DOCS]
 NAME = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
 LEAST_TERMS = 70  # of the paper, its Table 1, EMVA 1288, radiometry and photometry
