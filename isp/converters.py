@@ -78,7 +78,10 @@ def bayer_name(path: Path) -> Path:
 
 
 def converter_note(raw: RawImage, path: Path) -> str:
-    """Say which file a converter is given in place of a negative, and how it differs; empty where there is no other."""
+    """Say which file a converter is given in place of a negative of merged samples, and how it differs; else empty.
+
+    That another mosaic than Bayer's is re-mosaiced for it goes without saying: `rodcone --help` says so once.
+    """
     ways = [] if is_bayer(raw.cfa) else ["re-mosaiced"]
     if raw.dn.dtype.kind == "f":
         step_e = sixteen_bit_step_e(raw)
@@ -87,4 +90,5 @@ def converter_note(raw: RawImage, path: Path) -> str:
             ways += [f"in whole numbers of 16 bits ({steps})"]
         elif ways:
             ways += [f"in floats, which some refuse (16 bits would have {steps})"]
-    return f"{path.name}: give {bayer_name(path).name} to raw converters: it is {', '.join(ways)}" if ways else ""
+    told = raw.dn.dtype.kind == "f" and ways
+    return f"{path.name}: give {bayer_name(path).name} to raw converters: it is {', '.join(ways)}" if told else ""

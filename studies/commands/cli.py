@@ -34,7 +34,10 @@ def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
 app = App(
     name="rodcone",
     help="Camera simulation from spectral scene to developed picture: interleaved RGBW beside Bayer.",
-    help_epilogue="-o is short for --out.",
+    help_epilogue=(
+        "-o is short for --out. Beside a NAME.dng of RGBW, or of another mosaic that raw converters take for a wrong "
+        "one such as GMCY, lies NAME_bayer.dng: give them that one."
+    ),
     version=lambda: metadata.version("rodcone"),
     # A flag has no --no-flag, a list no --empty-list; that a flag is off and a list empty goes without saying.
     default_parameter=Parameter(

@@ -20,6 +20,7 @@ from render.radiance_files.mat_file import read_numbers
 from render.radiance_files.radiance_source import load_picture
 from render.spectrum import Spectrum, luminance, photons_per_joule
 from rodcone.errors import InputError
+from rodcone.file_keys import formats
 
 NM = np.arange(400.0, 701.0, 10.0)
 PHOTONS = 1e15 * np.random.default_rng(7).random((5, 6, NM.size))
@@ -338,3 +339,15 @@ def test_a_misspelt_variable_is_refused_and_others_are_let_through(tmp_path: Pat
     )
     refusal(read_iset_scene, save(tmp_path, photons=PHOTONS, wave=NM, imgMeans=NM), match="did you mean 'imgMean'")
     read_iset_scene(save(tmp_path, photons=PHOTONS, wave=NM, comment="a", mine=1.0, dist=1.2, fov=10.0))
+
+
+def test_a_scene_is_read_with_all_that_scene_to_file_writes_beside_it(tmp_path: Path) -> None:
+    """`sceneToFile` without a basis saves the photons twice, in ``photons`` and in the struct ``data``."""
+    lamp = {"name": "D65", "type": "illuminant", "spectrum": {"wave": NM}, "data": {"photons": np.ones(NM.size)}}
+    data = {"photons": np.zeros(PHOTONS.shape), "luminance": np.empty((0, 0)), "meanL": 5.0, "bitDepth": 32.0}
+    beside = {"comment": "c", "dist": 1.2, "name": "n", "type": "scene", "magnification": 1.0, "spectrum": {"wave": NM}}
+    read = read_iset_scene(save(tmp_path, photons=PHOTONS, wave=NM, illuminant=lamp, fov=10.0, data=data, **beside))
+    assert read.values == pytest.approx(PHOTONS * JOULE, rel=6e-8)
+    assert read.horizontal_view_deg == 10.0
+    table = formats()["ISETCam variable"]
+    assert set(beside) <= set(table["without_effect"])

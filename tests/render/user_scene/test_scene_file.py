@@ -18,6 +18,7 @@ from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import LONGEST_CHAIN, SceneFile
 from render.user_scene.scene_paths import MOST_NESTED
 from rodcone.errors import InputError
+from rodcone.file_keys import formats
 from studies.study.scene_source import open_scene
 
 CAMERA = """
@@ -685,3 +686,34 @@ def test_bombs_are_refused_within_a_second(tmp_path: Path) -> None:
     path = write(tmp_path, CAMERA, SUN)
     path.write_text('<!DOCTYPE s [<!ENTITY a "evil">]>' + path.read_text().replace("hdrfilm", "&a;"))
     assert "a DOCTYPE is not allowed" in refusal(load_scene_file, path)
+
+
+# A value of each listed property, and plug-ins of each kind, of which one at least knows it: read from Mitsuba's
+# sources at https://github.com/mitsuba-renderer/mitsuba3, and asked of the installed one.
+VALUES: dict[str, Any] = {
+    "width": 4, "height": 4, "crop_width": 2, "crop_height": 2, "crop_offset_x": 0, "crop_offset_y": 0,
+    "file_format": "openexr", "pixel_format": "rgb", "component_format": "float32", "sample_border": False,
+    "compensate": False, "banner": False, "sample_count": 16, "seed": 1, "jitter": True, "strength": 2, "radius": 2.0,
+    "stddev": 0.5, "lobes": 3, "B": 0.3, "C": 0.3,
+}  # fmt: skip
+PLUGINS = {
+    "film": ("hdrfilm", "specfilm"),
+    "sampler": ("independent", "stratified", "multijitter", "orthogonal", "ldsampler"),
+    "rfilter": ("box", "tent", "gaussian", "mitchell", "catmullrom", "lanczos"),
+}
+
+
+@pytest.mark.parametrize("kind", PLUGINS)
+def test_every_listed_property_of_a_part_that_is_left_out_is_one_of_mitsubas(kind: str) -> None:
+    mi, table = mitsuba_module(), formats()[f"Mitsuba {kind} property"]
+
+    def known(plugin: str, **own: Any) -> bool:
+        try:
+            mi.load_dict({"type": plugin, **own})
+        except Exception:  # of any kind
+            return False
+        return True
+
+    assert not any(known(plugin, no_such_property=1) for plugin in PLUGINS[kind])
+    for name in (*table["applied"], *table["refused"], *table["without_effect"]):
+        assert any(known(plugin, **{name: VALUES[name]}) for plugin in PLUGINS[kind]), name

@@ -297,7 +297,7 @@ def test_a_time_with_a_unit_is_the_time_in_seconds(exr: Path, tmp_path: Path) ->
     for given in (["--exposure", "20ms"], ["--exposure", "20", "ms"], ["--exposure", "1/50"]):
         code, _, err = call(["capture", str(exr), "-o", str(tmp_path / "shot.dng"), *given])
         assert code == 0
-        assert "shot.dng: give shot_bayer.dng to raw converters: it is re-mosaiced" in err
+        assert "raw converters" not in err
         frames.append(read_raw(tmp_path / "shot.dng"))
     assert same(frames[0], frames[1])
     assert same(frames[0], frames[2])

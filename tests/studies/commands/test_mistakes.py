@@ -1,10 +1,12 @@
 """51 mistakes as people type them: one line each, exit status 2, and the line names the remedy."""
 
+import shlex
+import warnings
 from pathlib import Path
 
 import numpy as np
 import pytest
-from command_line import check_refusals
+from command_line import call, check_refusals
 
 PIXEL = "[pixel]\npitch_um=2\nfill_factor=1\nfull_well_e=5000\nread_noise_e=2\ndsnu_e=0\nprnu=0.01\n"
 LENS = "[lens]\nf_number=2\n"
@@ -111,3 +113,77 @@ def test_51_mistakes_are_refused_in_one_line_that_names_the_remedy(
     assert sum(map(len, MISTAKES.values())) == 51
     for command, rows in MISTAKES.items():
         check_refusals(command, rows, tmp_path)
+
+
+# What the line of a mistake says to do, typed: by command, the command that was meant, files mended as its line says.
+MENDED = {
+    "thz.csv": "wavelength_nm,R\n380,1\n780,2\n",
+    "two.csv": "nm,R\n380,1\n780,2\n# lamp 2\n#400,1\n#500,2\n",
+    "broken.csv": "nm,R\n380,1\n500,2\n780,1\n",
+    "w.csv": "nm,watt\n380,1\n780,1\n",
+    "chart.csv": "wavelength_nm," + ",".join(str(n) for n in range(1, 25)) + "\n"
+    + "\n".join(f"{nm}," + ",".join(f"{0.03 * n:.2f}" for n in range(1, 25)) for nm in (380, 580, 780)) + "\n",
+    "bgr.csv": "nm,B,G,R\n400,.5,.1,.1\n550,.1,.5,.1\n700,.1,.1,.5\n",
+    "bgr.toml": FILES["bgr.toml"],
+    "a.toml": 'holds="reflectance"\nwavelength_nm=[400,550,700]\n',
+    "b.toml": 'holds="reflectance"\nwavelength_nm=[400,550,700]\nscale=0.01\n',
+    "e.hdr": "ENVI\nsamples=20\nlines=20\nbands=2\ndata type=4\ninterleave=bsq\n"
+    "wavelength units=Nanometers\nwavelength={450,650}\n",
+    "e.toml": 'holds="reflectance"\n',
+    "r.toml": 'scenes=["flat_field"]\nlevels=["5lux"]\nprocessors=["bayer"]\n[render]\nsize=16\nspp=1\n'
+    '[budget]\nmodel="default"\n',
+}  # fmt: skip
+QUICK = " --size 16 --spp 1"
+REMEDIES = {
+    "capture": (
+        f"flat_field --light thz.csv{QUICK}", f"flat_field --light two.csv{QUICK}",
+        f"flat_field --light broken.csv{QUICK}", f"flat_field --light w.csv{QUICK}", f"flat_field --light A{QUICK}",
+        "color_checker --chart chart.csv --size 32 --spp 1", f"flat_field --sensor bgr.toml{QUICK}", "a.npy", "b.npy",
+        "c.npy", "e.hdr", f"flat_field --level 5lux foo.dng{QUICK}", f"flat_field --level 5cd/m2{QUICK}",
+        f"flat_field --exposure 20ms{QUICK}", f"flat_field --exposure 20s{QUICK}", "flat_field --size 96 --spp 1",
+        f"flat_field --frames 1{QUICK}", f"--source flat_field{QUICK}",
+    ),
+    "render": (
+        "flat_field -o a.exr --height 8 --spp 1", "flat_field -o a.exr --bands 380:780:100 --height 8 --spp 1",
+        "flat_field -o a.exr --height 8 --noise 0.5", "flat_field -o a.exr --height 8 --spp 2",
+    ),
+    "develop": ("foo.dng", "foo.dng --bits 16 -o a.tif", "foo.dng --bits 8 -o b.png"),
+    "snr": ("low_noise", "low_noise --at 10", "low_noise --light 3000K", "low_noise --exposure 33ms"),
+    "new": ("study -o mine.toml", "preset low_noise -o mine_sensor.toml"),
+    "sweep": ("r.toml --out out",),
+    "report": ("out",),
+    "export": ("out -o a.csv",),
+    "demo": (
+        "--level 5lux --dry-run", "--processor bayer --dry-run", "--scene still_life --dry-run",
+    ),
+    "list": ("scenes",),
+    "characterise": ("low_noise --height 16 --width 16",),
+    "expect": ("low_noise --over 'moonlight:sunlit day' --dry-run",),
+    "plan": ("r.toml",),
+    "dataset": ("r.toml --out set --shards 1",),
+    "reference": ("flat_field -o refs --size 16 --max-seconds 1",),
+}  # fmt: skip
+
+
+@pytest.mark.thorough
+def test_the_remedy_of_each_mistake_is_typed_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, text in MENDED.items():
+        (tmp_path / name).write_text(text, "utf-8")
+    for name, cube in (
+        ("a", np.full((20, 20, 3), 0.5)),
+        ("b", np.full((20, 20, 3), 50.0)),
+        ("c", np.full((20, 20, 3), 0.5)),
+    ):
+        np.save(tmp_path / f"{name}.npy", cube)
+    (tmp_path / "c.toml").write_text(MENDED["a.toml"], "utf-8")
+    np.full((2, 20, 20), 0.5, np.float32).tofile(tmp_path / "e.img")
+    failed = []
+    for command, rows in REMEDIES.items():
+        for row in rows:
+            with warnings.catch_warnings():
+                warnings.simplefilter("default")  # a coarse table is told of, and taken
+                code, _, err = call([*command.split(), *shlex.split(row)])
+            if code != 0:
+                failed.append(f"{command} {row}: {err.splitlines()[-1:]}")
+    assert not failed
