@@ -34,6 +34,7 @@ from studies.explore.controls import TIME, Controls, Lamp, camera_of, lit_transp
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_pixels
 from studies.photograph.camera import colour_fit, develop_to_scale
+from studies.study.gain import iso_speed
 from studies.study.study import AS_SHOT
 
 Development = Callable[[], tuple[Image, Picture]]  # the processor's own result: linear sRGB at the scale of the truth
@@ -80,6 +81,8 @@ class Exposure:
     raw : RawImage
     shot_noise : bool
         Of `Controls`.
+    iso : float or None
+        Saturation-based speed at the gain of the exposure; None of a camera that has none.
     """
 
     sensor: SensorConfig
@@ -93,6 +96,7 @@ class Exposure:
     device: Device
     raw: RawImage
     shot_noise: bool
+    iso: float | None
 
     @property
     def white_cd_m2(self) -> float:
@@ -151,7 +155,14 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     """Light the scene, image it and read the chip out."""
     require_keys("lamps: light group", controls.lamps, transport.groups)
     lamps = tuple((name, controls.lamps.get(name, Lamp())) for name in transport.groups)
-    terms = (_items(controls.lens), _items(controls.pixel), controls.bits, controls.gain, controls.shot_noise)
+    terms = (
+        _items(controls.lens),
+        _items(controls.pixel),
+        controls.bits,
+        controls.gain,
+        controls.iso,
+        controls.shot_noise,
+    )
     camera = (controls.sensor, controls.mosaic, *terms)
     optics = (controls.sensor, controls.mosaic, _items(controls.lens))
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
@@ -163,6 +174,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     scale = controls.level_cd_m2 * scale_1
     base = memo.of("own camera", optics[:2], lambda: vary(preset(controls.sensor), controls.mosaic))
     sensor = memo.of("camera", camera, camera_of, controls, base)
+    own_gain, speed = sensor.gain, memo.of("speed", camera, iso_speed, sensor)
 
     # Lens and filters
     frames = {}
@@ -202,8 +214,9 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
             frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
         exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
     raw = merged_raw(exposures)
+    iso = None if speed is None else speed * sensor.gain / own_gain  # which an automatic exposure may have raised
     return Exposure(
-        *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise)
+        *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise, iso)
     )
 
 

@@ -22,9 +22,10 @@ from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
 from sensor.config import LONGEST_S, MOST_GAIN, SensorConfig
 from sensor.exposure import AUTO_INFORMATION, RULES
-from sensor.photodiodes import with_gain
 from sensor.presets import VARIATIONS, preset_names
+from sensor.raw import ISO_RANGE
 from studies.metrics.truth import Light, light_in_bands
+from studies.study.gain import at_gain, gain_text
 from studies.study.scene_source import LIGHT, first_light
 from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
@@ -86,6 +87,8 @@ class Controls:
         Of the converter; None takes the preset's.
     gain : float or None
         Between pixel and converter; None takes the preset's, which an automatic exposure may raise.
+    iso : float or None
+        Saturation-based speed that a gain is wanted for, in place of `gain`.
     shot_noise : bool
         Whether light and dark current come as Poisson counts; False, which no camera does, takes their means.
     processor : str
@@ -118,6 +121,7 @@ class Controls:
     pixel: Mapping[str, float] = field(default_factory=dict)
     bits: int | None = None
     gain: Annotated[float | None, (1.0, MOST_GAIN, "give a factor, 1 where a full well reads the top")] = None
+    iso: Annotated[float | None, (*ISO_RANGE, "give a speed such as 400")] = None
     shot_noise: bool = True
     processor: str = "ple"
     settings: Mapping[str, float] = field(default_factory=dict)
@@ -135,6 +139,7 @@ class Controls:
         illuminant(self.reference_light)
         for name, lamp in self.lamps.items():
             require_fields(lamp, f"lamps[{name!r}].")
+        gain_text(self.gain, self.iso)
         require_keys("lens", self.lens, LENS)
         require_keys("pixel", self.pixel, PIXEL)
         if self.settings and self.processor not in ADJUSTABLE:
@@ -303,4 +308,4 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
         pixel=replace(base.pixel, **controls.pixel),
         bits=base.bits if controls.bits is None else controls.bits,
     )
-    return camera if controls.gain is None else with_gain(camera, controls.gain)
+    return at_gain(camera, gain_text(controls.gain, controls.iso))

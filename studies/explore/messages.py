@@ -22,12 +22,14 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.config_file import OF_TABLES
 from sensor.exposure import RULES
+from sensor.photodiodes import with_gain
 from sensor.presets import preset
 from sensor.presets import preset_names as sensors
 from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source
 from studies.explore.views import VIEWS, Bytes
+from studies.study.gain import iso_speed
 from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
@@ -85,6 +87,7 @@ def sensor_terms(sensor: SensorConfig) -> Header:
         "pixel": {term: getattr(sensor.pixel, term) for term in PIXEL},
         "bits": sensor.bits,
         "gain": sensor.gain,
+        "iso": iso_speed(with_gain(sensor, 1.0)),
     }
 
 

@@ -168,10 +168,16 @@ def _bytes(encoded: Image) -> Bytes:
 
 
 def facts(shot: Shot) -> dict[str, Any]:
-    """Return the figures of a shot: exposure time, share of full pixels, green's SNR where it is measured."""
+    """Return the figures of a shot: exposure time, gain, speed, share of full pixels, green's SNR if measured."""
     exposed = shot.exposed
     saturated = float(exposed.raw.saturated.mean())
-    return {"exposure_s": exposed.exposure_s, "saturated": saturated, "snr_db": shot.developed.snr_db}
+    return {
+        "exposure_s": exposed.exposure_s,
+        "gain": exposed.sensor.gain,
+        "iso": exposed.iso,
+        "saturated": saturated,
+        "snr_db": shot.developed.snr_db,
+    }
 
 
 def histogram(raw: RawImage) -> dict[str, Any]:

@@ -2,7 +2,7 @@
 // time, the next with the newest values as soon as the answer is painted, so that pictures follow a slider that moves.
 // `render` is what a notebook's widget calls, and the page too.
 
-const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "gain", "processor", "settings",
+const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "gain", "iso", "processor", "settings",
   "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
 const TITLES = {
   picture: "Picture", truth: "Reference", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
@@ -37,7 +37,7 @@ const TERMS = {
   level: "Mean luminance of the scene, lamps that are seen themselves left out.",
   "level name": "Usual levels of light.",
   reference_light: "Light under which colours of a file or of a scene's own lamps are judged; white in it is white.",
-  exposure: "How the exposure time is chosen. auto: the 99th percentile of green at 80 % of the well. auto:W: the same of W. auto:information: where the raw image tells most of the scene. time: as stated.",
+  exposure: "How the exposure time is chosen. auto: the 99th percentile of green at 80 % of the well. auto:W: the same of W. auto:information: the time that leaves the least expected error in the picture. time: as stated.",
   exposure_s: "The time, or the longest that the rule may choose.",
   frames: "Exposures that are merged into one: noise falls with the root of their number, the time rises with it.",
   seed: "Of the chip's fixed patterns and of the noise: the same seed makes the same bits.",
@@ -47,6 +47,7 @@ const TERMS = {
   veiling_glare: "Share of the light that scatters evenly over the picture (about ISO 9358's index).",
   sensor: "Pixel, lens and converter to begin with. A .toml file, with the .csv files that it names, can be dropped on the page.",
   mosaic: "Colour filters in front of the pixels; W is none.",
+  iso: "Saturation-based speed (ISO 12232) of green: it goes with the gain. An automatic exposure takes the longest time that this leaves room for.",
   gain: "Between pixel and converter: at 1 a full well reads the converter's top, at 8 an eighth of it. What the converter adds falls by it.",
   bits: "Of the analogue-to-digital converter: 2 to that power are its steps.",
   shot_noise: "Light and dark current come as Poisson counts. No camera is without.",
@@ -185,8 +186,9 @@ function render({ model, el }) {
     const name = view === "truth" ? `${TITLES[view]}, ${header.spp ? `${format(header.spp)} samples, render noise ${(100 * header.render_error).toPrecision(2)} %` : "from the file"}` : `${side.toUpperCase()}: ${TITLES[view]}`;
     if (view !== "picture") return `${name}: ${SCALES[view]}`;
     const snr = facts.snr_db === null ? "" : `, green's SNR ${facts.snr_db.toFixed(1)} dB`;
+    const speed = facts.iso === null ? `, gain ${Number(facts.gain.toPrecision(3))}` : `, ISO ${Number(facts.iso.toPrecision(3))}`;
     const time = (told.frames > 1 ? `${told.frames} × ` : "") + seconds(facts.exposure_s), full = Number((100 * facts.saturated).toPrecision(2));
-    return `${name}: ${told.processor}, ${time}, ${full} % full${snr}`;
+    return `${name}: ${told.processor}, ${time}${speed}, ${full} % full${snr}`;
   }
 
   // Figures follow the picture: asked once it is painted, dim until theirs is there
@@ -325,6 +327,17 @@ function render({ model, el }) {
       details.open = parts.controls.children.length ? open.has(name) : true;
       return details;
     };
+    // Speed is in proportion to gain: either slider moves the other.
+    const gain = slider(["Gain", 1, 64, "log", "×"], camera.iso ? camera.iso / preset.iso : camera.gain ?? preset.gain, value => {
+      camera.iso = null;
+      iso?.show(round(value * preset.iso));
+      set("gain", value === preset.gain ? null : value);
+    }, "gain");
+    const iso = preset.iso && slider(["ISO", preset.iso, 64 * preset.iso, "log", ""], camera.iso ?? round((camera.gain ?? preset.gain) * preset.iso), value => {
+      camera.gain = null;
+      gain.show(round(value / preset.iso));
+      set("iso", value);
+    }, "iso");
     parts.controls.replaceChildren(...[
       group("Light",
         slider(["Level", 1e-4, 1e5, "log", "cd/m²"], state.a.level_cd_m2, value => {
@@ -345,6 +358,7 @@ function render({ model, el }) {
       group("Exposure",
         choice("Rule", hello.rules.map(each => [each, each]), camera.exposure, value => set("exposure", value, true), "exposure"),
         slider([rule ? "Time" : "Longest time", 1e-6, 100, "log", "s"], camera.exposure_s, value => set("exposure_s", value), "exposure_s"),
+        ...iso ? [iso] : [],
         slider(["Burst, exposures", 1, 64, "whole", ""], camera.frames, value => set("frames", value), "frames"),
         numberBox("Seed", camera.seed, value => set("seed", value), "seed"),
         make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
@@ -352,7 +366,7 @@ function render({ model, el }) {
       group("Sensor",
         choice("Preset", [...Object.keys(hello.sensors).map(each => [each, each.split(/[\\/]/).pop()]), ["file", "from a file …"]], camera.sensor, value => {
           if (value === "file") { buildControls(); return sensorFile.click(); }
-          Object.assign(camera, { lens: {}, pixel: {}, bits: null, gain: null });
+          Object.assign(camera, { lens: {}, pixel: {}, bits: null, gain: null, iso: null });
           set("sensor", value, true);
         }, "sensor"),
         sensorFile,
@@ -363,7 +377,7 @@ function render({ model, el }) {
           }
           set("mosaic", value, true);
         }, "mosaic"),
-        slider(["Gain", 1, 64, "log", "×"], camera.gain ?? preset.gain, value => set("gain", value === preset.gain ? null : value), "gain"),
+        gain,
         slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
         checkbox("Shot noise", camera.shot_noise, value => set("shot_noise", value), "shot_noise"),
         ...terms("pixel", PIXEL, preset.pixel)),
@@ -390,7 +404,7 @@ function render({ model, el }) {
     const text = Object.fromEntries(await Promise.all([...files].map(async file => [file.name, await file.text()])));
     ask("sensor", () => ({ files: text }), ({ sensor, terms }) => {
       hello.sensors[sensor] = terms;
-      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null, gain: null });
+      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null, gain: null, iso: null });
       buildControls();
       change();
     });
@@ -524,7 +538,9 @@ function slider([title, from, to, way, unit], value, act, key, off = false) {
     act(Number(box.value));
   };
   const zero = off && button("off", () => { box.value = 0; box.oninput(); });
-  return make("div", { class: "slider" }, term(title, key), box, make("small", {}, unit), zero, range);
+  const element = make("div", { class: "slider" }, term(title, key), box, make("small", {}, unit), zero, range);
+  element.show = number => { box.value = number; range.value = STEPS * clamp(place(number), 0, 1); tell(number); };
+  return element;
 }
 function drawing(title) {
   const element = document.createElementNS("http://www.w3.org/2000/svg", "svg");

@@ -12,20 +12,23 @@ from loop import loop
 from refusal import refusal
 
 import rodcone as public
+import studies.explore.chain as CHAIN
 from isp.processors.catalogue import PROCESSORS, default_processor, libraries
 from isp.processors.piecewise import takes
 from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
 from sensor.optics import form_image
+from sensor.presets import preset
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, controls_from, mosaics_of
+from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, camera_of, controls_from, mosaics_of
 from studies.explore.memo import Memo, never_cancel
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.source import GIVEN, RenderOptions, of_transport, open_source
 from studies.explore.views import VIEWS, histogram, pixel
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2, true_srgb
+from studies.study.gain import iso_speed
 
 
 @pytest.mark.thorough
@@ -46,7 +49,7 @@ MOVED = {
     "lamps": {"sun": Lamp("A", 2.0)}, "level_cd_m2": 3.0, "exposure": "auto:W", "exposure_s": 0.001,
     "sensor": "table1_output", "mosaic": "rgbw_4x4", "bits": 10, "shot_noise": False, "seed": 3, "exposure_number": 4,
     "frames": 2, "reference_light": "A", "processor": "ple_rgbw", "white_balance": "gray-world",
-    "settings": {"sigma_s": 2.0}, "pixel": {}, "lens": {},
+    "settings": {"sigma_s": 2.0}, "gain": 4.0, "iso": 200.0, "pixel": {}, "lens": {},
 }  # fmt: skip
 PIXEL_MOVED = {
     "read_noise_e": 20.0, "dsnu_e": 30.0, "prnu": 0.1, "dark_current_e_per_s": 3e5, "column_gain_spread": 0.1,
@@ -64,8 +67,7 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
     memo, transport = Memo(), small_transport()
     first = expose_scene(transport, start, memo)
     true_picture_of(first, start, memo)
-    others = {x.name for x in fields(Controls)} - set(MOVED)
-    assert others <= {"gain", "iso"}, "a control without a line in MOVED"
+    assert {x.name for x in fields(Controls)} == set(MOVED), "a control without a line in MOVED"
     moved = [{name: value} for name, value in MOVED.items() if value != {}]
     moved += [{"lamps": {name: Lamp("A")}} for name in transport.groups]
     moved += [{"pixel": hot | {name: PIXEL_MOVED[name]}} for name in PIXEL]
@@ -89,6 +91,25 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
             assert pickle.dumps(mine) == pickle.dumps(theirs), change
         if not {"reference_light", "processor", "white_balance", "settings"} & change.keys():
             assert kept.raw.dn.shape != first.raw.dn.shape or not np.array_equal(kept.raw.dn, first.raw.dn), change
+
+
+def test_a_speed_is_taken_as_the_gain_that_has_it_and_is_told_of_the_exposure():
+    """Of a pixel of half the well, whose speed at gain 1 is twice as high, and of a gain that the exposure raised."""
+    transport, shallow = small_transport(), {"full_well_e": preset("low_noise").pixel.full_well_e / 2}
+    base = iso_speed(preset("low_noise"))
+    by_iso = expose_scene(transport, Controls(pixel=shallow, iso=8 * base), Memo())
+    by_gain = expose_scene(transport, Controls(pixel=shallow, gain=4.0), Memo())
+    assert by_iso.sensor.gain == pytest.approx(4.0, rel=1e-9)
+    assert np.array_equal(by_iso.raw.dn, by_gain.raw.dn)
+    assert by_iso.iso == pytest.approx(8 * base, rel=1e-9)
+    refusal(Controls, gain=4.0, iso=200.0, match="one of the two")
+    refusal(expose_scene, transport, Controls(iso=base / 2), Memo(), match="speed at gain 1")
+    dim = camera_of(Controls(), replace(preset("low_noise"), gain_limit=8.0))
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(CHAIN, "camera_of", lambda *_: dim)
+        raised = expose_scene(transport, Controls(exposure="auto", exposure_s=1e-4), Memo())
+    assert raised.sensor.gain > 2.0
+    assert raised.iso == pytest.approx(iso_speed(raised.sensor), rel=1e-9)
 
 
 def test_frames_of_a_burst_have_noise_of_their_own():

@@ -137,6 +137,22 @@ def offered() -> Iterator[str]:
 
 
 @pytest.mark.thorough
+def test_speed_and_gain_are_one_control(browser, address):
+    """Low noise has ISO 51.57 at a gain of 1 (78 lux s over what fills its well): either moves the other."""
+    page = CHROME.open_page(browser, address)
+    EXPLORE.settle(page)
+    enter = """(() => { const box = document.querySelector('[data-key="%s box"]');
+      box.value = "%s"; box.dispatchEvent(new Event("input")); })()"""
+    value = "Number(document.querySelector('[data-key=\"%s box\"]').value)"
+    caption = "document.querySelector('.explore figcaption').textContent"
+    for key, number, other, wanted, speed in (("iso", 412.6, "gain", 8.001, 413), ("gain", 2, "iso", 103.1, 103)):
+        page.evaluate(enter % (key, number))
+        EXPLORE.settle(page)
+        assert page.evaluate(value % other) == pytest.approx(wanted, rel=1e-3)
+        assert f", ISO {speed}, " in page.evaluate(caption)
+
+
+@pytest.mark.thorough
 def test_level_by_name_a_dropped_sensor_another_scene_and_back(browser, offered, one_render, tmp_path, monkeypatch):
     """Each is in the copied Python; a scene keeps the cameras; *Reset* brings all back."""
     monkeypatch.chdir(tmp_path)
@@ -170,7 +186,7 @@ def answered(page, views, script):
     said = first_message(open_source("still_life_outdoor", RenderOptions(size=48, spp=4)))
     answer = {
         "kind": "show", "cameras": [{"controls": said["controls"], "waiting_for": None}], "views": views,
-        "facts": [{"exposure_s": 0.01, "saturated": 0.0, "snr_db": None}],
+        "facts": [{"exposure_s": 0.01, "gain": 1.0, "iso": 100.0, "saturated": 0.0, "snr_db": None}],
         "size": [1, 1], "spp": 4, "render_error": 0.1, "last": True, "notes": [],
     }  # fmt: skip
     return page.evaluate(
@@ -308,7 +324,7 @@ def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, 
           const figures = {json.dumps(FIGURES)}, wait = kind => new Promise(done => (function look() {{
             const one = asked.find(each => each.kind === kind); one ? done(one.number) : setTimeout(look, 10); }})());
           const colour = new DataView(new Uint8Array([10, 20, 30, 10, 20, 30]).buffer);
-          const facts = [{{ exposure_s: 0.0125, saturated: 0.9999, snr_db: 17.36 }}];
+          const facts = [{{ exposure_s: 0.0125, gain: 2.0, iso: 413.25, saturated: 0.9999, snr_db: 17.36 }}];
           const cameras = answer.cameras.map(one => ({{ ...one, controls: {{ ...one.controls, frames: 4 }} }}));
           tell({{ ...answer, number: 2, size: [2, 1], facts, cameras }}, [colour, colour]);
           el.querySelector("canvas").dispatchEvent(new KeyboardEvent("keydown", {{ key: "ArrowUp" }}));
@@ -326,7 +342,7 @@ def test_captions_and_figures_have_the_programs_numbers_in_their_units(browser, 
             figures: all(el, ".figures svg").map(svg) }};
         """,
     )
-    assert said["captions"][0].endswith(": interleaved, 4 × 12.5 ms, 100 % full, green's SNR 17.4 dB")
+    assert said["captions"][0].endswith(": interleaved, 4 × 12.5 ms, ISO 413, 100 % full, green's SNR 17.4 dB")
     assert said["captions"][1] == "Reference, 4 samples, render noise 10 %: without the sensor's noise"
     assert said["pixel"] == [10, 20, 30, 255]
     assert said["rows"] == [

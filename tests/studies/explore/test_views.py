@@ -179,7 +179,8 @@ def test_the_facts_of_a_shot_are_those_of_its_frame():
     shot = photograph(small_transport(), Controls(exposure=TIME, exposure_s=0.03, level_cd_m2=60.0))
     full = shot.exposed.raw.electrons > 0.97 * shot.exposed.raw.full_well_e
     told = facts(shot)
-    assert told["exposure_s"] == 0.03
+    assert (told["exposure_s"], told["gain"]) == (0.03, 1.0)
+    assert told["iso"] == pytest.approx(51.57, abs=0.01)  # as docs/how_to/gain.md has it
     assert 0.05 < full.mean() < 0.95
     assert told["saturated"] == pytest.approx(full.mean(), abs=0.03)
     assert told["snr_db"] == shot.developed.snr_db
