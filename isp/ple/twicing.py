@@ -9,7 +9,9 @@ weighted by how alike cells are in the estimate (as a bilateral filter, Tomasi &
 
 r_c the sum of the residuals of a cell's n_c samples, x the estimate in units of noise. Brightness is best known by the
 mosaic's sharpest channel g and stays: a colour gets d_c = b_c - (x_c / x_g) b_g, times 1 - SURE / chi^2 where positive
-(James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance.
+(James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance s_c^2. The estimate is seldom wrong
+by more than half of a colour's light x_c, which is therefore the prior deviation of its bias, and d_c counts by
+Wiener's share (x_c / 2)^2 / ((x_c / 2)^2 + s_c^2): samples that know a region's light worse than that add noise alone.
 
 A cell in which the residuals of a channel differ from each other by more than noise holds a lamp or an edge, and no
 even surface. It gives no residuals to other cells and nothing is added to it.
@@ -31,6 +33,7 @@ from sensor.raw import RawImage
 CELL = 4  # pixels a side: a tile has at most as many
 REACH = 4  # cells on each side of one
 SURE = 1.5  # chi^2 up to which nothing is added: at 1 hues are a little nearer, and black has coloured clouds
+LIKELY_BIAS = 0.5  # of a colour's estimate, standard deviation [share of its light]
 ALIKE = 1.0  # between cells of one colour [units of a sample's noise]
 TOGETHER = 16  # rows of cells that are worked on together
 LAMP_SIGMAS = 6.0  # root of a cell's summed squares, beyond which no even surface lies there
@@ -108,11 +111,13 @@ def _bias(like: Singles, wide: list[Singles], light: Singles, guide: int, colour
             np.add(total, by * values[window], out=total)
     count = np.maximum(count, _LEAST)
     mean, variance = residual / count, variance / count**2
-    known = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
-    share = light / known
+    guide_light = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
+    share = light / guide_light
     off, error = mean - share * mean[..., guide, None], variance + share**2 * variance[..., guide, None] + _LEAST
     square = (off[..., colours] ** 2 / error[..., colours]).mean(axis=-1, keepdims=True)
-    result = np.maximum(off * np.maximum(1.0 - SURE / np.maximum(square, _LEAST), 0.0), -light)
+    known = (np.float32(LIKELY_BIAS) * light) ** 2
+    off *= np.maximum(1.0 - SURE / np.maximum(square, _LEAST), 0.0) * known / (known + error)
+    result = np.maximum(off, -light)
     result[..., guide] = 0.0
     return np.asarray(result, np.float32)
 

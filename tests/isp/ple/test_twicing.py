@@ -76,6 +76,19 @@ def test_noise_alone_adds_next_to_nothing(tile):
     assert np.abs(added.mean(axis=(0, 1))).max() < 4 * np.hypot(0.027, 0.019)
 
 
+@pytest.mark.parametrize("tile", [RGBW, BAYER])
+def test_a_region_whose_light_drowns_in_noise_gets_no_clouds(tile):
+    """An exact estimate of a grey at 1 e- under 30 e- of noise: 324 samples know it to 1.7 e-, so they add under 0.06.
+
+    Without Wiener's share it is a third of the light by RGBW, which took 2 dB off a picture by Table 1's pixel.
+    """
+    truth = np.full((128, 128, len(channels(tile))), 1.0, np.float32)
+    rng = np.random.default_rng(3)
+    raw = raw_of(truth, tile, noise_e=30.0)
+    noisy = replace(raw, dn=200 + rng.poisson(1.0, raw.shape) + rng.normal(0, 30.0, raw.shape))
+    assert np.sqrt(np.mean((twiced(truth, noisy) - truth) ** 2)) < 0.06
+
+
 @pytest.mark.parametrize(("tile", "least"), [(RGBW, 0.4), (BAYER, 0.28)])
 def test_dark_strong_colours_keep_their_hue(tile, least):
     """A red and a green of 4 times the other colours' share, in patches of 24 pixels at 2 e- of white in G.
