@@ -168,7 +168,7 @@ def gains(rows: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     errors, lines = defaultdict(list), []
     for row, figure in product(rows, FIGURES):
         key = row["sensor"], row["mosaic"], row["level"], figure, row["developer"]
-        errors[key].append(_decibels(figure, float(row[figure])))
+        errors[key].append(decibels(figure, float(row[figure])))
     by_scene = {key: np.reshape(values, (SCENES, -1)).mean(axis=1) for key, values in errors.items()}
     ple: Mapping[str, tuple[str, ...]] = dict.fromkeys(MOSAICS, ("ple",))
     compared = [(*x, "ple", ple) for x in product(SENSORS, list(MOSAICS)[1:], LEVELS)]
@@ -195,12 +195,13 @@ def with_expected(lines: Sequence[dict[str, Any]]) -> Sequence[Mapping[str, Any]
         expected = {tile: expect(vary(preset(sensor), tile), list(LEVELS.values()), blur=True) for tile in MOSAICS}
         for line, figure in product((x for x in lines if x["sensor"] == sensor), FIGURES):
             index = list(LEVELS).index(line["level"])
-            of, beside = (_decibels(figure, getattr(expected[m][index], figure)) for m in (line["mosaic"], BAYER))
+            of, beside = (decibels(figure, getattr(expected[m][index], figure)) for m in (line["mosaic"], BAYER))
             line[f"{figure}_expected"] = of - beside
     return lines
 
 
-def _decibels(figure: str, value: float) -> float:
+def decibels(figure: str, value: float) -> float:
+    """Return a figure in decibels, more being better: the error of colour as -20 lg, others as they are."""
     return -20 * log10(value) if figure == "colour" else value
 
 
