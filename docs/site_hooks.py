@@ -14,6 +14,7 @@ from latex2mathml.converter import convert
 from mkdocs.structure.files import File, Files
 from mkdocs.structure.pages import Page
 from mkdocs.utils import get_relative_url
+from PIL import Image
 from run_page import FENCE
 
 from rodcone import _PUBLIC
@@ -23,6 +24,7 @@ ROOT = Path(__file__).resolve().parent.parent
 PACKAGES = ("rodcone", "render", "scenes", "sensor", "isp", "studies")
 RESULTS = sorted((ROOT / "docs" / "results").glob("*.csv"))
 FIGURES = ("*", "demo/*", "paper/*", "tutorial/*/*", "how_to/*/*", "understand/*/*")  # what docs/figures.mk makes
+SMALL_PX, WIDE_PX = 96, 512  # height up to which a picture is shown four times as large, width from which as it is
 SHOWN = (".html", ".png", ".svg")
 # How much a word of a page counts in the search, by its folder; elsewhere 1. Who searches wants to do or to understand
 # something: these pages come first, then what can be named; records of decisions and the functions within come last.
@@ -40,6 +42,7 @@ WORDS = tomllib.loads((ROOT / "docs" / "search.toml").read_text("utf-8"))
 # Links to files of the repository outside docs: on the site they lead to copies.
 OUTSIDE = re.compile(r"\]\(((?:\.\./)+)((?:studies|examples|sensor|benchmarks)/[\w./-]+|[A-Z]+\.(?:md|cff))\)")
 LINK = re.compile(r'href="([^":#]*\.html|)#([^"]+)"')
+PICTURE = re.compile(r'<img ([^>]*?)src="((?:\.\./)*(?:pictures|images/understand)/[^"]+\.(webp|svg))"')
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
 MADE = re.compile(r"`out/(demo/report|paper/paper)\.html`")  # in words where no figures are, a link on the site
 CSV_LINK = re.compile(r"\(results/(\w+)\.csv\)")  # a file in the repository, a page of the site
@@ -111,6 +114,7 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
 
 def on_page_content(html: str, page: Page, config: Any, files: Files) -> str:
     """Write formulas as MathML, which browsers show by themselves, and lead names of modules to their pages."""
+    html = PICTURE.sub(lambda image: shown_large(image, page.file.src_uri), html)
     html = FORMULA.sub(lambda match: mathml(match[2], block=match[1] == "div"), html)
     return NAME.sub(lambda match: match[0] if match[1] else linked(match[2], match[0], page.url), html)
 
@@ -193,6 +197,20 @@ def mathml(latex: str, block: bool) -> str:
     if not block:
         return convert(unescape(latex))
     return f'<div class="formula">{convert(unescape(latex), display="block")}</div>'
+
+
+def shown_large(image: re.Match[str], page: str) -> str:
+    """Return a picture's tag with its look: small pictures enlarged, pixel by pixel, drawings on a light ground.
+
+    It isn't said in the pages' Markdown, because a forge would show it as text.
+    """
+    _, place, kind = image.groups()
+    if kind == "svg":
+        return f'<img class="drawing" {image[0][5:]}'
+    with Image.open((ROOT / "docs" / page).parent / place) as picture:
+        width, height = picture.size
+    times = 4 if height <= SMALL_PX else 2
+    return image[0] if width > WIDE_PX else f'<img class="pixels" width="{times * width}" {image[0][5:]}'
 
 
 def linked(name: str, code: str, url: str) -> str:

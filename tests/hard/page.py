@@ -15,10 +15,12 @@ COLUMNS = (*INVARIANTS, OWN)
 
 TEXT = """# Hard cases
 
-`make hard-cases` takes each case through the whole chain, measures how far it is from breaking each invariant, and
-writes this page. `pytest tests/hard -k sun_glint` runs one case. Both fail for anything that breaks an invariant and
-isn't listed below as a limit. Unless a case says otherwise, the scene is `cornell_box` at 64 × 64 pixels, the camera
-`low_noise` with an RGBW and a Bayer mosaic, the exposure 10 ms.
+A camera simulator should stay right at the ends of every range: the sun's glint, no light at all, a frame of three
+rows, a well of a million electrons. Each case on this page is taken through the whole chain, and it is measured how far
+it is from breaking each of the promises below. `make hard-cases` does so and writes this page. `pytest tests/hard -k
+sun_glint` runs one case. Both fail for anything that breaks a promise and isn't listed as a limit. Unless a case says
+otherwise, the scene is `cornell_box` at 64 × 64 pixels, the camera `low_noise` with an RGBW and a Bayer mosaic, and the
+exposure 10 ms.
 
 {summary}
 
@@ -26,13 +28,13 @@ isn't listed below as a limit. Unless a case says otherwise, the scene is `corne
 
 {invariants}
 
-A number is the worst error as a share of what is allowed: up to 1 the invariant is kept. Electrons may differ by 10⁻⁶
-of a pixel's expected electrons; the mean of 32 raw images or 12 pictures by what a false-alarm rate of 10⁻⁶ allows;
-mirrored and cut pictures by the arithmetic's rounding.
+Each number is the worst error as a share of what is allowed: the invariant is kept up to 1. Electrons may differ by
+10⁻⁶ of a pixel's expected electrons. The mean of 32 raw images or 12 pictures may differ by what a false-alarm rate of
+10⁻⁶ allows, and mirrored and cut pictures by the rounding of the arithmetic.
 
 ## Limits
 
-What isn't kept, by how much, and why. `tests/hard` holds this list to be exact.
+The table lists what isn't kept, by how much, and why. A test in `tests/hard` holds this list to be exact.
 
 {limits}
 
