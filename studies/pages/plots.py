@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 from io import BytesIO
 from itertools import pairwise
 from math import ceil
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ from studies.photograph.snr import snr_at
 
 UNIT = 1 / 72  # inches: lengths below are points, which are the units of Matplotlib's SVG
 SIDE = 192  # width of a picture [points]
+TITLE_LETTERS = 32  # of a line that is no wider than a picture
 CHART = (460, 250)  # width and height of a chart [points]
 LABEL_GAP = 15  # between the names at the ends of lines [points]
 PNG_DPI = 144
@@ -68,9 +70,14 @@ def blank(width: float, height: float) -> Figure:
 
 @rc_context(STYLE)
 def picture_rows(rows: Sequence[Sequence[tuple[str, NDArray[np.float64]]]]) -> Figure:
-    """Draw rows of encoded pictures (h, w, 3), each with words above it; all have one width."""
+    """Draw rows of encoded pictures (h, w, 3), each under words no wider than it; all have one width."""
     columns = max(len(row) for row in rows)
-    heights = [max(SIDE * picture.shape[0] / picture.shape[1] for _, picture in row) + 28 for row in rows]
+    rows = [[("\n".join(wrap(words, TITLE_LETTERS)), picture) for words, picture in row] for row in rows]
+    lines = [1 + max(words.count("\n") for words, _ in row) for row in rows]
+    heights = [
+        max(SIDE * picture.shape[0] / picture.shape[1] for _, picture in row) + 14 + 14 * count
+        for row, count in zip(rows, lines, strict=True)
+    ]
     figure = blank(columns * (SIDE + 10), sum(heights))
     grid = figure.subplots(len(rows), columns, squeeze=False, height_ratios=heights)
     for axes in grid.flat:

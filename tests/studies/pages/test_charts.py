@@ -13,7 +13,9 @@ import numpy as np
 import pytest
 from matplotlib import rc_context
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from PIL import Image
 
 from render.illuminants import illuminant
@@ -247,3 +249,15 @@ def test_names_at_the_ends_of_lines_keep_their_order_and_their_distance() -> Non
         assert sorted(heights, key=lambda name: heights[name]) == ["far", "low", "high"], log
         points = [height * 72 / figure.dpi for height in sorted(heights.values())]
         assert min(high - low for low, high in pairwise(points)) >= 0.9 * LABEL_GAP, log
+
+
+def test_titles_of_neighbouring_pictures_do_not_print_over_each_other() -> None:
+    long = "table1_output: the default, W's luminance, 5ms"
+    figure = picture_rows([[(long, PICTURE), (long, PICTURE)], [("short", PICTURE), (long, PICTURE)]])
+    svg_text(figure)  # lays it out
+    renderer = FigureCanvasAgg(figure).get_renderer()
+    titles = [max(axes.findobj(Text), key=lambda text: len(text.get_text())) for axes in figure.axes]
+    boxes = [title.get_window_extent(renderer) for title in titles]
+    pictures = [axes.get_window_extent(renderer) for axes in figure.axes]
+    assert all(box.x1 <= picture.x1 + 8 for box, picture in zip(boxes, pictures, strict=True))
+    assert not any(box.overlaps(other) for box in boxes for other in [*pictures, *boxes] if other is not box)
