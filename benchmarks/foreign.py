@@ -60,12 +60,12 @@ def by_opencv(mosaic: Plane, raw: RawImage, algorithm: str) -> Image:
 
 def picture(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, program: object, algorithm: str) -> Picture:
     require_bayer(raw.cfa)
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     scale = (WHITE - BLACK) / raw.full_well_e
     wide = np.pad(mosaic * scale + BLACK, BORDER, mode="reflect")
     planes = program(np.rint(np.clip(wide, 0, WHITE)).astype(np.uint16), raw, algorithm)
     planes = (planes[BORDER:-BORDER, BORDER:-BORDER] - BLACK) / scale
-    return Picture(to_rgb(raw, planes, level, colours, MALVAR_REACH), sources)
+    return Picture(to_rgb(raw, planes, gains, colours, MALVAR_REACH), sources)
 
 
 def ffdnet(mixed: Image, sigma: list[float]) -> Image:

@@ -8,7 +8,8 @@ from numpy.typing import ArrayLike, DTypeLike, NDArray
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.encoding import encode
-from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.substitution import COLOUR_ERROR
 from rodcone.colour_spaces import white_of
 from rodcone.display import Axes, brief, draw_line, preview_png
@@ -132,7 +133,7 @@ def finish(
     noise = np.zeros(3)
     if noise_gain is not None:
         noise = relative_noise(raw, planes, noise_gain, gains, colours)
-    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
+    balanced = clip_highlights(raw, planes * gains, gains)
     return Picture(balanced @ colours.matrix(noise=noise * COLOUR_ERROR).T, sources, engine)
 
 

@@ -2,7 +2,8 @@
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.edges import sharpen
-from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish, require_letters
 from isp.planes import bilinear, rows_at
@@ -56,7 +57,7 @@ def picture_interleaved(
     snr = green_snr(raw, result.estimate)
     weight = substitution_weight(snr, substitution_snr)
     planes = sharpen(result.white, result.estimate, gains, result.noise_gain)
-    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
+    balanced = clip_highlights(raw, planes * gains, gains)
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 
@@ -81,7 +82,7 @@ def picture_interleaved_paper(
     noise = relative_noise(raw, result.estimate, result.noise_gain, gains, colours)
     snr = green_snr(raw, result.estimate)
     weight = float(substitution_weight(snr, substitution_snr) > 0.5)
-    balanced = clip_highlights(raw, result.estimate * gains, highlight_level(raw, gains))
+    balanced = clip_highlights(raw, result.estimate * gains, gains)
 
     # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
     rgb = balanced @ matrix_with_white(colours, noise, weight).T

@@ -1,7 +1,6 @@
-"""White balance of a developed frame: by Gray World, as calibrated, or as given; and highlights that stay neutral.
+"""White balance of a developed frame: by Gray World, as calibrated, or as given.
 
 Gray World (Buchsbaum 1980) makes the channels' means alike; where it is too dark for that the calibrated neutral holds.
-Where samples are saturated, colours are held where the first is full.
 """
 
 from __future__ import annotations
@@ -13,7 +12,8 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from isp.planes import box_sums, rows_at
+from isp.colour.highlights import saturated_nearby
+from isp.planes import rows_at
 from render.illuminants import illuminant
 from rodcone.display import brief
 from rodcone.errors import InputError
@@ -21,41 +21,6 @@ from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.curves import Responses, built_in, electrons_from_neutral
 from sensor.raw import RawImage, channel_variance
-
-
-def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:
-    """Pixels with a saturated sample of one of `channels` within `reach` pixels along either axis, shape (h, w).
-
-    Left out, the reach is one tile.
-    """
-    hit = raw.saturated & mask(raw.cfa, channels, raw.shape)
-    if not hit.any():
-        return hit
-    reach = max(len(raw.cfa), len(raw.cfa[0])) - 1 if reach is None else reach
-    return box_sums(np.pad(hit, reach).astype(np.uint16), (2 * reach + 1, 2 * reach + 1)) > 0
-
-
-def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
-    """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
-    wells_e = {name: raw.noise_of(name).full_well_e for name in raw.colour_channels}
-    return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
-
-
-def clip_highlights(
-    raw: RawImage, balanced: NDArray[np.float64], level: float, reach: int | None = None
-) -> NDArray[np.float64]:
-    """Hold every balanced colour at `highlight_level` near a saturated colour sample: highlights stay neutral.
-
-    `reach` as in `saturated_nearby`: that of the filter which made the planes. Where nothing is held the array itself
-    is returned.
-    """
-    clipped = saturated_nearby(raw, "".join(raw.colour_channels), reach)
-    if not clipped.any():
-        return balanced
-    limited = balanced.copy()
-    limited[clipped] = np.minimum(rows_at(balanced, clipped), level)
-    return limited
-
 
 BalanceSource = Literal["gray world", "calibrated", "given"]
 

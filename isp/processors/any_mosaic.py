@@ -3,7 +3,8 @@
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Settings
@@ -46,7 +47,7 @@ def picture_any_mosaic(
     result = reconstruct_with_noise(raw, settings, balance.expected(raw))
     planes = np.asarray(result.estimate, dtype=np.float64)
     gains, sources = balance.gains(raw, planes)
-    balanced = clip_highlights(raw, planes * gains, highlight_level(raw, gains))
+    balanced = clip_highlights(raw, planes * gains, gains)
     noise = np.zeros(len(gains))
     if colours.plain is None:
         noise = relative_noise(raw, planes, result.noise_gain, gains, colours) * COLOUR_ERROR

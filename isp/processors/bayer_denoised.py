@@ -14,7 +14,6 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.interleaved import reconstruct_with_noise
 from isp.picture import Picture, finish
-from isp.planes import bilinear
 from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
 from isp.processors.sub_images import Mix, bm3d, bm3d_mosaic
@@ -58,8 +57,7 @@ def picture_demosaicked_first(
     channels but for the dark noise, as demosaicking supposes.
     """
     require_bayer(raw.cfa)
-    gains, _ = balance.gains(raw, bilinear(raw))
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     names, sites = raw.channels, channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
     noise = raw.plain_noise
@@ -69,4 +67,4 @@ def picture_demosaicked_first(
         sigma = NOISE_AFTER_DEMOSAICKING * np.sqrt(OPPONENT**2 @ gains)
         planes = denoise(planes @ OPPONENT.T, sigma.tolist()) @ OPPONENT
     electrons = unstabilise(planes / np.sqrt(gains), noise.dark_noise_e / noise.shot) * noise.shot
-    return Picture(to_rgb(raw, electrons * gains, level, colours, MALVAR_REACH), sources)
+    return Picture(to_rgb(raw, electrons * gains, gains, colours, MALVAR_REACH), sources)

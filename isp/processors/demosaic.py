@@ -61,8 +61,8 @@ def picture_demosaicked(
 ) -> Picture:
     """Develop a Bayer raw image with `malvar` or `menon`: its mosaic, or a denoised one [e-], is balanced first."""
     require_bayer(raw.cfa)
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
-    return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), level, colours, MALVAR_REACH), sources)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
+    return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), gains, colours, MALVAR_REACH), sources)
 
 
 def require_bayer(cfa: Tile) -> None:

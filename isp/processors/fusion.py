@@ -23,7 +23,8 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.white_balance import WhiteBalance, neutral_response, saturated_nearby
+from isp.colour.highlights import saturated_nearby
+from isp.colour.white_balance import WhiteBalance, neutral_response
 from isp.picture import Picture, require_letters
 from isp.planes import fill, fill_channels, tent
 from isp.processors.mosaic import balance_mosaic, to_rgb
@@ -44,8 +45,8 @@ _STANDS_FOR = {"C": "R", "Y": "G", "M": "B", "W": "W"}
 def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image with W as the luminance of bilinear colours."""
     require_letters(raw, CHANNELS)
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
-    rgb = to_rgb(raw, fill_channels(mosaic, raw.cfa, "RGB"), level, colours, 1)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
+    rgb = to_rgb(raw, fill_channels(mosaic, raw.cfa, "RGB"), gains, colours, 1)
     return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
@@ -58,9 +59,9 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
     if balance.neutral is None:
         behind_density = np.array([1.0, 1.0, 1.0, matched_transmittance(rgbw())])
         balance = replace(balance, neutral=raw.channel_mixing @ (neutral_response(CHANNELS) * behind_density))
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     planes = np.stack([tent_means(mosaic, raw.cfa, channel) for channel in "RGB"], axis=-1)
-    rgb = to_rgb(raw, planes, level, colours, MATCHED_RADIUS)
+    rgb = to_rgb(raw, planes, gains, colours, MATCHED_RADIUS)
     return Picture(_fused(raw, rgb, fill(mosaic, raw.cfa, "W")), sources)
 
 
@@ -86,11 +87,11 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
 def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image by early fusion: combined differences of each colour from W, added to W."""
     require_letters(raw, CHANNELS)
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons, balance)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     white = fill(mosaic, raw.cfa, "W")
     differences = mosaic - white
     planes = np.stack([white + tent_means(differences, raw.cfa, channel) for channel in "RGB"], axis=-1)
-    return Picture(to_rgb(raw, planes, level, colours, MATCHED_RADIUS), sources)
+    return Picture(to_rgb(raw, planes, gains, colours, MATCHED_RADIUS), sources)
 
 
 def tent_means(values: Plane, cfa: Tile, channel: str) -> Plane:

@@ -18,7 +18,8 @@ and Adams' interpolation after it. Where W is full its sub-image is flat, and th
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.white_balance import WhiteBalance, saturated_nearby
+from isp.colour.highlights import saturated_nearby
+from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture, require_letters
 from isp.planes import fill_channels
 from isp.processors.fusion import CHANNELS
@@ -40,10 +41,10 @@ def picture_gindele(
 ) -> Picture:
     """Develop a 2x2 RGBW raw image: its mosaic, or a denoised one [e-]."""
     require_letters(raw, CHANNELS)
-    mosaic, level, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
+    mosaic, gains, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     clipped = saturated_nearby(raw, "W", REACH)[..., None]
     planes = np.where(clipped, fill_channels(mosaic, raw.cfa, "RGB"), adams_planes(mosaic, raw.cfa))
-    return Picture(to_rgb(raw, planes, level, colours, REACH), sources)
+    return Picture(to_rgb(raw, planes, gains, colours, REACH), sources)
 
 
 def adams_planes(mosaic: Mosaic, cfa: Tile) -> Image:

@@ -5,16 +5,17 @@ from collections.abc import Mapping
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.white_balance import BalanceSource, WhiteBalance, clip_highlights, highlight_level, saturated_nearby
+from isp.colour.highlights import clip_highlights, highlight_level, saturated_nearby
+from isp.colour.white_balance import BalanceSource, WhiteBalance
 from isp.planes import bilinear
-from rodcone.types import Image, Mosaic, Plane
+from rodcone.types import Floats, Image, Mosaic, Plane
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 
 def balance_mosaic(
     raw: RawImage, electrons: Mosaic, balance: WhiteBalance
-) -> tuple[Plane, float, Mapping[str, BalanceSource]]:
+) -> tuple[Plane, Floats, Mapping[str, BalanceSource]]:
     """Balance a mosaic before it is demosaicked, as raw converters do.
 
     Demosaicking that carries detail from one colour to another supposes that their differences are smooth, which only
@@ -32,10 +33,10 @@ def balance_mosaic(
     -------
     (h, w) float64
         Mosaic in which a neutral reads the same electrons in every channel: green's [e-]. Beside a saturated colour
-        sample no colour reads more than the level that follows, so that a neutral highlight is neutral in the mosaic
-        already.
-    float
-        `isp.colour.white_balance.highlight_level` [e-].
+        sample no colour reads more than `isp.colour.highlights.highlight_level`, so that a neutral highlight is
+        neutral in the mosaic already.
+    (channel,) float64
+        Gain of each channel.
     mapping of str to str
         Where each channel's gain comes from, as `Picture.balance` has it.
     """
@@ -46,10 +47,9 @@ def balance_mosaic(
         factors[sites == name] = factor
     values = electrons * factors
     clipped = saturated_nearby(raw, "RGB", 1) & (sites != "W")
-    level = highlight_level(raw, gains)
-    return np.where(clipped, np.minimum(values, level), values), level, sources
+    return np.where(clipped, np.minimum(values, highlight_level(raw, gains)), values), gains, sources
 
 
-def to_rgb(raw: RawImage, planes: Image, level: float, colours: ColourFit, reach: int) -> Image:
+def to_rgb(raw: RawImage, planes: Image, gains: Floats, colours: ColourFit, reach: int) -> Image:
     """Linear sRGB of balanced planes of three colours that a filter of this reach made: highlights, matrix."""
-    return np.asarray(clip_highlights(raw, planes, level, reach) @ colours.matrix().T)
+    return np.asarray(clip_highlights(raw, planes, gains, reach) @ colours.matrix().T)

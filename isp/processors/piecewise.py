@@ -13,7 +13,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.white_balance import WhiteBalance, clip_highlights, highlight_level
+from isp.colour.highlights import clip_highlights
+from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
 from isp.ple.overlap import STRIDE
@@ -104,14 +105,13 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
     gains, sources = balance.gains(raw, planes)
     # The posterior variance is all of the error: no factor on it, as weighted means of samples need.
     noise = relative_noise(raw, planes, np.broadcast_to(variance, planes.shape), gains, colours)
-    level = highlight_level(raw, gains)
     if {"R", "G", "B"} <= set(names):
         # Where pixels exchange charge, W tells how much of it is in the colours.
         used = len(names) if raw.crosstalk and colours.plain is None else 3
         matrix = colours.matrix(names[:used], noise[:used])
-        rgb = clip_highlights(raw, planes[..., :used] * gains[:used], level) @ matrix.T
+        rgb = clip_highlights(raw, planes[..., :used] * gains[:used], gains) @ matrix.T
     else:
-        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, level), colours, noise)
+        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, gains), colours, noise)
     return Picture(rgb, sources)
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.white_balance import saturated_nearby
+from isp.colour.highlights import saturated_nearby
 from isp.planes import bilinear
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.types import Image

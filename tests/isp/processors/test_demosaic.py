@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, raw_image
 
+from isp.colour.highlights import highlight_level
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.demosaic import malvar, menon
 from isp.processors.mosaic import balance_mosaic
@@ -66,6 +67,6 @@ def test_colours_are_held_where_the_first_channel_is_full_though_green_is_read_a
     """Green behind a density is full at 45 000 e-, red at 15 000, balanced 30 000."""
     noise = ChannelNoise("G", full_well_e=45_000.0, shot=3.0, read_noise_e=1.0, dsnu_e=0.0, prnu=0.0)
     raw = raw_image(np.full((8, 8), 40_100), BAYER, channel_noise=(noise,))
-    mosaic, level, _ = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
-    assert level == pytest.approx(30_000.0)
+    mosaic, gains, _ = balance_mosaic(raw, raw.electrons, WhiteBalance(given=np.array([0.5, 1.0, 0.4])))
+    assert highlight_level(raw, gains) == pytest.approx(30_000.0)
     assert mosaic == pytest.approx(np.full((8, 8), 30_000.0))

@@ -1,0 +1,109 @@
+"""Highlights that stay neutral: colours are held where the first is full, and small full lamps are white.
+
+A full sample is a lower bound of the light. Within a wide highlight samples of every colour tell its hue. A lamp of a
+few pixels holds samples of some colours alone; the others' planes are filled from the dark around it, and it would come
+out in the colour of the samples that it happens to cover. So a full pixel is white unless a sample of its lamp says
+otherwise. A sample is of the lamp where it is lit, or lies in a rectangle with lit samples at two opposite corners, at
+most a tile apart: so the dark blue sites of a sodium lamp of 2x2 pixels are.
+"""
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from isp.planes import box_sums, rows_at
+from sensor.cfa import channel_map, mask
+from sensor.raw import RawImage
+
+LIT = 0.25  # of the level of highlights: dark samples beside a sharp lamp, and its halo, are under it
+FULL = 0.97  # of it: what shot noise and gains that differ leave of a sample at that level
+
+
+def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:
+    """Pixels with a saturated sample of one of `channels` within `reach` pixels along either axis, shape (h, w).
+
+    Left out, the reach is one tile.
+    """
+    return _nearby(raw.saturated & mask(raw.cfa, channels, raw.shape), _tile_side(raw) - 1 if reach is None else reach)
+
+
+def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
+    """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
+    wells_e = {name: raw.noise_of(name).full_well_e for name in raw.colour_channels}
+    return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
+
+
+def clip_highlights(
+    raw: RawImage, balanced: NDArray[np.float64], gains: NDArray[np.float64], reach: int | None = None
+) -> NDArray[np.float64]:
+    """Hold every balanced colour at `highlight_level` near a saturated colour sample, and make white lamps neutral.
+
+    Parameters
+    ----------
+    raw : RawImage
+    balanced : (h, w, channel) float64
+        Planes times gains [e-]: of every channel, or of the first ones in the order of `raw.channels`.
+    gains : (channel,) float64
+        White balance of each of `raw.channels`.
+    reach : int, optional
+        As in `saturated_nearby`: that of the filter which made the planes.
+
+    Returns
+    -------
+    (h, w, channel) float64
+        A pixel of `white_lamps` has its brightest colour's value in every channel, the level at least where its own
+        sample is a colour's. Where nothing is held, the array itself.
+    """
+    colours, level = "".join(raw.colour_channels), highlight_level(raw, gains)
+    clipped = saturated_nearby(raw, colours, reach)
+    if not clipped.any():
+        return balanced
+    limited = balanced.copy()
+    limited[clipped] = np.minimum(rows_at(balanced, clipped), level)
+    white = white_lamps(raw, gains)
+    brightest = limited[white][:, [raw.channels.index(name) for name in colours]].max(axis=-1)
+    own = mask(raw.cfa, colours, raw.shape)[white]
+    limited[white] = np.where(own, np.maximum(brightest, level), brightest)[:, None]
+    return limited
+
+
+def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """Full pixels near a full colour sample, about which no sample of their lamp says a colour, shape (h, w).
+
+    A sample of a colour says one where it is under the level of highlights; those within one tile are asked.
+    """
+    colours, full, level = "".join(raw.colour_channels), raw.saturated, highlight_level(raw, gains)
+    near = saturated_nearby(raw, colours)
+    sites = channel_map(raw.cfa, raw.shape)
+    light = raw.electrons * np.select([sites == name for name in raw.channels], gains.tolist())
+    side = _tile_side(raw)
+    lamp = _enclosed(full | (light >= LIT * level), side)
+    coloured = lamp & ~full & (light < FULL * level) & mask(raw.cfa, colours, raw.shape)
+    return np.asarray(full & near & ~_nearby(coloured, side - 1))
+
+
+def _enclosed(lit: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
+    """Rectangles of at most `side` steps along either axis, of which two opposite corners are lit."""
+    height, width = lit.shape
+    result = lit.copy()
+    for down, across in product(range(side + 1), range(-side, side + 1)):
+        if (down == 0 and across <= 0) or down >= height or abs(across) >= width:
+            continue
+        left, right = max(-across, 0), width - max(across, 0)
+        both = lit[: height - down, left:right] & lit[down:, left + across : right + across]
+        if both.any():
+            for i, j in product(range(down + 1), range(min(across, 0), max(across, 0) + 1)):
+                result[i : height - down + i, left + j : right + j] |= both
+    return result
+
+
+def _nearby(hit: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
+    """Pixels with a hit within `reach` pixels along either axis."""
+    if not hit.any():
+        return hit
+    return box_sums(np.pad(hit, reach).astype(np.uint16), (2 * reach + 1, 2 * reach + 1)) > 0
+
+
+def _tile_side(raw: RawImage) -> int:
+    return max(len(raw.cfa), len(raw.cfa[0]))
