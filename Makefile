@@ -70,7 +70,7 @@ out/verify/%: $(CODE) | $(VENV)/installed-dev
 	@mv $@.begun $@
 
 hard-cases: $(VENV)/installed-dev
-	@PYTHONPATH=tests $(BIN)/python -m hard.page
+	@PYTHONPATH=tests:docs/make $(BIN)/python -m hard.page
 
 # docs/results/parts.toml lists the parts; PART="one two" makes these.
 results: $(VENV)/installed-dev

@@ -3,6 +3,9 @@
     python examples/01_picture.py [SIZE]
 
 SIZE is the picture's side in pixels. Writes picture.png.
+
+New here: the whole chain in eight calls, from light transport to a developed picture and its error.
+Expect: a grainy night picture, some 26 dB from the noise-free one, and a mean of some tens of electrons.
 """
 
 import sys

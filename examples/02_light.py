@@ -3,6 +3,9 @@
     python examples/02_light.py [SIZE]
 
 Writes moonlight.png, day.png, tungsten.png and sodium.png.
+
+New here: `relight` gives any lamp and level from one render.
+Expect: four pictures of one scene; the sodium one has no colour, because such a lamp has a single one.
 """
 
 import sys

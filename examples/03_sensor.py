@@ -3,6 +3,10 @@
     python examples/03_sensor.py [SIZE]
 
 SIZE is the side of the chip that is measured.
+
+New here: `PixelConfig` holds a data sheet's numbers, `characterise` measures them back from simulated frames.
+Expect: an SNR that follows shot noise in the light and falls below it in the dark, and measured figures within a few
+per cent of the configured ones.
 """
 
 import sys

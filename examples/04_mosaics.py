@@ -3,6 +3,9 @@
     python examples/04_mosaics.py [SIZE]
 
 Writes mosaics.png: above in moonlight, below in an office; left Bayer, right RGBW.
+
+New here: two mosaics over one pixel, compared by one method, and the error to expect in closed form before a render.
+Expect: RGBW ahead by one or two dB in moonlight, and nearly level in the office.
 """
 
 import sys

@@ -3,6 +3,9 @@
     python examples/05_scene.py [SIZE]
 
 Writes evening.png, night.png, explorer.png and night.exr, the night's radiance as spectral OpenEXR.
+
+New here: a scene from Python values, light groups that dim separately, spectral OpenEXR.
+Expect: the ball red in the evening, and lit from one side at night.
 """
 
 import sys

@@ -3,6 +3,9 @@
     python examples/06_raw_files.py [SIZE]
 
 Writes ramp.dng, night_1.dng to night_4.dng, one.png and four.png.
+
+New here: `expose` reads out any array of electrons; raw files; a burst that is merged by the noise model.
+Expect: four merged frames with half the read noise of one.
 """
 
 import sys

@@ -3,6 +3,9 @@
     python examples/07_study.py [SIZE]
 
 Writes the folder dusk with its pictures and report.html. Ended by Ctrl-C it goes on where it was.
+
+New here: a sweep that goes on where it stopped, a plan of what may be left out, a report of one page.
+Expect: RGBW ahead of Bayer in the dark and level or behind at 5 cd/m2.
 """
 
 import sys

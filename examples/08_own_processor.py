@@ -3,6 +3,9 @@
     python examples/08_own_processor.py [SIZE]
 
 Writes cells.png and the folder cells with its report.html.
+
+New here: a function of yours as a processor, in `develop` and in a study.
+Expect: cells of 2x2 pixels lose detail; they are behind bilinear interpolation by some dB.
 """
 
 import sys

@@ -3,6 +3,9 @@
     python examples/09_training_set.py [SIZE]
 
 Writes the folder night with the set and batch.png: raw frames above their truth. `torch_batches` is for PyTorch.
+
+New here: thousands of raw frames with their noise-free truth, as shards that data loaders read.
+Expect: a batch whose upper row is noisy and whose lower row is clean.
 """
 
 import io

@@ -7,9 +7,11 @@ import subprocess
 import sys
 from pathlib import Path
 from pkgutil import resolve_name
+from urllib.parse import unquote
 
 import browser as CHROME
 import pytest
+from ask_site import first_hits
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCS = ROOT / "docs"
@@ -28,6 +30,25 @@ RUN = [page for page in PAGES if page.parent != DOCS]
 NAME = re.compile(rf"`((?:{'|'.join(PACKAGES)})(?:\.\w+)+)`")
 LEAST_TERMS = 70  # of the paper, its Table 1, EMVA 1288, radiometry and photometry
 SMALL = ["DEMO=--size 32 --spp 16 --level 0.05cd/m2 --level 25cd/m2", "PAPER=--size 48 --spp 16 --seeds 2"]
+# What readers type, and the page that answers it. The first seven are those of a trial by three new users.
+QUESTIONS = {
+    "ISO": "how_to/gain",
+    "crosstalk": "isp",
+    "DNG": "how_to/dng_from_numpy",
+    "how many photons": "understand/light",
+    "dark current": "understand/noise",
+    "own sensor": "how_to/own_sensor",
+    "lux": "understand/light",
+    "sensor": "how_to/own_sensor",
+    "model": "model",
+    "exposure": "understand/exposure",
+    "read noise": "understand/noise",
+    "install": "how_to/install",
+    "white balance": "isp",
+    "Lightroom": "how_to/which_program",
+    "pandas": "formats",
+}
+LEAST_ANSWERED = 12  # by the first hit
 VIEWS = [(360, False), (360, True), (1280, False), (1280, True)]
 
 
@@ -119,20 +140,9 @@ def test_the_code_of_a_page_runs(page: Path, figures: Path) -> None:
 @pytest.fixture(scope="module")
 def site(figures: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The site, built strictly: a warning, such as a missing figure or a dead link, ends the build."""
-    for library in ("mkdocs", "material", "mkdocstrings", "latex2mathml"):
-        pytest.importorskip(library, reason="needs MkDocs (extra docs)")
     make(figures)
     folder = tmp_path_factory.mktemp("site")
-    done = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)],
-        cwd=ROOT,
-        env=os.environ | {"FIGURES": str(figures), "NO_MKDOCS_2_WARNING": "1"},
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "WARNING" not in done.stderr
+    assert "WARNING" not in built(folder, figures, "--strict")
     return folder
 
 
@@ -192,3 +202,54 @@ def test_a_browser_shows_the_pages_at_two_widths_in_light_and_dark_without_a_com
             assert page.evaluate("document.body.dataset.mdColorScheme") == ("slate" if dark else "default")
             ground = CHROME.screenshot(page)[300:, :8, :].mean()  # the margin: what is beside it may be a picture
             assert (ground < 100) if dark else (ground > 155), f"{name}: mean {ground:.0f}, dark: {dark}"
+
+
+def built(folder: Path, figures: Path, *options: str) -> str:
+    """Build the site into a folder, and return what the build said."""
+    for library in ("mkdocs", "material", "mkdocstrings", "latex2mathml"):
+        pytest.importorskip(library, reason="needs MkDocs (extra docs)")
+    done = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "build", *options, "--site-dir", str(folder)],
+        cwd=ROOT,
+        env=os.environ | {"FIGURES": str(figures), "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    return done.stderr
+
+
+@pytest.fixture(scope="module")
+def bare_site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site without the figures that take minutes: its pages, links and search are the same."""
+    folder = tmp_path_factory.mktemp("bare")
+    built(folder, folder / "no_figures", "--no-strict")
+    return folder
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+@CHROME.NEEDED
+def test_the_search_answers_what_readers_type_by_its_first_hit(bare_site: Path, browser) -> None:
+    hits = first_hits(browser, bare_site, QUESTIONS, count=1)
+    wrong = {question: hits[question] for question, page in QUESTIONS.items() if hits[question] != [f"{page}.html"]}
+    assert len(QUESTIONS) - len(wrong) >= LEAST_ANSWERED, wrong
+
+
+@pytest.mark.slow
+@pytest.mark.timeout(900)
+def test_every_link_of_the_site_has_its_file_and_its_anchor(bare_site: Path) -> None:
+    texts = {page.resolve(): page.read_text("utf-8") for page in bare_site.rglob("*.html")}
+    anchors = {page: set(re.findall(r'\bid="?([^"\s>]+)', text)) for page, text in texts.items()}
+    wrong = []
+    for page, text in texts.items():
+        for link in set(re.findall(r'<a\b[^>]*\bhref="?([^"\s>]+)', text)):
+            place, _, anchor = link.partition("#")
+            target = (page.parent / place).resolve() if place else page
+            if re.match(r"\w+:", link) or place.startswith("/") or "figures/" in place:
+                continue
+            if not target.is_file() or (anchor and target in anchors and unquote(anchor) not in anchors[target]):
+                wrong.append(f"{page.relative_to(bare_site.resolve())}: {link}")
+    assert len(texts) > 300
+    assert wrong == []

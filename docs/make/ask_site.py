@@ -4,6 +4,7 @@ The theme's own search answers, in a headless Chromium, from the file and withou
 with the addresses of its first hits.
 """
 
+import re
 import sys
 from collections.abc import Iterable
 from pathlib import Path
@@ -27,8 +28,8 @@ def first_hits(browser: Any, site: Path, questions: Iterable[str], count: int = 
         page.focus(".md-search__input")
         page.wait_for_function(DONE, arg=question, timeout=60_000)
         links = page.eval_on_selector_all(HITS, "links => links.map(link => link.href)")
-        places = [link.removeprefix(root).partition("?")[0] + link.partition("#")[2].join(["#", ""]) for link in links]
-        answers[question] = [place.removesuffix("#") for place in places[:count]]
+        places = [re.sub(r"\?[^#]*", "", link.removeprefix(root)) for link in links]  # less the words that are marked
+        answers[question] = places[:count]
         page.close()
     return answers
 

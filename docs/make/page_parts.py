@@ -1,7 +1,8 @@
 """What the programs that write pages share: parts of a page, tables beside it, and figures that sentences quote.
 
 A part of a page stands between ``<!-- NAME -->`` and ``<!-- end -->``; the program that makes the page writes it. A
-figure within a sentence stands between ``<!-- =NAME -->`` and ``<!-- / -->``; docs/results/quoted.csv holds its text.
+figure within a sentence stands between ``<!-- =NAME -->`` and ``<!-- / -->``. NAME is one of docs/results/quoted.csv or
+a cell of a table there, ``TABLE[KEY=VALUE;KEY=VALUE].COLUMN``, with its interval where there is a column ``COLUMN ±``.
 """
 
 import csv
@@ -26,7 +27,8 @@ csv_text = partial(csv_of, line_end="\n")  # as git keeps the results' tables
 RESULTS = Path(__file__).resolve().parents[1] / "results"
 ROOT = RESULTS.parents[1]
 QUOTED = RESULTS / "quoted.csv"
-QUOTE = re.compile(r"(<!-- =(?P<name>[\w.]+) -->)(?P<text>.*?)(<!-- / -->)", re.DOTALL)
+QUOTE = re.compile(r"(<!-- =(?P<name>.+?) -->)(?P<text>.*?)(<!-- / -->)", re.DOTALL)
+CELL = re.compile(r"(?P<table>\w+)\[(?P<keys>[^\]]*)\]\.(?P<column>.+)")
 STAMP = "# "  # begins the line of a table that says where it comes from
 
 
@@ -63,11 +65,31 @@ def with_quotes(text: str, figures: Mapping[str, str]) -> str:
 
     def quote(place: re.Match[str]) -> str:
         name = place["name"]
+        if at := CELL.fullmatch(name):
+            return f"{place[1]}{cell_text(at['table'], at['keys'], at['column'])}{place[4]}"
         if name not in figures:
             raise InputError(f"{name}: no part of `make results` makes it; allowed: the names in {QUOTED.name}")
         return f"{place[1]}{figures[name]}{place[4]}"
 
     return QUOTE.sub(quote, text)
+
+
+def cell_text(table: str, keys: str, column: str) -> str:
+    """Return the text of one cell of a table of docs/results.
+
+    Raises
+    ------
+    InputError
+        Where there is no such table or column, or the keys are those of no row or of several.
+    """
+    path = RESULTS / f"{table}.csv"
+    rows = list(csv.DictReader(unstamped(path.read_text("utf-8")).splitlines())) if path.is_file() else []
+    wanted = dict(key.split("=", 1) for key in keys.split(";"))
+    found = [row for row in rows if all(row.get(key) == value for key, value in wanted.items())]
+    if len(found) != 1 or column not in found[0]:
+        raise InputError(f"{table}[{keys}].{column}: {len(found)} rows; allowed: a column of one row of {path.name}")
+    half = found[0].get(f"{column} ±", "")
+    return f"{found[0][column]} ± {half}" if half else found[0][column]
 
 
 def quote_everywhere() -> None:

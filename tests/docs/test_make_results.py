@@ -81,6 +81,17 @@ def test_sentences_quote_what_was_made() -> None:
         with_quotes("<!-- =light.lead --><!-- / -->", figures)
 
 
+def test_sentences_quote_cells_of_the_tables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(page_parts, "RESULTS", tmp_path)
+    (tmp_path / "t.csv").write_text("# 0.3.0, a day\nlamp,place,snr,snr ±\nA,near,3.5,0.4\nA,far,2.5,\n", "utf-8")
+    page = "<!-- =t[lamp=A;place=near].snr -->0<!-- / --> and <!-- =t[place=far].snr -->0<!-- / --> dB"
+    told = "<!-- =t[lamp=A;place=near].snr -->3.5 ± 0.4<!-- / --> and <!-- =t[place=far].snr -->2.5<!-- / --> dB"
+    assert with_quotes(page, {}) == told
+    for wrong in ("t[lamp=A].snr", "t[lamp=B].snr", "t[place=far].psnr", "u[lamp=A].snr"):
+        with pytest.raises(InputError, match="allowed: a column of one row"):
+            with_quotes(f"<!-- ={wrong} --><!-- / -->", {})
+
+
 def test_a_part_renews_its_own_figures_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(page_parts, "QUOTED", tmp_path / "quoted.csv")
     page_parts.QUOTED.write_text(csv_text(["name", "text"], [["light.old", "1"], ["paper.kept", "2"]]), "utf-8")

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from hard.case import Margin
 from hard.catalogue import CASES, INVARIANTS, LIMITS, OWN, Result, run_case, unexpected
+from page_parts import quote_everywhere, write_quoted
 
 from rodcone.jit import backend
 
@@ -55,6 +56,8 @@ def main() -> int:
     PAGE.write_text(page(results), encoding="utf-8")
     with (PAGE.parent / "results" / "hard_cases.csv").open("w", encoding="utf-8", newline="") as file:
         writer(file, lineterminator="\n").writerows(catalogue(results))
+    write_quoted("hard_cases", counts(results))
+    quote_everywhere()
     print(f"\n{summary(results)}\n{PAGE}")
     return int(any(unexpected(result) for result in results))
 
@@ -72,13 +75,25 @@ def page(results: Sequence[Result]) -> str:
 
 def summary(results: Sequence[Result]) -> str:
     """Counts in a sentence."""
-    margins = [margin for result in results for margin in result.margins.values() if margin is not None]
-    whole = sum(not result.broken for result in results)
-    held = sum(margin.kept for margin in margins)
+    told = counts(results)
     return (
-        f"{len(results)} cases, {len(margins)} invariants measured: {held} kept, {len(margins) - held} not; "
-        f"{whole} cases keep all of theirs."
+        f"{told['cases']} cases, {told['invariants']} invariants measured: {told['kept']} kept, {told['not_kept']} "
+        f"not; {told['whole']} cases keep all of theirs."
     )
+
+
+def counts(results: Sequence[Result]) -> dict[str, str]:
+    """Counts by name: cases, invariants, how many are kept and not, cases that keep all of theirs."""
+    margins = [margin for result in results for margin in result.margins.values() if margin is not None]
+    held = sum(margin.kept for margin in margins)
+    numbers = {
+        "cases": len(results),
+        "invariants": len(margins),
+        "kept": held,
+        "not_kept": len(margins) - held,
+        "whole": sum(not result.broken for result in results),
+    }
+    return {name: str(number) for name, number in numbers.items()}
 
 
 def limits(results: Sequence[Result]) -> str:
