@@ -484,3 +484,24 @@ def test_a_metered_channels_time_counts_what_its_density_lets_through(light_shar
     (reading,) = resolve(sensor, white, 1.0, "W")
     held = 80_000.0 * light_share * reading.time_share
     assert 0.8 * 15_000 * 2 ** (-1 / 16) < held <= 0.8 * 15_000 * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("gain", [1.0, 2.0])
+def test_a_metered_channel_fills_the_converters_range_at_the_cameras_gain(gain):
+    sensor = with_channel_readings(replace(low_noise(), gain=gain), [ChannelReading("W", metered=True)])
+    (reading,) = resolve(sensor, np.full((8, 8), 80_000.0), 1.0, "W")
+    most = 0.8 * 15_000 / gain
+    assert most * 2 ** (-1 / 16) < 80_000.0 * reading.time_share <= most * (1 + 1e-9)
+
+
+@loop("reading", WAYS)
+def test_a_raw_image_states_each_channels_noise_with_its_converters_rounding(reading):
+    sensor = camera(reading, column_gain_spread=0.0)
+    raw = shot(sensor, scene(), 1)
+    for channel, apart in (("W", reading), ("G", ChannelReading("G"))):
+        alone = at_channel(chip_readings(sensor, EXPOSURE_S), channel)[0].sensor
+        read_e, dark_e = apart.read_noise_e or 1.5, 2000 * EXPOSURE_S * apart.time_share
+        noise, fixed_e2 = raw.noise_of(channel), (apart.dsnu_e or 1.0) ** 2 + 2.0**2
+        stated_e2 = (noise.read_noise_e**2 + noise.dsnu_e**2) * apart.share**2
+        written_e2 = read_e**2 + dark_e + alone.gain_e_per_dn**2 / 12 + fixed_e2
+        assert stated_e2 == pytest.approx(written_e2, rel=1e-6), channel

@@ -132,6 +132,16 @@ def test_noise_steps_of_a_frame_and_of_a_burst_are_as_near_to_the_closed_form_as
         assert np.abs(stated / found - 1).max() < most
 
 
+def test_noise_steps_begin_where_a_reading_is_left_out_in_the_electrons_that_are_merged():
+    """Photodiodes of half and of a quarter of the light: a step lies at three quarters of the whole pixel's light."""
+    sensor = sensor_of(Reading(2.0, 0.0, 5000.0, 0.5, 1.0, "a"), Reading(2.0, 0.0, 5000.0, 0.25, 1.0, "b"))
+    readings = chip_readings(sensor, 0.01)
+    first, second = merged_noise_steps(readings)
+    (handover_e, _) = seams(readings).handover_e
+    assert (first.from_e, second.from_e) == (0.0, pytest.approx(0.75 * handover_e))
+    assert 0.5 * 10_000 <= handover_e < 10_000
+
+
 @loop("name", HDR)
 def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
     one, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")

@@ -399,3 +399,9 @@ def test_every_term_scales_as_its_kind_does_with_light_and_with_time() -> None:
         assert getattr(brief, name) == pytest.approx(getattr(dim, name)), name
     assert (dim.exposure_s, brief.exposure_s, dim.condition, dim.mosaic) == (0.01, 0.001, CONDITION, "rgbw")
     assert named | {"exposure_s", "condition", "mosaic"} == {field.name for field in fields(ScaledEffects)}
+
+
+def test_bands_are_paid_for_four_at_a_time() -> None:
+    """85 ns a band and sample, and as much as 12 bands to trace a path."""
+    for bands, paid in ((4, 4), (5, 8), (8, 8), (9, 12), (20, 20)):
+        assert render_ns(bands, 10) == pytest.approx((paid + 12) * 10 * 85.0)

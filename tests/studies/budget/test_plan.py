@@ -56,7 +56,6 @@ def planned(cache: Path) -> Plan:
     return plan(SMALL, cache=cache)
 
 
-@pytest.mark.thorough
 def test_a_plan_has_a_render_for_each_scene_and_an_image_for_each_condition(planned: Plan) -> None:
     (model,) = planned.renders.values()
     assert list(planned.renders) == list(SMALL.scenes)

@@ -117,3 +117,12 @@ def test_a_sweeps_time_counts_first_calls_of_each_process_metrics_and_the_report
     assert seconds('["ple_bayer"]', 1) - one > 1.5, "its tables"
     assert seconds('["bayer"]', 1, planned=True) - one == pytest.approx(6.0)
     assert seconds('["bayer"]', 1, frames=True) < one - 2.0, "neither developed nor reported"
+
+
+def test_half_of_a_sweep_is_that_of_half_its_seeds_or_of_a_quarter_of_its_pixels(tmp_path: Path) -> None:
+    whole, half = (SAMPLE.small_study(tmp_path, seeds=tuple(range(count))) for count in (8, 4))
+    told = estimated(whole, tmp_path / "out", 1)
+    assert told.half_cells_seconds == pytest.approx(estimated(half, tmp_path / "out", 1).seconds)
+    assert (told.cells, told.kept, told.renders, told.workers) == (2 * 8, 0, 0, 1)
+    SAMPLE.picture(tmp_path / "scene.exr", (8, 10))
+    assert told.half_size_seconds == pytest.approx(estimated(whole, tmp_path / "out", 1).seconds, rel=1e-3)

@@ -17,7 +17,7 @@ from refusal import refusal
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from sensor.presets import low_noise, preset_file, vary
-from studies.dataset.judge import MEASURED, Score, expected, judge, scores_of_sweep
+from studies.dataset.judge import MEASURED, Score, expected, judge, scores, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
 from studies.dataset.shards import read_shard
@@ -119,6 +119,15 @@ def test_white_balances_and_bursts_of_a_sweep_are_not_averaged(out: Path) -> Non
     for alone, first, second in zip(of(plain, "bayer"), shot, world, strict=True):
         assert alone.means == first.means
         assert first.means["psnr_db"] - second.means["psnr_db"] == pytest.approx(1)
+
+
+def test_samples_of_a_scene_are_averaged_before_scenes_are(out: Path) -> None:
+    """Scene a has three samples of 10, 20 and 30, scene b one of 40: the mean is 30, of two scenes."""
+    (row, *_) = [vars(row) for row in read_rows(out)]
+    values = (("a", 10.0), ("a", 20.0), ("a", 30.0), ("b", 40.0))
+    (score,) = scores([row | {"scene": scene, "psnr_db": db, "mosaic": "bayer"} for scene, db in values], "mine")
+    assert (score.scenes, score.means["psnr_db"]) == (2, 30.0)
+    assert score.halves["psnr_db"] == pytest.approx(12.7062 * 10.0, rel=1e-5)
 
 
 @pytest.mark.thorough

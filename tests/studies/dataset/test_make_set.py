@@ -17,6 +17,7 @@ import pytest
 import sweep_sample as SAMPLE
 from refusal import refusal
 
+from render.radiance_files.radiance_source import extent_of
 from render.surfaces import see_surfaces
 from rodcone.digests import digest
 from scenes.catalogue import load
@@ -292,6 +293,28 @@ def test_the_room_asked_for_is_that_of_the_set(tmp_path: Path) -> None:
         path.stat().st_size for path in folder.glob("*.tar")
     )
     assert 0.5 * needed < written < 1.3 * needed
+
+
+def test_the_room_asked_for_is_the_sum_of_its_parts(tmp_path: Path) -> None:
+    """Bayer has three channels and RGBW four; one light group, eight frames."""
+    study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
+    pixels, frames, spectra = extent_of(tmp_path / "scene.exr")[0], 2 * 2, 1  # by the file's bytes
+    needed = order_module.bytes_needed(study, SAMPLE.stated(study), open_all(study).values(), SetOrder())
+    fixed = 2 + 12 + 12 + 4 + 12 + 4 + 4  # raw, rgb, xyz, depth, normals, ids, mosaic
+    parts = [frames * (pixels * (fixed + 4 * n + 4) + 20_000) + spectra * 4 * pixels * (20 + n) for n in (3, 4)]
+    assert needed == sum(parts), "a file's light is there already"
+
+
+def test_a_value_at_a_bound_of_the_cards_histograms_is_counted_above_it(stored: Path) -> None:
+    lines = [dict(line) for line in read_manifest(stored)]
+    for line, snr_db, share in zip((x for x in lines if x["kind"] == "sample"), (0, 10, 10, 20, 30, 29, -1, 5),
+                                   (0.01, 0.03, 0.1, 0.3, 1.0, 0.99, 0.0, 0.02), strict=True):  # fmt: skip
+        line |= {"snr_db": snr_db, "render_noise": {"mean": share, "of_95_percent": share}}
+    text = make_set_module.card(lines)
+    for words in ("under 0 | 1", "0 to 10 | 2", "10 to 20 | 2", "20 to 30 | 2", "30 and more | 1"):
+        assert f"| {words} |" in text, words
+    for words in ("under 0.01 | 1", "0.01 to 0.03 | 2", "0.03 to 0.1 | 1", "0.1 to 0.3 | 1", "0.3 to 1 | 2"):
+        assert f"| {words} |" in text, words
 
 
 def test_splits_hold_their_shares_and_no_scene_twice() -> None:

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 import sweep_sample as SAMPLE
+from explore_sample import small_transport
 from loop import loop
 
 from render.engine import render
@@ -17,6 +18,7 @@ from sensor.pixel import ChannelReading
 from sensor.presets import low_noise
 from sensor.readings.resolve import chip_readings
 from studies.dataset.sample import Arrays, Sample, group_shares, make_sample, noise_coefficients, scene_hash
+from studies.explore.controls import Lamp, lit_group
 from studies.study.lit_scene import open_choice
 from studies.study.study import RenderLimits, SceneChoice, Study
 
@@ -228,6 +230,26 @@ def test_shares_of_lights_sum_to_the_picture_and_each_is_what_it_gives_alone() -
     for index, given in enumerate(alone):
         # radiance is rounded to float32 after it is summed
         np.testing.assert_allclose(shares[..., index] * whole, given, atol=1e-6 * whole.max())
+
+
+def test_shares_follow_each_lamps_own_spectrum_within_the_bands() -> None:
+    """In bands of 50 nm the eye weighs a lamp at their red end otherwise than daylight in the same band."""
+    transport = small_transport()
+    red = Lamp(table=tuple((nm, float(np.exp(-(((nm - 615.0) / 20.0) ** 2)))) for nm in np.arange(380.0, 781.0, 2.0)))
+    lamps = {"sun": red, "sky": Lamp("D65")}  # each at its own luminance
+    groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
+    lit = replace(transport, groups=groups)
+    shares = group_shares(lit)
+    alone = []
+    for name in groups:
+        powers = {other: groups[other].power * (other == name) for other in groups}
+        view = lit.relight(powers=powers)
+        alone.append(luminance(view.values.astype(float), view.wavelength_nm, view.widths_nm, view.light))
+    whole = np.sum(alone, axis=0)
+    bright = whole > 0.01 * whole.max()
+    for index, plane in enumerate(alone):
+        np.testing.assert_allclose(shares[bright, index], (plane / np.maximum(whole, 1e-9))[bright], atol=5e-3)
+    assert shares[bright].mean(axis=0).min() > 0.05
 
 
 def test_a_scene_has_one_hash_whatever_lights_it_and_another_for_other_shapes(tmp_path: Path) -> None:

@@ -331,3 +331,10 @@ def test_each_figure_is_that_of_its_own_metric_and_estimate() -> None:
     assert told == pytest.approx(expected, rel=1e-9)
     assert min(np.diff(np.sort(expected))) > 0.01
     assert (-10 * np.log10(known) > -10 * np.log10(linear) + 0.3).all()
+
+
+def test_a_samples_room_in_the_well_is_what_dark_current_leaves() -> None:
+    dark = replace(BAYER, pixel=replace(BAYER.pixel, dark_current_e_per_s=50_000.0))
+    frame = np.full((4, 4), 100.0)
+    assert noise_of(resolve(BAYER, frame, 0.1)).full_e == pytest.approx(BAYER.top_e)
+    assert noise_of(resolve(dark, frame, 0.1)).full_e == pytest.approx(BAYER.top_e - 5000.0)

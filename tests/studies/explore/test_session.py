@@ -14,14 +14,17 @@ from explore_sample import BANDS, ran, small_transport
 from scipy.io import savemat
 
 import rodcone as public
+from isp.settings import PAPER
 from rodcone.errors import InputError
-from sensor.presets import preset_file
+from scenes.levels import DEMO_LEVELS
+from sensor.presets import preset, preset_file
 from sensor.readout import noise_variance
 from studies.explore import chain
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import expose_scene, photograph
-from studies.explore.controls import Controls, Lamp
+from studies.explore.controls import LENS, PIXEL, SETTINGS, Controls, Lamp
 from studies.explore.memo import Memo, never_cancel
+from studies.explore.messages import first_message
 from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
@@ -141,6 +144,45 @@ def test_a_render_with_more_noise_than_the_sensor_is_told_on_the_page_and_once_o
     notes = [header["noise_note"] for header in page.headers]
     assert [note.startswith("the render's noise has ") for note in notes] == [True, True, False]
     assert capsys.readouterr().err == f"rodcone: {notes[0]}\n"
+
+
+def test_a_bursts_share_of_the_renders_noise_is_the_frames_times_that_of_one():
+    """The sensor's noise of four frames has four times one frame's variance, an error of the light sixteen times."""
+    controls = Controls(exposure="time", exposure_s=0.005)
+    exposed = expose_scene(small_transport(), controls, Memo())
+    one, four = (noise_share(exposed, replace(controls, frames=frames), Memo()) for frames in (1, 4))
+    assert one > 0
+    assert four == pytest.approx(4 * one)
+
+
+def test_what_is_told_of_two_cameras_is_each_ones_own(session):
+    cameras = [
+        {"exposure": "time", "exposure_s": time_s, "level_cd_m2": level} | QUICK
+        for time_s, level in ((0.002, 5.0), (0.02, 900.0))
+    ]
+    told = connected(session).ask(session, "show", 1, cameras=cameras, views=[[1, "raw"], [0, "raw"]])
+    assert [facts["exposure_s"] for facts in told["facts"]] == [0.002, 0.02]
+    assert told["facts"][0]["saturated"] < 0.1
+    assert told["facts"][1]["saturated"] > 0.3
+    assert [each["controls"]["level_cd_m2"] for each in told["cameras"]] == [5.0, 900.0]
+    assert ["0.02" in python for python in told["python"]] == [True, False]
+    transport = small_transport()
+    assert (told["spp"], told["render_error"]) == (transport.spp, transport.relative_mc_error)
+
+
+def test_the_page_is_told_every_sensors_and_processors_own_terms():
+    said = first_message(of_transport(small_transport()))
+    names = {"lens": LENS, "pixel": PIXEL}
+    for name, terms in said["sensors"].items():
+        sensor = preset(name)
+        assert (terms["bits"], terms["gain"]) == (sensor.bits, sensor.gain), name
+        for part, keys in names.items():
+            assert terms[part] == {key: getattr(getattr(sensor, part), key) for key in keys}, name
+        assert set(terms) == {"lens", "pixel", "bits", "gain"}
+    paper = said["processors"]["interleaved_paper"]["settings"]
+    assert paper == {name: getattr(PAPER, name) for name in SETTINGS} != said["processors"]["interleaved"]["settings"]
+    assert said["levels"] == {level.name: pytest.approx(level.luminance_cd_m2, rel=1e-3) for level in DEMO_LEVELS}
+    assert said["groups"] == dict.fromkeys(small_transport().groups, False)
 
 
 @pytest.mark.parametrize("good_states", [0, 1])

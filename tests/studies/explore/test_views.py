@@ -197,3 +197,12 @@ def test_a_pixel_reads_its_own_sample_and_its_channels_well():
         assert told["read_e"] == pytest.approx((dn - exposed.raw.black_dn) * exposed.raw.gain_e_per_dn, rel=1e-9)
         assert told["well_e"] == pytest.approx(exposed.raw.noise_of(channel).full_well_e)
         assert told["wavelength_nm"] == exposed.transport.wavelength_nm.tolist()
+
+
+def test_the_histogram_holds_the_deepest_well_of_the_channels():
+    controls = Controls(sensor="white_apart", mosaic="own", processor="any_mosaic", level_cd_m2=5000.0)
+    raw = expose_scene(small_transport(), replace(controls, exposure=TIME, exposure_s=0.05), Memo()).raw
+    deepest = max(raw.noise_of(channel).full_well_e for channel in raw.channels)
+    assert deepest > 1.5 * raw.full_well_e
+    assert histogram(raw)["edges_e"][-1] == pytest.approx(1.05 * deepest)
+    assert histogram(raw)["edges_e"][0] == 0.5

@@ -335,7 +335,6 @@ def test_seconds_are_means_over_the_pictures_of_a_camera_and_a_sensor() -> None:
     assert isnan(rows[1][3])
 
 
-@pytest.mark.thorough
 def test_each_render_has_its_cost_and_the_worst_share_of_its_pictures() -> None:
     def shared(row: Row) -> Row:
         worst = (row.scene, row.spectrum, row.level, row.processor) == ("still_life", "own", "moonlight", "bayer")

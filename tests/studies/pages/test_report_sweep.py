@@ -23,9 +23,9 @@ from refusal import refusal
 from studies.metrics.flip import seen
 from studies.pages.report import group_views, render_report
 from studies.pages.report_compare import Comparison
-from studies.pages.report_data import ReportSensor
+from studies.pages.report_data import ReportRender, ReportSensor
 from studies.pages.report_pictures import busiest, flip_map, opened, view_order
-from studies.pages.report_sweep import sensor_of, sweep_report
+from studies.pages.report_sweep import render_of, sensor_of, sweep_report
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
@@ -239,3 +239,11 @@ def test_white_balances_stand_beside_each_other_and_the_rules_of_exposure_are_to
     page = unescape(render_report(report, pictures))
     assert "<summary>automatic for W, balanced as shot</summary>" in page
     assert "automatic: the 99th percentile of expected G at 80 % of the well; automatic for W: the 99th" in page
+
+
+def test_a_renders_facts_are_those_of_its_rows() -> None:
+    """Every number is another one, so that none is taken for its neighbour."""
+    row = SAMPLE.row("bayer", 0, spp=64.0, bands=20, render_s=1.5, capture_s=2.5, develop_s=3.5, measure_s=4.5)
+    other = replace(row, scene="table", spp=1.0, bands=2, render_s=3.0)
+    assert render_of([other, row], "desk") == ReportRender("desk", 64.0, 20, 1.5, "file", "samples", 0.01)
+    assert render_of([row], "street") == ReportRender("street")

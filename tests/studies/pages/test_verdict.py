@@ -143,6 +143,13 @@ def test_a_lead_is_worth_the_light_that_the_other_needs() -> None:
     assert np.isnan(light_ratio(light, worse + np.array([0.1, 0.12]), worse)[2]).all(), "0.3 dB in a decade are unseen"
 
 
+def test_of_several_places_of_a_value_the_nearest_to_the_level_counts() -> None:
+    """The curve passes 15 dB at 10^0.5 and, after a loss, at 10^2.5 cd/m2; the level is 100: a factor of 10^0.5."""
+    worse = np.array([[10.0], [20.0], [10.0], [20.0]]) + np.zeros(2)
+    better = np.array([[10.0], [20.0], [15.0], [20.0]]) + np.zeros(2)
+    assert light_ratio([1.0, 10.0, 100.0, 1000.0], better, worse)[2] == pytest.approx([10**0.5] * 3)
+
+
 def test_the_same_method_on_both_mosaics_is_compared_first_else_what_varies() -> None:
     four = noisy(cameras=("interleaved", "bayer", "ple_rgbw", "ple_bayer"), levels=1)
     assert (first_comparison(four).compared, first_comparison(four).a, first_comparison(four).b) == (CAMERA, 2, 3)

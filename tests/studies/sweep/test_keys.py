@@ -44,6 +44,7 @@ def test_a_frames_key_changes_with_each_of_its_inputs_alone(tmp_path: Path, monk
     dim = replace(sensor, pixel=replace(sensor.pixel, fill_factor=0.5))
     found = [first, key(render="c"), key(identity="d"), key(spectrum="D65"), key(spectrum="A"), key(preset=dim)]
     found += [key(sensor=dim), key(study=replace(study, levels=("10lux",)))]
+    found += [key(study=replace(study, sensor_side_um=side_um)) for side_um in (40.0, 50.0)]
     lamp.write_text("wavelength_nm,value\n380,1\n780,2\n")
     found.append(key())
     monkeypatch.setattr(frames_module, "versions", lambda: "another version")

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 from builders import any_order
+from loop import loop
 from PIL import Image
 from refusal import refusal
 
@@ -124,6 +125,14 @@ def test_rules_of_exposure_are_each_cameras_own_and_leave_its_noise(tmp_path: Pa
     assert times["interleaved", "auto:information"] < times["interleaved", "auto"]  # W is not left full
     bayer = {run_cell(cell).picture for cell in cells if (cell.processor, cell.condition.exposure) in SAME}
     assert len(bayer) == 1  # the same time, the same picture
+
+
+@loop("rule", ["auto", "auto:W"])
+def test_twice_the_gain_takes_half_the_time_of_an_automatic_exposure(rule: str, tmp_path: Path) -> None:
+    changes: dict[str, Any] = {"levels": ("900cd/m2",), "exposures": (rule,), "processors": ("interleaved",)}
+    one, two = made(tmp_path, **changes, gains=(1.0, 2.0), seeds=(0,))
+    assert (one.frame.sensor.gain, two.frame.sensor.gain) == (1.0, 2.0)
+    assert two.exposure_s == pytest.approx(one.exposure_s / 2, rel=1e-9)
 
 
 def test_a_white_balance_as_shot_is_the_neutral_of_the_scenes_light(tmp_path: Path) -> None:
