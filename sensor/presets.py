@@ -113,6 +113,11 @@ VARIATIONS: Mapping[str, tuple[Tile, Callable[[Responses], Responses]]] = Mappin
 )
 
 
+def tile_named(mosaic: str) -> Tile:
+    """Return the tile of a mosaic by a name of `sensor.cfa.MOSAICS` or `VARIATIONS`."""
+    return VARIATIONS[mosaic][0] if mosaic in VARIATIONS else tile_of(mosaic)
+
+
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
 

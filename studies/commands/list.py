@@ -63,14 +63,18 @@ def texts(kind: Kind) -> dict[str, str]:
     if kind == "sensors":
         return _sensors()
     if kind == "mosaics":
-        from sensor import cfa
+        from sensor.presets import tile_named
 
-        return {name: "/".join(cfa.tile_of(name)) for name in cfa.mosaics()}
+        return {name: f"{'/'.join(tile_named(name))}: {text}" for name, text in _texts_of(kind).items()}
     if kind == "metrics":
         from studies.metrics.metric import METRICS
 
         units = {x.key: f" [{x.unit}]" if x.unit else "" for x in METRICS}
         return {x.key: f"{x.name}{units[x.key]}, {'higher' if x.higher else 'lower'} is better" for x in METRICS}
+    return _texts_of(kind)
+
+
+def _texts_of(kind: Kind) -> dict[str, str]:
     names: dict[str, str] = tomllib.loads(NAMES.read_text("utf-8"))[kind]
     return names
 

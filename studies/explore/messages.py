@@ -23,7 +23,7 @@ from sensor.config import SensorConfig
 from sensor.config_file import OF_TABLES
 from sensor.exposure import RULES
 from sensor.photodiodes import with_gain
-from sensor.presets import preset
+from sensor.presets import preset, tile_named
 from sensor.presets import preset_names as sensors
 from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
 from studies.explore.slow import is_slow
@@ -33,6 +33,8 @@ from studies.study.gain import iso_speed
 from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
+
+DATA = Path(__file__).parents[1] / "data"
 
 MOST_CHARACTERS = 200_000  # bytes of a message; three tables of spectra fit
 MOST_OF_A_PAGE = 40  # characters of a file's name
@@ -75,6 +77,7 @@ def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[
             for name, processor in PROCESSORS.items()
             if not _missing(name)
         },
+        "mosaics": _mosaics(),
         "views": list(VIEWS),
         "assumed": list(source.notes),
     }
@@ -88,7 +91,14 @@ def sensor_terms(sensor: SensorConfig) -> Header:
         "bits": sensor.bits,
         "gain": sensor.gain,
         "iso": iso_speed(with_gain(sensor, 1.0)),
+        "tile": list(sensor.cfa),
     }
+
+
+def _mosaics() -> Header:
+    """Return the tile of each mosaic by name and a sentence on it; the sensors' own stand with these."""
+    texts = parse_toml((DATA / "names.toml").read_text("utf-8"))["mosaics"]
+    return {name: {"tile": list(tile_named(name)), "text": text} for name, text in texts.items()}
 
 
 def _missing(processor: str) -> bool:

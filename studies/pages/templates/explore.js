@@ -31,6 +31,8 @@ const SETTINGS = {
   sigma_d: ["σ of distance", 0.3, 30, "log", "px"], sigma_s: ["σ of similarity", 0.1, 3000, "log", "noise"],
 };
 const CHANNELS = { R: "var(--red)", G: "var(--green)", B: "var(--blue)", W: "var(--ink)", C: "var(--blue)", M: "var(--red)", Y: "var(--green)" };
+// Filters in the colours that they pass; C is cyan.
+const FILTERS = { R: "#d43d33", G: "#2f9e4f", B: "#3b62d6", W: "#f4f4f0", C: "#45b8c4", M: "#b84fa8", Y: "#e3c53a" };
 // What each control is; shown where the pointer rests on its name.
 const TERMS = {
   scene: "What is photographed. Another one is rendered first; the cameras stay as they are.",
@@ -377,6 +379,7 @@ function render({ model, el }) {
           }
           set("mosaic", value, true);
         }, "mosaic"),
+        tile(hello.mosaics[camera.mosaic]?.tile ?? preset.tile, hello.mosaics[camera.mosaic]?.text ?? "the sensor's own"),
         gain,
         slider(["Converter", 1, 16, "whole", "bit"], camera.bits ?? preset.bits, value => set("bits", value === preset.bits ? null : value), "bits"),
         checkbox("Shot noise", camera.shot_noise, value => set("shot_noise", value), "shot_noise"),
@@ -488,6 +491,21 @@ function choice(title, options, value, act, key = title) {
   select.value = value;
   select.onchange = () => act(select.value);
   return make("label", { class: "choice" }, term(title, key), select);
+}
+// A mosaic's tile in the colours of its filters, a small one twice across and down, and what it is.
+function tile(rows, text) {
+  const times = rows.length > 2 || rows[0].length > 2 ? 1 : 2, high = times * rows.length, wide = times * rows[0].length;
+  const clear = !/[MY]/.test(rows.join("")); // C beside Y or M is cyan, else clear
+  const picture = drawing(`Tile ${rows.join("/")}`);
+  picture.setAttribute("viewBox", `0 0 ${wide} ${high}`);
+  picture.classList.add("tile");
+  for (let y = 0; y < high; y += 1) {
+    for (let x = 0; x < wide; x += 1) {
+      const letter = rows[y % rows.length][x % rows[0].length];
+      add(picture, "rect", { x, y, width: 1, height: 1, fill: FILTERS[letter === "C" && clear ? "W" : letter] ?? "#888888" });
+    }
+  }
+  return make("div", { class: "mosaic" }, picture, make("small", {}, `${rows.join("/")}: ${text}`));
 }
 function checkbox(title, value, act, key) {
   const box = make("input", { type: "checkbox", "data-key": key });

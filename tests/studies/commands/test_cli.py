@@ -65,7 +65,8 @@ def test_every_name_of_every_catalogue_is_listed() -> None:
     assert tuple(found["scenes"]) == catalogue.scene_names()
     assert tuple(found["lights"]) == (*illuminants.illuminant_names(), "3000K", "D7000K")
     assert tuple(found["sensors"]) == (*presets.preset_names(), *measured_cameras())
-    assert tuple(found["mosaics"]) == cfa.mosaics()
+    assert tuple(found["mosaics"]) == (*cfa.mosaics(), *presets.VARIATIONS)
+    assert found["mosaics"]["rgbw_nd"].startswith("RG/BW: ")
     assert tuple(found["processors"]) == tuple(PROCESSORS)
     assert "flip_mean" in found["metrics"]
     assert all(text.strip() for lines in found.values() for text in lines.values())
@@ -76,7 +77,7 @@ def test_every_name_of_every_catalogue_is_listed() -> None:
 def test_one_kind_is_listed_alone_with_a_line_a_name() -> None:
     lines = printed("mosaics").splitlines()
     assert lines[0] == "mosaics"
-    assert [line.split() for line in lines[1:3]] == [["rgbw", "RG/BW"], ["bayer", "RG/GB"]]
+    assert [line.split()[:2] for line in lines[1:3]] == [["rgbw", "RG/BW:"], ["bayer", "RG/GB:"]]
 
 
 @pytest.mark.thorough

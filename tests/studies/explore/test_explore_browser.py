@@ -52,6 +52,18 @@ def test_the_page_opens_with_two_mosaics_by_one_method(browser):
         assert page.evaluate(chosen) == ["bayer", "ple"]
 
 
+@pytest.mark.thorough
+def test_a_mosaic_shows_its_tile_in_the_colours_of_its_filters_and_what_it_is(browser, address):
+    page = CHROME.open_page(browser, address)
+    EXPLORE.settle(page)
+    fills = "[...document.querySelectorAll('.explore svg.tile rect')].map(each => each.getAttribute('fill'))"
+    red, green, blue, white = "#d43d33", "#2f9e4f", "#3b62d6", "#f4f4f0"
+    rows = [[red, green] * 2, [blue, white] * 2]
+    assert page.evaluate(fills) == (rows[0] + rows[1]) * 2
+    said = page.evaluate("document.querySelector('.explore .mosaic').textContent")
+    assert said.startswith("RG/BW: one pixel of four is clear")
+
+
 @pytest.fixture
 def one_render(monkeypatch: pytest.MonkeyPatch) -> None:
     """Each render that copied Python asks for is made once: `test_written` shows that a second one is the same."""

@@ -17,7 +17,8 @@ import rodcone as public
 from isp.settings import PAPER
 from rodcone.errors import InputError
 from scenes.levels import DEMO_LEVELS
-from sensor.presets import preset, preset_file
+from sensor.photodiodes import with_gain
+from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.readout import noise_variance
 from studies.explore import chain
 from studies.explore.answers import noise_share, python_of
@@ -29,6 +30,7 @@ from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
 from studies.photograph.picture_file import to_png
+from studies.study.gain import iso_speed
 
 
 class Page:
@@ -178,7 +180,14 @@ def test_the_page_is_told_every_sensors_and_processors_own_terms():
         assert (terms["bits"], terms["gain"]) == (sensor.bits, sensor.gain), name
         for part, keys in names.items():
             assert terms[part] == {key: getattr(getattr(sensor, part), key) for key in keys}, name
-        assert set(terms) == {"lens", "pixel", "bits", "gain"}
+        assert terms["iso"] == iso_speed(with_gain(sensor, 1.0))
+        assert terms["tile"] == list(sensor.cfa)
+        assert set(terms) == {"lens", "pixel", "bits", "gain", "iso", "tile"}
+    offered = {name for processor in said["processors"].values() for name in processor["mosaics"]}
+    assert offered - set(said["mosaics"]) == {"own"}
+    for name, mosaic in said["mosaics"].items():
+        assert mosaic["tile"] == list(vary(low_noise(), name).cfa), name
+        assert mosaic["text"]
     paper = said["processors"]["interleaved_paper"]["settings"]
     assert paper == {name: getattr(PAPER, name) for name in SETTINGS} != said["processors"]["interleaved"]["settings"]
     assert said["levels"] == {level.name: pytest.approx(level.luminance_cd_m2, rel=1e-3) for level in DEMO_LEVELS}
