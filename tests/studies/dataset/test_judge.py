@@ -106,7 +106,13 @@ def test_a_sweeps_pictures_are_judged_as_the_sweep_measured_them(out: Path, tmp_
         assert own.means["psnr_db"] == pytest.approx(
             np.mean([row.psnr_db for row in rows if row.level == own.level]), abs=1e-9
         )
-        for key, bound in (("psnr_db", 0.05), ("ssim", 0.01), ("flip_mean", 0.005), ("delta_e_median", 0.3)):
+        for key, bound in (
+            ("psnr_db", 0.05),
+            ("ssim", 0.01),
+            ("flip_mean", 0.005),
+            ("delta_e_median", 0.3),
+            ("pu21_psnr_db", 0.5),
+        ):
             assert copied.means[key] == pytest.approx(own.means[key], abs=bound)
 
 
