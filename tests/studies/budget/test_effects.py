@@ -405,3 +405,11 @@ def test_bands_are_paid_for_four_at_a_time() -> None:
     """85 ns a band and sample, and as much as 12 bands to trace a path."""
     for bands, paid in ((4, 4), (5, 8), (8, 8), (9, 12), (20, 20)):
         assert render_ns(bands, 10) == pytest.approx((paid + 12) * 10 * 85.0)
+
+
+def test_errors_of_merged_bands_rise_and_fall_together() -> None:
+    """Standard errors of 1 and 3 have the mean 2: a variance of 4, not 5."""
+    made = transport(even())
+    variance = np.where(np.arange(40) % 2, 9.0, 1.0)[None, :, None, None] * np.ones((1, 1, *SIZE))
+    merged = merge_transport(replace(made, variance=variance.astype(np.float32)), band_groups(WIDTH_NM, 20))
+    assert np.allclose(merged.variance, 4.0)
