@@ -53,6 +53,35 @@ def test_each_reading_s_own_variance_is_that_of_a_chip_that_is_read_once(name):
         np.testing.assert_allclose(total[:, index, index] * reading.share**2, alone, rtol=1e-12)
 
 
+def test_what_two_readings_have_in_common_is_written_out_by_source():
+    """Two gains of photodiode a, of half the light, and one of b, of a quarter; a column's offset is common to all."""
+    terms = {"prnu": 0.02, "column_offset_e": 3.0, "column_gain_spread": 0.01, "dark_current_e_per_s": 1000.0}
+    hot = {"hot_pixel_share": 0.01, "hot_pixel_dark_current_e_per_s": 1e4}
+    gains = (Reading(2.0, 1.0, 2000.0, 0.5, 1.0, "a"), Reading(6.0, 2.0, 8000.0, 0.5, 1.0, "a"))
+    readings = chip_readings(sensor_of(*gains, Reading(4.0, 3.0, 5000.0, 0.25, 1.0, "b"), **terms, **hot), 0.1)
+    found = {name: matrix[0] for name, matrix in covariances(np.array([1000.0]), readings).items()}
+    share = np.array([0.5, 0.5, 0.25])
+    charge = np.array([[2.0, 2.0, 0.0], [2.0, 2.0, 0.0], [0.0, 0.0, 4.0]])
+    photodiode = (charge > 0) * 1.0
+    collected = {
+        "shot noise": 1000.0 * charge,
+        "dark current": 100.0 * charge,
+        "hot pixels": 0.01 * 1e3 * charge + 0.01 * 0.99 * 1e6 * photodiode,
+        "PRNU": 20.0**2 * photodiode,
+    }
+    wanted = collected | {
+        "column gains": 0.01**2 * (sum(collected.values()) + (1000.0 + 100.0 + 10.0) ** 2),
+        "column offsets": 9.0 / np.outer(share, share),
+        "DSNU": np.diag([1.0, 4.0, 9.0] / share**2),
+        "read noise": np.diag([4.0, 36.0, 16.0] / share**2),
+        "converter noise": np.zeros((3, 3)),
+        "quantisation": np.diag([x.sensor.gain_e_per_dn**2 / 12 for x in readings] / share**2),
+    }
+    assert found.keys() == wanted.keys()
+    for name, matrix in wanted.items():
+        np.testing.assert_allclose(found[name], matrix, rtol=1e-12, err_msg=name)
+
+
 def test_two_gains_of_one_charge_share_its_shot_noise_and_average_their_read_noise():
     sensor = dual()
     light = np.array([0.0, 1.0, 100.0, 1500.0])
