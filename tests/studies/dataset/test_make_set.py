@@ -274,7 +274,8 @@ def test_another_set_and_foreign_files_are_refused_before_any_render_and_left_al
 def test_a_set_of_other_parts_is_another_set(tmp_path: Path) -> None:
     SAMPLE.picture(tmp_path / "scene.exr", (32, 32))
     made(tmp_path, order=SetOrder(shards=3, crop=32))
-    refusal(made, tmp_path, order=SetOrder(shards=3, crop=16), match="holds another set, 'rodcone dataset'")
+    for other in (SetOrder(shards=3, crop=16), SetOrder(shards=2, crop=32), SetOrder(shards=3, crop=32, truth="rgb")):
+        refusal(made, tmp_path, order=other, match="holds another set, 'rodcone dataset'")
 
 
 def test_a_disk_too_small_is_told_before_anything_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

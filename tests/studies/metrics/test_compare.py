@@ -8,7 +8,8 @@ from refusal import refusal
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from rodcone.colour_spaces import encode_srgb
+from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from studies.metrics.appearance import appearance
 from studies.metrics.appearance import picture_quality as quality_of
 from studies.metrics.compare import ReferencePicture, measure, reference_picture
 from studies.photograph.camera import capture
@@ -83,3 +84,18 @@ def test_a_camera_and_its_reference_are_balanced_to_the_lamp_that_the_radiance_s
     picture = develop(capture(radiance, exposure_s=0.01, rng=np.random.default_rng(1)))
     told = measure(picture, reference_picture(radiance))
     assert told["delta_e_median"] < 3  # noise leaves 1.7; by D65, which `capture` took for every lamp, it was 20
+
+
+def test_a_picture_is_seen_at_the_references_own_luminance() -> None:
+    """PU21 weighs the same error of a picture by its light: in the dark less of it is seen."""
+    rng = np.random.default_rng(4)
+    linear = rng.uniform(0.05, 0.9, (32, 32, 3))
+    other = linear * rng.uniform(0.9, 1.1, linear.shape)
+    dark, bright = (ReferencePicture(linear, white_cd_m2) for white_cd_m2 in (0.1, 1000.0))
+    found = [measure(other, reference)["pu21_psnr_db"] for reference in (dark, bright)]
+    assert found[0] > found[1] + 3.0
+    factor = luminance_of_srgb(linear).mean() / luminance_of_srgb(other).mean()
+    for reference, told in zip((dark, bright), found, strict=True):
+        scaled = other * factor
+        seen = appearance(scaled, encode_srgb(scaled), reference.truth, reference.white_cd_m2)
+        assert told == pytest.approx(seen.pu21_psnr_db, abs=0.05)
