@@ -40,7 +40,9 @@ BOOSTS = {
 # By page the words under which readers look for it, beside those of its own text.
 WORDS = tomllib.loads((ROOT / "docs" / "search.toml").read_text("utf-8"))
 # Links to files of the repository outside docs: on the site they lead to copies.
-OUTSIDE = re.compile(r"\]\(((?:\.\./)+)((?:studies|examples|sensor|benchmarks)/[\w./-]+|[A-Z]+\.(?:md|cff))\)")
+OUTSIDE = re.compile(
+    r"\]\(((?:(?:\.\./)+(?=[A-Z]|studies/|examples/|sensor/|benchmarks/))|(?=make/))([\w./-]+\.(?:md|cff|toml|csv|py))\)"
+)
 LINK = re.compile(r'href="([^":#]*\.html|)#([^"]+)"')
 PICTURE = re.compile(r'<img ([^>]*?)src="((?:\.\./)*(?:pictures|images/understand)/[^"]+\.(webp|svg))"')
 FORMULA = re.compile(r'<(span|div) class="arithmatex">\\[(\[](.*?)\\[)\]]</\1>', re.DOTALL)
@@ -80,9 +82,10 @@ def on_files(files: Files, config: Any) -> Files:
     for place, text in pages.items():
         files.append(File.generated(config, place, content=text))
     for page in sorted((ROOT / "docs").rglob("*.md")):
-        for _, name in OUTSIDE.findall(page.read_text("utf-8")):
-            if f"files/{name}" not in files.src_uris:
-                files.append(File.generated(config, f"files/{name}", content=(ROOT / name).read_text("utf-8")))
+        for link in OUTSIDE.finditer(page.read_text("utf-8")):
+            if copy_of(link[2]) not in files.src_uris:
+                text = (page.parent / f"{link[1]}{link[2]}").read_text("utf-8")
+                files.append(File.generated(config, copy_of(link[2]), content=text))
     folder = ROOT / config.extra["figures"]
     for place in sorted(path for pattern in FIGURES for path in folder.glob(pattern) if path.suffix in SHOWN):
         name = f"figures/{place.relative_to(folder).as_posix()}"
@@ -95,7 +98,7 @@ def on_page_markdown(markdown: str, page: Page, config: Any, files: Files) -> st
     page.meta.setdefault("search", {"boost": BOOSTS.get(page.file.src_uri.partition("/")[0], 1.0)})
     page.meta["tags"] = WORDS.get(page.file.src_uri, [])
     up = "../" * page.file.src_uri.count("/")
-    markdown = OUTSIDE.sub(rf"]({up}files/\2)", markdown)
+    markdown = OUTSIDE.sub(lambda link: f"]({up}{copy_of(link[2])})", markdown)
     markdown = MADE.sub(rf"[`out/\1.html`]({up}figures/\1.html)", markdown)
     if not page.file.src_uri.startswith("results/"):
         markdown = CSV_LINK.sub(r"(results/\1.md)", markdown)
@@ -135,6 +138,11 @@ def on_post_build(config: Any) -> None:
         new = LINK.sub(mended, text)
         if new != text:
             path.write_text(new, "utf-8")
+
+
+def copy_of(name: str) -> str:
+    """Return the place on the site of a file from outside docs; Markdown stays text, since its links lead elsewhere."""
+    return f"files/{name}.txt" if name.endswith(".md") else f"files/{name}"
 
 
 def modules(package: str) -> list[str]:
