@@ -142,7 +142,8 @@ def on_post_build(config: Any) -> None:
 
 def copy_of(name: str) -> str:
     """Return the place on the site of a file from outside docs; Markdown stays text, since its links lead elsewhere."""
-    return f"files/{name}.txt" if name.endswith(".md") else f"files/{name}"
+    place = name.replace("make/", "lists/", 1)  # mkdocs.yml excludes what lies in a folder `make`
+    return f"files/{place}.txt" if name.endswith(".md") else f"files/{place}"
 
 
 def modules(package: str) -> list[str]:
