@@ -6,6 +6,10 @@ compiles, the later ones read what is there. It prints the environment, then sec
 over the later ones: from the start of the process to the picture, on the clock and of the processor; of these the
 imports, the scene's dict, the render, in it Mitsuba's loading (timed again after the picture) and Dr.Jit's writing out
 of its kernels; last the kernels that later processes compiled. No illuminance is asked for.
+
+``--develop`` measures the command `rodcone develop` instead, on a raw image of 256 x 256 pixels, each time in a new
+process: seconds on the clock, of the processor, and of it outside the first thread; last what the clock would show on
+two idle cores, on which the first thread's seconds come one after the other and the others' two at a time.
 """
 
 import argparse
@@ -14,7 +18,9 @@ import os
 import subprocess
 import sys
 import time
+from contextlib import redirect_stdout, suppress
 from dataclasses import replace
+from io import StringIO
 from tempfile import TemporaryDirectory
 from typing import Any
 
@@ -67,7 +73,46 @@ def starts(name: str, size: int, spp: int, repeats: int) -> list[dict[str, Any]]
     return made
 
 
+def develop_once(raw: str, began: float) -> dict[str, float]:
+    """Develop a raw file by the command's own function, in a process that began at a time of the monotonic clock."""
+    from studies.commands.cli import main as rodcone  # imports are part of what is measured
+
+    with redirect_stdout(StringIO()), suppress(SystemExit):
+        rodcone(["develop", raw, "--out", f"{raw}.png"])
+    return {"whole": time.monotonic() - began, "processor": time.process_time(), "first thread": time.thread_time()}
+
+
+def develop_starts(repeats: int) -> None:
+    """Print seconds of `rodcone develop` for both mosaics."""
+    print(f"{'mosaic':20s}" + "".join(f"{word:>16s}" for word in ("clock", "processor", "other threads", "two cores")))
+    with TemporaryDirectory() as folder:
+        for mosaic in ("rgbw", "bayer"):
+            raw = f"{folder}/{mosaic}.dng"
+            photograph = [
+                sys.executable,
+                "-m",
+                "rodcone",
+                "capture",
+                "still_life",
+                "--level",
+                "5cd/m2",
+                "--size",
+                "256",
+            ]
+            subprocess.run([*photograph, "--cfa", mosaic, "--out", raw], check=True, capture_output=True)
+            made = []
+            for _ in range(repeats):
+                command = [sys.executable, __file__, "--develop-one", raw, repr(time.monotonic())]
+                made.append(json.loads(subprocess.run(command, check=True, capture_output=True, text=True).stdout))
+            whole, processor, first = (float(np.median([one[key] for one in made])) for key in made[0])
+            told = (whole, processor, processor - first, first + (processor - first) / 2)
+            print(f"{mosaic:20s}" + "".join(f"{value:16.2f}" for value in told), flush=True)
+
+
 def main() -> None:
+    if sys.argv[1:2] == ["--develop-one"]:
+        print(json.dumps(develop_once(sys.argv[2], float(sys.argv[3]))))
+        return
     if sys.argv[1:2] == ["--one"]:
         name, size, spp, began = sys.argv[2:]
         print(json.dumps(start(name, int(size), int(spp), float(began))))
@@ -81,8 +126,12 @@ def main() -> None:
     parser.add_argument("--size", type=int, default=16)
     parser.add_argument("--spp", type=int, default=1)
     parser.add_argument("--repeats", type=int, default=5)
+    parser.add_argument("--develop", action="store_true", help="measure `rodcone develop` of 256 x 256 pixels")
     given = parser.parse_args()
     print_environment()
+    if given.develop:
+        develop_starts(given.repeats)
+        return
     head = ("scene", "first", "compiling", "later", "processor", "imports", "scene", "render", "loading", "code")
     print(f"{head[0]:20s}" + "".join(f"{word:>10s}" for word in (*head[1:], "compiled")))
     for name in given.scene or scene_names():

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import convolve
-from scipy.optimize import least_squares
 
 _BINS = 24  # of brightness
 _SMOOTHEST = 0.2  # share of a bin's blocks that is used
@@ -78,6 +77,8 @@ def _fit(level: NDArray[np.float64], variance: NDArray[np.float64]) -> NoiseEsti
 
     def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(np.log((parameters[0] * level + parameters[1]) / variance))
+
+    from scipy.optimize import least_squares  # imported here: a tenth of a second that no other raw file needs
 
     slope = max(float(np.median(variance / level)), 1e-12)
     start = [slope, 0.1 * float(variance.min())]
