@@ -1,18 +1,16 @@
-"""What `rodcone expect` tells of mosaics beside pictures of drawn scenes: `benchmarks/forecast.py HASH SCENES`.
+"""What `rodcone expect` tells of mosaics beside pictures of drawn scenes: `docs/make/forecast.py HASH:SCENES ...`.
 
 So many scenes are drawn from a commit's hash, rendered, lit by D65 at five levels, photographed through each mosaic and
 developed by `ple`. For every sensor, level and mosaic it prints the gain over Bayer as expected (with blur) and as
 simulated, with half the 95 % interval over scenes; then the root mean square of their differences, and in brackets
-that of an exact forecast, which the simulation's own noise leaves. Ten scenes take eight minutes of the processor. Rows
-are kept in out/forecast, so that a second call, after a change of the forecast alone, takes seconds. `--csv FILE`
-writes the table.
+that of an exact forecast, which the simulation's own noise leaves. A scene takes 50 seconds of the processor. Rows are
+kept in out/forecast, so that a second call, after a change of the forecast alone, takes seconds.
 
 A forecast is changed by what scenes of one hash show, and judged by those of another.
 """
 
 import argparse
 import json
-import sys
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
 from itertools import product
@@ -20,26 +18,23 @@ from math import sqrt
 from pathlib import Path
 
 import numpy as np
+from design import BAYER, FIGURES, LEVELS, SENSORS, decibels, scene_rows, transport_of
 from scipy.special import stdtrit
 
-from rodcone.csv_file import csv_text
 from sensor.presets import preset, vary
 from studies.design.expect import expect
-
-sys.path.append(str(Path(__file__).resolve().parents[1] / "docs" / "make"))
-from design import BAYER, FIGURES, LEVELS, SENSORS, decibels, scene_rows, transport_of
 
 FOLDER = Path("out/forecast")
 # Beside Bayer; R and B of the second and the fifth are an eighth of the pixels.
 MOSAICS = ("rgbw", "rgbw_4x4", "rgbw_sparse", "RBWB/GRGR/RWBB/BGRG", "WRWG/GWBW", "BRBR/RGRG/BRBR/RGWG")
-Gains = dict[tuple[str, str, str, str], np.ndarray]  # by sensor, mosaic, level and figure
+Key = tuple[str, str, str, str]  # sensor, mosaic, level, figure
+Gains = dict[Key, np.ndarray]  # of each scene
 
 
-def simulated(commit: str, scenes: int) -> Gains:
+def simulated(scenes: Sequence[str]) -> Gains:
     """Return the gain over Bayer of each scene [dB]."""
     errors = defaultdict(list)
-    for number, mosaic, level in product(range(scenes), (BAYER, *MOSAICS), LEVELS):
-        name = f"generated-{int(commit, 16) + number:x}"
+    for name, mosaic, level in product(scenes, (BAYER, *MOSAICS), LEVELS):
         path = FOLDER / f"{name}-{mosaic.replace('/', '_')}-{level}.json"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
@@ -56,7 +51,7 @@ def simulated(commit: str, scenes: int) -> Gains:
     }
 
 
-def expected() -> dict[tuple[str, str, str, str], float]:
+def expected() -> dict[Key, float]:
     """Return the gain over Bayer that the closed form tells [dB]."""
     told = {}
     for sensor in SENSORS:
@@ -67,7 +62,7 @@ def expected() -> dict[tuple[str, str, str, str], float]:
     return told
 
 
-def rms_text(told: Mapping[tuple[str, ...], float], found: Gains, keys: Sequence[tuple[str, str, str, str]]) -> str:
+def rms_text(told: Mapping[Key, float], found: Gains, keys: Sequence[Key]) -> str:
     """Return the root mean square of the differences, and that of an exact forecast."""
     off = [told[key] - found[key].mean() for key in keys]
     exact = [found[key].var(ddof=1) / len(found[key]) for key in keys]
@@ -75,20 +70,13 @@ def rms_text(told: Mapping[tuple[str, ...], float], found: Gains, keys: Sequence
 
 
 def main() -> None:
+    """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("commit", help="hash that scenes are drawn from")
-    parser.add_argument("scenes", type=int)
-    parser.add_argument("--csv", type=Path)
-    given = parser.parse_args()
-    found, told = simulated(given.commit, given.scenes), expected()
-    half = float(stdtrit(given.scenes - 1, 0.975)) / sqrt(given.scenes)
-    rows = [
-        (*key, f"{told[key]:.3f}", f"{gains.mean():.3f}", f"{gains.std(ddof=1) * half:.3f}")
-        for key, gains in found.items()
-    ]
-    if given.csv:
-        head = ("sensor", "mosaic", "level", "figure", "expected_db", "simulated_db", "half_interval_db")
-        given.csv.write_text(csv_text(head, rows, line_end="\n"))
+    parser.add_argument("drawn", nargs="+", help="HASH:SCENES, a commit's whole hash and how many are drawn from it")
+    parts = [text.partition(":") for text in parser.parse_args().drawn]
+    scenes = [f"generated-{int(commit, 16) + k:x}" for commit, _, count in parts for k in range(int(count))]
+    found, told = simulated(scenes), expected()
+    half = float(stdtrit(len(scenes) - 1, 0.975)) / sqrt(len(scenes))
     for sensor, figure in product(SENSORS, FIGURES):
         print(f"\n{sensor}, {figure}: gain over Bayer, expected / simulated ± half the interval [dB]")
         print(f"{'':20s}" + "".join(f"{f'{level} {value:g}':>20s}" for level, value in LEVELS.items()))
