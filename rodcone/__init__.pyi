@@ -67,6 +67,7 @@ from studies.photograph.picture_file import write_picture as write_picture
 from studies.photograph.shot import Order as Order
 from studies.photograph.shot import take as take
 from studies.photograph.snr import LightForSnr
+from studies.score.figure import Score
 from studies.study.study import RenderLimits as RenderLimits
 from studies.study.study import SceneChoice as SceneChoice
 from studies.study.study import Study as Study
@@ -140,6 +141,7 @@ __all__ = [
     "report",
     "run_in_processes",
     "scenes",
+    "score",
     "sensors",
     "snr",
     "sweep",
@@ -230,6 +232,9 @@ def render(
     progress: Callable[[float, float], None] | None = None,
     denoise: bool = False,
 ) -> Transport: ...
+def score(
+    sensor: _Sensor, light: str = "D65", exposure_s: _Seconds = 0.033, only: Sequence[str] = (), seed: int = 0
+) -> list[Score]: ...
 def snr(
     electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = ...
 ) -> NDArray[np.float64]: ...

@@ -201,13 +201,15 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),
-        "light_for_snr.exposure_s": _some_seconds,
+        **dict.fromkeys(("light_for_snr.exposure_s", "score.exposure_s"), _some_seconds),
+        "only": _each(_TEXT),
         **dict.fromkeys(
             (
                 "load_radiance.light",
                 "load_radiance.spectra",
                 "load_transport.light",
                 "light_for_snr.light",
+                "score.light",
                 "expect.light",
             ),
             _TEXT,

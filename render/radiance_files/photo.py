@@ -16,6 +16,7 @@ from render.radiance_files.surface_spectra import srgb_basis, surface_reflectanc
 from render.spectrum import DEFAULT_WAVELENGTH_NM
 from rodcone.colour_spaces import decode_srgb
 from rodcone.errors import InputError, read_errors, require_name
+from rodcone.types import Floats
 
 EXTENSIONS = (".jpg", ".jpeg", ".png")
 MOST_SIDE = 4096  # pixels, before memory is taken for them
@@ -51,14 +52,7 @@ def read_photo(path: str | Path, spectra: str = SURFACES) -> SpectralRadiance:
         Where one pixel in a hundred or more has a colour that the measured surfaces don't reach.
     """
     require_name("spectra", spectra, SPECTRA)
-    # damaged streams and Exif fail in many ways within Pillow
-    damage = read_errors(f"{path}: its pixels can't be read", "save it again", Exception)
-    with _opened(Path(path)) as image, damage:
-        upright = ImageOps.exif_transpose(image)
-        deep = upright.mode.startswith("I")
-        pixels = np.asarray(upright if deep else upright.convert("RGB"), dtype=np.float64)
-    encoded = np.clip(pixels / (65535.0 if deep else 255.0), 0.0, 1.0)
-    encoded = encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=-1)
+    encoded = read_pixels(path)
     if spectra == SRGB_BASIS:
         mixtures = decode_srgb(encoded) @ srgb_basis(DEFAULT_WAVELENGTH_NM)
         return SpectralRadiance(mixtures.astype(np.float32), DEFAULT_WAVELENGTH_NM)
@@ -72,6 +66,24 @@ def read_photo(path: str | Path, spectra: str = SURFACES) -> SpectralRadiance:
             stacklevel=2,
         )
     return SpectralRadiance(reflectance, DEFAULT_WAVELENGTH_NM)
+
+
+def read_pixels(path: str | Path) -> Floats:
+    """Read the pixels of a photograph, (h, w, 3) from 0 to 1 as the file encodes them, upright by its Exif.
+
+    Raises
+    ------
+    InputError
+        For a file that isn't a JPEG or PNG of at most 4096 pixels a side, or is damaged.
+    """
+    # damaged streams and Exif fail in many ways within Pillow
+    damage = read_errors(f"{path}: its pixels can't be read", "save it again", Exception)
+    with _opened(Path(path)) as image, damage:
+        upright = ImageOps.exif_transpose(image)
+        deep = upright.mode.startswith("I")
+        pixels = np.asarray(upright if deep else upright.convert("RGB"), dtype=np.float64)
+    encoded = np.clip(pixels / (65535.0 if deep else 255.0), 0.0, 1.0)
+    return encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=-1)
 
 
 def _opened(path: Path) -> Image.Image:

@@ -110,7 +110,7 @@ WRONG: tuple[Any, ...] = (
 # Rendering or studies behind the door: what it lets through is checked with the commands.
 SLOW = {
     *("characterise", "explore", "plan", "reference_plan", "relight_denoised", "render", "report", "run"),
-    *("explorer_view", "run_in_processes", "sweep", "take"),
+    *("explorer_view", "run_in_processes", "score", "sweep", "take"),
 }
 # No file is there.
 READING = {

@@ -1,0 +1,56 @@
+"""A sheet of a camera's figures of merit, to be printed on one page."""
+
+from collections.abc import Mapping, Sequence
+from math import isfinite
+
+from matplotlib import rc_context
+
+from studies.pages.page import svg_address, write_out
+from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_text
+from studies.score.figure import Score
+from studies.score.over_light import AtLight
+
+
+def score_page(
+    scores: Mapping[str, Sequence[Score]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
+) -> str:
+    """Write the sheet: a row for each figure, its closed form and its measurement for each camera."""
+    rows: dict[str, dict[str, Score]] = {}
+    for camera, found in scores.items():
+        for one in found:
+            rows.setdefault(one.name, {})[camera] = one
+    return write_out(
+        "score.html.j2",
+        cameras=list(scores),
+        rows=[(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values()],
+        chart=svg_address(curves_svg(curves)),
+        number=number_text,
+        set_up=set_up,
+        version=version,
+    )
+
+
+def number_text(value: float) -> str:
+    """Write a figure to four digits; a dash for one that isn't there."""
+    return f"{value:.4g}" if isfinite(value) else "—"
+
+
+@rc_context(STYLE)
+def curves_svg(curves: Mapping[str, Sequence[AtLight]]) -> str:
+    """Draw ratio and accuracy over light: lines are closed forms, dots are simulated frames."""
+    figure = blank(2 * CHART[0], CHART[1])
+    left, right = figure.subplots(1, 2)
+    for (camera, rows), colour in zip(curves.items(), COLOURS, strict=False):
+        lux = [row.lux for row in rows]
+        for axes, computed, measured in (
+            (left, [row.snr_db for row in rows], [row.measured_snr_db for row in rows]),
+            (right, [row.accuracy for row in rows], [row.measured_accuracy for row in rows]),
+        ):
+            axes.semilogx(lux, computed, color=colour, label=camera)
+            axes.semilogx(lux, measured, color=colour, marker="o", markersize=3, linestyle="")
+    left.set(title="SNR of a pixel [dB]", xlabel="lux on an 18 % grey card", ylim=(-20, None))
+    right.set(title="contrast transfer accuracy", xlabel="lux on an 18 % grey card", ylim=(0, 1.02))
+    for axes in (left, right):
+        plain_ticks(axes)
+    left.legend(fontsize=8, frameon=False)
+    return svg_text(figure)

@@ -1,0 +1,123 @@
+"""Figures of colour on the ColorChecker's 24 patches: how far a matrix can take the camera to the standard observer.
+
+Noise of a patch's mean adds to its difference of colour, by b / n of n frames. So a difference E is measured on two
+halves of the frames and on all of them: 2 E(all) - (E(first) + E(second)) / 2 is free of it.
+"""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from skimage.color import deltaE_cie76, deltaE_ciede2000, xyz2lab
+
+from render.radiance import SpectralRadiance
+from render.spectrum import tristimulus
+from rodcone.colour_spaces import SRGB_TO_XYZ, adapt_to_d65
+from rodcone.types import Floats
+from scenes.reflectances import color_checker_reflectances, held
+from sensor.capture import expose
+from sensor.cfa import mask
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.optics import form_image
+from sensor.response import electrons_per_irradiance, expected_electrons, mixing_of
+from studies.metrics.truth import Light, named_light
+from studies.photograph.camera import calibrate
+from studies.score.figure import Definition
+
+GREYS = 6  # the chart's last row
+SIDE_PX, CHIPS = 64, 8  # pixels of a patch, and chips that see it in one measurement
+ACROSS, BORDER = 5, 2  # patches, and pixels of a patch's border that crosstalk reaches
+WHITE_SHARE = 0.7  # of the converter's top, for a perfect white in the most sensitive channel
+INDEX_FACTOR = 5.5  # ISO 17321-1
+
+
+def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Iterator[Definition]:
+    """Define the figures of a camera that tells three colours."""
+    known = named_light(light)
+    plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
+    matrix = calibrate(plain, known.lamp).to_srgb
+    named = color_checker_reflectances()
+    surfaces = np.array([held(x).band_average(known.wavelength_nm, known.width_nm) for _, x in named])
+    true_lab = _true_lab(surfaces, known)
+    signals = _signals(plain, known, surfaces)
+    chart_e = _chart_e(plain, known, surfaces, exposure_s)
+    words = (
+        f"raw channels balanced on {light}, the matrix fitted on the 24 patches, white at {WHITE_SHARE:.0%} of the top"
+    )
+
+    def errors(measured: Floats) -> tuple[Floats, Floats]:
+        balanced = measured[:, :3] / signals[-1, :3]
+        lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
+        return np.asarray(deltaE_ciede2000(true_lab, lab)), np.asarray(deltaE_cie76(true_lab, lab))
+
+    def means_of(chips: int, rng: np.random.Generator) -> Floats:
+        """Return the chips' mean samples of each patch and, last, of white: (25, channel)."""
+        total = np.zeros_like(signals)
+        for _ in range(chips):
+            raw = expose(chart_e, plain, exposure_s, draw_device(plain, chart_e.shape, rng), rng)
+            channels = [np.where(mask(raw.cfa, name, raw.shape), raw.electrons, np.nan) for name in raw.channels]
+            total += np.transpose([_patch_means(samples) for samples in channels])
+        return total / chips
+
+    def balanced_errors(means: Floats) -> tuple[Floats, Floats]:
+        return errors(means[:-1] * (signals[-1] / means[-1]))
+
+    def on_frames(rng: np.random.Generator) -> tuple[float, float]:
+        """Return the mean differences of all and of the coloured patches, free of what noise of the means adds."""
+        halves = [means_of(CHIPS // 2, rng) for _ in range(2)]
+        both, *each = (balanced_errors(means) for means in ((halves[0] + halves[1]) / 2, *halves))
+        found = [np.array([of[0].mean(), of[1][:-GREYS].mean()]) for of in (both, *each)]
+        all_patches, coloured = 2 * found[0] - (found[1] + found[2]) / 2
+        return float(all_patches), float(coloured)
+
+    yield Definition(
+        "iso_17321.index",
+        "sensitivity metamerism index",
+        "1",
+        "like ISO 17321-1: 100 - 5.5 x mean CIELAB difference",
+        f"the chart's 18 coloured patches, {words}",
+        100 - INDEX_FACTOR * float(errors(signals[:-1])[1][:-GREYS].mean()),
+        lambda rng: 100 - INDEX_FACTOR * on_frames(rng)[1],
+    )
+    yield Definition(
+        "color_checker.delta_e",
+        "mean CIEDE2000 of the 24 patches",
+        "1",
+        "CIE 142; ISO 17321's patches and balance",
+        words,
+        float(errors(signals[:-1])[0].mean()),
+        lambda rng: on_frames(rng)[0],
+    )
+
+
+def _true_lab(surfaces: Floats, light: Light) -> Floats:
+    white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
+    xyz = tristimulus(surfaces * light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
+    return np.asarray(xyz2lab(adapt_to_d65(xyz, white) / white[1]))
+
+
+def _signals(sensor: SensorConfig, light: Light, surfaces: Floats) -> Floats:
+    """Return what the channels read of each patch and, last, of a perfect white: (25, channel)."""
+    weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.width_nm, 1.0, light.lamp)
+    seen = np.vstack([surfaces, np.ones_like(light.spectrum)]) * light.spectrum
+    return np.asarray(seen @ (mixing_of(sensor) @ weights).T)
+
+
+def _chart_e(sensor: SensorConfig, light: Light, surfaces: Floats, exposure_s: float) -> Floats:
+    """Return the photo-electrons of a chart of 5 x 5 even patches, of which the last is white."""
+    rows, columns = (len(line) * sensor.sites for line in (sensor.cfa, sensor.cfa[0]))
+    repeats, patches = (SIDE_PX // rows, SIDE_PX // columns), []
+    for reflectance in (*surfaces, np.ones_like(light.spectrum)):
+        values = np.broadcast_to(reflectance * light.spectrum, (rows, columns, light.spectrum.size)).copy()
+        radiance = SpectralRadiance(values, light.wavelength_nm, width_nm=light.width_nm, light=light.lamp)
+        patches.append(np.tile(expected_electrons(form_image(radiance, sensor), sensor, exposure_s), repeats))
+    chart_e = np.block([patches[row * ACROSS : (row + 1) * ACROSS] for row in range(ACROSS)])
+    return np.asarray(chart_e * WHITE_SHARE * sensor.top_e / sensor.sites**2 / patches[-1].max())
+
+
+def _patch_means(samples: Floats) -> Floats:
+    """Return the mean of each patch's samples of a channel, which are nan elsewhere, without the patch's border."""
+    height, width = (side // ACROSS for side in samples.shape)
+    patches = samples.reshape(ACROSS, height, ACROSS, width).swapaxes(1, 2)[:, :, BORDER:-BORDER, BORDER:-BORDER]
+    return np.asarray(np.nanmean(patches, axis=(2, 3)).ravel())

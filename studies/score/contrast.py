@@ -1,0 +1,98 @@
+"""Contrast transfer accuracy (IEEE 2020-2024): how surely a pair of pixels tells the contrast of what it sees.
+
+Two pixels see luminances of Michelson contrast K. The one that they tell, (x - y) / (x + y), counts as right within
+K (1 - d) and K (1 + d); the figure is the probability of that, the sum over all pairs of readings. A reading has
+
+    P(DN) = sum_n Poisson(n; e + m) P(DN | n),
+
+e photo-electrons and m electrons of dark current, P(DN | n) a normal distribution of what else is noise, rounded and
+clipped by the converter. From 1000 electrons on all of it is taken as one normal distribution.
+"""
+
+from collections.abc import Iterator
+from functools import partial
+from math import pi
+
+import numpy as np
+from scipy.special import ndtr
+from scipy.stats import poisson
+
+from rodcone.types import Floats
+from sensor.config import SensorConfig
+from sensor.readings.resolve import at_channel, resolve, several
+from studies.metrics.truth import GREY, named_light
+from studies.score.even_field import EvenField, even_field
+from studies.score.figure import Definition
+
+CONTRAST, TOLERANCE = 0.2, 0.5  # K and d
+EQUAL = 1e-5  # by which a contrast may be beyond a limit: readings are whole numbers, and many lie on it
+COUNTED_E = 1000.0  # electrons, under which their distribution is Poisson's
+TAIL = 1e-12  # of Poisson's distribution, that is left out
+LUX = (0.1, 1.0, 10.0, 100.0)  # on an 18 % grey card that has the pair's mean luminance
+
+
+def contrast_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
+    """Define the accuracy at each light."""
+    field = even_field(sensor, named_light(light), exposure_s, channel)
+    for lux in LUX:
+        mean = lux * GREY / pi
+        yield Definition(
+            f"ieee_2020.cta_{lux:g}_lux",
+            f"contrast transfer accuracy at {lux:g} lux",
+            "1",
+            "IEEE 2020-2024 (there CTA, before CDP)",
+            f"{channel}, raw, Michelson contrast {CONTRAST:g} within {TOLERANCE:.0%}, each pixel with "
+            f"patterns of its own, {light}, {exposure_s * 1e3:.4g} ms, f/{sensor.lens.f_number:g}",
+            accuracy(field, mean),
+            partial(accuracy_on_frames, field, mean),
+        )
+
+
+def accuracy(field: EvenField, mean_cd_m2: float) -> float:
+    """Return the closed form at a pair's mean luminance; nan of a camera that merges readings."""
+    sides = [reading_distribution(field, mean_cd_m2 * side) for side in (1 + CONTRAST, 1 - CONTRAST)]
+    if not all(len(side[0]) for side in sides):
+        return float("nan")
+    (bright_e, bright), (dark_e, dark) = sides
+    total = bright_e[:, None] + dark_e
+    told = np.divide(bright_e[:, None] - dark_e, total, out=np.full_like(total, np.inf), where=total > 0)
+    right = np.abs(told - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL
+    return float(bright @ right @ dark)
+
+
+def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floats, Floats]:
+    """Return electrons of the readings that a pixel may give, and their probabilities."""
+    sensor, expected_e = field.sensor, luminance_cd_m2 * field.electrons_per_cd_m2
+    readings = at_channel(resolve(sensor, np.array([expected_e]), field.exposure_s, field.channel), field.channel)
+    if several(readings):
+        return np.empty(0), np.empty(0)
+    (reading,) = readings
+    seen, share = reading.sensor, reading.share
+    law, gain = reading.law.over(1 / share), seen.gain_e_per_dn
+    mean_e, dark_e = expected_e * share, seen.pixel.dark_current_e_per_s * reading.exposure_s
+    temporal_e2 = max(law.dark_e**2 - gain**2 / 12 - dark_e, 0.0)
+    rest_e = float(np.sqrt(temporal_e2 + law.fixed_e**2 + (law.prnu * mean_e) ** 2))
+    counts, weights = np.array([mean_e + dark_e]), np.ones(1)
+    if mean_e < COUNTED_E:
+        counts = np.arange(int(poisson.ppf(1 - TAIL, mean_e + dark_e)) + 1.0)
+        weights = poisson.pmf(counts, mean_e + dark_e)
+    else:
+        rest_e = float(np.hypot(rest_e, (mean_e + dark_e) ** 0.5))
+    centre = seen.black_dn + counts / gain
+    low = max(int(centre[0] - 8 * rest_e / gain) - 1, 0)
+    high = min(int(centre[-1] + 8 * rest_e / gain) + 2, seen.white_dn)
+    dn = np.arange(low, high + 1.0)
+    edges = np.concatenate(([-np.inf], (dn[1:] + dn[:-1]) / 2, [np.inf]))
+    below = ndtr((edges - centre[:, None]) / max(rest_e / gain, 1e-9))
+    return (dn - seen.black_dn) * gain / share, np.asarray(weights @ np.diff(below, axis=1))
+
+
+def accuracy_on_frames(field: EvenField, mean_cd_m2: float, rng: np.random.Generator) -> float:
+    """Return the share of pairs whose contrast is told right: the pixels of two fields on two chips."""
+    bright, dark = (
+        field.samples_e(field.shoot(mean_cd_m2 * side, field.draw_chip(rng), rng))
+        for side in (1 + CONTRAST, 1 - CONTRAST)
+    )
+    total = bright + dark
+    told = np.divide(bright - dark, total, out=np.full_like(total, np.inf), where=total > 0)
+    return float(np.mean(np.abs(told - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL))

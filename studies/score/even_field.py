@@ -1,0 +1,102 @@
+"""An even neutral field before a camera: the light that it sees, and samples of simulated frames of it."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from render.radiance import SpectralRadiance
+from rodcone.types import Floats
+from sensor.capture import expose
+from sensor.cfa import mask
+from sensor.config import SensorConfig
+from sensor.device import Device, draw_device
+from sensor.optics import camera_equation, form_image
+from sensor.raw import RawImage
+from sensor.readings.noise import collected_share
+from sensor.readings.resolve import PlainReading, at_channel, chip_readings, several
+from sensor.readout import sources_of
+from sensor.response import expected_electrons
+from studies.metrics.truth import Light, neutral_electrons
+
+TEMPORAL = ("read noise", "converter noise", "quantisation", "dark current")  # sources that change between frames
+SIDE_PX = 128  # of a frame: 4096 samples of a channel that has one pixel in four
+
+
+@dataclass(frozen=True)
+class EvenField:
+    """An even neutral field under a light, and the camera that sees it.
+
+    Attributes
+    ----------
+    sensor : SensorConfig
+        Its lens without falloff and shake: an even field has none in the middle of the picture.
+    light : Light
+    exposure_s : float
+    channel : str
+        Whose samples are measured.
+    frame_e : (h, w) float64
+        Photo-electrons behind each filter at 1 cd/m^2.
+    """
+
+    sensor: SensorConfig
+    light: Light
+    exposure_s: float
+    channel: str
+    frame_e: Floats
+
+    @property
+    def electrons_per_cd_m2(self) -> float:
+        """Mean photo-electrons of the channel's samples at 1 cd/m^2, crosstalk included."""
+        means = neutral_electrons(self.sensor, self.light, self.exposure_s)
+        return float(means[self.sensor.channels.index(self.channel)])
+
+    @property
+    def lux_s_per_cd_m2(self) -> float:
+        """Luminous exposure of the sensor at 1 cd/m^2 [lux s]."""
+        return camera_equation(self.sensor.lens) * self.exposure_s
+
+    def draw_chip(self, rng: np.random.Generator) -> Device:
+        """Make a chip of the frame's size."""
+        return draw_device(self.sensor, self.frame_e.shape, rng)
+
+    def shoot(self, luminance_cd_m2: float, chip: Device, rng: np.random.Generator) -> RawImage:
+        """Expose and read one frame of the field at a luminance."""
+        return expose(self.frame_e * luminance_cd_m2, self.sensor, self.exposure_s, chip, rng)
+
+    def samples_e(self, raw: RawImage) -> Floats:
+        """Return the channel's samples of a frame, in electrons of the whole pixel in the whole time."""
+        samples = raw.electrons[mask(raw.cfa, self.channel, raw.shape)]
+        return np.asarray(samples / (collected_share(self.readings) if several(self.readings) else 1.0), np.float64)
+
+    @property
+    def readings(self) -> tuple[PlainReading, ...]:
+        """Readings of the channel's pixels that the chip can take."""
+        return tuple(at_channel(chip_readings(self.sensor, self.exposure_s), self.channel))
+
+    @property
+    def headroom_e(self) -> float:
+        """Photo-electrons of the whole pixel that the largest reading holds."""
+        return max(reading.headroom_e for reading in self.readings)
+
+    @property
+    def temporal_dark_e(self) -> float:
+        """Standard deviation over frames of a dark pixel [e-]."""
+        if not several(self.readings):
+            return float(self.readings[0].law.dark_e)
+        sources_e = sources_of(0.0, self.readings)
+        return float(np.hypot.reduce([sources_e[name] for name in TEMPORAL]))
+
+
+def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: str) -> EvenField:
+    """Put an even neutral field before a camera."""
+    plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0))
+    tile_rows, tile_columns = (side * plain.sites for side in (len(plain.cfa), len(plain.cfa[0])))
+    radiance = SpectralRadiance(
+        np.broadcast_to(light.spectrum, (tile_rows, tile_columns, light.spectrum.size)).copy(),
+        light.wavelength_nm,
+        width_nm=light.width_nm,
+        light=light.lamp,
+    )
+    tile_e = expected_electrons(form_image(radiance, plain), plain, exposure_s)
+    repeats = SIDE_PX // tile_rows, SIDE_PX // tile_columns
+    return EvenField(plain, light, exposure_s, channel, np.tile(tile_e, repeats))

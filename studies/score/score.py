@@ -1,0 +1,116 @@
+"""Score a camera: every figure in closed form beside the same figure measured on simulated frames."""
+
+from collections.abc import Iterator, Sequence
+from math import nan
+
+from rodcone.errors import InputError, require_whole
+from sensor.config import SensorConfig
+from sensor.emva1288.characterise import characterise
+from sensor.readings.resolve import at_channel, chip_readings
+from studies.score.colour import colour_figures
+from studies.score.contrast import contrast_figures
+from studies.score.figure import Definition, Score, measured
+from studies.score.noise_figures import noise_figures
+from studies.score.sharpness import sharpness
+
+# Groups of figures, by the first part of their names.
+GROUPS = (
+    "oecf",
+    "iso_12232",
+    "snr10",
+    "snr1s",
+    "iso_15739",
+    "iso_12233",
+    "ieee_1858",
+    "ieee_2020",
+    "iso_17321",
+    "color_checker",
+    "emva_1288",
+)
+NORMAL_95 = 1.959964  # standard errors on either side, of an interval of 95 %
+COLOURS = 3  # channels that tell colours
+
+
+def score(
+    sensor: SensorConfig, light: str = "D65", exposure_s: float = 0.033, only: Sequence[str] = (), seed: int = 0
+) -> list[Score]:
+    """Compute a camera's figures of merit, and measure each on simulated frames.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+    light : str
+        Illuminant of all figures whose definition doesn't name another one.
+    exposure_s : float
+        Exposure time of the same [s].
+    only : sequence of str
+        Groups, such as ``iso_12232``, or whole names; all figures by default.
+    seed : int
+        Of the chips and frames.
+
+    Returns
+    -------
+    list of Score
+        Figures that the camera doesn't have are left out: colours of fewer than three channels, light for a ratio that
+        no light reaches, contrast of merged readings in closed form.
+
+    Raises
+    ------
+    InputError
+        For a name that isn't known, or a seed below 0.
+
+    Examples
+    --------
+    >>> import rodcone
+    >>> (row,) = rodcone.score(rodcone.low_noise(), only=["snr10"])
+    >>> row.title, row.agrees
+    ('SNR10: light for a ratio of 10', True)
+    """
+    require_whole("seed", seed, 0, 2**31, "give a whole number")
+    for name in only:
+        if name.partition(".")[0] not in GROUPS:
+            raise InputError(f"only: {name!r} is not known; allowed: {', '.join(GROUPS)}; write one of them")
+    found = [
+        measured(definition, seed)
+        for definition in definitions(sensor, light, exposure_s, only)
+        if _wanted(definition.name, only)
+    ]
+    found = [one for one in found if one.computed == one.computed]
+    return found + (_emva(sensor, exposure_s, only, seed) if _group_wanted("emva_1288", only) else [])
+
+
+def _wanted(name: str, only: Sequence[str]) -> bool:
+    return not only or any(name == one or name.startswith(f"{one}.") for one in only)
+
+
+def _group_wanted(group: str, only: Sequence[str]) -> bool:
+    return not only or any(one.partition(".")[0] == group for one in only)
+
+
+def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Sequence[str]) -> Iterator[Definition]:
+    """Define the figures of the groups that are asked for, EMVA's excepted; each is computed and not yet measured."""
+    channel = sensor.unit_channel
+    if any(_group_wanted(group, only) for group in ("oecf", "iso_12232", "snr10", "snr1s", "iso_15739")):
+        yield from noise_figures(sensor, light, exposure_s, channel)
+    if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858")):
+        yield from sharpness(sensor, light, exposure_s, channel)
+    if _group_wanted("ieee_2020", only):
+        yield from contrast_figures(sensor, light, exposure_s, channel)
+    if len(sensor.channels) >= COLOURS and any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
+        yield from colour_figures(sensor, light, exposure_s)
+
+
+def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: int) -> list[Score]:
+    """Characterise the unit channel's reading as an EMVA 1288 laboratory does, and list its figures."""
+    reading = at_channel(chip_readings(sensor, exposure_s), sensor.unit_channel)[0].sensor
+    chip = characterise(reading, seed=seed)
+    conditions = "a chip of 256 x 320 pixels, photon transfer of even fields"
+    scores = []
+    for figure in chip.figures:
+        half = NORMAL_95 * figure.error if figure.error > 0 else nan
+        name = "emva_1288." + "_".join("".join(x if x.isalnum() else " " for x in figure.name.lower()).split())
+        stated = (name, figure.name, figure.unit, "EMVA 1288, release 4", conditions)
+        scores.append(
+            Score(*stated, figure.configured, figure.measured, figure.measured - half, figure.measured + half)
+        )
+    return [one for one in scores if _wanted(one.name, only)]

@@ -1,0 +1,185 @@
+"""Figures of sharpness by a slanted edge: lens, pixel aperture and crosstalk in closed form beside measured edges."""
+
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+
+import numpy as np
+from scipy.signal import fftconvolve
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from render.spectrum import VISIBLE_NM
+from rodcone.types import Floats
+from sensor.capture import expose
+from sensor.config import SensorConfig, with_tile
+from sensor.device import draw_device
+from sensor.diffraction import defocus_otf, diffraction_otf
+from sensor.optics import form_image, least_samples
+from sensor.response import electrons_per_irradiance, expected_electrons
+from studies.metrics.mtf import EdgeResponse, edge_response
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE
+from studies.metrics.truth import Light, light_in_bands
+from studies.score.figure import Definition
+
+SIDE_PX = 192
+ANGLE_DEG, CONTRAST = 5.0, 4.0  # of ISO 12233's edge
+FRAMES = (
+    8  # each of a chip of its own, whose mean is measured: noise lowers the first frequency at which a transfer is half
+)
+BRIGHT_SHARE = 0.6  # of the well
+BAND_NM = 20.0
+GRID: Floats = np.arange(-6000, 6001) / 2000.0  # frequencies of the closed form [cycles per pixel]
+# IEEE 1858 (CPIQ): relative contrast sensitivity v^0.8 exp(-0.2 v), v in cycles per degree.
+CSF_POWER, CSF_DECAY = 0.8, 0.2
+
+
+def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
+    """Define the figures of an edge that one channel sees at every pixel."""
+    seen = _every_pixel(sensor, channel)
+    bands = _bands(light)
+    edge_e = _edge_electrons(seen, bands, exposure_s)
+    frequency, mtf = _windowed(_transfer(seen, bands, exposure_s))
+    lens = seen.lens
+    blur = f"diffraction {lens.diffraction:g}, defocus {lens.defocus_um:g} um"
+    words = (
+        f"{channel} at every pixel, raw, edge of {CONTRAST:g}:1 at {ANGLE_DEG:g} degrees, {light}, "
+        f"f/{lens.f_number:g}, {blur}, crosstalk {seen.pixel.crosstalk:g}"
+    )
+
+    def on_edges(rng: np.random.Generator, figure: Callable[[EdgeResponse], float]) -> float:
+        """Measure a figure free of what noise adds: b / n of n frames, as two halves and all of them tell."""
+        frames = [
+            np.mean([expose(edge_e, seen, exposure_s, chip, rng).electrons for chip in chips], axis=0)
+            for chips in ([draw_device(seen, edge_e.shape, rng) for _ in range(FRAMES // 2)] for _ in range(2))
+        ]
+        both, *halves = (figure(edge_response(picture)) for picture in ((frames[0] + frames[1]) / 2, *frames))
+        return 2 * both - sum(halves) / 2
+
+    yield Definition(
+        "iso_12233.mtf50",
+        "MTF50",
+        "cycles/px",
+        "ISO 12233:2017, annex D (e-SFR)",
+        words,
+        _first_half(frequency, mtf),
+        lambda rng: on_edges(rng, lambda edge: edge.mtf50_cycles_per_px),
+    )
+    yield Definition(
+        "iso_12233.mtf_half_nyquist",
+        "MTF at half the Nyquist frequency",
+        "1",
+        "ISO 12233:2017, annex D (e-SFR)",
+        words,
+        float(np.interp(0.25, frequency, mtf)),
+        lambda rng: on_edges(rng, lambda edge: _at(edge, 0.25)),
+    )
+    yield Definition(
+        "ieee_1858.acutance",
+        "acutance",
+        "1",
+        "IEEE 1858 (CPIQ): MTF weighted by the contrast sensitivity, up to Nyquist",
+        f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree, the display taken as perfect",
+        _acutance(frequency, mtf),
+        lambda rng: on_edges(rng, lambda edge: _acutance(*_curve(edge))),
+    )
+
+
+def _every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
+    """Return the camera whose every pixel is the channel's, with a lens that an even part of the picture sees."""
+    plain = with_tile(sensor, (channel,), sensor.responses)
+    return replace(plain, lens=replace(plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
+
+
+def _bands(light: str) -> Light:
+    centres = np.arange(VISIBLE_NM[0] + BAND_NM / 2, VISIBLE_NM[1], BAND_NM)
+    return light_in_bands(illuminant(light), centres, np.full(centres.size, BAND_NM))
+
+
+def _edge_electrons(sensor: SensorConfig, bands: Light, exposure_s: float) -> Floats:
+    """Return an edge's expected photo-electrons, the bright side at a share of the well."""
+    samples = least_samples(sensor)
+    coverage = edge_coverage(SIDE_PX * sensor.sites * samples)
+    reflectance = (1 + (CONTRAST - 1) * coverage) / CONTRAST
+    radiance = SpectralRadiance(
+        (reflectance[..., None] * bands.spectrum).astype(np.float32),
+        bands.wavelength_nm,
+        width_nm=bands.width_nm,
+        light=bands.lamp,
+    )
+    electrons = expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s)
+    return np.asarray(electrons * BRIGHT_SHARE * sensor.top_e / sensor.sites**2 / electrons.max())
+
+
+def edge_coverage(side: int) -> Floats:
+    """Return the share of each of side x side squares that lies right of an edge through the middle.
+
+    A square's shadow across the edge is the sum of two even spreads, |cos| and |sin| wide, so that the share is the
+    integral of a trapezoid:
+
+        F(d) = sum of +-max(d +- (a +- b) / 2, 0)^2 / (2 a b).
+    """
+    cosine, sine = np.cos(np.radians(ANGLE_DEG)), np.sin(np.radians(ANGLE_DEG))
+    place = np.arange(side) - (side - 1) / 2
+    distance = place[None, :] * cosine + place[:, None] * sine
+
+    def ramp(at: float) -> Floats:
+        return np.asarray(np.maximum(distance + at, 0.0) ** 2)
+
+    wide, narrow = (cosine + sine) / 2, (cosine - sine) / 2
+    return np.asarray((ramp(wide) - ramp(narrow) - ramp(-narrow) + ramp(-wide)) / (2 * cosine * sine))
+
+
+def _transfer(sensor: SensorConfig, bands: Light, exposure_s: float) -> Floats:
+    """Return the transfer of lens, pixel aperture and crosstalk across the edge at `GRID` [cycles per raw pixel]."""
+    weights = electrons_per_irradiance(sensor, bands.wavelength_nm, bands.width_nm, exposure_s, bands.lamp)[0]
+    weights = weights * bands.spectrum
+    angle, share = np.radians(ANGLE_DEG), sensor.pixel.crosstalk
+    along, down = GRID * np.cos(angle), GRID * np.sin(angle)
+    spread = 1 - 4 * share + 2 * share * (np.cos(2 * np.pi * along) + np.cos(2 * np.pi * down))
+    per_um = np.abs(GRID) / sensor.pixel.pitch_um
+    lens = defocus_otf(per_um, sensor.lens.defocus_um)
+    if sensor.lens.diffraction:
+        by_band = np.array([diffraction_otf(per_um, nm, sensor.lens) for nm in bands.wavelength_nm])
+        lens = lens * (weights @ by_band) / weights.sum()
+    return np.asarray(lens * np.sinc(along) * np.sinc(down) * spread)
+
+
+def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
+    """Return frequencies up to 1 cycle per pixel, and the transfer as the standard's Hamming window shows it.
+
+    The window on the line spread, 2 R wide, is a convolution of its transfer with
+
+        1.08 sinc(2 R f) + 0.46 (sinc(2 R f - 1) + sinc(2 R f + 1)).
+    """
+    reach = SIDE_PX / 2 * (1 - np.tan(np.radians(ANGLE_DEG))) * np.cos(np.radians(ANGLE_DEG))
+    turns = 2 * reach * GRID
+    window = 1.08 * np.sinc(turns) + 0.46 * (np.sinc(turns - 1) + np.sinc(turns + 1))
+    shown = fftconvolve(transfer, window, mode="same")
+    middle, last = GRID.size // 2, GRID.size // 2 + round(1 / (GRID[1] - GRID[0]))
+    return GRID[middle : last + 1], np.abs(shown[middle : last + 1] / shown[middle])
+
+
+def _first_half(frequency: Floats, mtf: Floats) -> float:
+    """Return the first frequency at which the transfer is 0.5; nan where it stays above."""
+    below = np.flatnonzero(mtf < 0.5)
+    if not below.size:
+        return float("nan")
+    last = slice(int(below[0]) - 1, int(below[0]) + 1)
+    return float(np.interp(-0.5, -mtf[last], frequency[last]))
+
+
+def _at(edge: EdgeResponse, frequency: float) -> float:
+    return float(np.interp(frequency, edge.frequency_cycles_per_px, edge.mtf))
+
+
+def _curve(edge: EdgeResponse) -> tuple[Floats, Floats]:
+    return edge.frequency_cycles_per_px, edge.mtf
+
+
+def _acutance(frequency: Floats, mtf: Floats) -> float:
+    """Return the integral of sensitivity x transfer over that of the sensitivity, both up to Nyquist."""
+    grid = np.linspace(0.0, 0.5, 501)
+    per_degree = grid * PIXELS_PER_DEGREE
+    sensitivity = per_degree**CSF_POWER * np.exp(-CSF_DECAY * per_degree)
+    transfer = np.interp(grid, frequency, mtf)
+    return float(np.trapezoid(sensitivity * transfer, grid) / np.trapezoid(sensitivity, grid))
