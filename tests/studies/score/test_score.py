@@ -10,7 +10,7 @@ from refusal import refusal
 from scipy.integrate import quad
 from scipy.stats import binom
 
-import rodcone
+import rodcone as public
 from sensor.config import SensorConfig
 from studies.metrics.truth import named_light, neutral_electrons
 from studies.score.contrast import accuracy, reading_distribution
@@ -24,7 +24,7 @@ EXPOSURE_S = 0.033
 
 def shot_noise_camera(**changes: float) -> SensorConfig:
     """A camera whose samples have shot noise alone."""
-    sensor = rodcone.low_noise("bayer")
+    sensor = public.low_noise("bayer")
     pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0, column_gain_spread=0.0, **changes)
     return replace(sensor, pixel=pixel, bits=16, black_level_dn=64)
 
@@ -87,7 +87,7 @@ def test_a_wider_aperture_and_a_longer_exposure_need_less_light() -> None:
 @pytest.mark.parametrize("lux", [0.1, 3.0, 100.0])
 def test_the_contrast_accuracy_is_that_of_pairs_drawn_by_numpy(lux: float) -> None:
     """400 000 pairs of Poisson counts with normal noise, rounded; five standard errors: one in 1.7 million."""
-    sensor, rng, pairs = rodcone.low_noise(), np.random.default_rng(5), 400_000
+    sensor, rng, pairs = public.low_noise(), np.random.default_rng(5), 400_000
     field = even_field(sensor, named_light("D65"), EXPOSURE_S, "G")
     mean_cd_m2, gain = lux * 0.18 / pi, sensor.gain_e_per_dn
 
@@ -104,7 +104,7 @@ def test_the_contrast_accuracy_is_that_of_pairs_drawn_by_numpy(lux: float) -> No
 
 
 def test_a_readings_distribution_has_the_noise_laws_moments() -> None:
-    sensor = rodcone.low_noise()
+    sensor = public.low_noise()
     field = even_field(sensor, named_light("D65"), EXPOSURE_S, "G")
     for luminance in (0.05, 5.0):
         electrons, chance = reading_distribution(field, luminance)
@@ -141,12 +141,12 @@ def test_the_mtf_of_a_perfect_lens_is_the_pixels_own() -> None:
 
 def test_the_metamerism_index_is_what_colour_science_makes_of_the_cameras_curves() -> None:
     """100 - 5.5 dE*ab of 18 patches, from colour-science's observers, adaptation and CIELAB."""
-    sensor = rodcone.low_noise("bayer")
+    sensor = public.low_noise("bayer")
     from scenes.reflectances import color_checker_reflectances, held
     from studies.photograph.camera import calibrate
 
     nm = np.arange(380.5, 780.0)
-    lamp = rodcone.illuminant("D65").band_average(nm, np.ones_like(nm))
+    lamp = public.illuminant("D65").band_average(nm, np.ones_like(nm))
     surfaces = np.array([held(x).band_average(nm, np.ones_like(nm)) for _, x in color_checker_reflectances()])
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"].copy().align(colour.SpectralShape(380, 780, 1))
     bars = np.array([(observer.values[:-1, i] + observer.values[1:, i]) / 2 for i in range(3)])
@@ -157,7 +157,7 @@ def test_the_metamerism_index_is_what_colour_science_makes_of_the_cameras_curves
     true_lab = colour.XYZ_to_Lab(adapted, colour.XYZ_to_xy(d65))
     curves = np.array([sensor.responses.curves[c].band_average(nm, np.ones_like(nm)) for c in "RGB"])
     balanced = ((surfaces * lamp * nm) @ curves.T) / ((lamp * nm) @ curves.T)
-    linear = np.clip(balanced @ calibrate(sensor, rodcone.illuminant("D65")).to_srgb.T, 0, None)
+    linear = np.clip(balanced @ calibrate(sensor, public.illuminant("D65")).to_srgb.T, 0, None)
     lab = colour.XYZ_to_Lab(colour.sRGB_to_XYZ(colour.models.eotf_inverse_sRGB(linear)), colour.XYZ_to_xy(d65))
     index = 100 - 5.5 * colour.delta_E(true_lab, lab, method="CIE 1976")[:18].mean()
     assert computed(sensor, "iso_17321.index") == pytest.approx(index, abs=0.15)
@@ -174,7 +174,7 @@ def test_over_light_is_the_ratio_of_shot_noise_at_full_light() -> None:
 
 
 def test_one_figure_is_the_same_whichever_others_are_asked_for() -> None:
-    sensor = rodcone.low_noise()
+    sensor = public.low_noise()
     (alone,) = score(sensor, only=["snr1s"])
     both = score(sensor, only=["snr10", "snr1s.lux"])
     assert alone in both
@@ -182,7 +182,7 @@ def test_one_figure_is_the_same_whichever_others_are_asked_for() -> None:
 
 
 def test_a_name_that_is_not_known_is_refused() -> None:
-    message = refusal(lambda: rodcone.score("low_noise", only=["iso_9999"]))
+    message = refusal(lambda: public.score("low_noise", only=["iso_9999"]))
     assert "only: 'iso_9999' is not known" in message
     assert all(group in message for group in GROUPS)
 
@@ -192,10 +192,10 @@ CAMERAS = ("low_noise", "low_noise bayer", "table1_output_3um", "white_apart", "
 
 def camera(name: str) -> SensorConfig:
     if name == "grey at gain 4":
-        sensor = rodcone.with_gain(rodcone.low_noise("mono"), 4.0)
+        sensor = public.with_gain(public.low_noise("mono"), 4.0)
         return replace(sensor, bits=10, converter_noise_dn=0.8)
     preset, _, mosaic = name.partition(" ")
-    return rodcone.low_noise(mosaic) if mosaic else rodcone.preset(preset)
+    return public.low_noise(mosaic) if mosaic else public.preset(preset)
 
 
 @pytest.mark.thorough
