@@ -67,7 +67,7 @@ from studies.photograph.picture_file import write_picture as write_picture
 from studies.photograph.shot import Order as Order
 from studies.photograph.shot import take as take
 from studies.photograph.snr import LightForSnr
-from studies.score.figure import Score
+from studies.score.figure import Merit
 from studies.study.study import RenderLimits as RenderLimits
 from studies.study.study import SceneChoice as SceneChoice
 from studies.study.study import Study as Study
@@ -234,7 +234,7 @@ def render(
 ) -> Transport: ...
 def score(
     sensor: _Sensor, light: str = "D65", exposure_s: _Seconds = 0.033, only: Sequence[str] = (), seed: int = 0
-) -> list[Score]: ...
+) -> list[Merit]: ...
 def snr(
     electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = ...
 ) -> NDArray[np.float64]: ...

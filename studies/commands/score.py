@@ -1,5 +1,6 @@
 """The command `rodcone score`: the figures of merit that data sheets and test houses state."""
 
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from importlib import metadata
 from pathlib import Path
@@ -14,8 +15,9 @@ from sensor.config import SensorConfig
 from sensor.presets import preset
 from studies.commands.console import Time, print_json, print_table, require_place, say
 from studies.pages.score_page import number_text, score_page
+from studies.score.figure import Merit
 from studies.score.over_light import over_light
-from studies.score.score import score as scores_of
+from studies.score.score import score as merits_of
 
 HEAD = ("figure", "unit", "computed", "measured", "95 % from", "to", "defined by")
 MOST_SENSORS = 4
@@ -76,37 +78,32 @@ def score(
     found = {}
     for name, sensor in cameras.items():
         say(f"{name}: measuring; some 15 s" if not only else f"{name}: measuring")
-        found[name] = scores_of(sensor, light, exposure, only or (), seed)
-    if out is not None and out.suffix.lower() == ".csv":
-        rows = [{"sensor": name} | asdict(one) for name, of in found.items() for one in of]
-        write_files({out: csv_text(list(rows[0]) if rows else ["sensor"], [list(row.values()) for row in rows])})
-    elif out is not None:
+        found[name] = merits_of(sensor, light, exposure, only or (), seed)
+    if out is not None and out.suffix.lower() == ".html":
         curves = {name: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}
         lens = "; ".join(f"{name} at f/{sensor.lens.f_number:g}" for name, sensor in cameras.items())
         set_up = f"Under {light}, {exposure * 1e3:.4g} ms, unless a row says otherwise: {lens}."
         write_files({out: score_page(found, curves, set_up, metadata.version("rodcone"))})
+    elif out is not None:
+        rows = [{"sensor": name} | asdict(one) for name, of in found.items() for one in of]
+        write_files({out: csv_text(list(rows[0]) if rows else ["sensor"], [list(row.values()) for row in rows])})
     if json:
         print_json({name: [asdict(one) | {"agrees": one.agrees} for one in of] for name, of in found.items()})
         return
     for name, of in found.items():
-        if len(found) > 1:
-            print(name)
-        print_table(
-            HEAD,
-            [
-                (
-                    one.title,
-                    one.unit,
-                    *(number_text(x) for x in (one.computed, one.measured, one.low, one.high)),
-                    one.standard,
-                )
-                for one in of
-            ],
-            words=2,
-        )
-    off = sum(one.agrees is False for of in found.values() for one in of)
-    checked = sum(one.agrees is not None for of in found.values() for one in of)
-    print(f"{checked - off} of {checked} closed forms lie inside their interval; one in twenty misses by chance.")
+        _print_merits(name if len(found) > 1 else "", of)
+    checked = [one.agrees for of in found.values() for one in of if one.agrees is not None]
+    print(f"{sum(checked)} of {len(checked)} closed forms lie inside their interval; one in twenty misses by chance.")
+
+
+def _print_merits(name: str, merits: Sequence[Merit]) -> None:
+    if name:
+        print(name)
+    rows = [
+        (one.title, one.unit, *map(number_text, (one.computed, one.measured, one.low, one.high)), one.standard)
+        for one in merits
+    ]
+    print_table(HEAD, rows, words=2)
 
 
 def _with_lens(sensor: SensorConfig, f_number: float | None, diffraction: float | None) -> SensorConfig:

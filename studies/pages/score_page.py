@@ -7,15 +7,15 @@ from matplotlib import rc_context
 
 from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_text
-from studies.score.figure import Score
+from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
 
 def score_page(
-    scores: Mapping[str, Sequence[Score]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
+    scores: Mapping[str, Sequence[Merit]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
 ) -> str:
     """Write the sheet: a row for each figure, its closed form and its measurement for each camera."""
-    rows: dict[str, dict[str, Score]] = {}
+    rows: dict[str, dict[str, Merit]] = {}
     for camera, found in scores.items():
         for one in found:
             rows.setdefault(one.name, {})[camera] = one

@@ -34,6 +34,7 @@ INDEX_FACTOR = 5.5  # ISO 17321-1
 
 def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Iterator[Definition]:
     """Define the figures of a camera that tells three colours."""
+    # What the camera and the standard observer see of the patches, without noise.
     known = named_light(light)
     plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
     matrix = calibrate(plain, known.lamp).to_srgb
@@ -51,6 +52,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Itera
         lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
         return np.asarray(deltaE_ciede2000(true_lab, lab)), np.asarray(deltaE_cie76(true_lab, lab))
 
+    # The same on frames.
     def means_of(chips: int, rng: np.random.Generator) -> Floats:
         """Return the chips' mean samples of each patch and, last, of white: (25, channel)."""
         total = np.zeros_like(signals)
@@ -71,6 +73,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Itera
         all_patches, coloured = 2 * found[0] - (found[1] + found[2]) / 2
         return float(all_patches), float(coloured)
 
+    # The figures.
     yield Definition(
         "iso_17321.index",
         "sensitivity metamerism index",

@@ -12,7 +12,7 @@ CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class Score:
+class Merit:
     """One figure of merit of a camera.
 
     Attributes
@@ -54,7 +54,7 @@ class Definition:
     Attributes
     ----------
     name, title, unit, standard, conditions
-        As of `Score`.
+        As of `Merit`.
     computed : float
     measure : callable
         Takes a generator, measures the figure once on frames of a fresh chip, and returns it.
@@ -69,7 +69,7 @@ class Definition:
     measure: Callable[[np.random.Generator], float]
 
 
-def measured(definition: Definition, seed: int) -> Score:
+def measured(definition: Definition, seed: int) -> Merit:
     """Measure a figure `REPEATS` times, and give the mean with its interval by Student's t distribution."""
     if not isfinite(definition.computed):
         return _score(definition, [])
@@ -82,11 +82,11 @@ def measured(definition: Definition, seed: int) -> Score:
     return _score(definition, values)
 
 
-def _score(definition: Definition, values: Sequence[float]) -> Score:
+def _score(definition: Definition, values: Sequence[float]) -> Merit:
     mean, half = nan, nan
     if values and np.isfinite(values).all():
         mean = float(np.mean(values))
         spread = float(np.std(values, ddof=1)) / len(values) ** 0.5
         half = spread * float(scipy.stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
     stated = {key: getattr(definition, key) for key in ("name", "title", "unit", "standard", "conditions", "computed")}
-    return Score(**stated, measured=mean, low=mean - half, high=mean + half)
+    return Merit(**stated, measured=mean, low=mean - half, high=mean + half)

@@ -1,7 +1,7 @@
 """Figures of signal and noise on even fields: speeds, dynamic range, signal-to-noise ratios, light for a ratio.
 
 The signal is the raw one of a single channel. Where a standard asks for the developed picture's luminance, that is a
-choice which `Score.conditions` states.
+choice which `Merit.conditions` states.
 """
 
 from collections.abc import Callable, Iterator

@@ -1,4 +1,4 @@
-"""Score a camera: every figure in closed form beside the same figure measured on simulated frames."""
+"""Merit a camera: every figure in closed form beside the same figure measured on simulated frames."""
 
 from collections.abc import Iterator, Sequence
 from math import nan
@@ -9,7 +9,7 @@ from sensor.emva1288.characterise import characterise
 from sensor.readings.resolve import at_channel, chip_readings
 from studies.score.colour import colour_figures
 from studies.score.contrast import contrast_figures
-from studies.score.figure import Definition, Score, measured
+from studies.score.figure import Definition, Merit, measured
 from studies.score.noise_figures import noise_figures
 from studies.score.sharpness import sharpness
 
@@ -33,7 +33,7 @@ COLOURS = 3  # channels that tell colours
 
 def score(
     sensor: SensorConfig, light: str = "D65", exposure_s: float = 0.033, only: Sequence[str] = (), seed: int = 0
-) -> list[Score]:
+) -> list[Merit]:
     """Compute a camera's figures of merit, and measure each on simulated frames.
 
     Parameters
@@ -50,7 +50,7 @@ def score(
 
     Returns
     -------
-    list of Score
+    list of Merit
         Figures that the camera doesn't have are left out: colours of fewer than three channels, light for a ratio that
         no light reaches, contrast of merged readings in closed form.
 
@@ -100,7 +100,7 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield from colour_figures(sensor, light, exposure_s)
 
 
-def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: int) -> list[Score]:
+def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: int) -> list[Merit]:
     """Characterise the unit channel's reading as an EMVA 1288 laboratory does, and list its figures."""
     reading = at_channel(chip_readings(sensor, exposure_s), sensor.unit_channel)[0].sensor
     chip = characterise(reading, seed=seed)
@@ -111,6 +111,6 @@ def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: in
         name = "emva_1288." + "_".join("".join(x if x.isalnum() else " " for x in figure.name.lower()).split())
         stated = (name, figure.name, figure.unit, "EMVA 1288, release 4", conditions)
         scores.append(
-            Score(*stated, figure.configured, figure.measured, figure.measured - half, figure.measured + half)
+            Merit(*stated, figure.configured, figure.measured, figure.measured - half, figure.measured + half)
         )
     return [one for one in scores if _wanted(one.name, only)]
