@@ -405,6 +405,12 @@ def test_a_scene_is_shown_small_first_and_then_whole():
     assert next(states, None) is None
 
 
+def test_the_python_of_a_render_has_its_samples_and_its_seed():
+    options = RenderOptions(size=16, spp=2, seed=5, band_nm=100.0)
+    (state,) = open_source("flat_field", options).states(lambda: None)
+    assert "rodcone.render(scene, (16, 16), spp=2, seed=5, **bands)" in state.code
+
+
 def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):
     radiance = public.render("flat_field", (16, 20), wavelength_nm=np.arange(400.0, 780.0, 40.0), spp=2).relight()
     path = tmp_path / "seen.exr"
