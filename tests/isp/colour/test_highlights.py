@@ -41,9 +41,9 @@ def test_each_pixel_of_a_full_white_lamp_is_white_near_a_full_colour(tile):
 
 @pytest.mark.parametrize("tile", [*BAYER_PHASES, *RGBW_PHASES])
 def test_a_dark_sample_within_a_lamp_says_its_colour(tile):
-    """Red, green and W of a sodium lamp are full at 1e5 e-; blue reads 2000 e- of its 7500 e- at the level."""
+    """Red, green and W of a sodium lamp are full at 6e4 e-; blue reads a sixth of the level (lit: a quarter)."""
     for size in [(2, 2), (2, 3), (3, 3), (4, 4), (6, 5)]:
-        raw, _ = lamp(SODIUM, 1e5, size, tile)
+        raw, _ = lamp(SODIUM, 6e4, size, tile)
         assert not white_lamps(raw, gains_of(raw)).any(), size
 
 
