@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from itertools import product
-from math import inf
+from math import inf, nan
 
 import numpy as np
 import scipy
@@ -59,6 +59,15 @@ def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
     """
     x = np.pi * diameter_um * frequency_per_um
     return np.asarray(np.divide(2 * scipy.special.j1(x), x, out=np.ones_like(x), where=x > 1e-9))
+
+
+def half_frequency(frequency: Floats, transfer: Floats) -> float:
+    """Return the first frequency at which a transfer is 0.5, by a straight line; nan where it stays above."""
+    under = np.flatnonzero(transfer < 0.5)
+    if not under.size:
+        return nan
+    last = slice(int(under[0]) - 1, int(under[0]) + 1)
+    return float(np.interp(-0.5, -transfer[last], frequency[last]))
 
 
 def sampled_otf(

@@ -8,7 +8,7 @@ on threads.
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from math import ceil, inf, isnan, nan, pi, radians, tan
+from math import ceil, inf, isnan, pi, radians, tan
 
 import numpy as np
 import scipy
@@ -20,7 +20,7 @@ from rodcone.display import brief
 from rodcone.errors import InputError, require_whole
 from rodcone.types import Floats
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
-from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
+from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency, limit_per_um, sampled_otf
 from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
@@ -236,22 +236,13 @@ def least_samples(sensor: SensorConfig) -> int:
 def mtf50_error(sensor: SensorConfig) -> float:
     """Relative error of an edge's MTF50 that one sample a pixel makes, at 550 nm; nan where MTF50 is beyond Nyquist."""
     frequency, ideal, imaged = _axis_mtfs(sensor)
-    true, found = (_half(frequency, mtf) for mtf in (ideal, imaged))
+    true, found = (half_frequency(frequency, mtf) for mtf in (ideal, imaged))
     return found / true - 1
 
 
 def _edge_words(sensor: SensorConfig) -> str:
     error = mtf50_error(sensor)
     return "" if isnan(error) else f" and an edge's mtf50_cy_per_px by {-error:.1%}"
-
-
-def _half(frequency: Floats, mtf: Floats) -> float:
-    """First frequency at which a falling transfer is 0.5; nan where it stays above."""
-    under = np.flatnonzero(mtf < 0.5)
-    if not under.size:
-        return nan
-    last = slice(under[0] - 1, under[0] + 1)
-    return float(np.interp(-0.5, -mtf[last], frequency[last]))
 
 
 def _axis_mtfs(sensor: SensorConfig) -> tuple[Floats, Floats, Floats]:

@@ -8,12 +8,14 @@ it with a slip. So is the bin's own, which the standard leaves in: 1 % at 0.3 cy
 """
 
 from dataclasses import dataclass
+from math import isnan
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from rodcone.errors import InputError
 from rodcone.types import Floats
+from sensor.diffraction import half_frequency
 
 OVERSAMPLING = 4  # bins a pixel, as the standard has it
 LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % here
@@ -139,9 +141,7 @@ def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
 
 
 def _first_half(frequency: Floats, mtf: Floats) -> float:
-    """First frequency where the response is 0.5, between samples by a straight line."""
-    below = np.flatnonzero(mtf < 0.5)
-    if below.size == 0:
+    found = half_frequency(frequency, mtf)
+    if isnan(found):
         raise InputError(f"luminance: its response stays above half up to {HIGHEST_CYCLES_PER_PX:g} cycles a pixel")
-    after = int(below[0])
-    return float(np.interp(0.5, mtf[[after, after - 1]], frequency[[after, after - 1]]))
+    return found
