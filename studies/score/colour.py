@@ -1,10 +1,8 @@
 """Figures of colour on the ColorChecker's 24 patches: how far a matrix can take the camera to the standard observer.
 
-Noise of a patch's mean adds to its difference of colour, by b / n of n frames. So a difference E is measured on two
-halves of the frames and on all of them: 2 E(all) - (E(first) + E(second)) / 2 is free of it.
+Noise of a patch's mean adds to its difference of colour, which `without_noise_bias` takes off.
 """
 
-from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -23,7 +21,7 @@ from sensor.optics import form_image
 from sensor.response import electrons_per_irradiance, expected_electrons, mixing_of
 from studies.metrics.truth import Light, named_light
 from studies.photograph.camera import calibrate
-from studies.score.figure import Definition
+from studies.score.figure import Definition, Merit, without_noise_bias
 
 GREYS = 6  # the chart's last row
 SIDE_PX, CHIPS = 64, 8  # pixels of a patch, and chips that see it in one measurement
@@ -32,7 +30,7 @@ WHITE_SHARE = 0.7  # of the converter's top, for a perfect white in the most sen
 INDEX_FACTOR = 5.5  # ISO 17321-1
 
 
-def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Iterator[Definition]:
+def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Definition:
     """Define the figures of a camera that tells three colours."""
     # What the camera and the standard observer see of the patches, without noise.
     known = named_light(light)
@@ -43,9 +41,8 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Itera
     true_lab = _true_lab(surfaces, known)
     signals = _signals(plain, known, surfaces)
     chart_e = _chart_e(plain, known, surfaces, exposure_s)
-    words = (
-        f"raw channels balanced on {light}, the matrix fitted on the 24 patches, white at {WHITE_SHARE:.0%} of the top"
-    )
+    white = f"white at {100 * WHITE_SHARE:.0f} % of the top"
+    words = f"raw channels balanced on {light}, the matrix fitted on the 24 patches, {white}"
 
     def errors(measured: Floats) -> tuple[Floats, Floats]:
         balanced = measured[:, :3] / signals[-1, :3]
@@ -62,36 +59,39 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Itera
             total += np.transpose([_patch_means(samples) for samples in channels])
         return total / chips
 
-    def balanced_errors(means: Floats) -> tuple[Floats, Floats]:
-        return errors(means[:-1] * (signals[-1] / means[-1]))
+    def figures(means: Floats) -> list[float]:
+        return _figures(*errors(means[:-1] * (signals[-1] / means[-1])))
 
-    def on_frames(rng: np.random.Generator) -> tuple[float, float]:
-        """Return the mean differences of all and of the coloured patches, free of what noise of the means adds."""
-        halves = [means_of(CHIPS // 2, rng) for _ in range(2)]
-        both, *each = (balanced_errors(means) for means in ((halves[0] + halves[1]) / 2, *halves))
-        found = [np.array([of[0].mean(), of[1][:-GREYS].mean()]) for of in (both, *each)]
-        all_patches, coloured = 2 * found[0] - (found[1] + found[2]) / 2
-        return float(all_patches), float(coloured)
+    def measure(rng: np.random.Generator) -> list[float]:
+        first, second = (means_of(CHIPS // 2, rng) for _ in range(2))
+        return without_noise_bias(*(figures(means) for means in ((first + second) / 2, first, second)))
 
     # The figures.
-    yield Definition(
-        "iso_17321.index",
-        "sensitivity metamerism index",
-        "1",
-        "like ISO 17321-1: 100 - 5.5 x mean CIELAB difference",
-        f"the chart's 18 coloured patches, {words}",
-        100 - INDEX_FACTOR * float(errors(signals[:-1])[1][:-GREYS].mean()),
-        lambda rng: 100 - INDEX_FACTOR * on_frames(rng)[1],
+    index, difference = _figures(*errors(signals[:-1]))
+    merits = (
+        Merit(
+            "iso_17321.index",
+            "sensitivity metamerism index",
+            "1",
+            "like ISO 17321-1: 100 - 5.5 x mean CIELAB difference",
+            f"the chart's 18 coloured patches, {words}",
+            index,
+        ),
+        Merit(
+            "color_checker.delta_e",
+            "mean CIEDE2000 of the 24 patches",
+            "1",
+            "CIE 142; ISO 17321's patches and balance",
+            words,
+            difference,
+        ),
     )
-    yield Definition(
-        "color_checker.delta_e",
-        "mean CIEDE2000 of the 24 patches",
-        "1",
-        "CIE 142; ISO 17321's patches and balance",
-        words,
-        float(errors(signals[:-1])[0].mean()),
-        lambda rng: on_frames(rng)[0],
-    )
+    return Definition(merits, measure)
+
+
+def _figures(ciede2000: Floats, cielab: Floats) -> list[float]:
+    """Return the index of the coloured patches, and the mean difference of all."""
+    return [100 - INDEX_FACTOR * float(cielab[:-GREYS].mean()), float(ciede2000.mean())]
 
 
 def _true_lab(surfaces: Floats, light: Light) -> Floats:

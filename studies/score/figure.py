@@ -1,13 +1,13 @@
 """A figure of merit: what a closed form says, and what repeated measurements on simulated frames say."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import isfinite, nan
 
 import numpy as np
 import scipy
 
-REPEATS = 8  # measurements, each of a fresh chip
+REPEATS = 8  # measurements, each of fresh chips
 CONFIDENCE = 0.95
 
 
@@ -25,10 +25,10 @@ class Merit:
     conditions : str
         What was photographed, and how each choice was made that the standard leaves open.
     computed : float
-        In closed form.
+        In closed form; nan where the camera doesn't have the figure.
     measured, low, high : float
-        Mean over simulated measurements, and the limits of its interval of `CONFIDENCE`; nan limits of a figure that
-        EMVA 1288 derives from others.
+        Mean over simulated measurements, and the limits of its interval of `CONFIDENCE`; nan before it is measured, and
+        the limits of a figure that EMVA 1288 derives from others.
     """
 
     name: str
@@ -37,9 +37,9 @@ class Merit:
     standard: str
     conditions: str
     computed: float
-    measured: float
-    low: float
-    high: float
+    measured: float = nan
+    low: float = nan
+    high: float = nan
 
     @property
     def agrees(self) -> bool | None:
@@ -49,44 +49,43 @@ class Merit:
 
 @dataclass(frozen=True)
 class Definition:
-    """A figure of merit before it is measured.
+    """Figures of merit that are measured together, on the same frames.
 
     Attributes
     ----------
-    name, title, unit, standard, conditions
-        As of `Merit`.
-    computed : float
+    merits : tuple of Merit
+        Computed, and not yet measured.
     measure : callable
-        Takes a generator, measures the figure once on frames of a fresh chip, and returns it.
+        Takes a generator, and returns each figure as one measurement on fresh chips gives it.
     """
 
-    name: str
-    title: str
-    unit: str
-    standard: str
-    conditions: str
-    computed: float
-    measure: Callable[[np.random.Generator], float]
+    merits: tuple[Merit, ...]
+    measure: Callable[[np.random.Generator], Sequence[float]]
 
 
-def measured(definition: Definition, seed: int) -> Merit:
-    """Measure a figure `REPEATS` times, and give the mean with its interval by Student's t distribution."""
-    if not isfinite(definition.computed):
-        return _score(definition, [])
+def measured(definition: Definition, seed: int) -> list[Merit]:
+    """Measure figures `REPEATS` times, and give each mean with its interval by Student's t distribution.
+
+    Figures that the camera doesn't have are left out.
+    """
+    if not any(isfinite(merit.computed) for merit in definition.merits):
+        return []
     # A stream per name, so that a figure doesn't depend on which others are asked for.
-    name_key = int.from_bytes(definition.name.encode(), "little") % 2**63
-    values = [
-        definition.measure(np.random.default_rng(np.random.SeedSequence((seed, name_key, repeat))))
-        for repeat in range(REPEATS)
+    key = int.from_bytes(definition.merits[0].name.encode(), "little") % 2**63
+    seeds = [np.random.SeedSequence((seed, key, repeat)) for repeat in range(REPEATS)]
+    values = np.array([definition.measure(np.random.default_rng(one)) for one in seeds])
+    means, spreads = values.mean(axis=0), values.std(axis=0, ddof=1)
+    halves = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, REPEATS - 1) * spreads / REPEATS**0.5
+    return [
+        replace(merit, measured=mean, low=mean - half, high=mean + half)
+        for merit, mean, half in zip(definition.merits, means.tolist(), halves.tolist(), strict=True)
+        if isfinite(merit.computed)
     ]
-    return _score(definition, values)
 
 
-def _score(definition: Definition, values: Sequence[float]) -> Merit:
-    mean, half = nan, nan
-    if values and np.isfinite(values).all():
-        mean = float(np.mean(values))
-        spread = float(np.std(values, ddof=1)) / len(values) ** 0.5
-        half = spread * float(scipy.stats.t.ppf((1 + CONFIDENCE) / 2, len(values) - 1))
-    stated = {key: getattr(definition, key) for key in ("name", "title", "unit", "standard", "conditions", "computed")}
-    return Merit(**stated, measured=mean, low=mean - half, high=mean + half)
+def without_noise_bias(whole: Sequence[float], first: Sequence[float], second: Sequence[float]) -> list[float]:
+    """Extrapolate figures of the mean of n frames to no noise: 2 E(all) - (E(one half) + E(other half)) / 2.
+
+    Noise adds b / n to a figure that isn't linear in the frame, and b / (n / 2) to that of either half.
+    """
+    return [2 * all_frames - (a + b) / 2 for all_frames, a, b in zip(whole, first, second, strict=True)]

@@ -4,9 +4,9 @@ The signal is the raw one of a single channel. Where a standard asks for the dev
 choice which `Merit.conditions` states.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
-from math import log10, pi
+from math import isfinite, log10, nan, pi, sqrt
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,14 +15,17 @@ from sensor.config import SensorConfig
 from studies.metrics.truth import GREY, named_light
 from studies.photograph.snr import electrons_at_snr, snr
 from studies.score.even_field import EvenField, even_field
-from studies.score.figure import Definition
+from studies.score.figure import Definition, Merit
+from studies.study.gain import ISO_SATURATION_LUX_S
 
-ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: the saturation-based speed is 78 over the exposure that saturates
 ISO_NOISE_LUX_S = 10.0  # the noise-based speed is 10 over the exposure that has the signal-to-noise ratio
 REFERENCE_SHARE = 0.13  # of the saturation luminance, at which ISO 15739 takes the signal-to-noise ratio
 RAMP = (0.1, 0.2, 0.35, 0.5, 0.65)  # of saturation: light at which the response is measured
 LADDER = (0.8, 0.9, 1.0, 1.11, 1.25)  # of the light that the closed form gives, around which a ratio is searched
 SNR1S = ("3200 K", 1 / 60, 1.4)  # of SNR1s: colour temperature, exposure time, f-number
+
+
+Named = tuple[Merit, Callable[[float], float]]  # a figure before it is computed, and what it makes of a luminance
 
 
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
@@ -31,45 +34,44 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
     words = f"{channel}, raw samples of one pixel, {light}, {exposure_s * 1e3:.4g} ms, fixed patterns included"
     at_saturation = field.headroom_e / field.electrons_per_cd_m2
     e_per_lux_s = field.electrons_per_cd_m2 / field.lux_s_per_cd_m2
-    yield Definition(
+    slope = Merit(
         "oecf.slope",
         "slope of the opto-electronic conversion",
         "e-/(lux s)",
         "ISO 14524",
-        f"{channel}, raw, a ramp of {len(RAMP)} even fields up to {RAMP[-1]:.0%} of saturation, {light}",
+        f"{channel}, raw, a ramp of {len(RAMP)} even fields up to {100 * RAMP[-1]:.0f} % of saturation, {light}",
         e_per_lux_s,
-        lambda rng: _slope_e(field, rng),
     )
-    yield Definition(
+    speed = Merit(
         "iso_12232.saturation_speed",
         "saturation-based speed",
         "ISO",
         "ISO 12232:2019, 6.2: 78 / H",
         f"{words}; the mean reads the converter's top, no half stop taken off",
-        ISO_SATURATION_LUX_S * e_per_lux_s / field.headroom_e,
-        lambda rng: ISO_SATURATION_LUX_S * _slope_e(field, rng) / field.headroom_e,
+        _saturation_speed(field, e_per_lux_s),
     )
-    for ratio, name in ((40.0, "first excellent"), (10.0, "first acceptable")):
-        yield _light_figure(
-            field,
-            ratio,
-            f"iso_12232.noise_speed_{ratio:.0f}",
-            f"noise-based speed, S/N {ratio:.0f}, {name}",
-            "ISO",
-            "ISO 12232:2019, 6.3: 10 / H",
-            words,
-            lambda luminance: ISO_NOISE_LUX_S / (luminance * field.lux_s_per_cd_m2),
-        )
-    yield _light_figure(
-        field,
-        10.0,
+
+    def measure_response(rng: np.random.Generator) -> tuple[float, float]:
+        found = _slope_e(field, rng)
+        return found, _saturation_speed(field, found)
+
+    yield Definition((slope, speed), measure_response)
+
+    def noise_speed(ratio: int, quality: str) -> Named:
+        name, title = f"iso_12232.noise_speed_{ratio}", f"noise-based speed, S/N {ratio}, {quality}"
+        stated = Merit(name, title, "ISO", "ISO 12232:2019, 6.3: 10 / H", words, nan)
+        return stated, lambda luminance: ISO_NOISE_LUX_S / (luminance * field.lux_s_per_cd_m2)
+
+    snr10 = Merit(
         "snr10.lux",
         "SNR10: light for a ratio of 10",
         "lux",
         "maker's figure: illuminance of an 18 % grey card",
         f"{words}, f/{sensor.lens.f_number:g}",
-        lambda luminance: luminance * pi / GREY,
+        nan,
     )
+    yield _light_for_ratio(field, 40.0, [noise_speed(40, "first excellent")])
+    yield _light_for_ratio(field, 10.0, [noise_speed(10, "first acceptable"), (snr10, lambda cd_m2: cd_m2 * pi / GREY)])
     yield _snr1s(sensor, channel)
     yield from _iso_15739(field, words, at_saturation)
 
@@ -78,24 +80,28 @@ def _iso_15739(field: EvenField, words: str, at_saturation: float) -> Iterator[D
     reference = REFERENCE_SHARE * at_saturation
     reference_e = np.array([reference * field.electrons_per_cd_m2])
     ratio = float(snr(reference_e, field.sensor, field.exposure_s, field.channel)[0])
-    yield Definition(
+    grey = Merit(
         "iso_15739.snr_18",
         "total signal-to-noise ratio of 18 % grey",
         "dB",
         "ISO 15739:2023, 6.3: at 13 % of the saturation luminance",
         words,
         20 * log10(ratio),
-        lambda rng: 20 * log10(_ratio_at(field, reference, rng)),
     )
-    yield Definition(
+    span = Merit(
         "iso_15739.dynamic_range",
         "dynamic range",
         "dB",
         "ISO 15739:2023, 6.4: saturation over the dark's temporal noise",
-        f"{field.channel}, raw, {field.exposure_s * 1e3:.4g} ms, no light; the ratio in the dark is 1 there",
+        f"{field.channel}, raw, {field.exposure_s * 1e3:.4g} ms, noise of frames without light",
         20 * log10(field.headroom_e / field.temporal_dark_e),
-        lambda rng: 20 * log10(_measured_range(field, rng)),
     )
+    yield Definition((grey,), lambda rng: [20 * log10(_ratio_at(field, reference, rng))])
+    yield Definition((span,), lambda rng: [20 * log10(_measured_range(field, rng))])
+
+
+def _saturation_speed(field: EvenField, e_per_lux_s: float) -> float:
+    return ISO_SATURATION_LUX_S * e_per_lux_s / field.headroom_e
 
 
 def _slope_e(field: EvenField, rng: np.random.Generator) -> float:
@@ -119,28 +125,17 @@ def _measured_range(field: EvenField, rng: np.random.Generator) -> float:
     return float((bright.mean() - np.mean(dark)) / (np.std(dark[0] - dark[1], ddof=1) / 2**0.5))
 
 
-def _light_figure(
-    field: EvenField,
-    ratio: float,
-    name: str,
-    title: str,
-    unit: str,
-    standard: str,
-    conditions: str,
-    figure: Callable[[float], float],
-) -> Definition:
-    """Define a figure of the light at which a pixel reaches a ratio; `figure` makes it of the luminance."""
-    electrons = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel)
-    luminance = electrons / field.electrons_per_cd_m2
-    return Definition(
-        name,
-        title,
-        unit,
-        standard,
-        conditions,
-        figure(luminance) if np.isfinite(luminance) else float("nan"),
-        lambda rng: figure(_light_for(field, ratio, luminance, rng)),
-    )
+def _light_for_ratio(field: EvenField, ratio: float, figures: Sequence[Named]) -> Definition:
+    """Define figures of the light at which a pixel reaches a ratio, each by what it makes of the luminance."""
+    luminance = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
+    reached = isfinite(luminance)
+    merits = [replace(merit, computed=of_light(luminance) if reached else nan) for merit, of_light in figures]
+
+    def measure(rng: np.random.Generator) -> list[float]:
+        found = _light_for(field, ratio, luminance, rng)
+        return [of_light(found) for _, of_light in figures]
+
+    return Definition(tuple(merits), measure)
 
 
 def _light_for(field: EvenField, ratio: float, about_cd_m2: float, rng: np.random.Generator) -> float:
@@ -162,25 +157,25 @@ def _snr1s(sensor: SensorConfig, channel: str) -> Definition:
     lamp, exposure_s, f_number = SNR1S
     seen = replace(sensor, lens=replace(sensor.lens, f_number=f_number, magnification=0.0))
     field = even_field(seen, named_light(lamp), exposure_s, channel)
-    # G / sqrt(G + d^2) = 1 has the root (1 + sqrt(1 + 4 d^2)) / 2.
-    dark_e = field.temporal_dark_e
-    electrons = (1 + (1 + 4 * dark_e**2) ** 0.5) / 2
-    lux_per_electron = pi / GREY / field.electrons_per_cd_m2
 
-    def measure(rng: np.random.Generator) -> float:
+    def measure(rng: np.random.Generator) -> list[float]:
         chip = field.draw_chip(rng)
         dark = [field.samples_e(field.shoot(0.0, chip, rng)) for _ in range(2)]
         lit_cd_m2 = 0.3 * field.headroom_e / field.electrons_per_cd_m2
         per_cd_m2 = (field.samples_e(field.shoot(lit_cd_m2, chip, rng)).mean() - np.mean(dark)) / lit_cd_m2
-        noise_e = float(np.std(dark[0] - dark[1], ddof=1)) / 2**0.5
-        return (1 + float(np.sqrt(1 + 4 * noise_e**2))) / 2 * pi / GREY / float(per_cd_m2)
+        return [_equal_to_noise_e(float(np.std(dark[0] - dark[1], ddof=1)) / 2**0.5) * pi / GREY / float(per_cd_m2)]
 
-    return Definition(
+    merit = Merit(
         "snr1s.lux",
         "SNR1s: light for a temporal ratio of 1",
         "lux",
         "Sony's SNR1s: signal over the root of signal and squared dark noise",
         f"{channel}, raw, {lamp}, 18 % grey, f/{f_number:g}, 1/60 s, no matrix",
-        electrons * lux_per_electron,
-        measure,
+        _equal_to_noise_e(field.temporal_dark_e) * pi / GREY / field.electrons_per_cd_m2,
     )
+    return Definition((merit,), measure)
+
+
+def _equal_to_noise_e(dark_e: float) -> float:
+    """Return the electrons n that equal their temporal noise: n / sqrt(n + d^2) = 1 at (1 + sqrt(1 + 4 d^2)) / 2."""
+    return (1 + sqrt(1 + 4 * dark_e**2)) / 2

@@ -71,12 +71,11 @@ def score(
         if name.partition(".")[0] not in GROUPS:
             raise InputError(f"only: {name!r} is not known; allowed: {', '.join(GROUPS)}; write one of them")
     found = [
-        measured(definition, seed)
-        for definition in definitions(sensor, light, exposure_s, only)
-        if _wanted(definition.name, only)
+        merit for definition in definitions(sensor, light, exposure_s, only) for merit in measured(definition, seed)
     ]
-    found = [one for one in found if one.computed == one.computed]
-    return found + (_emva(sensor, exposure_s, only, seed) if _group_wanted("emva_1288", only) else [])
+    if _group_wanted("emva_1288", only):
+        found += _emva(sensor, exposure_s, seed)
+    return [merit for merit in found if _wanted(merit.name, only)]
 
 
 def _wanted(name: str, only: Sequence[str]) -> bool:
@@ -93,14 +92,14 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
     if any(_group_wanted(group, only) for group in ("oecf", "iso_12232", "snr10", "snr1s", "iso_15739")):
         yield from noise_figures(sensor, light, exposure_s, channel)
     if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858")):
-        yield from sharpness(sensor, light, exposure_s, channel)
+        yield sharpness(sensor, light, exposure_s, channel)
     if _group_wanted("ieee_2020", only):
         yield from contrast_figures(sensor, light, exposure_s, channel)
     if len(sensor.channels) >= COLOURS and any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
-        yield from colour_figures(sensor, light, exposure_s)
+        yield colour_figures(sensor, light, exposure_s)
 
 
-def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: int) -> list[Merit]:
+def _emva(sensor: SensorConfig, exposure_s: float, seed: int) -> list[Merit]:
     """Characterise the unit channel's reading as an EMVA 1288 laboratory does, and list its figures."""
     reading = at_channel(chip_readings(sensor, exposure_s), sensor.unit_channel)[0].sensor
     chip = characterise(reading, seed=seed)
@@ -113,4 +112,4 @@ def _emva(sensor: SensorConfig, exposure_s: float, only: Sequence[str], seed: in
         scores.append(
             Merit(*stated, figure.configured, figure.measured, figure.measured - half, figure.measured + half)
         )
-    return [one for one in scores if _wanted(one.name, only)]
+    return scores

@@ -1,6 +1,5 @@
 """Figures of sharpness by a slanted edge: lens, pixel aperture and crosstalk in closed form beside measured edges."""
 
-from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -13,13 +12,13 @@ from rodcone.types import Floats
 from sensor.capture import expose
 from sensor.config import SensorConfig, with_tile
 from sensor.device import draw_device
-from sensor.diffraction import defocus_otf, diffraction_otf
+from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency
 from sensor.optics import form_image, least_samples
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.metrics.mtf import EdgeResponse, edge_response
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 from studies.metrics.truth import Light, light_in_bands
-from studies.score.figure import Definition
+from studies.score.figure import Definition, Merit, without_noise_bias
 
 SIDE_PX = 192
 ANGLE_DEG, CONTRAST = 5.0, 4.0  # of ISO 12233's edge
@@ -33,7 +32,7 @@ GRID: Floats = np.arange(-6000, 6001) / 2000.0  # frequencies of the closed form
 CSF_POWER, CSF_DECAY = 0.8, 0.2
 
 
-def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
+def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the figures of an edge that one channel sees at every pixel."""
     seen = _every_pixel(sensor, channel)
     bands = _bands(light)
@@ -46,42 +45,38 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
         f"f/{lens.f_number:g}, {blur}, crosstalk {seen.pixel.crosstalk:g}"
     )
 
-    def on_edges(rng: np.random.Generator, figure: Callable[[EdgeResponse], float]) -> float:
-        """Measure a figure free of what noise adds: b / n of n frames, as two halves and all of them tell."""
-        frames = [
+    def figures(edge: EdgeResponse) -> list[float]:
+        shown = edge.frequency_cycles_per_px, edge.mtf
+        return [edge.mtf50_cycles_per_px, float(np.interp(0.25, *shown)), _acutance(*shown)]
+
+    def measure(rng: np.random.Generator) -> list[float]:
+        first, second = (
             np.mean([expose(edge_e, seen, exposure_s, chip, rng).electrons for chip in chips], axis=0)
             for chips in ([draw_device(seen, edge_e.shape, rng) for _ in range(FRAMES // 2)] for _ in range(2))
-        ]
-        both, *halves = (figure(edge_response(picture)) for picture in ((frames[0] + frames[1]) / 2, *frames))
-        return 2 * both - sum(halves) / 2
+        )
+        return without_noise_bias(*(figures(edge_response(x)) for x in ((first + second) / 2, first, second)))
 
-    yield Definition(
-        "iso_12233.mtf50",
-        "MTF50",
-        "cycles/px",
-        "ISO 12233:2017, annex D (e-SFR)",
-        words,
-        _first_half(frequency, mtf),
-        lambda rng: on_edges(rng, lambda edge: edge.mtf50_cycles_per_px),
+    e_sfr = "ISO 12233:2017, annex D (e-SFR)"
+    merits = (
+        Merit("iso_12233.mtf50", "MTF50", "cycles/px", e_sfr, words, half_frequency(frequency, mtf)),
+        Merit(
+            "iso_12233.mtf_half_nyquist",
+            "MTF at half the Nyquist frequency",
+            "1",
+            e_sfr,
+            words,
+            float(np.interp(0.25, frequency, mtf)),
+        ),
+        Merit(
+            "ieee_1858.acutance",
+            "acutance",
+            "1",
+            "IEEE 1858 (CPIQ): MTF weighted by the contrast sensitivity, up to Nyquist",
+            f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree, the display taken as perfect",
+            _acutance(frequency, mtf),
+        ),
     )
-    yield Definition(
-        "iso_12233.mtf_half_nyquist",
-        "MTF at half the Nyquist frequency",
-        "1",
-        "ISO 12233:2017, annex D (e-SFR)",
-        words,
-        float(np.interp(0.25, frequency, mtf)),
-        lambda rng: on_edges(rng, lambda edge: _at(edge, 0.25)),
-    )
-    yield Definition(
-        "ieee_1858.acutance",
-        "acutance",
-        "1",
-        "IEEE 1858 (CPIQ): MTF weighted by the contrast sensitivity, up to Nyquist",
-        f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree, the display taken as perfect",
-        _acutance(frequency, mtf),
-        lambda rng: on_edges(rng, lambda edge: _acutance(*_curve(edge))),
-    )
+    return Definition(merits, measure)
 
 
 def _every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
@@ -157,23 +152,6 @@ def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
     shown = fftconvolve(transfer, window, mode="same")
     middle, last = GRID.size // 2, GRID.size // 2 + round(1 / (GRID[1] - GRID[0]))
     return GRID[middle : last + 1], np.abs(shown[middle : last + 1] / shown[middle])
-
-
-def _first_half(frequency: Floats, mtf: Floats) -> float:
-    """Return the first frequency at which the transfer is 0.5; nan where it stays above."""
-    below = np.flatnonzero(mtf < 0.5)
-    if not below.size:
-        return float("nan")
-    last = slice(int(below[0]) - 1, int(below[0]) + 1)
-    return float(np.interp(-0.5, -mtf[last], frequency[last]))
-
-
-def _at(edge: EdgeResponse, frequency: float) -> float:
-    return float(np.interp(frequency, edge.frequency_cycles_per_px, edge.mtf))
-
-
-def _curve(edge: EdgeResponse) -> tuple[Floats, Floats]:
-    return edge.frequency_cycles_per_px, edge.mtf
 
 
 def _acutance(frequency: Floats, mtf: Floats) -> float:
