@@ -61,7 +61,7 @@ def score(
     seed
         Seed of the chips and frames.
     out
-        File to write as well: a sheet that prints on one page (.html), or a table (.csv).
+        File to write as well: a sheet (.html), which is one printed page for one or two sensors, or a table (.csv).
     json
         Print one JSON object: a list of figures for each sensor.
     """
@@ -77,7 +77,7 @@ def score(
         return
     found = {}
     for name, sensor in cameras.items():
-        say(f"{name}: measuring; some 15 s" if not only else f"{name}: measuring")
+        say(f"{name}: measuring, some 10 s" if not only else f"{name}: measuring")
         found[name] = merits_of(sensor, light, exposure, only or (), seed)
     if out is not None and out.suffix.lower() == ".html":
         curves = {name: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}

@@ -10,6 +10,8 @@ from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_t
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
+PLAIN = 1000.0  # from which on a figure has no decimals
+
 
 def score_page(
     scores: Mapping[str, Sequence[Merit]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
@@ -31,8 +33,10 @@ def score_page(
 
 
 def number_text(value: float) -> str:
-    """Write a figure to four digits; a dash for one that isn't there."""
-    return f"{value:.4g}" if isfinite(value) else "—"
+    """Write a figure to four digits, large ones without an exponent; a dash for one that isn't there."""
+    if not isfinite(value):
+        return "—"
+    return f"{value:.4g}" if abs(value) < PLAIN else f"{value:.0f}"
 
 
 @rc_context(STYLE)
