@@ -1,15 +1,12 @@
 """The command `rodcone list`."""
 
-import tomllib
 from pathlib import Path
 from typing import Literal, get_args
 
 from rodcone.errors import InputError
 from rodcone.files import check_place, require_ending, write_files
 from studies.commands.console import print_json, print_table
-
-# Scenes, lights and processors as their catalogues have them, which import Dr.Jit and take a second.
-NAMES = Path(__file__).parent.parent / "data" / "names.toml"
+from studies.study.name_texts import texts_of
 
 Kind = Literal["scenes", "lights", "sensors", "mosaics", "processors", "metrics"]
 
@@ -65,18 +62,13 @@ def texts(kind: Kind) -> dict[str, str]:
     if kind == "mosaics":
         from sensor.presets import tile_named
 
-        return {name: f"{'/'.join(tile_named(name))}: {text}" for name, text in _texts_of(kind).items()}
+        return {name: f"{'/'.join(tile_named(name))}: {text}" for name, text in texts_of(kind).items()}
     if kind == "metrics":
         from studies.metrics.metric import METRICS
 
         units = {x.key: f" [{x.unit}]" if x.unit else "" for x in METRICS}
         return {x.key: f"{x.name}{units[x.key]}, {'higher' if x.higher else 'lower'} is better" for x in METRICS}
-    return _texts_of(kind)
-
-
-def _texts_of(kind: Kind) -> dict[str, str]:
-    names: dict[str, str] = tomllib.loads(NAMES.read_text("utf-8"))[kind]
-    return names
+    return texts_of(kind)
 
 
 def _sensors() -> dict[str, str]:

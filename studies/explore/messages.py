@@ -30,14 +30,13 @@ from studies.explore.slow import is_slow
 from studies.explore.source import Source
 from studies.explore.views import VIEWS, Bytes
 from studies.study.gain import iso_speed
+from studies.study.name_texts import texts_of
 from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
 
-DATA = Path(__file__).parents[1] / "data"
-
-MOST_CHARACTERS = 200_000  # bytes of a message; three tables of spectra fit
-MOST_OF_A_PAGE = 40  # characters of a file's name
+MOST_CHARACTERS = 200_000  # characters of a message; three tables of spectra fit
+MOST_OF_A_PAGE = 40  # characters of a page's name
 # Keys of each kind of message beside `kind`, `number` and, where pages share a connection, `page`; in this order they
 # are answered.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
@@ -97,8 +96,7 @@ def sensor_terms(sensor: SensorConfig) -> Header:
 
 def _mosaics() -> Header:
     """Return the tile of each mosaic by name and a sentence on it; the sensors' own stand with these."""
-    texts = parse_toml((DATA / "names.toml").read_text("utf-8"))["mosaics"]
-    return {name: {"tile": list(tile_named(name)), "text": text} for name, text in texts.items()}
+    return {name: {"tile": list(tile_named(name)), "text": text} for name, text in texts_of("mosaics").items()}
 
 
 def _missing(processor: str) -> bool:
