@@ -10,7 +10,7 @@ from sensor.config import SensorConfig
 from sensor.config_file import SensorTable
 from sensor.pixel import BINNINGS, MERGED, SWITCHED
 from studies.study.json_schema import DIALECT, schema_of
-from studies.study.study import BudgetShares, SceneChoice, Study
+from studies.study.study import AUTOMATIC, STARTING_POINTS, BudgetShares, SceneChoice, Study
 
 Kind = Literal["sensor", "study"]
 _TEXTS = {"type": "array", "items": {"type": "string"}}
@@ -80,6 +80,6 @@ def study_schema() -> dict[str, Any]:
     known: dict[Any, Mapping[str, Any]] = {
         SceneChoice: scene,
         (Study, "trust_code"): {},  # no file may ask for it
-        (BudgetShares, "model"): {"enum": ["automatic", "fast", "default", "reference"]},
+        (BudgetShares, "model"): {"enum": [AUTOMATIC, *STARTING_POINTS]},
     }
     return schema_of(Study, known, single=True)
