@@ -118,7 +118,7 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def scene_means_of(means: Means) -> SceneMeans:
-    """Return the picture's mean light but for lamps that are seen directly, and the share of pixels without a lamp.
+    """Return the picture's mean light but for lamps that are seen directly, and the share of it without a lamp.
 
     Pixels are independent of each other.
     """

@@ -17,7 +17,7 @@ from rodcone.optional import optional_library
 from rodcone.types import Planes
 
 EXTRA = "denoise"
-SPECTRA = 6  # so that each call of the denoiser has three planes and two calls do
+SPECTRA = 6  # two calls of the denoiser, with three planes each
 LEAST_ALBEDO = 0.02  # of darker surfaces too, because their light divided by albedo would be noise alone
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20

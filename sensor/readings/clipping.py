@@ -79,7 +79,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
         mean[near] += first
         variance[near], slope[near] = second - first**2, open_
 
-    # Clip at black: only the noise of reading takes samples there, for counted electrons aren't negative.
+    # Clip at black: only the noise of reading takes samples there, for counts aren't negative; rounding clips none.
     bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - dark_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
     after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))

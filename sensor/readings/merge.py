@@ -15,7 +15,7 @@ from sensor.readings.noise import best_weights, collected_share, covariances, se
 from sensor.readings.resolve import PlainReading
 
 # The merged image has linear words of 24 bits, as chips that merge write them; single precision holds each exactly.
-# This white is also a whole number of 16 bits, because a digital negative states black and white in 16 bits.
+# Over 256, black and white are whole numbers of 16 bits, in which a digital negative states them.
 MERGED_WHITE_DN = 256 * 65_535
 _ROUNDS = 6  # in which the weights are refined, as in `sensor.burst`
 _LEVELS = 512  # of light at which weights are computed; between them they are interpolated

@@ -121,7 +121,7 @@ def seams(readings: Sequence[PlainReading]) -> Seams:
 
 
 def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Mapping[str, Floats]:
-    """Return the merge's variance over chips and exposures for each source [e-^2 of the whole pixel].
+    """Return the merge's variance over chips and exposures for each source [e-^2], shaped as `expected_e`.
 
     Around a seam some pixels keep the reading that fills and some leave it out, by their merged light; that is not
     correlated with what the readings differ by, so that the variances add by the shares of the pixels.

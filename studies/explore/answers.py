@@ -79,7 +79,7 @@ def shown(
 
 
 def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
-    """Develop an exposure; None where its processor is slow and hasn't finished."""
+    """Develop an exposure; None where its processor is slow and has no result yet."""
     if stand_in(controls, exposed.raw.dn.size) == controls:
         development = development_of(exposed, controls, memo)
         memo.check()

@@ -37,7 +37,7 @@ from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.study.gain import iso_speed
 from studies.study.study import AS_SHOT
 
-Development = Callable[[], tuple[Image, Picture]]  # the processor's own result: linear sRGB at the scale of the truth
+Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, and the processor's result
 _CHIP, _FRAME = 0, 1  # second part of the seed, equal to that of `studies.photograph.shot`
 _LONGEST_S = 1e7
 

@@ -38,7 +38,7 @@ PIXEL = (
 SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
 # Processors with settings of their own, and the defaults of these.
 ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
-MOST_POINTS = 2000  # name of a spectrum from a file
+MOST_POINTS = 2000  # points of a spectrum from a file
 WIDEST = 41  # pixels on a side of Omega; they take four times the default's time
 
 
