@@ -1,6 +1,7 @@
 """The commands `rodcone demo` and `rodcone reference`: the demo, and the light that it photographs."""
 
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -26,7 +27,7 @@ from studies.budget.starting_points import plan_from_settings
 from studies.commands.console import INTERRUPTED, Seconds, Time, say, told
 from studies.commands.sweep import make_all, require_enough
 from studies.photograph.clock import Clock
-from studies.study.cost import cores
+from studies.study.cost import PictureCost, cores
 from studies.study.lit_scene import film_of, level_luminance, lux_per_cd_m2, open_choice
 from studies.study.render_noise import MARGIN, render_share
 from studies.study.study import SceneChoice, Study
@@ -162,6 +163,7 @@ def reference(
     max_seconds: Seconds | None = None,
     define: tuple[str, ...] = (),
     out: Path | None = None,
+    dry_run: bool = False,
 ) -> int:
     """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
 
@@ -183,6 +185,9 @@ def reference(
         NAME=VALUE of a $parameter of the scene file; -D is short for it; may be given several times.
     out
         Folder of references; by default the variable RODCONE_REFERENCES names it, or it lies in your home.
+    dry_run
+        Print what the first 512 samples per pixel cost, and how far the light that is there already has come; render
+        nothing.
     """
     # What to render, as the demo would
     require_range("until", until, 1e-4, 1e3, "give a share of the sensor's noise variance: 0.03")
@@ -195,21 +200,34 @@ def reference(
     path = reference_path(folder, opened.scene, film)
     found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)
     transport = found.transport if found else None  # what is there already is gone on from
+    if not transport:
+        cost = PictureCost(
+            size=film.size,
+            bands=film.wavelength_nm.size,
+            groups=len(opened.scene.groups),
+            spp=STEP_SPP,
+            after_s=0.0,
+            max_seconds=max_seconds,
+        )
+        if not told(cost, dry_run=dry_run, json=False):
+            print(f"After these it tells how long a share of {until:g} of the sensor's variance takes.")
+            return 0
+    elif dry_run:
+        print(_so_far(transport, _most(_shares(transport, study)), until))
+        return 0
     # Go on until the noise is low enough, and keep the file after each step
     with progress(sys.stderr) as step:
         while True:
             most_samples = STEP_SPP
             if transport:
                 shares = _shares(transport, study)
-                now = max(share for of_sensor in shares.values() for share in of_sensor.values())
+                now = _most(shares)
                 save_reference(
                     path,
                     transport,
                     _certificate(transport, shares, now, f"rodcone reference {scene} --size {max(film.size)}"),
                 )
-                left_s = transport.seconds * (MARGIN * now / until - 1)
-                words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
-                say(f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}")
+                say(_so_far(transport, now, until))
                 if now <= until or transport.stopped_by != "samples":
                     break
                 most_samples = int(min(MOST_SPP, transport.spp + STEP_SPP, transport.spp * MARGIN * now / until + 1))
@@ -229,6 +247,18 @@ def reference(
                 break
     print(path)
     return INTERRUPTED if transport.stopped_by == "interrupt" else 0
+
+
+def _so_far(transport: Transport, now: float, until: float) -> str:
+    """One line: samples, the share of the sensor's variance that they leave, and how long the rest takes."""
+    left_s = transport.seconds * (MARGIN * now / until - 1)
+    words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
+    return f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}"
+
+
+def _most(shares: Mapping[str, Mapping[str, float]]) -> float:
+    """Return the largest share over sensors and levels."""
+    return max(share for of_sensor in shares.values() for share in of_sensor.values())
 
 
 def _shares(transport: Transport, study: Study) -> dict[str, dict[str, float]]:

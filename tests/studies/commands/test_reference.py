@@ -15,6 +15,7 @@ from render.reference import FOLDER, SHIPPED, find_reference, require_agreement,
 from rodcone.progress import duration
 from scenes.catalogue import load
 from studies.budget.starting_points import plan_from_settings
+from studies.commands import demo
 from studies.commands.demo import STUDY
 from studies.study.lit_scene import film_of, open_choice
 from studies.study.render_noise import MARGIN
@@ -63,6 +64,24 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(folder, monke
     assert second["share"] <= float(until)
     assert second["samples"] > first["samples"]
     assert second["seconds"] > first["seconds"]
+
+
+def test_a_dry_run_says_what_the_first_samples_cost_or_how_far_the_light_has_come(tmp_path, monkeypatch):
+    monkeypatch.setenv(FOLDER, str(tmp_path / "none"))
+    monkeypatch.setattr(demo, "render", lambda *_, **__: pytest.fail("rendered"))
+    code, out, told = call(["reference", "still_life", "--size", "64", "--dry-run"])
+    assert (code, told) == (0, "")
+    assert re.match(r"about .+ GB: 64 x 64 pixels, 512 samples per pixel, 20 bands;", out)
+    assert "share of 0.03" in out
+    code, out, told = call(["reference", "still_life", "--until", "0.001", "--dry-run"])  # 256 px come with rodcone
+    share = stored(size=256).certificate["share"]
+    read_back = re.fullmatch(
+        r"\d+ samples a pixel: ([\d.]+) of the sensor's variance in .+; about .+ more to 0.001\n", out
+    )
+    assert (code, told) == (0, "")
+    assert read_back is not None
+    assert float(read_back[1]) == pytest.approx(share, rel=0.1)
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_the_demo_tests_the_reference_photographs_it_and_says_so(folder, tmp_path, monkeypatch):
