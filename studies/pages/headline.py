@@ -149,7 +149,10 @@ def in_light(pair: Pair) -> str:
             if here == outcome and ratio[0] > 1:
                 mean, *ends = (significant(1 / value, digits=2) for value in ratio)
                 interval = f" ({' to '.join(reversed(ends))})" if len(set(ends)) > 1 else ""
-                shares.append(f"{_SHARES.get(mean, f'{mean} times')} the light{interval} at {name}")
+                word = next(
+                    (word for share, word in _SHARES.items() if abs(share * ratio[0] - 1) < _ROUND), f"{mean} times"
+                )
+                shares.append(f"{word} the light{interval} at {name}")
         if shares:
             sentences.append(f"For the same PSNR {better} needs {', '.join(shares)}.")
     if not sentences:
@@ -161,7 +164,8 @@ def in_light(pair: Pair) -> str:
     return " ".join(sentences)
 
 
-_SHARES = {"0.5": "half", "0.33": "a third", "0.25": "a quarter"}
+_SHARES = {1 / 2: "half", 1 / 3: "a third", 1 / 4: "a quarter"}
+_ROUND = 0.05  # of a share, within which its word is said; the interval stands beside it
 
 
 # Words of pairs in their places

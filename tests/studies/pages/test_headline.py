@@ -76,6 +76,9 @@ def test_in_light_the_better_one_needs_less() -> None:
     assert words == f"For the same PSNR A needs half the light at moonlight. {alike}"
     # a deviation of 0.5 sqrt(3/2) dB: half the interval is 4.303 x 0.612 / sqrt(3) = 1.52 dB, a factor of 1.42
     assert "half the light (0.35 to 0.71) at moonlight" in in_light(pair(psnr_db=[3, 3, 0, 0], scatter=0.5))
+    # half within a twentieth, said in a word; further off, as a number
+    assert "half the light (0.35 to 0.7" in in_light(pair(psnr_db=[3.1, 3.1, 0, 0], scatter=0.5))
+    assert "0.45 times the light (" in in_light(pair(psnr_db=[3.5, 3.5, 0, 0], scatter=0.5))
     # A's curve is 5, 15, 30: it has 10 dB after half a decade, and 20 after a third
     lost = in_light(pair(psnr_db=[-5, -5, 0, 0], scatter=0.001))
     assert lost == (
