@@ -31,7 +31,7 @@ import numpy as np
 from environment import beside, in_turn, print_environment, seconds_of
 from skimage.restoration import denoise_nl_means
 
-from isp.interleaved import reconstruct, reconstruct_with_noise
+from isp.interleaved.reconstruction import reconstruct, reconstruct_with_noise
 from isp.ple.tables import table
 from isp.processors.catalogue import PROCESSORS
 from isp.settings import Settings

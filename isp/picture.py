@@ -121,7 +121,8 @@ def finish(
     engine : "cuda", "llvm" or "numpy"
         What made the planes.
     noise_gain : (h, w, 3) array, optional
-        Of `isp.interleaved.reconstruct_with_noise`: with a `ColourFit` as `matrix`, colours that know this noise.
+        As `isp.interleaved.reconstruction.reconstruct_with_noise` returns it: with a `ColourFit` as `matrix`, colours
+        that know this noise.
     """
     shape = *raw.shape, len(raw.channels)
     if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):

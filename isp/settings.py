@@ -39,8 +39,8 @@ class Settings:
         Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
         0.001 to inf.
     distance : {"noise", "raw"}
-        Whether one guide serves all channels, in units of noise (`isp.panchromatic`), or as the paper has it each
-        channel its own plane, in electrons, for which W's stands by eq. (6), alpha counted over the patch.
+        Whether one guide serves all channels, in units of noise (`isp.interleaved.panchromatic`), or as the paper has
+        it each channel its own plane, in electrons, for which W's stands by eq. (6), alpha counted over the patch.
 
     Raises
     ------
@@ -111,7 +111,7 @@ class Reconstruction:
 
 @dataclass(frozen=True)
 class WhiteReading:
-    """A frame whose every sample is read as W (`isp.panchromatic.read_as_white`).
+    """A frame whose every sample is read as W (`isp.interleaved.panchromatic.read_as_white`).
 
     Attributes
     ----------

@@ -35,7 +35,7 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
     Parameters
     ----------
     estimate : (h, w, channel) array
-        Of `isp.interleaved.reconstruct` [e-].
+        Of `isp.interleaved.reconstruction.reconstruct` [e-].
     """
     kept = estimate[..., raw.channels.index("G")][~raw.saturated][::MEDIAN_STEP]
     green = np.asarray(kept, dtype=np.float64)

@@ -14,7 +14,7 @@ from PIL import Image, ImageDraw
 
 import rodcone
 from isp.colour.encoding import encode
-from isp.panchromatic import read_as_white
+from isp.interleaved.panchromatic import read_as_white
 from render.illuminants import illuminant
 from render.spectrum import photons_per_joule
 from sensor.cfa import mask

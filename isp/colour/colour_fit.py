@@ -275,7 +275,7 @@ def relative_noise(
     Parameters
     ----------
     estimate, noise_gain : (h, w, channel) array
-        Of `isp.interleaved.reconstruct_with_noise`; the median gain counts.
+        Of `isp.interleaved.reconstruction.reconstruct_with_noise`; the median gain counts.
     gains : (channel,) float64
         White balance.
 

@@ -5,7 +5,7 @@ import numpy as np
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
-from isp.interleaved import reconstruct_with_noise
+from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.picture import Picture, require_letters
 from isp.settings import DEFAULTS, Settings
 from isp.substitution import COLOUR_ERROR

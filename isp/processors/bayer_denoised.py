@@ -12,7 +12,7 @@ import numpy as np
 from isp.anscombe import stabilise, unstabilise
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
-from isp.interleaved import reconstruct_with_noise
+from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.picture import Picture, finish
 from isp.processors.demosaic import MALVAR_REACH, picture_demosaicked, require_bayer
 from isp.processors.mosaic import balance_mosaic, to_rgb
@@ -30,7 +30,7 @@ OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6
 
 
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image with `isp.interleaved.reconstruct`; every sample, read as green, guides.
+    """Develop a Bayer raw image with `isp.interleaved.reconstruction.reconstruct`; every sample, read as green, guides.
 
     The colours know their noise, as the interleaved camera's do.
     """

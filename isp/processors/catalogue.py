@@ -13,9 +13,9 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import interpolate_defects
+from isp.interleaved.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
 from isp.levelling import levelled
 from isp.picture import Picture
-from isp.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
 from isp.processors.any_mosaic import picture_any_mosaic
 from isp.processors.bayer_denoised import picture_bayer_nlm, picture_demosaicked_first, picture_denoised_first
 from isp.processors.demosaic import EXTRA as DEMOSAICKING

@@ -9,7 +9,7 @@ from math import log2
 
 import numpy as np
 
-from isp.similarity.guide import saturated_fraction
+from isp.interleaved.saturation import saturated_fraction
 from rodcone.colour_spaces import encode_srgb
 from rodcone.types import Image
 from sensor.cfa import mask

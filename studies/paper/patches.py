@@ -2,7 +2,7 @@
 
 Figure 4: beside an edge, the patch around a pixel x is nearer to that of y on its own side than to that of z. Section
 3.1: with patches of one pixel eq. (1) is the bilateral filter, with larger ones non-local means; both are written down
-here once more, straight from the two filters' own papers, to compare with `isp.interleaved`.
+here once more, straight from the two filters' own papers, to compare with `isp.interleaved.reconstruction`.
 """
 
 from collections.abc import Mapping
@@ -15,7 +15,7 @@ from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_raw
-from isp.interleaved import reconstruct
+from isp.interleaved.reconstruction import reconstruct
 from isp.planes import fill
 from isp.settings import Settings
 from rodcone.colour_spaces import encode_srgb

@@ -8,7 +8,7 @@ from typing import Annotated, Any, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.interleaved import reconstruct
+from isp.interleaved.reconstruction import reconstruct
 from isp.settings import Settings
 from render.engine import render
 from render.geometry import horizontal_view_deg

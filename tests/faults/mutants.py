@@ -29,7 +29,7 @@ from plant_faults import MAKE_TEST, ROOT, run_tests
 
 TESTS = {  # below tests/
     "sensor/readout.py": "sensor",
-    "isp/reference.py": "isp",
+    "isp/interleaved/numpy_form.py": "isp",
     "render/transport.py": "render",
     "render/meter.py": "render",
     "studies/pages/verdict.py": "studies/pages",

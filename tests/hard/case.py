@@ -31,7 +31,7 @@ class Situation:
     exposure_s : float
         [s].
     develop : mapping
-        Keywords of `isp.pipeline.picture_interleaved`, and fields of its `settings`.
+        Keywords of `isp.interleaved.pipeline.picture_interleaved`, and fields of its `settings`.
     bayer : tuple of str
         Mosaic of the same camera's other picture.
     samples_per_pixel : int

@@ -23,7 +23,7 @@ from hard.light import (
     with_planes,
 )
 
-from isp.interleaved import reconstruct
+from isp.interleaved.reconstruction import reconstruct
 from render.radiance import SpectralRadiance
 from sensor.cfa import channel_map
 from sensor.config import LensConfig, SensorConfig

@@ -7,16 +7,16 @@ from hard.case import Margin, Situation, worse, worst_of
 from hard.chain import CAMERAS, develop_fixed, shoot, to_picture
 
 from isp.colour.white_balance import neutral_response
-from isp.kernel.edges import FAR
-from isp.panchromatic import read_as_white
-from isp.reference import sum_weights
+from isp.interleaved.kernel.edges import FAR
+from isp.interleaved.numpy_form import sum_weights
+from isp.interleaved.panchromatic import read_as_white
 from isp.settings import NEIGHBOURHOOD, PATCH, SIGMA_D, SIGMA_S, Settings
 from rodcone.types import Image
 from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
 # The kernel's own bound: 1e-4 of the samples' range, or some 16 roundings of the largest log weight
-# (isp.kernel.accumulate, isp.kernel.kernel). Two developments differ by twice that.
+# (isp.interleaved.kernel.accumulate, isp.interleaved.kernel.kernel). Two developments differ by twice that.
 KERNEL_ERROR = 1e-4
 KERNEL_ROUNDINGS = 16 * 2.0**-24
 DOUBLE_ROUNDINGS = 64 * 2.0**-53  # bilinear planes and their matrix, all in double precision

@@ -8,11 +8,11 @@ import pytest
 from loop import loop
 
 from isp.anscombe import stabilise_raw, unstabilise_raw, without_prnu
-from isp.interleaved import reconstruct_with_noise
+from isp.interleaved.numpy_form import reference_with_noise
+from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.kriging import reconstruct_linear
 from isp.ple.prior import own_prior
 from isp.ple.pyramid import reconstruct as reconstruct_ple
-from isp.reference import reference_with_noise
 from isp.remosaic import remosaic
 from isp.settings import DEFAULTS
 from sensor.cfa import RGBW, channels, mask

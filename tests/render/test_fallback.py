@@ -20,7 +20,7 @@ from sensor.device import draw_device
 from sensor.presets import low_noise
 from sensor.raw import RawImage
 from sensor.cfa import RGBW
-from isp.interleaved import reconstruct_with_noise
+from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.settings import Settings
 
 said = []

@@ -10,7 +10,7 @@ from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, behind, mosaic_of, raw
 from refusal import refusal
 from skimage import data
 
-from isp.interleaved import reconstruct
+from isp.interleaved.reconstruction import reconstruct
 from isp.processors import sub_images
 from isp.processors.bayer_denoised import NOISE_AFTER_DEMOSAICKING
 from isp.processors.catalogue import PROCESSORS

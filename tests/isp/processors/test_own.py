@@ -31,11 +31,11 @@ def told(name: str) -> str:
 
 def test_a_function_and_a_processor_of_ones_own_are_what_they_call(tmp_path: Path) -> None:
     expected = PROCESSORS["bayer"].develop(RAW, COLOURS)
-    plain = "from isp.pipeline import picture_bayer as develop\n"
+    plain = "from isp.interleaved.pipeline import picture_bayer as develop\n"
     function = processor_of(written(tmp_path, plain))
     assert (function.mosaic, function.colours, function.unit) == ("own", (), "")
     assert np.array_equal(function.develop(RAW, COLOURS).rgb, expected.rgb)
-    stated = "from isp.processors.catalogue import Processor\nfrom isp.pipeline import picture_bayer\n"
+    stated = "from isp.processors.catalogue import Processor\nfrom isp.interleaved.pipeline import picture_bayer\n"
     processor = processor_of(written(tmp_path, stated + "develop = Processor('bayer', picture_bayer, 'mine')\n"))
     assert (processor.mosaic, processor.source) == ("bayer", "mine")
     assert processor.develop(RAW, COLOURS).balance == expected.balance

@@ -6,7 +6,7 @@ from math import pi
 import numpy as np
 import pytest
 
-from isp.similarity.guide import saturated_fraction
+from isp.interleaved.saturation import saturated_fraction
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.presets import preset

@@ -215,7 +215,7 @@ def test_a_likely_mistake_is_told_with_its_fix(tmp_path: Path) -> None:
 
 
 def test_code_beside_a_study_runs_with_consent_alone(tmp_path: Path) -> None:
-    (tmp_path / "mine.py").write_text("from isp.pipeline import picture_bayer as develop\n", "utf-8")
+    (tmp_path / "mine.py").write_text("from isp.interleaved.pipeline import picture_bayer as develop\n", "utf-8")
     changes = ['processors=["mine.py:develop", "bayer"]']
     refusal(read_study, written(tmp_path), changes, match=r"processors: '.*mine.py:develop' is Python code")
     for sly in ("trust_code=true", "trust_code=1"):

@@ -236,7 +236,7 @@ def test_targets_have_their_own_figures_on_their_own_scene(tmp_path: Path) -> No
 
 def test_a_processor_of_ones_own_counts_by_its_bytes_and_workers_run_no_others(tmp_path: Path) -> None:
     mine = tmp_path / "mine.py"
-    mine.write_text("from isp.pipeline import picture_bayer as develop\n", "utf-8")
+    mine.write_text("from isp.interleaved.pipeline import picture_bayer as develop\n", "utf-8")
     sensor = tmp_path / "bayer.toml"
     sensor.write_text(preset_file("low_noise").read_text("utf-8").replace('"rgbw"', '"bayer"', 1), "utf-8")
     asked: dict[str, Any] = {"processors": (f"{mine}:develop",), "trust_code": True, "sensors": (str(sensor),)}

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_4X4, RGBW_PHASES, raw_image
 
+from isp.interleaved.brightest import SIGMAS, brightest_allowed
+from isp.interleaved.saturation import WINDOW, saturated_fraction
 from isp.planes import fill
 from isp.settings import DEFAULTS, PAPER, Settings
-from isp.similarity.brightest import SIGMAS, brightest_allowed
-from isp.similarity.guide import WINDOW, saturated_fraction
 from sensor.cfa import BAYER, RGBW
 
 

@@ -10,19 +10,21 @@ import pytest
 from builders import RGBW_4X4, mosaic_of, raw_image, single_precision
 
 from isp.colour.white_balance import WhiteBalance
-from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.kernel.schedule import list_threads, make_pattern
+from isp.interleaved.kernel.schedule import list_threads, make_pattern
+from isp.interleaved.numpy_form import reference_with_noise, sum_weights
+from isp.interleaved.reconstruction import reconstruct, reconstruct_with_noise
+from isp.interleaved.saturation import saturated_fraction
 from isp.processors.catalogue import NAMED
-from isp.reference import reference_with_noise, sum_weights
 from isp.settings import PAPER, PAPER_5X5, Settings
-from isp.similarity.guide import saturated_fraction
 from rodcone.errors import InputError
 from rodcone.jit import backend, dr
 from sensor.cfa import BAYER, RGBW, Tile, channel_map, channels
 from sensor.raw import RawImage
 
 BLACK, FULL = 100.0, 4000.0
-EXP2_ERROR = 1.6e-4  # of a ratio of two weights: each is right to 7.5e-5 (isp.kernel.accumulate), and rounded
+EXP2_ERROR = (
+    1.6e-4  # of a ratio of two weights: each is right to 7.5e-5 (isp.interleaved.kernel.accumulate), and rounded
+)
 
 
 def exposure(electrons, tile=RGBW, read_noise_e=2.0):
@@ -278,7 +280,7 @@ def test_bad_parameters_are_one_line_of_advice(function):
 
 
 def test_without_dr_jit_the_reference_runs_and_the_result_says_so(monkeypatch):
-    monkeypatch.setattr("isp.interleaved.backend", lambda: "numpy")
+    monkeypatch.setattr("isp.interleaved.reconstruction.backend", lambda: "numpy")
     raw = scene((9, 8), 300.0)
     result = reconstruct_with_noise(raw)
     assert result.engine == "numpy"

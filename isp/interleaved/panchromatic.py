@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 from scipy.ndimage import correlate1d
 
 from isp.anscombe import stabilise_channel
-from isp.kernel.edges import TINY, channel_noise
-from isp.kernel.panchromatic import (
+from isp.interleaved.kernel.edges import TINY, channel_noise
+from isp.interleaved.kernel.panchromatic import (
     DETAIL_PX,
     FAINT,
     LEAST_LIGHT,
@@ -123,7 +123,7 @@ def _comb(steps: range) -> Floats:
 
 
 def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats]:
-    """Shares of the surroundings and guide [e-], in double precision; `isp.kernel.panchromatic` does it in single."""
+    """Return the surroundings' shares and the guide [e-] in double precision; `.kernel.panchromatic` in single."""
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     (shot, dark, _), electrons = channel_noise(raw), raw.electrons
     down, across = len(raw.cfa), len(raw.cfa[0])

@@ -3,15 +3,22 @@
 With a shared guide a thread owns all pixels of its block and reads one plane. Otherwise it owns those whose y lie at
 one cell of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and
 all mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
-(`isp.kernel.layout`).
+(`isp.interleaved.kernel.layout`).
 """
 
 from dataclasses import dataclass
 from typing import Any
 
-from isp.kernel.accumulate import HEADROOM, LEAST_WEIGHT, add_samples, mixed_squares, squared_distances, start_sums
-from isp.kernel.layout import Inputs
-from isp.kernel.schedule import Guide, Threads
+from isp.interleaved.kernel.accumulate import (
+    HEADROOM,
+    LEAST_WEIGHT,
+    add_samples,
+    mixed_squares,
+    squared_distances,
+    start_sums,
+)
+from isp.interleaved.kernel.layout import Inputs
+from isp.interleaved.kernel.schedule import Guide, Threads
 from rodcone.jit import dr
 
 

@@ -4,8 +4,9 @@
 
 What the paper leaves open is settled so:
 
-- One guide serves all channels: every sample read as W (`isp.panchromatic`), in units of noise by the Anscombe
-  transform. The paper's own method fills a plane a channel (`isp.planes`), in electrons, and eq. (6) mixes them.
+- One guide serves all channels: every sample read as W (`isp.interleaved.panchromatic`), in units of noise by the
+  Anscombe transform. The paper's own method fills a plane per channel (`isp.planes`), in electrons, and eq. (6) mixes
+  them.
 - Patches go on beyond the border by reflection without repeating the edge.
 - Omega ends at the border, where W_y normalises. Samples are averaged in electrons.
 - The largest weight counts as 1, so W_y is never 0: where all others underflow, the most similar sample is the result.
@@ -17,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.white_balance import neutral_response
-from isp.kernel.run import reconstruct_strips
-from isp.panchromatic import read_as_white
-from isp.reference import reference_with_noise
+from isp.interleaved.kernel.run import reconstruct_strips
+from isp.interleaved.numpy_form import reference_with_noise
+from isp.interleaved.panchromatic import read_as_white
 from isp.settings import DEFAULTS, Reconstruction, Settings
 from rodcone.jit import backend
 from rodcone.types import Floats

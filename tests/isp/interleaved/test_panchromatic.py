@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from builders import RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image
 
-from isp import panchromatic
-from isp.panchromatic import read_as_white, with_full_white
+from isp.interleaved import panchromatic
+from isp.interleaved.panchromatic import read_as_white, with_full_white
 from isp.processors.catalogue import PROCESSORS
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, channel_map
@@ -134,7 +134,7 @@ def test_both_engines_agree(tile, monkeypatch):
             twin = read_as_white(raw, neutral_of(raw))
         assert kernel.shares == pytest.approx(twin.shares, rel=1e-4), shape
         assert kernel.guide == pytest.approx(twin.guide, rel=1e-4, abs=1e-3), shape
-        monkeypatch.setattr("isp.kernel.panchromatic.BAND_PIXELS", 7 * shape[1])
+        monkeypatch.setattr("isp.interleaved.kernel.panchromatic.BAND_PIXELS", 7 * shape[1])
         bands = read_as_white(raw, neutral_of(raw))
         monkeypatch.undo()
         assert np.array_equal(bands.guide, kernel.guide), shape

@@ -1,14 +1,14 @@
 """The two cameras' pipelines: raw image in, scene-linear RGB out."""
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.edges import sharpen
 from isp.colour.highlights import clip_highlights
 from isp.colour.white_balance import WhiteBalance
-from isp.interleaved import reconstruct_with_noise
+from isp.interleaved.edges import sharpen
+from isp.interleaved.reconstruction import reconstruct_with_noise
+from isp.interleaved.saturation import saturated_fraction
 from isp.picture import Picture, finish, require_letters
 from isp.planes import bilinear, rows_at
 from isp.settings import DEFAULTS, PAPER, Settings
-from isp.similarity.guide import saturated_fraction
 from isp.substitution import SMOOTH_COLOUR_ERROR, SUBSTITUTION_SNR, green_snr, matrix_with_white, substitution_weight
 from rodcone.errors import InputError
 from sensor.raw import RawImage
@@ -34,7 +34,7 @@ def picture_interleaved(
     balance : WhiteBalance
         Gray World's, or a response to what should come out neutral, such as a file's as-shot neutral.
     settings : Settings
-        Of `isp.interleaved.reconstruct`.
+        Of `isp.interleaved.reconstruction.reconstruct`.
     substitution_snr : float
         W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
 

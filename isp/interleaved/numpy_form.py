@@ -11,10 +11,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from isp.interleaved.brightest import brightest_allowed
+from isp.interleaved.saturation import saturated_fraction
 from isp.planes import fill
 from isp.settings import PAPER, Reconstruction, Settings
-from isp.similarity.brightest import brightest_allowed
-from isp.similarity.guide import saturated_fraction
 from rodcone.types import Mosaic, Plane
 from sensor.cfa import mask
 from sensor.raw import RawImage
@@ -56,8 +56,8 @@ def reference_with_noise(
     Parameters
     ----------
     guide : (h, w) float64, optional
-        The one plane that patches are read from, of `isp.panchromatic.read_as_white`. Left out, each channel has its
-        own as the paper writes, W's stands for it by eq. (6), and distances are in electrons.
+        The one plane that patches are read from, as `isp.interleaved.panchromatic.read_as_white` returns it. Left out,
+        each channel has its own as the paper writes, W's stands for it by eq. (6), and distances are in electrons.
 
     Raises
     ------

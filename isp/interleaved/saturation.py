@@ -1,4 +1,4 @@
-"""What guides the paper's similarity at each pixel, W or the channel itself (eq. 6)."""
+"""What guides the paper's similarity at each pixel, W or the channel itself: alpha of eq. (6)."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.kernel.accumulate import HEADROOM
-from isp.kernel.kernel import KernelSums, Shape, launch
-from isp.kernel.layout import Inputs, Span, cut_strip, lay_out, strip_rows
-from isp.kernel.schedule import Guide, Pattern, Threads, list_threads, make_pattern
+from isp.interleaved.kernel.accumulate import HEADROOM
+from isp.interleaved.kernel.kernel import KernelSums, Shape, launch
+from isp.interleaved.kernel.layout import Inputs, Span, cut_strip, lay_out, strip_rows
+from isp.interleaved.kernel.schedule import Guide, Pattern, Threads, list_threads, make_pattern
 from isp.settings import Settings
 from rodcone.device_arrays import upload
 from rodcone.jit import arrays, dr

@@ -1,4 +1,4 @@
-"""The formula of `isp.colour.edges` in Dr.Jit: a thread a pixel, whose four channels lie together in a packet."""
+"""The formula of `isp.interleaved.edges` in Dr.Jit: a thread a pixel, whose four channels lie together in a packet."""
 
 from functools import reduce
 from itertools import combinations_with_replacement, product
@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.kernel.accumulate import larger
+from isp.interleaved.kernel.accumulate import larger
 from isp.settings import WhiteReading
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
@@ -45,7 +45,7 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
 def sharpen_frame(
     white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any], scales: Floats
 ) -> NDArray[np.float32]:
-    """As `isp.colour.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
+    """As `isp.interleaved.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
     jit, raw = arrays(), white.raw
     names, (height, width) = raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from builders import RGBW_4X4, RGBW_PHASES, mosaic_of, raw_image, single_precision
 
-from isp.interleaved import reconstruct, reconstruct_with_noise
-from isp.reference import sum_weights
+from isp.interleaved.numpy_form import sum_weights
+from isp.interleaved.reconstruction import reconstruct, reconstruct_with_noise
 from isp.settings import Settings
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW, channel_map, channels

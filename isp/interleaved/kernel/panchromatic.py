@@ -1,4 +1,4 @@
-"""The formulas of `isp.panchromatic` in Dr.Jit, in bands of rows, so that memory stays bounded.
+"""The formulas of `isp.interleaved.panchromatic` in Dr.Jit, in bands of rows, so that memory stays bounded.
 
 Shares change more slowly than light: a thread a tile makes them, a thread a pixel the guide.
 """
@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
-from isp.kernel.accumulate import larger
-from isp.kernel.edges import TINY, channel_noise, pick
-from isp.kernel.layout import packet_width
+from isp.interleaved.kernel.accumulate import larger
+from isp.interleaved.kernel.edges import TINY, channel_noise, pick
+from isp.interleaved.kernel.layout import packet_width
 from isp.planes import tent
 from rodcone.device_arrays import divide, divisor, upload
 from rodcone.jit import arrays, dr
@@ -123,7 +123,7 @@ class Frame:
 def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Shares of the surroundings, by tile (rows, columns, channel), and guide, (h, w) [deviations of W's noise].
 
-    As `isp.panchromatic.read_as_white` states them.
+    As `isp.interleaved.panchromatic.read_as_white` states them.
     """
     (height, width), (down, across) = raw.shape, (len(raw.cfa), len(raw.cfa[0]))
     frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)

@@ -7,8 +7,8 @@ import pytest
 from builders import RGBW_4X4, raw_image
 from command_line import in_new_python
 
-from isp.interleaved import reconstruct_with_noise
-from isp.kernel.schedule import make_pattern
+from isp.interleaved.kernel.schedule import make_pattern
+from isp.interleaved.reconstruction import reconstruct_with_noise
 from isp.settings import Settings
 from rodcone.jit import backend
 from sensor.cfa import BAYER, RGBW
@@ -35,8 +35,8 @@ def test_the_height_of_strips_changes_no_bit(tile, distance, sigma_s, monkeypatc
     whole = reconstruct_with_noise(raw, settings)
     for height in (1, 2, 5):  # blocks a strip
         block = make_pattern(tile).block[0]
-        monkeypatch.setattr("isp.kernel.run.strip_rows", lambda *_, rows=height * block: rows)
-        monkeypatch.setattr("isp.kernel.panchromatic.BAND_PIXELS", height * block * raw.shape[1])
+        monkeypatch.setattr("isp.interleaved.kernel.run.strip_rows", lambda *_, rows=height * block: rows)
+        monkeypatch.setattr("isp.interleaved.kernel.panchromatic.BAND_PIXELS", height * block * raw.shape[1])
         strips = reconstruct_with_noise(raw, settings)
         assert np.array_equal(strips.estimate, whole.estimate)
         assert np.array_equal(strips.noise_gain, whole.noise_gain)
@@ -45,7 +45,7 @@ def test_the_height_of_strips_changes_no_bit(tile, distance, sigma_s, monkeypatc
 MEASURE = """
 import json, resource, sys
 import numpy as np
-from isp.interleaved import reconstruct
+from isp.interleaved.reconstruction import reconstruct
 from isp.settings import Settings
 from sensor.raw import RawImage
 height, width = int(sys.argv[1]), int(sys.argv[2])

@@ -33,12 +33,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
-from isp.kernel.schedule import Guide, Pattern, list_offsets
+from isp.interleaved.brightest import brightest_allowed
+from isp.interleaved.kernel.accumulate import LEAST_INVERSE_VARIANCE, OUTSIDE
+from isp.interleaved.kernel.schedule import Guide, Pattern, list_offsets
+from isp.interleaved.saturation import fraction_of_full
 from isp.planes import fill
 from isp.settings import Settings
-from isp.similarity.brightest import brightest_allowed
-from isp.similarity.guide import fraction_of_full
 from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
 from sensor.raw import RawImage, full_at_sites
@@ -68,7 +68,7 @@ class Strip:
     alpha : (h, w) float64 or None
         Eq. (6); None where it is 0 everywhere, and where one plane guides all channels.
     brightest : (th, tw, h, w) float32
-        Up to where samples count, of `isp.similarity.brightest` [DN over black].
+        Up to where samples count, of `isp.interleaved.brightest` [DN over black].
     """
 
     shape: tuple[int, int]
@@ -95,7 +95,7 @@ class Inputs:
     alpha : Float
         Packets of alpha, [row, packet, value]. None with a shared guide, and where it is 0 everywhere.
     entries, counts : Float, UInt
-        Of `isp.kernel.schedule.list_offsets`.
+        Of `isp.interleaved.kernel.schedule.list_offsets`.
     length : UInt
         Entries that a list has room for.
     packet_rows, packet_columns : int

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
-from isp.kernel.edges import (
+from isp.interleaved.kernel.edges import (
     APART,
     CORRELATION,
     FAR,
@@ -26,7 +26,7 @@ from isp.kernel.edges import (
     channel_noise,
     sharpen_frame,
 )
-from isp.panchromatic import at_pixels
+from isp.interleaved.panchromatic import at_pixels
 from isp.settings import WhiteReading
 from rodcone.jit import backend
 from rodcone.types import Floats
@@ -70,7 +70,7 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
         F'_c = F_c + max((1 - 1 / e^2) min(1, max(chi^2 / 30, l)), q, q_c) (max_d g_d F_d / g_c - F_c).
 
     Light that fills less than two fifths of the window, e > 1.5, and of which a plane averages few samples, is the
-    sample's own S, in the colour around: by the shares u of the surroundings (`isp.panchromatic`), or a neutral's where
+    sample's own S, in the colour around: by the shares u of the surroundings (`.panchromatic`), or a neutral's where
     S and a colour beside are full. With v = S / u_o, N_v its noise, and G the largest noise gain of a channel,
 
         F''_c = F'_c + min(1, 4 G) (1 - 1 / (1 + (e / 1.5)^4)) (L_c - F'_c),
@@ -84,11 +84,11 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     white : WhiteReading
         The frame, and the shares u.
     planes : (h, w, 4) float
-        R, G, B and W of `isp.interleaved.reconstruct` [e-].
+        R, G, B and W of `isp.interleaved.reconstruction.reconstruct` [e-].
     gains : (4,) float64
         White balance.
     noise_gain : (h, w, 4) float
-        Of `isp.interleaved.reconstruct_with_noise`.
+        Of `isp.interleaved.reconstruction.reconstruct_with_noise`.
 
     Returns
     -------
@@ -119,7 +119,7 @@ def _sharpen(
     planes: Floats,
     *samples: NDArray[Any],
 ) -> Floats:
-    """In double precision; planes and samples reach `FAR` pixels further. `isp.kernel.edges` is the same in single."""
+    """Sharpen in double precision; planes and samples reach `FAR` pixels further. `.kernel.edges` does it in single."""
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))

@@ -7,9 +7,9 @@ import pytest
 from builders import RGBW_4X4, RGBW_PHASES, behind, raw_image
 from scipy.ndimage import gaussian_filter
 
-from isp.colour import edges
-from isp.colour.edges import sharpen
-from isp.panchromatic import read_as_white
+from isp.interleaved import edges
+from isp.interleaved.edges import sharpen
+from isp.interleaved.panchromatic import read_as_white
 from isp.processors.catalogue import NAMED
 from isp.settings import WhiteReading
 from rodcone.jit import backend
@@ -35,7 +35,7 @@ def frame(picture, tile=RGBW):
 
 
 def read(raw, colour=COLOUR):
-    """The frame as `isp.panchromatic` reads it where all around has one colour."""
+    """The frame as `isp.interleaved.panchromatic` reads it where all around has one colour."""
     tiles = [-(-length // size) for length, size in zip(raw.shape, (len(raw.cfa), len(raw.cfa[0])), strict=True)]
     shares = np.broadcast_to(np.float32(colour / colour[3]), (*tiles, 4)).copy()
     return WhiteReading(raw, shares, np.zeros(raw.shape, np.float32))

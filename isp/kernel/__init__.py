@@ -1,1 +1,0 @@
-"""The interleaved reconstruction in Dr.Jit, one source for processors and CUDA: see `isp.kernel.run`."""
