@@ -96,7 +96,9 @@ def _electrons(stable: NDArray[np.floating], noise: ChannelNoise) -> NDArray[np.
 def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
     """Steps of a raw image's noise, each with what its piece of the transform is moved by to meet the one before."""
     joined: list[tuple[NoiseStep, float]] = []
-    both, below, offset = gains_shot(raw, raw.dark_current_e), partial(_counted, noise=raw.plain_noise), 0.0
+    both = gains_shot(raw, raw.dark_current_e)
+    below = partial(_counted, noise=raw.plain_noise)
+    offset = 0.0
     for step in (replace(step, shot=step.shot + both) for step in raw.noise_steps):
         seam_e = np.array(step.from_e)
         offset += float(below(seam_e) - _piece(seam_e, step))

@@ -37,7 +37,8 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
     the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
-    names, plain = raw.channels, replace(without_prnu(raw), noise_steps=())
+    names = raw.channels
+    plain = replace(without_prnu(raw), noise_steps=())
     values = stabilise_raw(raw.electrons, plain)
     sampled = [mask(raw.cfa, name, raw.shape) for name in names]
     low, high = np.array([np.percentile(values[at], (15.9, 84.1)) for at in sampled]).T
@@ -77,7 +78,8 @@ def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORR
         Channels in the order of `sensor.cfa.channels`; sum of the squared weights, the noise's variance in it.
     """
     height, width = values.shape
-    count, scales = len(channels(tile)), (*deviation.tolist(), correlation)
+    count = len(channels(tile))
+    scales = (*deviation.tolist(), correlation)
     estimate, noise_gain = np.empty((count, height, width)), np.empty((count, height, width))
     blas = ThreadpoolController()
     for rows in _alike(height, len(tile)):

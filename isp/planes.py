@@ -51,9 +51,11 @@ def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
         Where the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one serves.
         The sums run in one order at every pixel: a part of the frame gives the same bits.
     """
-    result, down, across = np.empty_like(values), len(tile), len(tile[0])
+    result = np.empty_like(values)
+    down, across = len(tile), len(tile[0])
     for phase in np.ndindex(down, across):
-        at, radius = (slice(phase[0], None, down), slice(phase[1], None, across)), tent_radius(tile, channel)
+        at = (slice(phase[0], None, down), slice(phase[1], None, across))
+        radius = tent_radius(tile, channel)
         if tile[phase[0]][phase[1]] == channel:
             result[at] = values[at]
             continue
@@ -70,7 +72,8 @@ def _tent_sums(
     values: NDArray[Any], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Sums of tent times sample, and of the tent, over the samples in the frame, for the pixels at one phase."""
-    size, tents = (len(tile), len(tile[0])), _phase_tent(tile, channel, phase, radius).astype(values.dtype)
+    size = (len(tile), len(tile[0]))
+    tents = _phase_tent(tile, channel, phase, radius).astype(values.dtype)
     counts = [len(range(first, length, pace)) for first, length, pace in zip(phase, values.shape, size, strict=True)]
     total, weight = np.zeros(counts, values.dtype), np.zeros(counts, values.dtype)
     for i, j in np.argwhere(tents).tolist():
@@ -114,14 +117,17 @@ def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
 
 def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
     """Sums of `count` rows that follow each other, from sums of a power of two of them."""
-    rows, start, power, total = len(values) - count + 1, 0, 1, None
+    rows = len(values) - count + 1
+    start, power, total = 0, 1, None
     while True:
         if count & power:
             part = values[start : start + rows]
-            total, start = part.copy(order="K") if total is None else np.add(total, part, out=total), start + power
+            total = part.copy(order="K") if total is None else np.add(total, part, out=total)
+            start = start + power
         if 2 * power > count:
             return np.asarray(total)
-        values, power = values[:-power] + values[power:], 2 * power
+        values = values[:-power] + values[power:]
+        power = 2 * power
 
 
 def bilinear(raw: RawImage) -> NDArray[np.float64]:

@@ -35,7 +35,9 @@ LEAST_LIGHT = 1e-6  # of the brightest band's: darker ones tell nothing of T
 _TOUCH, _AS_WIDE = 0.02, 1.5  # gap over width, ratio of widths
 _LEAST_NEGATIVE = 1e-9  # of the largest weight: rounding
 MOST_NOISE = 1.05  # of weights: times that of products of averages
-_RIDGES, _HALVINGS = (1e-8, 10.0), 12  # of T's variance: found within 0.5 %
+# of T's variance: found within 0.5 %
+_RIDGES = (1e-8, 10.0)
+_HALVINGS = 12
 
 
 class LampSpectrum(Protocol):
@@ -271,7 +273,8 @@ class Interpolation:
 
     def expected_error(self, values: Floats, weights: Floats) -> Floats:
         """Standard deviation of the integral's error by such weights, for T of variance 1, shape (curve,)."""
-        of_light, nm = self._of_light(values), self.points.nm
+        of_light = self._of_light(values)
+        nm = self.points.nm
         own = np.einsum("cx,xy,cy->c", of_light, _matern(nm[:, None] - nm), of_light, optimize=True)
         cross = np.einsum("cx,xb,cb->c", of_light, self.towards, weights, optimize=True)
         known = np.einsum("cb,bd,cd->c", weights, self.among, weights, optimize=True)

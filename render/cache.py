@@ -44,7 +44,8 @@ def read_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoise
     arrays = read_arrays(_path(folder, scene, film, seed, _kind(denoised)))
     if arrays is None:
         return None
-    values, lights = json.loads(str(arrays["values"])), emission(scene.groups, film.wavelength_nm, film.width_nm)
+    values = json.loads(str(arrays["values"]))
+    lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
     shared = SharedPaths(tuple(values["shared"]), arrays["correlation"]) if values["shared"] else None
     return Transport(
         **{name: arrays[name] for name in _ARRAYS},

@@ -62,7 +62,8 @@ def _wrong_in_an_instance(instance: _Instance, parts: Mapping[str, Node]) -> Ite
     for key, shape in instance.group.items():
         if not isinstance(shape, dict):
             continue
-        name, where = shape.get("id", key), f"in shapegroup {instance.group_name!r}, which instance {instance.name!r}"
+        name = shape.get("id", key)
+        where = f"in shapegroup {instance.group_name!r}, which instance {instance.name!r}"
         surfaces = list(_with_referred(shape, parts))
         colours = [str(part.get("name")) for part in surfaces if part["type"] == "mesh_attribute"]
         if moved and (vertex := [colour for colour in colours if colour.startswith("vertex_")]):
@@ -80,7 +81,8 @@ def _wrong_in_an_instance(instance: _Instance, parts: Mapping[str, Node]) -> Ite
 
 
 def _wrong_by_its_transform(name: str, shape: Node, parts: Mapping[str, Node]) -> Iterator[tuple[str, str, str]]:
-    kind, transform = shape.get("type"), _matrix(shape.get("to_world"))
+    kind = shape.get("type")
+    transform = _matrix(shape.get("to_world"))
     if kind in (*_MAPS_TURN["normalmap"], *_MESHES) and _mirrors(transform):
         maps = {part["type"] for part in _with_referred(shape, parts)} & _MAPS_TURN.keys()
         for turned in sorted(turned for turned in maps if _has_normals(shape, _MAPS_TURN[turned])):
@@ -129,7 +131,8 @@ def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]
 
 def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
     """All parts under a node, those that it refers to among them, each once."""
-    pending, met = [node], set()
+    pending = [node]
+    met = set()
     while pending:
         part = pending.pop()
         if part.get("type") == "ref":

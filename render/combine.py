@@ -34,7 +34,8 @@ def combine(maps: Floats, planes: Planes) -> Planes:
             result[band] = factors[band, chosen] @ flat[chosen].astype(np.float64)
         return result.reshape(bands, height, width)
     types = arrays()
-    sums, index = dr.empty(types.Float, bands * pixels), dr.arange(types.UInt, pixels)
+    sums = dr.empty(types.Float, bands * pixels)
+    index = dr.arange(types.UInt, pixels)
     most = max(groups, *map(len, read))
     for band, chosen in enumerate(read):  # a kernel each, all of one code; arrays of the host are read where they are
         total = types.Float64(0)

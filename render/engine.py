@@ -203,16 +203,19 @@ def _render(
     scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress, denoise: bool
 ) -> Transport:
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
-    own_share, denoised = (1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0), None
+    own_share = 1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0
+    denoised = None
     piloted = limits.most_samples > PILOT_FROM
     loaded = load_groups(scene, film)
-    lights, stopped_by = emission(scene.groups, film.wavelength_nm, film.width_nm), None
+    lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
+    stopped_by = None
     # Go on from the earlier means, or begin
     if earlier and (earlier.spp > PILOT_FROM or not piloted):
         means = means_of(earlier, split=denoise)
     else:  # a short one that had no pilot is drawn anew
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
-        means, earlier = no_means(scene, film, rates, split=denoise), None
+        means = no_means(scene, film, rates, split=denoise)
+        earlier = None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
     # Draw runs until a limit is reached
     fields: dict[str, Any] = {"relative_mc_error": np.inf}
@@ -223,7 +226,8 @@ def _render(
             add_run(loaded, means, film, look, limits.seed)
             if means.count >= LEAST_POINTS:
                 fields = fields_of(lights, means)
-            now, error = time.perf_counter(), fields["relative_mc_error"]
+            now = time.perf_counter()
+            error = fields["relative_mc_error"]
             progress(own_share * limits.share(means.count, error, now - start), error)
             # The error is told after every run, and stops the render at a look alone.
             looked_at = error if means.count >= look else np.inf

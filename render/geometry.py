@@ -82,9 +82,11 @@ def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> 
     """
     if camera.get("type") == "orthographic":
         return 0.0
-    field, axis = camera.get("fov"), camera.get("fov_axis", "x")
+    field = camera.get("fov")
+    axis = camera.get("fov_axis", "x")
     if not isinstance(field, int | float):
-        field, axis = _field_of_focal_length(camera.get("focal_length", "50mm")), "diagonal"
+        field = _field_of_focal_length(camera.get("focal_length", "50mm"))
+        axis = "diagonal"
     height, width = size
     spans = {
         "x": width,

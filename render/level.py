@@ -98,7 +98,8 @@ class Irradiance:
 
     def level(self, weights: Floats) -> Level:
         """Illuminance; `weights` as of `SceneMeans.luminance_level`."""
-        value, flat = float((weights * self.mean).sum()), weights.ravel()
+        value = float((weights * self.mean).sum())
+        flat = weights.ravel()
         if value <= 0:
             return Level(value, None)
         return Level(value, float(np.sqrt(max(float(flat @ self.covariance @ flat), 0.0))) / value)

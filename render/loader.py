@@ -65,7 +65,8 @@ def own_mitsuba_variant() -> Iterator[None]:
     import mitsuba
 
     mi: Any = mitsuba
-    variant_before, resolver_before = mi.variant(), mi.file_resolver()
+    variant_before = mi.variant()
+    resolver_before = mi.file_resolver()
     mitsuba_module()
     mi.set_variant(variant())
     mi.set_file_resolver(_search_path.pop() if _search_path else search_path(mi))
@@ -212,7 +213,8 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     if metered and scene.reference_plane:
         meter = {"type": "irradiancemeter", "film": _recorder((METER_PIXELS, METER_PIXELS))}
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
-    index, coloured = (list(scene.groups).index(group),), scene.groups[group].coloured
+    index = (list(scene.groups).index(group),)
+    coloured = scene.groups[group].coloured
     # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
     # number, so several keep their order only without.
     mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)

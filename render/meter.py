@@ -76,6 +76,8 @@ def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
 
 def _half(loaded: LoadedScene, film: Film, seed: int) -> Planes:
     """Irradiance of each of the film's pixels, (group, band, h, w)."""
-    alike, span, threads = np.ones(film.size, np.uint32), Span(0, HALF_SPP, 1), HALF_SPP * METER_PIXELS**2
+    alike = np.ones(film.size, np.uint32)
+    span = Span(0, HALF_SPP, 1)
+    threads = HALF_SPP * METER_PIXELS**2
     images = [traced(x.meter, alike, span, threads, seed) for x in tracers(loaded, film, METER_BANDS, seed)]
     return np.concatenate([x["scattered"].reshape(len(loaded.groups), -1, *film.size) for x in images], axis=1)

@@ -165,7 +165,9 @@ class SpectralRadiance:
 
 def check_values(name: str, values: NDArray[np.floating], signed: bool = False) -> None:
     """Raise `InputError` at the first value of (h, w, band) that is NaN, infinite or, unless `signed`, negative."""
-    least, most = float(values.min()), float(values.max())  # two passes without a temporary; NaN carries through
+    # two passes without a temporary; NaN carries through
+    least = float(values.min())
+    most = float(values.max())
     if least >= (-np.finfo(values.dtype).max if signed else 0) and most < np.inf:
         return
     row, column, band = (int(i) for i in np.argwhere(~(np.isfinite(values) & ((values >= 0) | signed)))[0])

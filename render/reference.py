@@ -210,7 +210,8 @@ def _unpacked(path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightG
     """Light of a file; variances are pooled from the error plane as a render's from its difference."""
     certificate = json.loads(str(arrays["certificate"]))
     wavelength_nm, width_nm = (np.array(certificate[name]) for name in ("wavelength_nm", "width_nm"))
-    light, rates = arrays["light"] * arrays["scale"], arrays["rates"]
+    light = arrays["light"] * arrays["scale"]
+    rates = arrays["rates"]
     means = Means(
         count=int(arrays["points"]),
         rates=rates,
@@ -241,7 +242,8 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
     that brings a part of the light; then its halves don't tell, and the reference's variance, at as many samples,
     does: the larger of the two counts. So the rate of false alarms is at most `FALSE_ALARM`.
     """
-    ratio, sums = (reference.counts / live.counts).astype(np.float32), partial(sums_over_blocks, side=BLOCK)
+    ratio = (reference.counts / live.counts).astype(np.float32)
+    sums = partial(sums_over_blocks, side=BLOCK)
     tests: list[Agreement] = []
     count = live.light.mean.shape[0] * live.light.mean.shape[1]
     for group, band in np.ndindex(live.light.mean.shape[:2]):
@@ -250,7 +252,8 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
         short, long = (np.square(x.difference.astype(np.float64)) for x in planes)
         variance = np.maximum(sums(short), sums(long * ratio)) + sums(long)
         lit = variance > 0
-        chi_square, blocks = float((gap[lit] ** 2 / variance[lit]).sum()), int(lit.sum())
+        chi_square = float((gap[lit] ** 2 / variance[lit]).sum())
+        blocks = int(lit.sum())
         chance = min(1.0, count * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
         tests.append(Agreement(float(live.wavelength_nm[band]), chi_square, blocks, chance))
     return min(tests, key=lambda test: test.chance)
@@ -283,7 +286,8 @@ def require_agreement(live: Transport, reference: Reference) -> str:
 def halves_agree(transport: Transport) -> Agreement:
     """Chi-square between a render's halves: whether errors of neighbouring pixels are independent of each other."""
     # A half's error is sqrt(2) times that of the mean, which the halves' difference estimates.
-    light, root = transport.light, np.float32(np.sqrt(2))
+    light = transport.light
+    root = np.float32(np.sqrt(2))
     even, odd = (
         replace(transport, light=Halves(light.mean + sign * light.difference, root * light.difference))
         for sign in (1, -1)

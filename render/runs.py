@@ -82,7 +82,8 @@ class Drawn:
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
     """Return the means before the first run. With `split`, indirect light is also kept by itself."""
-    bands, groups = film.wavelength_nm.size, scene.groups.values()
+    bands = film.wavelength_nm.size
+    groups = scene.groups.values()
     return Means(
         count=0,
         rates=rates,
@@ -123,7 +124,8 @@ def scene_means_of(means: Means) -> SceneMeans:
     Pixels are independent of each other.
     """
     groups, bands, *size = means.light.mean.shape
-    scattered, errors = np.empty((groups, bands)), []
+    scattered = np.empty((groups, bands))
+    errors = []
     for group in range(groups):
         light, seen = means.light[group], means.seen[group]
         scattered[group] = (light.mean - seen.mean).mean(axis=(1, 2), dtype=np.float64)
@@ -143,7 +145,9 @@ def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed
 
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
     """
-    start, chunk, split = means.count, chunk_from(means.count), means.indirect is not None
+    start = means.count
+    chunk = chunk_from(means.count)
+    split = means.indirect is not None
     # A launch takes as many chunks as its threads hold, but only of one length (chunks grow along the sequence).
     threads = launch_threads(scenes, film, split=split)
     fitting = max(1, threads // (int(means.rates.sum()) * chunk))
@@ -178,7 +182,8 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
     energy = (lights * film.width_nm).astype(np.float32)
     scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
     seen = np.zeros((len(lights), *film.size), np.float32)
-    uniform, threads = np.ones(film.size, np.uint32), launch_threads(scenes, film)
+    uniform = np.ones(film.size, np.uint32)
+    threads = launch_threads(scenes, film)
     for loaded in scenes:
         halves = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, _PILOT_STREAM))
         for slot, group in enumerate(loaded.groups):
@@ -207,7 +212,8 @@ def _drawn(
     split: bool = False,
 ) -> tuple[Drawn, Drawn]:
     """Draw a span of both halves of the paths of one loaded scene: the even half and the odd."""
-    halves, groups = [], len(loaded.groups)
+    halves = []
+    groups = len(loaded.groups)
     for half in range(2):
         group_seed = seed_of(seed, loaded.groups[0], half)
         traces = (tracer.camera for tracer in tracers(loaded, film, PART_BANDS, group_seed, split=split))

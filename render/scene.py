@@ -180,7 +180,8 @@ def spectrum_node(spectrum: Spectrum) -> Node:
     """
     if not spectrum.values.any():
         return uniform_node(0.0)  # Mitsuba refuses a table without any value above 0
-    nm, values = spectrum.wavelength_nm, ",".join(map(repr, spectrum.values.tolist()))
+    nm = spectrum.wavelength_nm
+    values = ",".join(map(repr, spectrum.values.tolist()))
     if np.allclose(np.diff(nm), nm[1] - nm[0], rtol=1e-9):
         return {"type": "regular", "wavelength_min": float(nm[0]), "wavelength_max": float(nm[-1]), "values": values}
     return {"type": "irregular", "wavelengths": ",".join(map(repr, nm.tolist())), "values": values}
@@ -199,7 +200,8 @@ def table_of(node: Node) -> Spectrum | None:
     InputError
         Where what it states is no such table.
     """
-    kind, keys = node.get("type"), node.keys() - {"type", "id"}
+    kind = node.get("type")
+    keys = node.keys() - {"type", "id"}
     try:
         if kind == "irregular" and keys == {"wavelengths", "values"}:
             return Spectrum(_numbers(node["wavelengths"]), _numbers(node["values"]))

@@ -58,7 +58,8 @@ def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Float
 
 def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> None:
     """Warn (`UserWarning`) where a light's spectrum ends within the bands at a value other than 0."""
-    shortest, longest = (wavelength_nm - width_nm / 2).min(), (wavelength_nm + width_nm / 2).max()
+    shortest = (wavelength_nm - width_nm / 2).min()
+    longest = (wavelength_nm + width_nm / 2).max()
     low, high = spectrum.wavelength_nm[[0, -1]]
     below = shortest < low - _SLACK_NM and spectrum.values[0] > 0
     if below or (longest > high + _SLACK_NM and spectrum.values[-1] > 0):

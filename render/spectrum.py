@@ -92,7 +92,8 @@ class Spectrum:
     @method
     def band_average(self, wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
         """Mean over each band ``wavelength_nm +- width_nm / 2``, shape (band,); exact for the linear pieces."""
-        centre, half = np.asarray(wavelength_nm, dtype=np.float64), np.asarray(width_nm, dtype=np.float64) / 2
+        centre = np.asarray(wavelength_nm, dtype=np.float64)
+        half = np.asarray(width_nm, dtype=np.float64) / 2
         return (self._integral_to(centre + half) - self._integral_to(centre - half)) / (2 * half)
 
     def _integral_to(self, nm: Floats) -> Floats:
@@ -118,7 +119,8 @@ def line_spectrum(lines_nm: ArrayLike, powers: ArrayLike) -> Spectrum:
     InputError
         Where lines aren't increasing, or less than 0.1 nm apart.
     """
-    lines, heights = np.atleast_1d(lines_nm).astype(np.float64), np.atleast_1d(powers) * (2 / LINE_BASE_NM)
+    lines = np.atleast_1d(lines_nm).astype(np.float64)
+    heights = np.atleast_1d(powers) * (2 / LINE_BASE_NM)
     if lines.shape != heights.shape or np.any(np.diff(lines) <= LINE_BASE_NM):
         raise InputError(f"lines_nm: {lines.tolist()!r} is not allowed; give increasing lines over 0.1 nm apart")
     nm = (lines[:, None] + np.array([-0.5, 0.0, 0.5]) * LINE_BASE_NM).ravel()
@@ -167,7 +169,8 @@ def line_bands(
 def emission_lines_nm(spectrum: Spectrum) -> Floats:
     """Wavelengths of a spectrum's emission lines (`line_spectrum`): peaks under 0.2 nm wide, twice their sides."""
     nm, values = spectrum.wavelength_nm, spectrum.values
-    beside, power = np.maximum(values[:-2], values[2:]), values[1:-1] * (nm[2:] - nm[:-2]) / 2
+    beside = np.maximum(values[:-2], values[2:])
+    power = values[1:-1] * (nm[2:] - nm[:-2]) / 2
     narrow = np.maximum(nm[2:] - nm[1:-1], nm[1:-1] - nm[:-2]) <= LINE_BASE_NM
     return nm[1:-1][narrow & (values[1:-1] > 2 * beside) & (power > LEAST_LINE * np.trapezoid(values, nm))]
 

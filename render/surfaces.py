@@ -54,7 +54,8 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     InputError
         Where Mitsuba can't load the scene; without LLVM and CUDA.
     """
-    mi, mi_scene = mitsuba_module(), load_unlit(scene, size)
+    mi = mitsuba_module()
+    mi_scene = load_unlit(scene, size)
     sensor = mi_scene.sensors()[0]
     pixel = dr.arange(mi.UInt32, size[0] * size[1])
     row = pixel // size[1]
@@ -64,7 +65,8 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     hit = interaction.is_valid()
     towards = dr.select(dr.dot(interaction.sh_frame.n, ray.d) > 0, -interaction.sh_frame.n, interaction.sh_frame.n)
     to_camera = sensor.world_transform().inverse()
-    normal, place = to_camera @ mi.Vector3f(towards), to_camera @ mi.Point3f(interaction.p)
+    normal = to_camera @ mi.Vector3f(towards)
+    place = to_camera @ mi.Point3f(interaction.p)
     # Mitsuba's camera has x to the left and y up.
     planes = [dr.select(hit, plane, 0.0) for plane in (place.z, -normal.x, -normal.y, normal.z)]
     depth, *normals = (np.array(mi.Float(plane), np.float32).reshape(size) for plane in planes)

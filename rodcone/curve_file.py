@@ -95,7 +95,8 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
         if not text.strip():
             raise ValueError("it is empty")
     if text.lstrip().startswith("<"):
-        names, table = [NM, "1"], _of_tm27(text, what, place)
+        names = [NM, "1"]
+        table = _of_tm27(text, what, place)
     else:
         names, table = _of_text(text, place)
     nm = table[:, 0]
@@ -144,7 +145,8 @@ def _of_text(text: str, place: str) -> tuple[list[str], Floats]:
 def _parsed(number: int, text: str, separator: str | None) -> _Line:
     """Split a line into cells; its numbers are empty unless it is a row: two cells or more, each a number."""
     cells = _cells(text, separator)
-    first, meter = _number(cells[0], separator), None
+    first = _number(cells[0], separator)
+    meter = None
     if first is None and (meter := _METER.fullmatch(cells[0])):
         first = _number(meter[1], separator)
     numbers = [first, *(_number(cell, separator) for cell in cells[1:])] if first is not None else [None]

@@ -94,7 +94,8 @@ def png_of(draw: Callable[[Axes], object]) -> bytes:
     """PNG of what a function draws into axes; Matplotlib's list of open figures doesn't grow."""
     from matplotlib.figure import Figure
 
-    figure, file = Figure(figsize=SIZE, layout="constrained"), BytesIO()
+    figure = Figure(figsize=SIZE, layout="constrained")
+    file = BytesIO()
     draw(figure.subplots())
     figure.savefig(file, format="png", dpi=100)
     return file.getvalue()

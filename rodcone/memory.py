@@ -121,9 +121,11 @@ def _groups(root: Path) -> Iterator[Limit]:
         return
     for _, controllers, place in places:
         if not controllers:
-            top, names = mount, ("memory.max", "memory.current", "inactive_file")
+            top = mount
+            names = ("memory.max", "memory.current", "inactive_file")
         elif "memory" in controllers.split(","):
-            top, names = mount / "memory", ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
+            top = mount / "memory"
+            names = ("memory.limit_in_bytes", "memory.usage_in_bytes", "total_inactive_file")
         else:
             continue
         innermost = top / place.lstrip("/")

@@ -35,7 +35,8 @@ def progress(file: TextIO) -> Iterator[Step]:
         *columns, console=console, transient=True, disable=not console.is_terminal, speed_estimate_period=math.inf
     )
     number = bar.add_task(START, total=None)
-    ended, most = Event(), 0.0
+    ended = Event()
+    most = 0.0
     printer = Thread(target=_print_lines, args=(bar.tasks[number], file, ended), daemon=True)
 
     def step(what: str, share: float) -> None:
@@ -64,7 +65,8 @@ def progress_bar(step: Step | None) -> Iterator[Step]:
     if step is not None or display is None:
         yield step or (lambda what, share: None)
         return
-    handle, shown_at = display({"text/plain": ""}, raw=True, display_id=True), -math.inf
+    handle = display({"text/plain": ""}, raw=True, display_id=True)
+    shown_at = -math.inf
 
     def show(what: str, share: float) -> None:
         nonlocal shown_at

@@ -56,7 +56,8 @@ def load(name: str, **options: Any) -> Scene:
         For an unknown name or option; the nearest allowed one is named.
     """
     if drawn := re.fullmatch(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})", name):
-        name, options = drawn[1], {**options, "seed": int(drawn[2], 16)}
+        name = drawn[1]
+        options = {**options, "seed": int(drawn[2], 16)}
     if name not in _NAMES:
         raise unknown("scene", name, _NAMES)
     builder = getattr(import_module(f"scenes.{name}"), name)

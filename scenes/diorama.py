@@ -98,7 +98,8 @@ def _street(rng: Rng) -> _Stage:
             z -= width + rng.uniform(0, 3)
     panes = [str(pane) for pane in rng.choice(panes, 3, replace=False)]
     for index in range(int(rng.integers(0, 4))):
-        x, z = rng.uniform(0.55, 0.8) * half_m * rng.choice((-1, 1)), rng.uniform(-30, 1)
+        x = rng.uniform(0.55, 0.8) * half_m * rng.choice((-1, 1))
+        z = rng.uniform(-30, 1)
         nodes |= {f"tree{index}_{key}": node for key, node in _tree(rng, x, z).items()}
     if rng.random() < 0.5:  # what closes the street
         nodes["end"] = block(translate(0, 0, -56), 60.0, rng.uniform(3, 14), 4.0, _tile(rng, 8))
@@ -173,7 +174,8 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
             nodes["sun"] = far_disk(towards, SUN_DISTANCE_M, SUN_RADIUS_DEG)
             groups["sun"] = LightGroup(("sun/emitter",), illuminant("sunlight"), rng.uniform(2e4, 9e4) / SUN_SR)
     elif hour in WINDOW_CD_M2:
-        size_m, luminance = rng.uniform(1.0, 1.6), rng.uniform(*WINDOW_CD_M2[hour])
+        size_m = rng.uniform(1.0, 1.6)
+        luminance = rng.uniform(*WINDOW_CD_M2[hour])
         nodes["window"] = panel(stage.window, size_m, size_m, matte(grey(0.04)), **area)
         groups["window"] = LightGroup(("window/emitter",), illuminant(f"D{rng.integers(*KELVIN[hour])}K"), luminance)
     if hour == "day":
@@ -201,7 +203,8 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
 def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
     """A measured patch's reflectance, mixed with grey and darkened."""
     _, patch = color_checker_reflectances()[rng.integers(24)]
-    share, level = purest * rng.uniform(0.6, 1), rng.uniform(0.03, 0.8)
+    share = purest * rng.uniform(0.6, 1)
+    level = rng.uniform(0.03, 0.8)
     return Spectrum(patch.wavelength_nm, rng.uniform(0.5, 1) * (share * patch.values + (1 - share) * level))
 
 
@@ -212,7 +215,8 @@ def _tile(rng: Rng, repeats: float) -> Node:
 
 def _surface(rng: Rng, repeats: float = 1.0) -> Node:
     """Any surface but glass."""
-    kind, turn_deg = rng.random(), float(rng.uniform(0, 180))
+    kind = rng.random()
+    turn_deg = float(rng.uniform(0, 180))
     if kind < 0.15:
         return printed(PRINTS[rng.integers(4)], _paint(rng) * 0.2, _paint(rng), 1.0)
     if kind < 0.3:
@@ -229,7 +233,9 @@ def _surface(rng: Rng, repeats: float = 1.0) -> Node:
 
 def _leaves(rng: Rng, wall: str, pose: Floats, half_m: Pair, sizes_m: Pair, count: int) -> Nodes:
     """Pictures and sheets on a wall, sizes by a power law, each before the one drawn earlier."""
-    nodes, (low, high), (half, up) = {}, sizes_m, half_m
+    nodes = {}
+    low, high = sizes_m
+    half, up = half_m
     for index in range(count):
         side_m = low * (1 - rng.random() * (1 - (low / high) ** 1.5)) ** (-1 / 1.5)
         at = pose @ translate(rng.uniform(-half, half), rng.uniform(-up, up), 0.0005 * index)
@@ -239,7 +245,8 @@ def _leaves(rng: Rng, wall: str, pose: Floats, half_m: Pair, sizes_m: Pair, coun
 
 def _tree(rng: Rng, x: float, z: float) -> Nodes:
     """Trunk and a crown of leafy balls."""
-    height_m, radius_m, leaf = rng.uniform(1.5, 3), rng.uniform(0.6, 1.4), _tile(rng, 2)
+    height_m, radius_m = rng.uniform(1.5, 3), rng.uniform(0.6, 1.4)
+    leaf = _tile(rng, 2)
     nodes = {"trunk": rod((x, 0.0, z), (x, height_m + radius_m, z), 0.1, matte(_paint(rng, 0.5)))}
     for index in range(16):
         away = rng.normal(size=3)
@@ -251,7 +258,9 @@ def _tree(rng: Rng, x: float, z: float) -> Nodes:
 
 def _thing(rng: Rng, x: float, z: float, unit_m: float) -> Nodes:
     """Ball, block, pillar, pole, stack or a heap of many small things, on the ground."""
-    kind, surface, size_m = rng.random(), _surface(rng), float(unit_m * rng.uniform(0.4, 1.0))
+    kind = rng.random()
+    surface = _surface(rng)
+    size_m = float(unit_m * rng.uniform(0.4, 1.0))
     x, z = x + rng.uniform(-0.2, 0.2) * unit_m, z + rng.uniform(-0.2, 0.2) * unit_m
     turned = translate(x, 0.002 * unit_m, z) @ rotate((0, 1, 0), float(rng.uniform(0, 180)))
     if kind < 0.2:

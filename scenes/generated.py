@@ -64,7 +64,8 @@ def generated(seed: int = 0, light: str | None = None) -> Scene:
         x, z = -0.44 + 0.22 * column + rng.uniform(-0.03, 0.03), -0.2 + 0.24 * row + rng.uniform(-0.03, 0.03)
         nodes[f"thing{index:02d}"] = _thing(rng, x, z)
 
-    turn, height_m = radians(rng.uniform(-70, 70)), rng.uniform(1.2, 2.2)
+    turn = radians(rng.uniform(-70, 70))
+    height_m = rng.uniform(1.2, 2.2)
     at = (1.9 * sin(turn), height_m, 1.9 * cos(turn))
     side_m = rng.uniform(0.3, 1.8)
     nodes["softbox"] = panel(look_at(at, (0.0, 0.2, 0.0)), side_m, side_m, matte(grey(0.04)), emitter={"type": "area"})
@@ -77,7 +78,8 @@ def generated(seed: int = 0, light: str | None = None) -> Scene:
 
 def _colour(rng: np.random.Generator) -> Spectrum:
     """Grey, a rise or a bump, each as saturated as it comes."""
-    kind, low, high = rng.random(), rng.uniform(0.03, 0.3), rng.uniform(0.3, 0.85)
+    kind = rng.random()
+    low, high = rng.uniform(0.03, 0.3), rng.uniform(0.3, 0.85)
     if kind < 0.3:
         return grey(rng.uniform(0.03, 0.9))
     if kind < 0.65:

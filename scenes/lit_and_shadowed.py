@@ -19,7 +19,8 @@ DARK_CD_M2, LIT_CD_M2 = 0.002, 25.0
 NIGHT_HALF_PER_LAMP, LAMP_HALF_PER_LAMP = 0.00587, 0.00582
 WIDTH_M, HEIGHT_M, DEPTH_M, BOARD_M = 0.58, 1.16, 0.45, 0.02  # inside of each half; thickness of its boards
 SHELF_M = 0.50
-OAK, WHITE, BLACK = edge(585, 45, 0.10, 0.46), grey(0.80), grey(0.04)
+OAK = edge(585, 45, 0.10, 0.46)
+WHITE, BLACK = grey(0.80), grey(0.04)
 
 
 def lit_and_shadowed(dark_cd_m2: float = DARK_CD_M2, lit_cd_m2: float = LIT_CD_M2) -> Scene:
@@ -52,8 +53,10 @@ def _lamps(side: str) -> tuple[str, ...]:
 def _half(middle: Floats) -> dict[str, Node]:
     """One half of the cabinet and what stands in it; `middle` is the middle of its bottom's front edge."""
     # carcass and shelf, and below the top and below the shelf a lamp behind a black lip
-    oak, side = matte(OAK), (WIDTH_M + BOARD_M) / 2
-    across, z = WIDTH_M + 2 * BOARD_M, -DEPTH_M / 2
+    oak = matte(OAK)
+    side = (WIDTH_M + BOARD_M) / 2
+    across = WIDTH_M + 2 * BOARD_M
+    z = -DEPTH_M / 2
     nodes = {
         "bottom": block(middle @ translate(0, -BOARD_M, z), across, BOARD_M, DEPTH_M, oak),
         "top": block(middle @ translate(0, HEIGHT_M, z), across, BOARD_M, DEPTH_M, oak),

@@ -57,7 +57,8 @@ def _black(nm: Floats) -> Floats:
     bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
     # Colours of every bump at fine resolution, and by products of averages over 10 nm: a black of both, so that a
     # program that multiplies averages sees the pairs alike too.
-    fine_nm, one_nm = np.arange(380.5, 780.0), np.ones(400)
+    fine_nm = np.arange(380.5, 780.0)
+    one_nm = np.ones(400)
     bands = (fine_nm, one_nm), (DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM))
     twin = np.vstack([_colours(nm, bumps, TWINS_UNDER, *at_nm) for at_nm in bands])
     other = _colours(nm, bumps, OTHER_LIGHT, fine_nm, one_nm)

@@ -20,14 +20,16 @@ MOON_HEIGHT_DEG, MOON_BEARING_DEG = 22.0, 6.0  # bearing: from straight ahead to
 SODIUM_LM, LED_LM = 0.8 * 6000.0, 0.8 * 4000.0
 OPENING_M = (0.40, 0.20)
 WINDOW_CD_M2 = 60.0  # a room's white wall at 300 lux (EN 12464-1) and reflectance 0.6
-ASPHALT, KERB, FRAME = edge(560, 80, 0.06, 0.09), edge(540, 60, 0.22, 0.30), grey(0.60)
+ASPHALT, KERB = edge(560, 80, 0.06, 0.09), edge(540, 60, 0.22, 0.30)
+FRAME = grey(0.60)
 DARK = grey(0.03)
 
 
 def night_street() -> Scene:
     """Street 5 m wide between house fronts; light groups ``moon``, ``sodium``, ``led`` and ``window``, all in view."""
     left, right = rotate((0, 1, 0), 90), rotate((0, 1, 0), -90)
-    line, kerb = matte(grey(0.50)), matte(KERB)
+    line = matte(grey(0.50))
+    kerb = matte(KERB)
     height, bearing = radians(MOON_HEIGHT_DEG), radians(MOON_BEARING_DEG)
     to_moon = (sin(bearing) * cos(height), sin(height), -cos(bearing) * cos(height))
     geometry: Node = {
@@ -63,7 +65,8 @@ def night_street() -> Scene:
 
 def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str, Node]:
     """Front 12 m wide that faces the +z of `pose`: windows with frames and sills in rows, a door, an eaves board."""
-    frame, pane = matte(FRAME), glossy(DARK, 0.08)
+    frame = matte(FRAME)
+    pane = glossy(DARK, 0.08)
     nodes = {
         "body": block(pose @ translate(0, 0, -4), 12.0, height, 8.0, matte(front)),
         "plinth": block(pose @ translate(0, 0, 0.02), 12.0, 0.6, 0.04, matte(KERB)),
@@ -85,7 +88,8 @@ def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str,
 
 def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
     """Street lamp 6 m high on the pavement, its arm over the street (`towards` = 1: to the right)."""
-    steel, head = matte(grey(0.12)), x + 1.1 * towards
+    steel = matte(grey(0.12))
+    head = x + 1.1 * towards
     down = translate(head, 6.025, z) @ rotate((1, 0, 0), 90)
     return {
         f"{name}_pole": rod((x, 0.0, z), (x, 6.1, z), 0.06, steel),
@@ -98,7 +102,8 @@ def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
 def _car(pose: Floats) -> dict[str, Node]:
     """Parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
     paint = glossy(band(460, 40, 0.03, 0.30), 0.1)
-    glazing, tyre = glossy(DARK, 0.08), matte(DARK)
+    glazing = glossy(DARK, 0.08)
+    tyre = matte(DARK)
     nodes = {
         "body": block(pose @ translate(0, 0.30, 0), 1.72, 0.55, 4.10, paint),
         "cabin": block(pose @ translate(0, 0.85, 0.30), 1.46, 0.52, 2.30, glazing),

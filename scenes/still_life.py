@@ -61,7 +61,8 @@ def _box(x: float, y: float, z: float, width: float, height: float, turn: float,
 def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
     """Thin black spokes: every spatial frequency at once (a Siemens star)."""
     nodes: dict[str, Node] = {}
-    width, middle = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9, 0.58 * radius
+    width = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9
+    middle = 0.58 * radius
     for index in range(SPOKES):
         angle = 360.0 * index / SPOKES
         centre = translate(x + middle * cos(angle * pi / 180), y + middle * sin(angle * pi / 180), z)

@@ -20,7 +20,9 @@ SUN_DISTANCE_M = 100.0
 # global light less its beam, which is 14 klx of 8300 K.
 SKY_LUX = 800.0 + 15_500.0 * sqrt(sin(radians(SUN_HEIGHT_DEG)))
 SKY_LIGHT = "D8300K"
-APPLE, LEAF, WOOD = edge(605, 14, 0.05, 0.55), band(550, 30, 0.04, 0.30), (0.33, 0.27, 0.36, 0.30, 0.25, 0.34)
+APPLE = edge(605, 14, 0.05, 0.55)
+LEAF = band(550, 30, 0.04, 0.30)
+WOOD = (0.33, 0.27, 0.36, 0.30, 0.25, 0.34)
 
 
 def still_life_outdoor() -> Scene:
@@ -30,7 +32,8 @@ def still_life_outdoor() -> Scene:
     """
     height, bearing = radians(SUN_HEIGHT_DEG), radians(SUN_BEARING_DEG)
     to_sun = (-sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height))
-    blue, slat = matte(band(465, 34, 0.05, 0.42)), rotate((1, 0, 0), 35)
+    blue = matte(band(465, 34, 0.05, 0.42))
+    slat = rotate((1, 0, 0), 35)
     geometry: Node = {
         "type": "scene",
         "sensor": camera(26.0, (0.10, 0.62, 2.05), (0.0, 0.17, 0.0)),
@@ -66,7 +69,8 @@ def still_life_outdoor() -> Scene:
 
 def _fruit() -> dict[str, Node]:
     """Apples in the crate, oranges and a lime on the cloth, grapes beside them."""
-    orange, grape = glossy(edge(575, 14, 0.04, 0.72), 0.2), glossy(band(430, 40, 0.03, 0.12), 0.15)
+    orange = glossy(edge(575, 14, 0.04, 0.72), 0.2)
+    grape = glossy(band(430, 40, 0.03, 0.12), 0.15)
     places = {
         "orange0": ball(0.11, 0.047, 0.28, 0.045, orange),
         "orange1": ball(0.20, 0.045, 0.34, 0.043, orange),
@@ -108,10 +112,12 @@ def _vessels() -> dict[str, Node]:
 
 def _tree(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
     """Clipped box tree: a ball of leafy tufts, evenly spread (golden angle)."""
-    tufts, count = {}, 90
+    tufts = {}
+    count = 90
     for i in range(count):
         up = 1 - 2 * (i + 0.5) / count
-        turn, out = i * pi * (3 - sqrt(5)), radius * (0.95 + 0.07 * (i % 3))
+        turn = i * pi * (3 - sqrt(5))
+        out = radius * (0.95 + 0.07 * (i % 3))
         across = out * sqrt(1 - up * up)
         middle = (x + across * cos(turn), y + out * up, z + across * sin(turn))
         tufts[f"tuft{i:02d}"] = ball(*middle, 0.019 + 0.002 * (i % 4), matte(LEAF))

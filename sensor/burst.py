@@ -122,7 +122,8 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
     """
     if len(frames) == 1:
         return frames[0]
-    merged, first = merge_frames(frames), frames[0]
+    merged = merge_frames(frames)
+    first = frames[0]
     times = np.array([frame.exposure_s for frame in frames])
     if first.noise_steps and np.ptp(times) > 0:
         raise InputError(
@@ -235,7 +236,8 @@ def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, floa
     """
     temporal_e2, dsnu_e = np.array(frames).T
     temporal_e2 = np.maximum(temporal_e2, 1e-30)  # without noise the times alone weigh
-    weights, whole_s = times_s**2 / temporal_e2, times_s.sum()
+    weights = times_s**2 / temporal_e2
+    whole_s = times_s.sum()
     offset = float((weights * dsnu_e / times_s).sum() / weights.sum())
     return float(whole_s / np.sqrt(weights.sum())), float(whole_s * offset)
 
@@ -277,9 +279,11 @@ def _weighted(groups: Sequence[_Group]) -> tuple[NDArray[np.float64], NDArray[np
     temporal, offset, response = (np.zeros(rate.shape) for _ in range(3))
     for weight, group in zip(weights, groups, strict=True):
         temporal_e2, dsnu_e, shot, prnu, dark_e, _ = _at_sites(group.first, rate * group.exposure_s)
-        share, exposure_s = weight / total, group.exposure_s
+        share = weight / total
+        exposure_s = group.exposure_s
         own_e2 = np.maximum(shot * rate * exposure_s + temporal_e2, LEAST_TEMPORAL * temporal_e2)
         temporal = temporal + share**2 * own_e2 / (group.count * exposure_s**2)
-        offset, response = offset + share * dsnu_e / exposure_s, response + share * prnu
+        offset = offset + share * dsnu_e / exposure_s
+        response = response + share * prnu
     both = 2 * groups[-1].first.column_gain_spread ** 2 * dark_e / groups[-1].exposure_s * light  # as `noise_at_sites`
     return rate, temporal, offset**2 + (response * rate) ** 2 + both

@@ -86,7 +86,8 @@ def unit_channel(tile: Tile) -> str:
 
     That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours; of equally common ones the first.
     """
-    names, sites = channels(tile), "".join(tile)
+    names = channels(tile)
+    sites = "".join(tile)
     return next((name for name in "GW" if name in names), max(names, key=sites.count))
 
 
@@ -171,7 +172,8 @@ def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] 
 
 def channel_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
     """Mean of `site_mixing` over the sites of each channel: K, shape (channel that reads, channel of the light)."""
-    at_sites, names = site_mixing(tile, crosstalk, light_shares), channels(tile)
+    at_sites = site_mixing(tile, crosstalk, light_shares)
+    names = channels(tile)
     sites = np.array([list(row) for row in tile])
     return np.stack([at_sites[sites == name].mean(axis=0) for name in names])
 

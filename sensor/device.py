@@ -70,7 +70,8 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
     check_frame(sensor, shape)
     check_chip(sensor)
     in_charge = sensor.in_charge
-    key, one_row = draw_key(rng), (1, shape[1] // 2 if in_charge else shape[1])
+    key = draw_key(rng)
+    one_row = (1, shape[1] // 2 if in_charge else shape[1])
     pixel = sensor.photosites.pixel
     draws = _normals_kept if shape[0] * shape[1] <= _MOST_KEPT else normals
 

@@ -99,7 +99,8 @@ def sampled_otf(
         copies.append((frequency_per_um, weight, frequency_per_um.min()))
 
     def of_band(wavelength_nm: float) -> Floats:
-        limit, total = limit_per_um(wavelength_nm, lens), np.zeros(shape)
+        limit = limit_per_um(wavelength_nm, lens)
+        total = np.zeros(shape)
         for frequency_per_um, weight, nearest_per_um in copies:
             if not lens.diffraction:
                 total += weight

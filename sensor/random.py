@@ -37,15 +37,14 @@ def draw_key(rng: np.random.Generator) -> int:
 def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[np.uint64], ...]:
     """Four 32-bit words (in uint64) for each counter of four 32-bit words, under a 64-bit key."""
     c0, c1, c2, c3 = counter
-    k0, k1 = key & 0xFFFFFFFF, key >> 32
+    k0 = key & 0xFFFFFFFF
+    k1 = key >> 32
     for _ in range(ROUNDS):
         first, second = c0 * MULTIPLIERS[0], c2 * MULTIPLIERS[1]
-        c0, c1, c2, c3 = (
-            (second >> np.uint64(32)) ^ c1 ^ np.uint64(k0),
-            second & _U32,
-            (first >> np.uint64(32)) ^ c3 ^ np.uint64(k1),
-            first & _U32,
-        )
+        c0 = (second >> np.uint64(32)) ^ c1 ^ np.uint64(k0)
+        c1 = second & _U32
+        c2 = (first >> np.uint64(32)) ^ c3 ^ np.uint64(k1)
+        c3 = first & _U32
         k0, k1 = (k0 + WEYL[0]) & 0xFFFFFFFF, (k1 + WEYL[1]) & 0xFFFFFFFF
     return c0, c1, c2, c3
 

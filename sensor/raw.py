@@ -213,7 +213,8 @@ class RawImage:
         """Level from which a channel's sample counts as saturated [e-]: but for dark current's, noise comes after the
         well clips; columns' gains act on the whole well. Rounding takes half a DN off at most, whatever its variance.
         """
-        last, dark_e = self.noise_steps[-1] if self.noise_steps else noise, noise.dark_current_e
+        last = self.noise_steps[-1] if self.noise_steps else noise
+        dark_e = noise.dark_current_e
         before_e2 = last.shot * dark_e + (self.column_gain_spread * dark_e) ** 2 + self.rounding_e2
         after_e = sqrt(max(hypot(last.read_noise_e, last.dsnu_e) ** 2 - before_e2, 0.0))
         spread_e = hypot(after_e, self.column_gain_spread * (noise.full_well_e + dark_e))

@@ -44,7 +44,8 @@ def draw_frame(
     one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`. Of one key, each
     `reading` draws read noise of its own, and the same shot noise.
     """
-    pixel, expected = sensor.photosites.pixel, np.asarray(expected_e, dtype=np.float64)
+    pixel = sensor.photosites.pixel
+    expected = np.asarray(expected_e, dtype=np.float64)
 
     # PRNU scales the mean: after the draw the variance would be wrong. It is the spread of the whole pixel's response,
     # as a flat field shows it, so crosstalk, which leaves a flat field alone, comes first and doesn't smooth it.

@@ -179,7 +179,8 @@ def lost_shares(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -
     """
     low, high = sensor.window_nm
     edges = np.linspace(low, high, max(2, round((high - low) / _STEP_NM) + 1))
-    nm, step = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    nm = (edges[1:] + edges[:-1]) / 2
+    step = np.diff(edges)
     first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
     held_nm = np.clip(np.minimum(last, edges[1:, None]) - np.maximum(first, edges[:-1, None]), 0.0, None).sum(axis=1)
     names = sensor.channels

@@ -32,7 +32,9 @@ FOCAL_LENGTH_MM = 6.0  # of a compact camera with Table 1's pixel
 SHAKES: Mapping[str, float] = MappingProxyType(
     {"hand": SPEED_RAD_PER_S / (2 * pi * RESONANCE_HZ) * FOCAL_LENGTH_MM * 1e3}
 )
-STEP_S, STEPS = 2e-3, (32, 4096)  # of a path: no longer than that, and fewest and most of them
+# of a path: no longer than that, and fewest and most of them
+STEP_S = 2e-3
+STEPS = (32, 4096)
 
 
 def held_lens(lens: LensConfig, shake: str | None) -> LensConfig:
@@ -106,7 +108,8 @@ def shaken(
     places = path(exposure_s, draw_key(rng)) * (sensor.lens.shake_um / sensor.site_pitch_um)
     if exposure_s == 0:
         return electrons
-    (height, width), count = electrons.shape[:2], places.shape[1]
+    height, width = electrons.shape[:2]
+    count = places.shape[1]
     frequencies = scipy.fft.fftfreq(2 * height), scipy.fft.rfftfreq(2 * width)
     down, across = (np.exp(-2j * pi * np.outer(place, f)) for place, f in zip(places, frequencies, strict=True))
     transfer = down.T @ across / count

@@ -35,7 +35,8 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
         Of pixels that exchange charge, `RawImage.channel_mixing`. With more than three channels all then go by their
         rows, and what W sees beyond three colours is in its neighbours too.
     """
-    three, share = len(names) >= 3, np.eye(len(names))
+    three = len(names) >= 3
+    share = np.eye(len(names))
     by_rows = mixing is not None and len(names) > 3
     if mixing is not None and by_rows:
         share = mixing * unmixed(mixing, colour.neutral)
@@ -46,7 +47,8 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
         # balanced channels of linear sRGB, (channel, 3), and how far their neutral lies from the exposure's, in stops
         candidates = []
         for name, xy in (("a", A_XY), ("d65", D65_XY)):
-            from_xyz, white = getattr(colour, f"xyz_to_camera_{name}"), xyz_from_xy(xy)
+            from_xyz = getattr(colour, f"xyz_to_camera_{name}")
+            white = xyz_from_xy(xy)
             neutral = from_xyz @ white
             to_xyz = np.linalg.inv(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
             stops = np.log2(np.maximum(neutral, 1e-9) / colour.neutral)

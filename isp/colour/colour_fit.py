@@ -153,13 +153,16 @@ def fit_colours(
         raise InputError(f"responses: {signals.shape[1]} channels don't fit the names {tuple(names)}; give one each")
     if len(names) < 3:
         target = grey_of(target)
-    mean, rest = signals.mean(axis=0), np.zeros(len(names))
+    mean = signals.mean(axis=0)
+    rest = np.zeros(len(names))
     if "W" in names[3:]:
-        white, colours = names.index("W"), signals[:, :3]
+        white = names.index("W")
+        colours = signals[:, :3]
         explained = colours @ fit_through_neutral(colours, signals[:, [white]])[0]
         rest[white] = WHITE_REST * np.mean((signals[:, white] - explained) ** 2)
         signals[:, white] = explained
-    moments, cross = signals.T @ signals / len(signals) + np.diag(rest), signals.T @ target / len(signals)
+    moments = signals.T @ signals / len(signals) + np.diag(rest)
+    cross = signals.T @ target / len(signals)
     return ColourFit(channels=tuple(names), mean=mean, moments=moments, cross=cross)
 
 

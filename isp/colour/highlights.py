@@ -55,7 +55,8 @@ def clip_highlights(
         A pixel of `white_lamps` has its brightest colour's value in every channel, the level at least where its own
         sample is a colour's. Where nothing is held, the array itself.
     """
-    colours, level = "".join(raw.colour_channels), highlight_level(raw, gains)
+    colours = "".join(raw.colour_channels)
+    level = highlight_level(raw, gains)
     clipped = saturated_nearby(raw, colours, reach)
     if not clipped.any():
         return balanced
@@ -73,7 +74,9 @@ def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
 
     A sample of a colour says one where it is under the level of highlights; those within one tile are asked.
     """
-    colours, full, level = "".join(raw.colour_channels), raw.saturated, highlight_level(raw, gains)
+    colours = "".join(raw.colour_channels)
+    full = raw.saturated
+    level = highlight_level(raw, gains)
     near = saturated_nearby(raw, colours)
     sites = channel_map(raw.cfa, raw.shape)
     light = raw.electrons * np.select([sites == name for name in raw.channels], gains.tolist())

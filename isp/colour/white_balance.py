@@ -88,7 +88,8 @@ class WhiteBalance:
         well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
         scene.
         """
-        names, unit, colours = raw.channels, raw.unit_channel, "".join(raw.colour_channels)
+        names, unit = raw.channels, raw.unit_channel
+        colours = "".join(raw.colour_channels)
         if self.given is not None:
             return self.given[names.index(unit)] / self.given, dict.fromkeys(names, "given")
         neutral = self.response(raw)

@@ -77,7 +77,8 @@ class Noise:
 @cache
 def single_gaussian(prior: Gaussians) -> Gaussians:
     """One Gaussian with the mean and covariance of the whole mixture."""
-    mean, root = np.tensordot(prior.weights, prior.means, 1), np.sqrt(prior.weights)[:, None, None]
+    mean = np.tensordot(prior.weights, prior.means, 1)
+    root = np.sqrt(prior.weights)[:, None, None]
     # b^2 mu mu' of the components is b^2 of the pooled mean's square, and b^2 of the deviations' squares: hence 1 + b^2
     spread = np.hypot(1.0, prior.brightness) * root * (prior.means - mean)
     wide = np.concatenate([*(root[..., None] * prior.factors), np.moveaxis(spread, 0, -1)], axis=-1)
@@ -94,7 +95,8 @@ def opening(distance: Floats) -> tuple[Floats, Floats]:
     each of which is a lower bound. Its slope is phi(a) (hazard(a) - a)^2.
     """
     a = np.minimum(distance, FAR)
-    density, over = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi), np.sqrt(2 / np.pi) / erfcx(a / np.sqrt(2)) - a
+    density = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi)
+    over = np.sqrt(2 / np.pi) / erfcx(a / np.sqrt(2)) - a
     share = np.asarray(ndtr(a) + density * over)
     return np.maximum(share, LEAST_SHARE), np.where(share > LEAST_SHARE, density * over**2, 0.0)
 
@@ -162,9 +164,12 @@ def sampled(prior: Gaussians, sampling: Floats, middle: NDArray[np.intp], lens: 
         L: share of one pixel's light (second axis) that falls on another (first axis); `sampling` has it too.
     """
     components, pixels, coefficients = prior.means.shape
-    h, f = sampling.reshape(len(sampling), -1), prior.directions.reshape(components, pixels * coefficients, -1)
-    hc, means = (h @ f) @ f.swapaxes(1, 2) + prior.rest[:, None, None] * h, prior.means.reshape(components, -1) @ h.T
-    by_pixel, signal = hc.reshape(components, len(h), pixels, coefficients), hc @ h.T
+    h = sampling.reshape(len(sampling), -1)
+    f = prior.directions.reshape(components, pixels * coefficients, -1)
+    hc = (h @ f) @ f.swapaxes(1, 2) + prior.rest[:, None, None] * h
+    means = prior.means.reshape(components, -1) @ h.T
+    by_pixel = hc.reshape(components, len(h), pixels, coefficients)
+    signal = hc @ h.T
     cross = np.einsum("pq,ksqc->kspc", lens[middle], by_pixel, optimize=True)
     off = np.einsum("pq,kqc->kpc", lens[middle], prior.means) - prior.means[:, middle]
     inside = np.concatenate([prior.directions[:, middle], off[..., None]], axis=-1)
@@ -192,7 +197,8 @@ def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Floats,
     noise : Noise
     """
     variance = sample_variance(scale * samples.means, scale**2 * samples.spread, noise)
-    total, cross = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1]), scale * samples.cross
+    total = scale**2 * samples.signal + variance[..., None] * np.eye(variance.shape[1])
+    cross = scale * samples.cross
     gain = np.asarray(np.linalg.solve(total, cross.reshape(*cross.shape[:2], -1))).reshape(*cross.shape)
     return gain, samples.within - np.einsum("kspc,kspe->kpce", scale * samples.error_cross, gain, optimize=True)
 

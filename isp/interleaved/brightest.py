@@ -41,7 +41,8 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
     (th, tw, h, w) of the same type
         A sample y counts at x up to the value [(y - x) mod (th, tw), x].
     """
-    tile, shape = (len(raw.cfa), len(raw.cfa[0])), electrons.shape
+    tile = (len(raw.cfa), len(raw.cfa[0]))
+    shape = electrons.shape
     z = max(SIGMAS, settings.sigma_s * (SIGMAS / SIGMA_S))
     if settings.distance == "raw" or z > MOST_SIGMAS:
         return np.full((*tile, *shape), np.inf, electrons.dtype)

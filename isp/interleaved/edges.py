@@ -94,7 +94,8 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     -------
     (h, w, 4) float32
     """
-    raw, nu = white.raw, 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
+    raw = white.raw
+    nu = 1.0 / (1.0 / np.maximum(noise_gain, TINY)).mean(axis=0).mean(axis=0)
     if backend() != "numpy":
         single = [np.ascontiguousarray(values, dtype=np.float32) for values in (planes, noise_gain)]
         return sharpen_frame(white, single[0], single[1], np.stack([gains, nu]))
@@ -102,9 +103,11 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     padded = np.pad(planes.astype(np.float64), (*border, (0, 0)), mode="reflect")
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
-    parts, shares = list[Floats](), at_pixels(white.shares, raw).astype(np.float64)
+    parts = list[Floats]()
+    shares = at_pixels(white.shares, raw).astype(np.float64)
     for first in range(0, raw.shape[0], STRIP_ROWS):
-        rows, own = slice(first, first + STRIP_ROWS + 2 * FAR), slice(first, first + STRIP_ROWS)
+        rows = slice(first, first + STRIP_ROWS + 2 * FAR)
+        own = slice(first, first + STRIP_ROWS)
         around = padded[rows], electrons[rows], sites[rows]
         parts.append(_sharpen(raw, gains, nu, shares[own], noise_gain[own], *around))
     return np.concatenate(parts).astype(np.float32)
@@ -123,11 +126,14 @@ def _sharpen(
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))
-    window, (shot, dark, full_e) = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1)), channel_noise(raw)
-    (height, width), inner = window.shape[:2], slice(REACH - 1, 1 - REACH)
+    window = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1))
+    shot, dark, full_e = channel_noise(raw)
+    height, width = window.shape[:2]
+    inner = slice(REACH - 1, 1 - REACH)
     sample = sliding_window_view(electrons[inner, inner], (3, 3)).reshape(height, width, 9)
     site = sliding_window_view(sites[inner, inner], (3, 3)).reshape(height, width, 9)
-    plane, near = window[..., REACH, REACH], window[..., inner, inner].reshape(height, width, 4, 9)
+    plane = window[..., REACH, REACH]
+    near = window[..., inner, inner].reshape(height, width, 4, 9)
 
     # What the window holds.
     mean = window.mean(axis=(3, 4))
@@ -178,7 +184,8 @@ def _sharpen(
     # Light that fills less than two fifths of the window: the sample's own, in the colour around.
     no_hue = is_full[..., 4] & (is_full & (site != 3)).any(axis=2)
     shares = np.where(no_hue[..., None], gains[3] / gains, shares)
-    own, of_w, here = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0], plane[..., 3], site[..., 4]
+    own = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0]
+    of_w, here = plane[..., 3], site[..., 4]
     as_white_noise = np.maximum((shot[here] * np.maximum(of_w, 0.0) + dark[here] / own) / own, TINY)
     difference = sample[..., 4] / own - of_w
     seen = np.maximum(1.0 - APART * as_white_noise / np.maximum(difference**2, TINY), 0.0)

@@ -82,7 +82,8 @@ def sum_weights(raw: RawImage, settings: Settings, guide: NDArray[Any] | None = 
 
 
 def _inputs(raw: RawImage, settings: Settings, guide: NDArray[Any] | None) -> _Inputs:
-    names, half = raw.channels, settings.patch // 2
+    names = raw.channels
+    half = settings.patch // 2
     planes = [fill(raw.electrons, raw.cfa, name) for name in names] if guide is None else [guide]
     return _Inputs(
         electrons=raw.electrons,

@@ -125,9 +125,11 @@ def _comb(steps: range) -> Floats:
 def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats]:
     """Return the surroundings' shares and the guide [e-] in double precision; `.kernel.panchromatic` in single."""
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
-    (shot, dark, _), electrons = channel_noise(raw), raw.electrons
+    shot, dark, _ = channel_noise(raw)
+    electrons = raw.electrons
     down, across = len(raw.cfa), len(raw.cfa[0])
-    tent_3, wide_tents = tent(1) / tent(1).sum(), [tent(size) / tent(size).sum() for size in tent_radii(raw.cfa)]
+    tent_3 = tent(1) / tent(1).sum()
+    wide_tents = [tent(size) / tent(size).sum() for size in tent_radii(raw.cfa)]
 
     def of_tiles(values: Floats) -> Floats:
         """Sum each channel's values over every tile and its neighbours in the window."""
@@ -142,7 +144,8 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     light = _mean(neutral, *wide_tents)
     beside = electrons / np.maximum(light, FAINT * np.sqrt(dark[white]) + TINY)
     samples = of_tiles(np.ones(raw.shape))
-    means, squares = of_tiles(beside) / samples, of_tiles(beside**2) / samples
+    means = of_tiles(beside) / samples
+    squares = of_tiles(beside**2) / samples
     all_samples = samples.sum(axis=2)
     mean, mean_square = (of_tiles(x).sum(axis=2) / all_samples for x in (neutral, neutral**2))
     contrast = np.maximum(mean_square / np.maximum(mean, np.sqrt(dark[white]) + TINY) ** 2 - 1.0, 0.0)
@@ -167,11 +170,13 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
         """Variance of a sample read as W [e-^2], at some light."""
         return np.asarray(np.maximum((shot[site] * np.maximum(light, 0.0) + dark[site] / own) / own, TINY))
 
-    weight, middle = 1.0 / noise(light), tent_3[1] ** 2
+    weight = 1.0 / noise(light)
+    middle = tent_3[1] ** 2
     total = _mean(weight, tent_3) - middle * weight
     around = (_mean(weight * value, tent_3) - middle * weight * value) / total
     around_variance = (_mean(weight, tent_3**2) - middle**2 * weight) / total**2
-    own_variance, difference = noise(around), value - around
+    own_variance = noise(around)
+    difference = value - around
     inverse = 1.0 / (own_variance + around_variance)
     detail = np.maximum(_box(difference**2 * inverse, DETAIL_PX) - 1.0, 0.0) / _box(inverse, DETAIL_PX)
     trusted = detail + around_variance

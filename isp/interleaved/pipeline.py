@@ -88,7 +88,8 @@ def picture_interleaved_paper(
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     alpha = saturated_fraction(raw, settings.patch)
     mixed = alpha > 0.0
-    without, without_white = alpha[mixed, None], colours.matrix("RGB", noise[:3] * SMOOTH_COLOUR_ERROR)
+    without = alpha[mixed, None]
+    without_white = colours.matrix("RGB", noise[:3] * SMOOTH_COLOUR_ERROR)
     rgb[mixed] = (1.0 - without) * rows_at(rgb, mixed) + without * (rows_at(balanced, mixed)[:, :3] @ without_white.T)
     return Picture(rgb, sources, engine=result.engine, snr=snr, substitution=weight)
 

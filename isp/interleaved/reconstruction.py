@@ -63,7 +63,8 @@ def reconstruct_with_noise(
 ) -> Reconstruction:
     """As `reconstruct`, with the factor by which the weights reduce white noise, the guide, and the engine that ran."""
     settings.check_reaches(raw.cfa)
-    engine, white = backend(), None
+    engine = backend()
+    white = None
     if settings.distance == "noise":
         white = read_as_white(raw, neutral_response(raw.channels) if neutral is None else neutral)
         raw = white.raw

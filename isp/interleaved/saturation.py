@@ -30,7 +30,8 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
     """`saturated_fraction` of the mosaic's saturated samples, (h, w)."""
     if "W" not in "".join(tile):
         return np.ones(full.shape)
-    alpha, box = np.zeros(full.shape), []
+    alpha = np.zeros(full.shape)
+    box = []
     if not full.any():
         return alpha
     # Around full samples alone: half a window and a tent to reach, and half a window to count the pixels in it.
@@ -40,7 +41,8 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
         box.append(slice(max(int(lines[0]) - margin, 0) // step * step, int(lines[-1]) + margin + 1))
     saturated = fill(full[box[0], box[1]].astype(np.float32), tile, "W") > 0.0
     # Saturated pixels in the window over all of its pixels in the frame; small whole numbers: 0 and 1 are exact.
-    half, count = window // 2, box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
+    half = window // 2
+    count = box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
     pixels = [np.arange(size) for size in saturated.shape]
     rows, columns = (np.minimum(line + half, line[-1]) - np.maximum(line - half, 0) + 1 for line in pixels)
     alpha[box[0], box[1]] = count / np.outer(rows, columns)

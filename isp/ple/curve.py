@@ -38,7 +38,8 @@ def on_the_curve(
         Over black, times the window.
     """
     taper, dark_e = at.taper, at.sampling.dark_e
-    average, (slope, start) = at.average.T.astype(np.float32), (part[component] for part in at.roots)
+    average = at.average.T.astype(np.float32)
+    slope, start = (part[component] for part in at.roots)
     bounds = np.flatnonzero(np.diff(component, prepend=-1, append=-1)).tolist()
     parts = [(slice(*ends), int(component[ends[0]])) for ends in pairwise(bounds)]
     sure = np.concatenate([1.0 / (noise[part, None] + at.whitening(k).spread) for part, k in parts]).astype(np.float32)
@@ -75,7 +76,8 @@ def _side_by_side(dark_e: tuple[float, ...], repeats: int) -> tuple[Singles, ...
     curves = [readings(noise_e) for noise_e in dark_e]
     black = np.array([curve.mean(np.zeros(1))[0] for curve in curves])
     offsets = np.stack([curve.offset for curve in curves])
-    bases, count = (black - offsets[:, 0]) ** 2, offsets.shape[1]
+    bases = (black - offsets[:, 0]) ** 2
+    count = offsets.shape[1]
     steps = [(count - 1) / (2.0 * curve.most[0]) for curve in curves]
     firsts = count * np.arange(len(curves)) + 0.5
     by_value = np.tile([bases, steps, firsts], repeats).astype(np.float32)

@@ -120,10 +120,12 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     def strip(first: int) -> tuple[Singles, ...]:
         last = min(first + rows, ny)
         part = slice(first * STRIDE, (last - 1) * STRIDE + size)
-        y, full = _windows(scale.samples[part], size), scale.full[part]
+        y = _windows(scale.samples[part], size)
+        full = scale.full[part]
         hit = _windows(full, size) if full.any() else np.zeros((len(y), 1), bool)
         if scale.columns is not None:
-            y, hit = y[:, scale.columns], hit[:, scale.columns] if full.any() else hit
+            y = y[:, scale.columns]
+            hit = hit[:, scale.columns] if full.any() else hit
         part_pilot = None
         if pilot is not None:
             part_pilot = PatchPilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
@@ -135,7 +137,8 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
     weight = np.zeros(total.shape[:2], np.float32)
     variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
-    cells, noise = np.zeros(variance.shape[:2], np.float32), []
+    cells = np.zeros(variance.shape[:2], np.float32)
+    noise = []
     # BLAS's own threads would wait for each other.
     with _blas().limit(limits=1), ThreadPoolExecutor(cpu_count()) as threads:
         # Tables first, each once: strips would make the same ones at the same time.
@@ -208,7 +211,8 @@ def _solve(
     A patch with saturated Ws is estimated twice: from R, G and B alone, and then with each of these Ws at the larger of
     that estimate and its reading.
     """
-    count, values = len(y), 4 * groups[0][0].size ** 2
+    count = len(y)
+    values = 4 * groups[0][0].size ** 2
     patches = Patches(*(np.empty((count, *shape), np.float32) for shape in ((values,), (), (4,), (4,))))
     hit = np.asarray(full.any(axis=1))
     if hit.any():
@@ -251,7 +255,8 @@ def _solve_one_light(
 ) -> None:
     """Estimate the patches `index`, whose samples are y, from one table."""
     # Patches whose linear estimate falls under black: `on_the_curve` redoes them
-    noise, below = None, [np.empty(0, np.intp)]
+    noise = None
+    below = [np.empty(0, np.intp)]
     parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
     if pilot is not None:
         noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
@@ -263,7 +268,8 @@ def _solve_one_light(
     bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
     for first, last in pairwise(bounds.tolist()):
         k = int(component[order[first]])
-        by, whitening = at.estimator(k), at.whitening(k)
+        by = at.estimator(k)
+        whitening = at.whitening(k)
         linear = by.linear[: evidence.shape[1]]
         for group in blocks(order[first:last]):
             variance, inner = by.variance, by.inner
@@ -275,10 +281,8 @@ def _solve_one_light(
                 rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
             # A patch that no component explains has a larger posterior variance, by `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT
-            place, weight = (
-                index[group],
-                (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32),
-            )
+            place = index[group]
+            weight = (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32)
             rows *= weight[:, None]
             weighted = np.matmul(rows, linear, out=values[: group.size])
             if noise is not None and at.mix.size == PATCH:

@@ -59,7 +59,8 @@ def blend_with_lines(
     balanced : callable
         Gives the light of values (..., channel) of `planes`, equal in all channels for a grey.
     """
-    names, letters = channels(tile), channel_map(tile, (4, 4))
+    names = channels(tile)
+    letters = channel_map(tile, (4, 4))
     sites = {name: [(i, j) for i, j in np.ndindex(2, 2) if np.all(letters[i::2, j::2] == name)] for name in names}
     guide = next((name for name in GUIDES if sites.get(name)), None)
     colours = [c for c, name in enumerate(names) if name != guide and len(sites[name]) == 1]
@@ -68,12 +69,14 @@ def blend_with_lines(
     height, width = planes.shape[:2]
     rows = np.pad(np.arange(height), (MARGIN_PX, MARGIN_PX + height % 2), mode="reflect")
     sides = ((0, 0), (MARGIN_PX, MARGIN_PX + width % 2), (0, 0))
-    edge, before = MARGIN_PX // 2, list[tuple[slice, Singles]]()
+    edge = MARGIN_PX // 2
+    before = list[tuple[slice, Singles]]()
     for first in range(0, height, TOGETHER):
         strip = np.pad(planes[rows[first : first + TOGETHER + 2 * MARGIN_PX]], sides, mode="reflect")
         # By row and column within 2x2 pixels: (2, 2, channel, row, column).
         parts = strip.reshape(len(strip) // 2, 2, -1, 2, len(names)).transpose(1, 3, 4, 0, 2).copy()
-        lines, share = parts[:, :, names.index(guide)].copy(), _colourfulness(parts, names, balanced)
+        lines = parts[:, :, names.index(guide)].copy()
+        share = _colourfulness(parts, names, balanced)
         for c in colours if sites[guide] in ([(0, 0), (1, 1)], [(0, 1), (1, 0)]) else ():
             (site,) = sites[names[c]]
             lines[site] = 0.5 * (lines[site] + _guide_at_samples(parts[*site, c], site, lines, sites[guide]))
@@ -142,7 +145,8 @@ def _predict(c: Singles, site: Phase, other: Singles, beside: Phase) -> Singles:
 
 def _line(c: Singles, g: Singles) -> tuple[Singles, Singles, Singles, Singles]:
     """Offset b and slope a of c over g around each sample; mean and variance of g."""
-    mean, middle, share = _means(c), _means(g), np.float32(1.0 - MIN_REL_VARIANCE)
+    mean, middle = _means(c), _means(g)
+    share = np.float32(1.0 - MIN_REL_VARIANCE)
     variance = _means(g * g) - share * middle * middle + _LEAST
     a = _means((_means(c * g) - share * mean * middle) / variance)
     return c - a * g, a, middle, variance

@@ -221,5 +221,6 @@ def pad_mosaic(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
         fits = inside & (frame_letters[np.where(inside, y + dy, 0), np.where(inside, x + dx, 0)] == wide_letters[gaps])
         for to, plane in zip(wide, samples, strict=True):
             to[gaps[0][fits], gaps[1][fits]] = plane[y[fits] + dy, x[fits] + dx]
-        gaps, y, x = (gaps[0][~fits], gaps[1][~fits]), y[~fits], x[~fits]
+        gaps = (gaps[0][~fits], gaps[1][~fits])
+        y, x = y[~fits], x[~fits]
     return wide

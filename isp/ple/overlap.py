@@ -46,7 +46,8 @@ def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
 
 def overlapped(patches: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
     """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
-    (ny, nx), across = shape, size // STRIDE
+    ny, nx = shape
+    across = size // STRIDE
     total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
     values = patches.values.reshape(ny, nx, size, -1)
     # Some rows of patches at once, so that values are read once. In a row patches that don't overlap, so that a sum
@@ -63,7 +64,8 @@ def overlapped(patches: Patches, shape: tuple[int, int], size: int) -> tuple[Sin
     # The window is a product of two lines: weights are summed across, then down, and so are the cells.
     inner = np.concatenate([patches.inner, np.ones((ny * nx, 1), np.float32)], axis=1)
     inner = (inner * patches.weight[:, None]).reshape(ny, nx, 5)
-    shares, sides = inner[..., 4:], taper(size).reshape(across, STRIDE)
+    shares = inner[..., 4:]
+    sides = taper(size).reshape(across, STRIDE)
     weight, cells = (np.zeros((ny, nx - 1 + across, width), np.float32) for width in (STRIDE, 5))
     for j in range(across):
         weight[:, j : j + nx] += shares * sides[j]

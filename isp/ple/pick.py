@@ -31,7 +31,8 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
     """
     count, size = len(evidence), len(at.rows)
-    best, component = np.full(count, -np.inf, np.float32), np.zeros(count, np.int16)
+    best = np.full(count, -np.inf, np.float32)
+    component = np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
     width = size if noise is None else size + 4
     # Arrays are made once: fresh memory costs as much as the sums.
@@ -47,7 +48,8 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
         likelihood = by.log_scale - 0.5 * square
         if noise is not None:
             # A row a direction, for sums along them.
-            news, spread = read[:, size:].T.copy(), noise[group] + by.spread[:, None].astype(np.float32)
+            news = read[:, size:].T.copy()
+            spread = noise[group] + by.spread[:, None].astype(np.float32)
             likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (news * news / spread).sum(axis=0))
         wins = likelihood > best[group]
         winners = group[wins]

@@ -182,7 +182,8 @@ def load_prior(path: Path) -> Prior:
             raise ValueError("it holds values that are no finite numbers")
         if not all(np.all(arrays[name] > 0) for name in ("neutrals_e", "weights", "rest")):
             raise ValueError("it holds a neutral, a weight or a variance that isn't above 0")
-    rows, (components, directions) = 4 * PATCH**2, (*arrays["centres"].shape, 0, 0)[:2]
+    rows = 4 * PATCH**2
+    components, directions = (*arrays["centres"].shape, 0, 0)[:2]
     lower = directions * (directions + 1) // 2
     shapes = {
         "neutrals_e": (*arrays["neutrals_e"].shape[:1], 4),

@@ -62,7 +62,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     (channel,) float64
         Posterior variance of a pixel over a sample's noise, median over the patches.
     """
-    electrons, full = site_electrons(raw), full_white(raw)
+    electrons = site_electrons(raw)
+    full = full_white(raw)
     shot, dark_e = counted_noise(raw)
     white_e = np.asarray(white_e) / shot  # as counted
     levels = pyramid(raw, white_e, electrons, full)
@@ -80,7 +81,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     scale = scale_of_pixels(raw, white_e, electrons, full)
     estimates = estimate(prior, scale, *_from_coarser(estimates, cells.sampling, scale.samplings[0][0], sums))
     index = list(cells.index)
-    planes, noise = estimates.planes[..., index], estimates.noise[index]
+    planes = estimates.planes[..., index]
+    noise = estimates.noise[index]
     plain = raw.plain_noise
     apart = [(c, i) for c, i in enumerate(index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
 
@@ -92,7 +94,8 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
 
     black = [float(readings(float(dark_e[i])).mean(np.zeros(1))[0]) for i in index]
     blend_with_lines(planes, raw.cfa, noise, black, lambda values: in_electrons(values) / (white_e * shot)[index])
-    in_noise, planes = planes, np.empty_like(planes)
+    in_noise = planes
+    planes = np.empty_like(planes)
     for first in range(0, len(planes), TOGETHER):
         planes[first : first + TOGETHER] = in_electrons(in_noise[first : first + TOGETHER])
     twice_colours(planes, in_noise, raw)
@@ -116,7 +119,8 @@ def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> P
     full, sums = (_sums(np.pad(a, [*sides, (0, 0)], mode=mode), stride) for a in (cells.full, cells.electrons))
     weights = np.where(full > 0, 0.0, weights)
     share = cells.presence.mean(axis=(0, 1))  # of cells that hold a channel
-    gains, floors = gains * share, dark**2 * share
+    gains = gains * share
+    floors = dark**2 * share
     whole = CELLS**2 * (weights @ gains)
     mean = (sums * weights).sum(axis=-1) / whole
     shot, floor = (CELLS**2 * (weights**2 * values).sum(axis=-1) / whole**2 for values in (gains, floors))

@@ -145,7 +145,9 @@ class Table:
 
     def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
         self.mix, self.sampling, self.rows = mix, sampling, np.array(sampling.rows)
-        pixels, at, among = mix.size**2, self.rows, _among(mix, sampling.rows)
+        pixels = mix.size**2
+        at = self.rows
+        among = _among(mix, sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
         self.unit_e = gains * light  # electrons of a signal of 1
         # The components in units of noise: values t, their slope in u, and their slope in the light.
@@ -188,10 +190,13 @@ class Table:
 
         It is one matrix on products of coordinates.
         """
-        at, own, white = self.rows, len(self.rows), self.white
+        at = self.rows
+        own = len(self.rows)
+        white = self.white
         means = np.concatenate([self.values[:, at], self.values @ self.average.T @ white.T], axis=1)
         covariances = np.empty((*means.shape, means.shape[1]))
-        samples, slopes, drift = covariances[:, :own, :own], self.slopes[:, at], self.drift[:, at]
+        samples = covariances[:, :own, :own]
+        slopes, drift = self.slopes[:, at], self.drift[:, at]
         np.multiply(_among(self.mix, self.sampling.rows).samples, slopes[:, :, None], out=samples)
         samples *= slopes[:, None]
         samples += drift[:, :, None] * drift[:, None]
@@ -206,7 +211,8 @@ class Table:
         pooled = np.tensordot(weights, covariances, 1) + (off.T * weights) @ off
         count = min(DIRECTIONS, covariances.shape[1] - 1)
         directions = np.linalg.eigh(pooled)[1][:, ::-1][:, :count]
-        mean, within = off @ directions, directions.T @ covariances @ directions
+        mean = off @ directions
+        within = directions.T @ covariances @ directions
         inverse = np.linalg.inv(within)
         others = covariances.shape[1] - count
         total = np.trace(covariances, axis1=1, axis2=2) + (off**2).sum(axis=1)
@@ -231,8 +237,10 @@ class Table:
         ks = [k for k in components if k not in self._whitenings]
         if not ks:
             return
-        at, own = self.rows, len(self.rows)
-        slopes, drift, values = self.slopes[ks][:, at], self.drift[ks][:, at], self.values[ks]
+        at = self.rows
+        own = len(self.rows)
+        slopes, drift = self.slopes[ks][:, at], self.drift[ks][:, at]
+        values = self.values[ks]
         scatter = _among(self.mix, self.sampling.rows).samples[ks] * slopes[:, :, None]
         scatter *= slopes[:, None]
         scatter += drift[:, :, None] * drift[:, None]
@@ -274,7 +282,8 @@ class Table:
         return self._estimators[k]
 
     def _make_estimator(self, k: int) -> Estimator:
-        at, whitening = self.rows, self.whitening(k)
+        at = self.rows
+        whitening = self.whitening(k)
         factor = whitening.reads[: len(at), : len(at)].T.astype(np.float64)
         covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
         half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
@@ -283,7 +292,8 @@ class Table:
         variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
         means = np.concatenate([self.average, self.inner])
         left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T
-        pilot, inner = whitening.turn @ left[:4], (left[4:] * self.inner).sum(axis=1)
+        pilot = whitening.turn @ left[:4]
+        inner = (left[4:] * self.inner).sum(axis=1)
         offset = self.over_black[k] - linear @ self.values[k, at]
         return Estimator(
             linear=(np.concatenate([linear.T, offset[None], pilot]) * self.taper).astype(np.float32),
@@ -297,7 +307,9 @@ class Table:
 
 @lru_cache(maxsize=16)
 def _among(mix: Mixture, rows: tuple[int, ...]) -> Among:
-    at, pixels, count = np.array(rows), mix.size**2, len(mix.means)
+    at = np.array(rows)
+    pixels = mix.size**2
+    count = len(mix.means)
     squares = mix.means**2 + np.diagonal(mix.covariances, axis1=1, axis2=2)
     samples = mix.covariances[:, at[:, None], at].astype(np.float64)
     by_channel = mix.covariances.reshape(count, pixels, 4, -1).swapaxes(1, 2)

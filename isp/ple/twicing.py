@@ -110,10 +110,12 @@ def _bias(like: Singles, wide: list[Singles], light: Singles, guide: int, colour
         ):
             np.add(total, by * values[window], out=total)
     count = np.maximum(count, _LEAST)
-    mean, variance = residual / count, variance / count**2
+    mean = residual / count
+    variance = variance / count**2
     guide_light = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
     share = light / guide_light
-    off, error = mean - share * mean[..., guide, None], variance + share**2 * variance[..., guide, None] + _LEAST
+    off = mean - share * mean[..., guide, None]
+    error = variance + share**2 * variance[..., guide, None] + _LEAST
     square = (off[..., colours] ** 2 / error[..., colours]).mean(axis=-1, keepdims=True)
     known = (np.float32(LIKELY_BIAS) * light) ** 2
     off *= np.maximum(1.0 - SURE / np.maximum(square, _LEAST), 0.0) * known / (known + error)

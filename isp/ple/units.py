@@ -69,7 +69,8 @@ class Readings:
 
     def moments(self, electrons: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
         """Mean, slope and variance together."""
-        limit, step = _limit(electrons, self.dark_e), self._step(electrons)
+        limit = _limit(electrons, self.dark_e)
+        step = self._step(electrons)
         straight = _straight(electrons, self.dark_e)
         return 2.0 * limit + self.offset[step], self.steepness[step] / limit, self.variances[step] * straight
 

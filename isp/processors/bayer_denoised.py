@@ -58,7 +58,8 @@ def picture_demosaicked_first(
     """
     require_bayer(raw.cfa)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
-    names, sites = raw.channels, channel_map(raw.cfa, raw.shape)
+    names = raw.channels
+    sites = channel_map(raw.cfa, raw.shape)
     gain = np.select([sites == name for name in names], gains.tolist())
     noise = raw.plain_noise
     stable = stabilise(mosaic / (gain * noise.shot), noise.dark_noise_e / noise.shot, 0.0) * np.sqrt(gain)

@@ -144,7 +144,8 @@ def _run(path: Path, function: Any, raw: RawImage, colours: Any, **options: Any)
 
 def _failure(path: Path, error: BaseException) -> str:
     """Words for an error in a user's file, with the last line of that file that was running."""
-    line, trace = getattr(error, "lineno", None), error.__traceback__
+    line = getattr(error, "lineno", None)
+    trace = error.__traceback__
     while trace is not None:
         if trace.tb_frame.f_code.co_filename == str(path):
             line = trace.tb_lineno

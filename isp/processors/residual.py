@@ -78,7 +78,8 @@ def _differences(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
 def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tuple[int, ...], window: int) -> Plane:
     """A colour that is linear in the guide within each window, the Laplacian of its residual being the least."""
     slopes = [sum(scipy.ndimage.convolve1d(plane, _SECOND, axis) for axis in axes) for plane in (guide, samples)]
-    guide_slope, sample_slope = np.where(sampled, slopes[0], 0.0), slopes[1]
+    guide_slope = np.where(sampled, slopes[0], 0.0)
+    sample_slope = slopes[1]
     gain = _sums(guide_slope * sample_slope, window) / (_sums(guide_slope**2, window) + _LEAST)
     count = _sums(sampled.astype(np.float64), window)
     sample, guides = (np.where(sampled, plane, 0.0) for plane in (samples, guide))

@@ -68,7 +68,8 @@ def band_light(
     """
     emitted = emission(lights, wavelength_nm, width_nm)
     maps = emitted[:, :, None] * np.eye(wavelength_nm.size)
-    groups, shares = list(lights.values()), emitted.sum(axis=1) * transport
+    groups = list(lights.values())
+    shares = emitted.sum(axis=1) * transport
     shining = [index for index in range(len(groups)) if emitted[index].any()]
     if not shining:
         return BandLight(None, maps, emitted, mixed=False)
@@ -84,7 +85,8 @@ def band_light(
     # Integrals of curves as wide as a band: of light of 1 in a band of the mixture, and of transport of 1 in one. Noise
     # is bounded where curves as wide as a camera's channels are summed, and where a line is told by its neighbours.
     edges = wavelength_nm[0] - width_nm[0] / 2, wavelength_nm[-1] + width_nm[-1] / 2
-    centres, wide = np.linspace(*edges, 2 * wavelength_nm.size + 1), float(width_nm.max())
+    centres = np.linspace(*edges, 2 * wavelength_nm.size + 1)
+    wide = float(width_nm.max())
 
     def bells(nm: Floats) -> Floats:
         return np.exp(-(((nm - centres[:, None]) / wide) ** 2) / 2)

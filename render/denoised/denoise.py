@@ -66,7 +66,8 @@ def first_surfaces(loaded: LoadedScene, film: Film, seed: int) -> tuple[Planes, 
 
     Pass another seed than the light's paths have: with that one the two would share their noise.
     """
-    once, span = np.ones(film.size, np.uint32), Span(0, SURFACE_POINTS, 1)
+    once = np.ones(film.size, np.uint32)
+    span = Span(0, SURFACE_POINTS, 1)
     group_seed = seed_of(seed, loaded.groups[0], 0)
     traces = (tracer.first_surface for tracer in tracers(loaded, film, PART_BANDS, group_seed))
     images = [traced(trace, once, span, SURFACE_THREADS, group_seed) for trace in traces]
@@ -98,7 +99,8 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
     # Reduce light over albedo, scaled to a mean of 1, to few spectra.
     unit = np.maximum(albedo, np.float32(LEAST_ALBEDO))
     unit *= np.float32((indirect / unit).mean(dtype=np.float64))
-    hats, light = _hats(len(indirect)), np.asarray(indirect / unit, np.float32)
+    hats = _hats(len(indirect))
+    light = np.asarray(indirect / unit, np.float32)
     reduced, error = (np.asarray(np.tensordot(hats, x, 1), np.float32) for x in (light, difference / unit))
     # Denoise the whole picture and each half of it.
     # The library takes normals only beside an albedo. Light is divided by albedo already, so a constant one is given.
@@ -111,7 +113,8 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
         images = [library.denoise(_channels_last(planes[triple]), **options) for triple in indices.reshape(-1, _PLANES)]
         return np.concatenate([np.moveaxis(image, -1, 0) for image in images])[: len(planes)]
 
-    even, odd = np.maximum(reduced + error, 0), np.maximum(reduced - error, 0)
+    even = np.maximum(reduced + error, 0)
+    odd = np.maximum(reduced - error, 0)
     share = _denoised_share(error, (filtered(even) - odd, filtered(odd) - even))
     mixture = reduced + share * (filtered(reduced) - reduced)
     return np.asarray(np.maximum(np.tensordot(_spectra_to_bands(light, reduced), mixture, 1), 0) * unit)
@@ -135,7 +138,8 @@ def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
     # E is estimated for a half, which has twice the variance of the mean: an upper bound for the mean's. The window
     # averages 4 pi s^2 independent pixels, so a variance has the relative error sqrt(2 / pixels); only what exceeds
     # that error counts as E.
-    of_half, pixels = 2 * variance, 4 * np.pi * MIXING_PIXELS**2
+    of_half = 2 * variance
+    pixels = 4 * np.pi * MIXING_PIXELS**2
     squared = np.maximum((even + odd) / 2 - of_half - of_half * (2 / pixels) ** 0.5, 0)
     total = variance + squared
     return np.asarray(np.divide(variance, total, out=np.ones_like(total), where=total > 0))

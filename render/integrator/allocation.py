@@ -43,7 +43,8 @@ def _powers_of_two(densities: Floats) -> NDArray[np.uint32]:
     """Powers of two from 1 on, nearest to numbers times the largest factor that keeps their mean at `LEAST_SHARE`."""
     if not densities.any():
         return np.ones(densities.shape, np.uint32)
-    logarithm, most = np.log2(np.maximum(densities / densities.max(), 1e-30)), int(np.log2(MOST_RATE))
+    logarithm = np.log2(np.maximum(densities / densities.max(), 1e-30))
+    most = int(np.log2(MOST_RATE))
     rates = np.ones(densities.shape, np.uint32)
     for shift in np.arange(0, min(most, -logarithm.min()) + 0.5 / STEPS, 1 / STEPS):
         larger = 1 << np.clip(np.floor(logarithm + shift + 0.5), 0, most).astype(np.uint32)

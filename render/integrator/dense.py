@@ -107,8 +107,10 @@ class Tracer:
         ray = mi.Ray3f(self._camera_ray(pixel, points))
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
-        albedo, normal = [mi.Spectrum(0.0) for _ in wavelengths], mi.Vector3f(0.0)
-        depth, chosen, active = mi.UInt32(0), mi.Bool(False), mi.Bool(True)
+        albedo = [mi.Spectrum(0.0) for _ in wavelengths]
+        normal = mi.Vector3f(0.0)
+        depth = mi.UInt32(0)
+        chosen, active = mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="first surface"):
             si = self.scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
             go_on = (depth + 1 < self.max_depth) & si.is_valid()
@@ -136,7 +138,8 @@ class Tracer:
     def _camera_ray(self, pixel: Any, points: Points) -> Any:
         """Ray through a point of each thread's pixel."""
         mi, size = self.mi, self.size
-        row, at = pixel // size[1], points.pair(FILM)
+        row = pixel // size[1]
+        at = points.pair(FILM)
         film = mi.Point2f((mi.Float(pixel - row * size[1]) + at.x) / size[1], (mi.Float(row) + at.y) / size[0])
         ray, _ = self.scene.sensors()[0].sample_ray(0.0, 0.5, film, points.pair(APERTURE))
         return ray
@@ -147,9 +150,11 @@ class Tracer:
         The offset from the bands' centres is one of those that the table is made for, if there is one. Centres and
         widths reach the kernel as data: other bands don't compile it anew.
         """
-        mi, sample = self.mi, points.at(WAVELENGTH)
+        mi = self.mi
+        sample = points.at(WAVELENGTH)
         if self.offsets is None:
-            offset, step = sample - 0.5, mi.UInt32(0)
+            offset = sample - 0.5
+            step = mi.UInt32(0)
         else:
             step = dr.minimum(mi.UInt32(sample * len(self.offsets)), len(self.offsets) - 1)
             offset = dr.gather(mi.Float, self.offsets, step)
@@ -212,7 +217,8 @@ class Tracer:
         direct, unscattered = mi.Bool(True), mi.Bool(True)
         lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
         first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
-        eta, depth = mi.Float(1.0), mi.UInt32(0)
+        eta = mi.Float(1.0)
+        depth = mi.UInt32(0)
         chosen, escaped, active = mi.Bool(False), mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="dense path"):
             # Light that the path meets
@@ -228,7 +234,8 @@ class Tracer:
             indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, mis_weight))
 
             # Light that is sampled from here, and the direction to go on in
-            go_on, escaped = (depth + 1 < self.max_depth) & si.is_valid(), beyond_first & ~si.is_valid()
+            go_on = (depth + 1 < self.max_depth) & si.is_valid()
+            escaped = beyond_first & ~si.is_valid()
             received, sample, weights, by_wavelength = self._bounce(
                 scene, points.bounce(depth + bounced), ray, si, go_on, wavelengths, step
             )
@@ -240,7 +247,8 @@ class Tracer:
             ray = si.spawn_ray(si.to_world(sample.wo))
             ray.wavelengths = wavelengths[0]
             eta *= sample.eta
-            previous, previous_pdf = dr.detach(si), sample.pdf
+            previous = dr.detach(si)
+            previous_pdf = sample.pdf
             previous_delta = mi.has_flag(sample.sampled_type, mi.BSDFFlags.Delta)
             direct = dr.select(si.is_valid(), unscattered, direct)
             unscattered &= previous_delta
@@ -250,7 +258,8 @@ class Tracer:
             active = go_on & survives
         # Environment of the paths that escaped
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
-        sky, indirect_sky = _select(escaped, throughput, dark), _select(escaped & ~direct, throughput, dark)
+        sky = _select(escaped, throughput, dark)
+        indirect_sky = _select(escaped & ~direct, throughput, dark)
         scattered = [result, sky] if self.environment else [result]
         indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.split else []
         return scattered, indirects, (lamp_first, sky_first, first), chosen
@@ -285,7 +294,8 @@ class Tracer:
         self, scene: Any, drawn: tuple[Any, ...], ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
     ) -> tuple[list[Any], Any, list[Any], Any]:
         """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
-        mi, bsdf = self.mi, si.bsdf(ray)
+        mi = self.mi
+        bsdf = si.bsdf(ray)
         towards_light, lobe, angle = drawn
         if not self.sample_lights:
             sample, weights, by_wavelength = dr.dispatch(bsdf, self._sampled, si, lobe, angle, wavelengths, step)

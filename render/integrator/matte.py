@@ -124,7 +124,8 @@ def _weights_at(surface: Any, si: Any, table: TableReader, step: Any, active: An
     ones = table.read(_row_at(surface, si), step, active)
     if surface.weight is None:
         return ones
-    share, others = _share_at(surface, si), table.read(surface.other_row, step, active)
+    share = _share_at(surface, si)
+    others = table.read(surface.other_row, step, active)
     return [dr.lerp(one, other, share) for one, other in zip(ones, others, strict=True)]
 
 

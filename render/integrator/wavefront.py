@@ -54,7 +54,8 @@ def traced(
     InputError
         Where a material chose by wavelength.
     """
-    mi, flat = mitsuba_module(), rates.ravel()
+    mi = mitsuba_module()
+    flat = rates.ravel()
     order = np.argsort(flat, kind="stable")
     # Paths of one packet change each other's last bits: Embree goes through its tree in another way once few are left.
     # So a packet holds the same paths whatever the launch, and a rate's last pixel fills its last packet up.
@@ -110,7 +111,8 @@ def _launched(
 ) -> Channels:
     """Channels of all points of blocks, each `chunk` points long, evaluated."""
     mi = mitsuba_module()
-    thread, length = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk), dr.opaque(mi.UInt32, chunk)
+    thread = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk)
+    length = dr.opaque(mi.UInt32, chunk)
     block = thread // length
     pixel, first = (dr.gather(mi.UInt32, numbers, block) for numbers in (pixel_of, first_of))
     index = first + thread - block * length

@@ -94,7 +94,8 @@ def open_envi(header: Path) -> EnviPicture:
     fields = _fields(header)
     size = {axis: _whole(fields, name, 1 << 20) for axis, name in _SIDES.items()}
     require_extent(*size.values())
-    kind, order = _whole(fields, "data type", 99), fields.get("interleave", "").lower()
+    kind = _whole(fields, "data type", 99)
+    order = fields.get("interleave", "").lower()
     if kind not in _TYPES or order not in _ORDER:
         raise InputError(
             f"data type {kind} and interleave {order!r} are not allowed; give one of {', '.join(map(str, _TYPES))} "
@@ -103,7 +104,8 @@ def open_envi(header: Path) -> EnviPicture:
     if _whole(fields, "file compression", 1, "0"):
         raise InputError("file compression: 1 is not allowed; save it without")
     dtype = np.dtype((">" if _whole(fields, "byte order", 1, "0") else "<") + _TYPES[kind])
-    offset, numbers = _whole(fields, "header offset", 1 << 40, "0"), data_file(header)
+    offset = _whole(fields, "header offset", 1 << 40, "0")
+    numbers = data_file(header)
     shape = tuple(size[axis] for axis in _ORDER[order])
     needed = offset + dtype.itemsize * int(np.prod(shape, dtype=np.int64))
     if require_file(numbers) < needed:

@@ -147,7 +147,8 @@ PREVIEW_TEXT = (
     "1 is whiteLuminance cd/m^2, of which the 99th percentile of luminance reaches 0.9"
 )
 _MAGIC = b"\x76\x2f\x31\x01"
-_HALF_MAX, _FLOAT = 65504.0, np.finfo(np.float32)
+_HALF_MAX = 65504.0
+_FLOAT = np.finfo(np.float32)
 MOST_ASPECT = 1e-3  # of a pixel's width over its height, from 1: a pixel in a thousand
 MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
 

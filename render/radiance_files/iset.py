@@ -60,7 +60,8 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     """
     path = Path(path)
     numbers = read_numbers(path, (*_KEYS, *_OF_LAMP, *_VIEWS_DEG, NAMES))
-    lamp, view_deg = _lamp(numbers, path), _view_deg(numbers, path)
+    lamp = _lamp(numbers, path)
+    view_deg = _view_deg(numbers, path)
     with in_place(str(path)):
         require_known("ISETCam variable", dict.fromkeys(str(name) for name in numbers[NAMES]))
         from_basis = "mcCOEF" in numbers and not any(key.startswith("scene/") for key in numbers)
@@ -114,7 +115,8 @@ def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray
     if any(key.startswith("scene/") for key in numbers):
         wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
     else:
-        wave, data = "wave" if "wave" in numbers else "wavelength", ""
+        wave = "wave" if "wave" in numbers else "wavelength"
+        data = ""
         photons = "photons" if "photons" in numbers else "data"
     nm = _numbers(numbers, wave).ravel().astype(np.float64)
     cube = _cube(numbers, photons, nm.size)

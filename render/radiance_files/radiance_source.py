@@ -65,7 +65,8 @@ def is_reflectance(path: str | Path) -> bool:
 
 def files_of(path: str | Path) -> list[Path]:
     """All files that a picture is read from: itself, the description beside a cube, and ENVI's numbers."""
-    suffix, described = Path(path).suffix.lower(), description(path)
+    suffix = Path(path).suffix.lower()
+    described = description(path)
     beside = [described] if suffix in cube.EXTENSIONS and described.is_file() else []
     return [Path(path), *beside, *([data_file(path)] if suffix == ".hdr" else [])]
 

@@ -53,8 +53,10 @@ def surface_reflectances(linear_srgb: Floats) -> tuple[NDArray[np.float32], Floa
         0 where the clusters hold the colour, up to 1.
     """
     colours = np.asarray(linear_srgb, dtype=np.float32).reshape(-1, 3)
-    maps, basis = _maps(), srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
-    result, share = np.empty((len(colours), len(basis)), np.float32), np.zeros(len(colours))
+    maps = _maps()
+    basis = srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
+    result = np.empty((len(colours), len(basis)), np.float32)
+    share = np.zeros(len(colours))
     for first in range(0, len(colours), STRIP):
         strip = slice(first, first + STRIP)
         number = cluster_of(colours[strip] @ SRGB_TO_XYZ.T.astype(np.float32))

@@ -73,7 +73,8 @@ def _check_ply(path: Path) -> None:
             fields[element] += [(words[4], f"3{_PLY_TYPES[words[3]]}")]
         elif words[:1] == ["property"]:
             fields[element] += [(words[2], _PLY_TYPES[words[1]])]
-    place, tokens = header.end(), content[header.end() :].split() if layout == "ascii" else []
+    place = header.end()
+    tokens = content[header.end() :].split() if layout == "ascii" else []
     for element, count in counts.items():
         if layout == "ascii":
             width = sum(3 if kind[0] == "3" else 1 for _, kind in fields[element])

@@ -98,7 +98,8 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
 
 def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     """Mitsuba's parser state. The scene's folders are on the search path only while no plug-in is loaded."""
-    resolver, config = search_path(mi), mi.parser.ParserConfig(mi.variant())
+    resolver = search_path(mi)
+    config = mi.parser.ParserConfig(mi.variant())
     mi.set_file_resolver(search_path(mi, file.parent))
     try:
         state = mi.parser.parse_file(config, str(file), **define)
@@ -117,7 +118,8 @@ def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
 
 def _from_xml(mi: Any, state: Any, bases: list[Path], folders: list[Path] | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
-    nodes, index_of = list(state.nodes), state.id_to_index
+    nodes = list(state.nodes)
+    index_of = state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
         raise InputError(f"{state.files[0]}: its root is {nodes[0].props.plugin_name()!r}; allowed: <scene>")
     # A part without an id goes by its key in what holds it.
@@ -130,7 +132,8 @@ def _from_xml(mi: Any, state: Any, bases: list[Path], folders: list[Path] | None
     parts = []
     for index, node in enumerate(nodes):
         try:
-            name, tag = node.props.id() or keys.get(index, ""), node.type.name.lower()
+            name = node.props.id() or keys.get(index, "")
+            tag = node.type.name.lower()
             require_allowed(node.props.plugin_name(), tag=tag, name=name, trust=folders is None)
             parts.append(_xml_part(node, nodes, index_of, bases, folders))
         except InputError as error:
@@ -139,7 +142,8 @@ def _from_xml(mi: Any, state: Any, bases: list[Path], folders: list[Path] | None
     for part, node in zip(parts, nodes, strict=True):
         for key, value in node.props.items():
             if node.props.type(key).name == "ResolvedReference":
-                child, tag = parts[value.index()], nodes[value.index()].type.name.lower()
+                child = parts[value.index()]
+                tag = nodes[value.index()].type.name.lower()
                 label = child.get("id", "" if key.startswith("_arg_") else key)
                 part[_key(part, index_of, numbers, label if part is parts[0] else key, tag)] = child
     return parts[0]
@@ -154,7 +158,8 @@ def _xml_part(
     if properties.id():
         result["id"] = properties.id()
     for name, value in properties.items():
-        key, kind = _RESERVED.sub("_", name), properties.type(name).name
+        key = _RESERVED.sub("_", name)
+        kind = properties.type(name).name
         if key in ("type", "id") or key in result:
             raise InputError(f"property name {name!r} is not allowed here; rename it")
         if kind == "Reference":

@@ -74,7 +74,8 @@ def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -
     kinds = {key: _kind(mi, child) for key, child in description.items()}
     _check_left_out(mi, name, description)
     integrators = [description[key] for key, kind in kinds.items() if kind == "integrator"]
-    (depth, rr_depth), notes = _depths(name, integrators), []
+    depth, rr_depth = _depths(name, integrators)
+    notes = []
     for integrator in integrators:
         limit = "of any length" if depth == DEEPEST else f"up to {depth} segments"
         engine = f"the engine brings its own, with paths {limit}, roulette from {rr_depth}"
@@ -119,7 +120,8 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
     if not nodes:
         direct = any(node["type"] in ("direct", "direct_projective") for node in integrators)
         return 2 if direct else Scene.max_depth, Scene.rr_depth
-    depth, rr_depth = nodes[0].get("max_depth", _PATHS[nodes[0]["type"]]), nodes[0].get("rr_depth", Scene.rr_depth)
+    depth = nodes[0].get("max_depth", _PATHS[nodes[0]["type"]])
+    rr_depth = nodes[0].get("rr_depth", Scene.rr_depth)
     require_whole(f"scene {name}: rr_depth", rr_depth, 1, 1 << 31, "roulette begins after the first surface")
     if depth >= 0:
         require_whole(f"scene {name}: max_depth", depth, 1, 1 << 31, "1 is emission alone, -1 without a limit")

@@ -158,7 +158,8 @@ def numbers_at_gains(low: EmvaReport, high: EmvaReport) -> PixelNumbers:
             f"{high.camera}: bits and black level {high.bits}, {high.black_level_dn}, at the lower gain {low.bits}, "
             f"{low.black_level_dn}; allowed: those of one converter; give reports of one camera"
         )
-    numbers, (k, k_high) = numbers_of(low), (low.figures["K"], high.figures["K"])
+    numbers = numbers_of(low)
+    k, k_high = low.figures["K"], high.figures["K"]
     sigma_e, sigma_high_e = (_read_noise(x.figures, x.source_note)[0].value for x in (low, high))
     if k_high <= k or sigma_high_e >= sigma_e:
         raise InputError(
@@ -193,8 +194,10 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
     clip_e = saturation_e
     for _ in range(8):  # the correction is a few per cent at first, and then what the last one missed
         z = (clip_e - mean_e) / np.sqrt(variance_e2)
-        above, density = scipy.special.ndtr(-z), np.exp(-(z**2) / 2) / sqrt(2 * pi)
-        first, second = z * above - density, 1 - above - z * density + z**2 * above
+        above = scipy.special.ndtr(-z)
+        density = np.exp(-(z**2) / 2) / sqrt(2 * pi)
+        first = z * above - density
+        second = 1 - above - z * density + z**2 * above
         variance = (variance_e2 * (second - first**2)) @ weights
         clip_e += saturation_e - light_e[np.argmax(variance)]
     return float(clip_e)

@@ -90,7 +90,8 @@ def _middle(raw: RawImage, window: int | None) -> NDArray[np.uint16]:
     """Square in the middle of a frame, beginning with the tile's first position."""
     if window is None:
         return raw.dn
-    (height, width), (rows, columns) = raw.dn.shape, (len(raw.cfa), len(raw.cfa[0]))
+    height, width = raw.dn.shape
+    rows, columns = len(raw.cfa), len(raw.cfa[0])
     if not max(rows, columns) <= window <= min(height, width):
         raise InputError(
             f"window: {window} pixels don't fit a frame of {height} x {width}; allowed: up to its side; give fewer"

@@ -159,7 +159,8 @@ def read_camera(path: Path) -> MeasuredCamera:
     try:
         content = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
         header, data = content["header"], content["spectral_data"]
-        channels, rows = list(data["index"]["main"]), data["data"]["main"]
+        channels = list(data["index"]["main"])
+        rows = data["data"]["main"]
         nm = np.array(sorted(float(key) for key in rows))
         table = np.array([rows[key] for key in sorted(rows, key=float)], dtype=np.float64)
         if header["license"] != LICENCE:

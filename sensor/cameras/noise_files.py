@@ -39,9 +39,11 @@ def dng_numbers(path: Path) -> PixelNumbers:
     source_note = f"NoiseProfile of {path.name}, {at}"
     white_e = profile.gain_e_per_dn
     rounding_e = white_e / (raw.white_dn - raw.black_dn) / sqrt(12)
-    read_e, words = profile.dark_noise_e, "sqrt(O) / S"
+    read_e = profile.dark_noise_e
+    words = "sqrt(O) / S"
     if read_e > rounding_e:
-        read_e, words = sqrt(read_e**2 - rounding_e**2), f"sqrt(O) / S, less {rounding_e:.3g} e- of rounding"
+        read_e = sqrt(read_e**2 - rounding_e**2)
+        words = f"sqrt(O) / S, less {rounding_e:.3g} e- of rounding"
     pixel = {
         "full_well_e": SourcedValue(white_e, f"electrons at white, 1 / S; {source_note}; the photodiode may hold more"),
         "read_noise_e": SourcedValue(read_e, f"{words}; {source_note}"),

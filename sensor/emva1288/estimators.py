@@ -57,7 +57,8 @@ def linearity(transfer: Transfer, dark_mean_dn: float, saturation_e: float) -> t
     share = np.full(transfer.light_e.shape, np.nan)
     if np.count_nonzero(used) < 3:
         return share, float("nan")
-    light, signal = transfer.light_e[used], transfer.mean_dn[used] - dark_mean_dn
+    light = transfer.light_e[used]
+    signal = transfer.mean_dn[used] - dark_mean_dn
     slope, start = np.polyfit(light, signal, 1, w=1 / light)
     line = start + slope * light
     share[used] = signal / np.where(line > 0, line, np.nan) - 1
@@ -116,8 +117,10 @@ def dark_current(slopes: NDArray[np.float64], gain_dn_per_e: Estimate) -> tuple[
     """Dark current of ordinary pixels [e-/s], share of hot pixels, and what these have on top [e-/s]."""
     hot = hot_pixels(slopes)
     share = float(hot.mean())
-    rest, relative = slopes[~hot] / gain_dn_per_e[0], gain_dn_per_e[1] / gain_dn_per_e[0]
-    current, spread = float(rest.mean()), float(rest.std() / sqrt(rest.size))
+    rest = slopes[~hot] / gain_dn_per_e[0]
+    relative = gain_dn_per_e[1] / gain_dn_per_e[0]
+    current = float(rest.mean())
+    spread = float(rest.std() / sqrt(rest.size))
     above = slopes[hot] / gain_dn_per_e[0] - current
     on_top = (float(above.mean()), float(above.std() / sqrt(above.size))) if hot.any() else (0.0, 0.0)
     return (

@@ -160,7 +160,8 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
 
 def _gain(stacks: list[list[_Site]], dark: list[_Site], levels: Floats, most_dn: float) -> Estimate:
     """Slope of the variance that light adds over the signal (eq. 50), in DN per electron; least squares by error."""
-    power, slope, of_flats, of_darks = 0.0, 0.0, 0.0, np.zeros(len(dark))
+    power, slope, of_flats = 0.0, 0.0, 0.0
+    of_darks = np.zeros(len(dark))
     for stack, level in zip(stacks, levels, strict=True):
         for index, (site, signal) in enumerate(zip(stack, level, strict=True)):
             if signal <= most_dn and signal > 0:

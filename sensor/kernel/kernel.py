@@ -132,7 +132,8 @@ def read_frame(
     Binned in charge, the wells are filled here and a quarter as many pixels converted in NumPy.
     """
     expected_e = np.asarray(expected_e, dtype=np.float32)
-    jit, one = arrays(), sensor.photosites
+    jit = arrays()
+    one = sensor.photosites
     pixel = one.pixel
     if pixel.crosstalk:
         expected_e = _single(spread_charge(np.minimum(expected_e, np.float64(LARGEST)), pixel.crosstalk))

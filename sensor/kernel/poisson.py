@@ -41,11 +41,13 @@ def alias_table() -> NDArray[np.uint32]:
 
 def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.uint32]]:
     """Cut columns of mean height 1 into columns of height 1 that two numbers own: the first's share, and the second."""
-    share, other = np.ones(heights.size), np.arange(heights.size, dtype=np.uint32)
+    share = np.ones(heights.size)
+    other = np.arange(heights.size, dtype=np.uint32)
     heights = heights.copy()
     low, high = list(np.flatnonzero(heights < 1)), list(np.flatnonzero(heights >= 1))
     while low and high:
-        short, tall = low.pop(), high[-1]
+        short = low.pop()
+        tall = high[-1]
         share[short], other[short] = heights[short], tall
         heights[tall] -= 1.0 - heights[short]
         if heights[tall] < 1:
@@ -104,7 +106,8 @@ def _by_inversion(mean: Any, uniform: Any, active: Any) -> Any:
 def _by_quantile(mean_e: Any, normal: Any) -> Any:
     """Q_N2 of Giles (2016); the mean's whole part stays out of the sum, whose rounding would move large draws."""
     whole = dr.floor(mean_e)
-    square, root = dr.square(normal), dr.sqrt(mean_e)
+    square = dr.square(normal)
+    root = dr.sqrt(mean_e)
     terms = dr.fma(root, normal, dr.fma(square, 1 / 6, 1 / 3))
     terms -= normal * dr.fma(square, 1 / 72, 1 / 36) / root
     terms += dr.fma(square, dr.fma(square, 1 / 270, 7 / 810), -8 / 405) / mean_e

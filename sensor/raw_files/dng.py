@@ -40,7 +40,8 @@ from sensor.raw_files.tiff import (
 
 PRIVATE = b"rodcone\0"
 PRIVATE_DATA = 50740
-MAKER, MAKE = 271, "rodcone"
+MAKER = 271
+MAKE = "rodcone"
 CFA_REPEAT, CFA_PATTERN, BLACK_LEVEL, WHITE_LEVEL = 33421, 33422, 50714, 50717
 OPCODES = 51008  # OpcodeList1: what is done to the samples as read
 EXPOSURE_TIME, F_NUMBER, ISO = 33434, 33437, 34855
@@ -84,7 +85,8 @@ def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: d
     OSError
         Where the folder is missing or can't be written.
     """
-    tags, moment = dng_tags(raw), _moment_tags(written or datetime.now(), frame)
+    tags = dng_tags(raw)
+    moment = _moment_tags(written or datetime.now(), frame)
     dn = raw.dn * np.float32(_sample_scale(raw)) if raw.dn.dtype.kind == "f" else raw.dn
     with replacing(path) as (part,):
         write_mosaic(part, dn, CFA, tags, {**exif_tags(raw), **moment}, LEAST_BYTES)
@@ -115,7 +117,8 @@ def read_dng(path: Path) -> RawImage:
     }
     expected = {**dng_tags(raw), **exif_tags(raw)}
     for code, name in _COMPARED.items():
-        of_file, allowed = tags.get(code), [expected.get(code), *earlier.get(code, [])]
+        of_file = tags.get(code)
+        allowed = [expected.get(code), *earlier.get(code, [])]
         if not any(_agree(of_file, each, _NEAR.get(code, 1e-6)) for each in allowed):
             stated, right = ("missing" if x is None else tuple(x[1][:8]) for x in (of_file, allowed[0]))
             raise InputError(
@@ -181,7 +184,8 @@ def dng_tags(raw: RawImage) -> Tags:
             "allowed: black of 0 or more, a whole white; write a .tif instead"
         )
     colour, (height, width) = raw.colour, raw.shape
-    scale, is_float = _sample_scale(raw), raw.dn.dtype.kind == "f"
+    scale = _sample_scale(raw)
+    is_float = raw.dn.dtype.kind == "f"
     tags: dict[int, tuple[str, Values]] = {
         254: ("I", (0,)),  # NewSubfileType: the full picture
         MAKER: text(MAKE),

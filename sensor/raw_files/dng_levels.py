@@ -87,7 +87,8 @@ def directories(path: Path, codes: Collection[int]) -> Iterator[Tags]:
         order = {b"II*\0": "<", b"MM\0*": ">"}.get(head[:4])
         if order is None or len(head) < 8:
             return  # no TIFF, but a camera's own format
-        waiting, offsets = list(struct.unpack(f"{order}I", head[4:])), {0}
+        waiting = list(struct.unpack(f"{order}I", head[4:]))
+        offsets = {0}
         while waiting and len(offsets) <= _MOST_DIRECTORIES:
             start = waiting.pop(0)
             if start in offsets:
@@ -170,7 +171,8 @@ def _tile(path: Path, tags: Tags) -> Tile:
 
 def _black(path: Path, tags: Tags, shape: tuple[int, int]) -> Floats:
     """Black level of each sample of the active area [DN]: a repeating pattern, and what rows and columns add."""
-    repeat, levels = _numbers(tags, BLACK_REPEAT) or (1, 1), _fractions(tags, BLACK) or (0.0,)
+    repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
+    levels = _fractions(tags, BLACK) or (0.0,)
     if len(repeat) != 2 or not 0 < repeat[0] * repeat[1] == len(levels):
         raise InputError(f"{path}: BlackLevel has {len(levels)} values for a pattern of {repeat[:2]}; it is damaged")
     pattern = np.array(levels).reshape(repeat)

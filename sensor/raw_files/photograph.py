@@ -112,11 +112,13 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
     # mosaic
     if opened.raw_image is None or opened.raw_image_visible.ndim != 2:
         raise InputError(f"{path}: it holds no mosaic, but whole pixels; allowed: Bayer raw files; take another file")
-    names, indices = opened.color_desc.decode("ascii", "replace"), np.asarray(opened.raw_colors_visible)
+    names = opened.color_desc.decode("ascii", "replace")
+    indices = np.asarray(opened.raw_colors_visible)
     levels = dng_levels(path, opened.raw_image.shape)  # a library moves margins, and the pattern's phase with them
     samples = opened.raw_image_visible
     if levels is not None:
-        indices, samples = np.asarray(opened.raw_colors)[levels.area], opened.raw_image[levels.area]
+        indices = np.asarray(opened.raw_colors)[levels.area]
+        samples = opened.raw_image[levels.area]
     if names != "RGBG" or indices.max() > 3:
         raise InputError(f"{path}: its colours are {names!r}; allowed: Bayer's R, G and B; take another file")
     colours = np.array(list(names))[indices]
@@ -145,11 +147,14 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
 
     # noise and colours
     full_dn = white - top
-    noise, source = read_noise_profile(path, full_dn), "profile of the file"
+    noise = read_noise_profile(path, full_dn)
+    source = "profile of the file"
     if noise is None:
-        noise, source = estimate_noise(upright.astype(np.float64) - top, full_dn), "estimated from the frame"
+        noise = estimate_noise(upright.astype(np.float64) - top, full_dn)
+        source = "estimated from the frame"
     if noise is None:
-        noise, source = NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E), "assumed"
+        noise = NoiseEstimate(ASSUMED_FULL_WELL_E / full_dn, ASSUMED_DARK_NOISE_E)
+        source = "assumed"
     colour, facts = _colour(opened)
     raw = RawImage(
         dn=upright,

@@ -75,7 +75,8 @@ def write_mosaic(
 
 def _directory(tags: Tags, start: int) -> bytes:
     """Directory of tags that stands at byte `start` (an even one), the values that don't fit into it behind it."""
-    entries, behind = struct.pack("<H", len(tags)), b""
+    entries = struct.pack("<H", len(tags))
+    behind = b""
     for code, (form, values) in sorted(tags.items()):
         packed = values if isinstance(values, bytes) else struct.pack(f"<{len(values)}{form[-1]}", *values)
         entries += struct.pack("<HHI", code, _TYPES[form], _count(form, values))

@@ -23,7 +23,8 @@ def join(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage
     dn: NDArray[Any] = plain.dn.astype(np.float32)
     noise = []
     for reading, raw in zip(readings[1:], raws[1:], strict=True):
-        share, channel = reading.share, str(reading.sites)
+        share = reading.share
+        channel = str(reading.sites)
         at = mask(plain.cfa, channel, plain.shape)
         dn[at] = raw.electrons[at] / share / plain.gain_e_per_dn + plain.black_dn
         noise.append(

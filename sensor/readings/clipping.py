@@ -54,7 +54,8 @@ def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floa
     """Return E[min(n, most)] - mean, E[(min(n, most) - mean)^2] and the share P(n < most), for a Gaussian n."""
     sigma = np.sqrt(variance)
     z = np.clip((most - mean) / np.maximum(sigma, 1e-300), -1e8, 1e8)
-    below, density = ndtr(z), np.exp(-np.square(np.clip(z, -40, 40)) / 2) / np.sqrt(2 * np.pi)
+    below = ndtr(z)
+    density = np.exp(-np.square(np.clip(z, -40, 40)) / 2) / np.sqrt(2 * np.pi)
     first = sigma * (z * ndtr(-z) - density)
     second = variance * (below - z * density + z**2 * ndtr(-z))
     return first, second, below
@@ -62,13 +63,17 @@ def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floa
 
 def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     """Return the moments of one reading's samples of `light_e` expected photo-electrons [the raw image's electrons]."""
-    shape, light = np.shape(light_e), np.ravel(np.asarray(light_e, dtype=np.float64))
+    shape = np.shape(light_e)
+    light = np.ravel(np.asarray(light_e, dtype=np.float64))
     sensor, share = reading.sensor, reading.share
     law = reading.law
     dark_e = sensor.pixel.dark_current_e_per_s * reading.exposure_s / share
     hot_e = reading.dark_e - dark_e
-    mean, variance, slope = light + hot_e, law.variance(light), np.ones_like(light)
-    well_e, top_e = sensor.pixel.full_well_e / share - dark_e, reading.headroom_e
+    mean = light + hot_e
+    variance = law.variance(light)
+    slope = np.ones_like(light)
+    well_e = sensor.pixel.full_well_e / share - dark_e
+    top_e = reading.headroom_e
 
     # Clip at the well and at the converter's top.
     near = mean + FAR * np.sqrt(variance) > top_e
@@ -99,7 +104,8 @@ def _over_reading(
     reach = np.maximum(FAR * after_e, 1e-9)
     change = np.clip(top_e - well_e, -reach, reach)  # under it the well clips first, over it the converter
     for start, end in ((-reach, change), (change, reach)):
-        half, middle = (end - start) / 2, (end + start) / 2
+        half = (end - start) / 2
+        middle = (end + start) / 2
         for node, weight in zip(_NODES, _WEIGHTS, strict=True):
             e = middle + half * node
             scale = np.maximum(after_e, 1e-9 / FAR)

@@ -35,7 +35,8 @@ def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImag
         What each of them read.
     """
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
-    whole, last = collected_share(readings), seams(readings).order[-1]
+    whole = collected_share(readings)
+    last = seams(readings).order[-1]
     dark_current_e = pixel.dark_current_e_per_s * exposure_s
     estimates_e = [raw.electrons / share for raw, share in zip(raws, shares(readings), strict=True)]
     electrons = merged_electrons(np.stack(estimates_e), readings) * whole
@@ -82,7 +83,8 @@ def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> F
     levels = np.concatenate([[0.0], np.geomspace(1e-2, readings[0].pixel.full_well_e, _LEVELS - 1)])
     total = np.asarray(sum(covariances(levels, readings).values()))
     flat = estimates_e.reshape(len(estimates_e), -1)
-    light, where = np.empty(flat.shape[1]), np.arange(flat.shape[1])
+    light = np.empty(flat.shape[1])
+    where = np.arange(flat.shape[1])
     for number, handover_e in enumerate(at.handover_e):
         weights = best_weights(total, at.order[number:])
         light[where] = _weighted(flat[:, where], weights, levels)
@@ -113,7 +115,8 @@ def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
 
     Each step states dark noise at its lower end and shot noise and PRNU at its upper end, where each dominates.
     """
-    at, whole = seams(readings), collected_share(readings)
+    at = seams(readings)
+    whole = collected_share(readings)
     temporal = ("read noise", "converter noise", "quantisation", "dark current")
     pixel, exposure_s = readings[0].pixel, readings[0].exposure_s
     of_columns_e2 = (pixel.column_gain_spread * pixel.dark_current_e_per_s * exposure_s) ** 2

@@ -76,7 +76,8 @@ def covariances(expected_e: Floats, readings: Sequence[PlainReading]) -> dict[st
     identity = np.eye(len(readings))
     charge = np.array([[a.charge == b.charge for b in readings] for a in readings]) / share
     photodiode = np.array([[a.photodiode == b.photodiode for b in readings] for a in readings]) * 1.0
-    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
+    hot_share = pixel.hot_pixel_share
     spread_e2 = hot_share * (1 - hot_share) * hot_e**2
     gain_e = np.array([x.sensor.gain_e_per_dn for x in readings])
 

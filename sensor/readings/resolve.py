@@ -112,7 +112,8 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
     """
     pixel = sensor.pixel
     dark_e = pixel.dark_current_e_per_s * exposure_s
-    hot_e, hot_share = pixel.hot_pixel_dark_current_e_per_s * exposure_s, pixel.hot_pixel_share
+    hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
+    hot_share = pixel.hot_pixel_share
     collected = {
         "shot noise": NoiseLaw(shot=poisson),
         "dark current": NoiseLaw(dark_e=sqrt(poisson * dark_e)),
@@ -122,7 +123,9 @@ def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0)
         "PRNU": NoiseLaw(prnu=pixel.prnu),
     }
     # Gain and collected electrons (mean e + m) are independent: variance E[gain^2] E[collected^2] - E[collected]^2.
-    of_all, mean_dark_e, spread = total(collected.values()), dark_e + hot_share * hot_e, pixel.column_gain_spread
+    of_all = total(collected.values())
+    mean_dark_e = dark_e + hot_share * hot_e
+    spread = pixel.column_gain_spread
     column_gains = NoiseLaw(
         shot=spread**2 * (of_all.shot + 2 * mean_dark_e),
         dark_e=spread * of_all.dark_e,

@@ -51,7 +51,8 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     left out, because its bands are the fine ones.
     """
     nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
-    matrix, means = _means(transport.width_nm, groups), transport.scene_means
+    matrix = _means(transport.width_nm, groups)
+    means = transport.scene_means
     # Of all light groups' bands, and of the uncovered part that stands behind them.
     every = block_diag(*[matrix] * len(transport.groups), 1.0)
 

@@ -101,7 +101,8 @@ def find_effects(
     """
     halves = transport.relight_halves(luminance_cd_m2=1.0)
     bare = replace(sensor, lens=replace(lens, **dict.fromkeys(IMAGING_TERMS.values(), 0.0)))
-    full, plain = _electrons(halves, replace(sensor, lens=lens)), _electrons(halves, bare)
+    full = _electrons(halves, replace(sensor, lens=lens))
+    plain = _electrons(halves, bare)
     without = {
         name: _electrons(halves, replace(sensor, lens=replace(lens, **{field: 0.0}))) - full
         for name, field in IMAGING_TERMS.items()
@@ -120,7 +121,8 @@ def shake_effect(
     transport: Transport, sensor: SensorConfig, lens: LensConfig, exposure_s: float, rng: np.random.Generator
 ) -> Pair:
     """Return what a still camera changes, as `Effects.lens`, for the path among `PATHS` that costs most."""
-    halves, held = transport.relight_halves(luminance_cd_m2=1.0), replace(sensor, lens=lens)
+    halves = transport.relight_halves(luminance_cd_m2=1.0)
+    held = replace(sensor, lens=lens)
     still = [channel_electrons(form_image(half, held), held, 1.0) for half in halves]
     effects = []
     for key in rng.integers(0, 2**63, PATHS):

@@ -51,7 +51,8 @@ def choose(rows: Sequence[ScaledEffects], sizes: dict[int, int], shares: BudgetS
         compared.setdefault(replace(row.condition, sensor=""), []).append(row)
     candidates: list[tuple[float, Choice]] = []
     for count, bands in sizes.items():
-        images_ns, left_out = 0.0, {}
+        images_ns = 0.0
+        left_out = {}
         for alike in compared.values():
             lens = effects_left_out(alike, count, bands, shares)
             if lens is None:

@@ -105,7 +105,8 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
     for spectrum in study.spectra:
         lit = under(pilot.transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
-        noise, radiance = _pilot_noise(pilot, lit), lit.relight(luminance_cd_m2=1.0)
+        noise = _pilot_noise(pilot, lit)
+        radiance = lit.relight(luminance_cd_m2=1.0)
         for name in study.sensors:
             auto_s = unit_exposure_s(radiance, preset(name).undivided)
             for mosaic in study_mosaics(study):
@@ -117,7 +118,8 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
                     if (condition.spectrum, condition.sensor) != (spectrum, name):
                         continue
                     level = level_luminance(condition.level, lux)
-                    exposure_s, camera = parse_exposure(condition.exposure), at_gain(sensor, condition.gain)
+                    exposure_s = parse_exposure(condition.exposure)
+                    camera = at_gain(sensor, condition.gain)
                     if exposure_s is None:
                         wanted_s = at_level_s(auto_s, level, AUTO, sensor) * sensor.gain / camera.gain
                         exposure_s, camera = amplified(camera, wanted_s, study.longest_exposure_s)
@@ -125,7 +127,8 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
                     if lens.shake_um:
                         shake = shake_effect(lit, sensor, lens, exposure_s, rng)
                         effects = replace(of_any_time, lens={**of_any_time.lens, SHAKE: shake})
-                    burst, burst_s = merged_sensor(camera, condition.frames), exposure_s * condition.frames
+                    burst = merged_sensor(camera, condition.frames)
+                    burst_s = exposure_s * condition.frames
                     yield scale_effects(condition, mosaic, burst, effects, level, burst_s, noise)
 
 

@@ -67,7 +67,8 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
             choice = choose(rows, sizes, study.budget, most_spp(study, scene) if pilot.rendered else 0)
             models = _chosen_models(choice, pilot, study)
         else:
-            choice, models = _choice_of(named, rows, pilot), named
+            choice = _choice_of(named, rows, pilot)
+            models = named
         if pilot.rendered:
             renders[scene] = models.renders[scene]
         images |= {condition: models.images[condition] for condition in conditions(study, scene)}

@@ -53,7 +53,8 @@ def plan_table(plan: Plan) -> Table:
     names = term_names(worse)
     large = {term.name for row in worse for term in row.terms if term.share >= LEAST_SHOWN}
     title = " ".join(words[0][i] for i in range(len(words[0])) if not varies[i] and i != LEVEL)
-    columns, left_out = [x for x in names if x in large], ", ".join(x for x in names if x not in large)
+    columns = [x for x in names if x in large]
+    left_out = ", ".join(x for x in names if x not in large)
     table = Table(
         box=None, padding=(0, 1, 0, 0), pad_edge=False, header_style="bold", title=title, title_justify="left"
     )

@@ -15,7 +15,8 @@ from studies.study.study import Condition
 # Standard errors added to a mean over the pilot's pixels. A few pixels may hold most of the noise, here and in the
 # render that is predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations
 # (Cantelli's inequality).
-EFFECT_MARGIN, NOISE_MARGIN = 2.0, 19.0**0.5
+EFFECT_MARGIN = 2.0
+NOISE_MARGIN = 19.0**0.5
 
 
 @dataclass(frozen=True)

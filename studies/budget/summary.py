@@ -93,7 +93,8 @@ def _too_few_samples(study: Study, spp: int, rows: Sequence[Ledger]) -> list[str
     share = max(term.share for row in rows for term in row.terms if term.name == MONTE_CARLO)
     if share <= study.budget.monte_carlo:
         return []
-    needed, allowed = float(f"{spp * share / study.budget.monte_carlo:.2g}"), share_text(study.budget.monte_carlo)
+    needed = float(f"{spp * share / study.budget.monte_carlo:.2g}")
+    allowed = share_text(study.budget.monte_carlo)
     return [
         f"Monte Carlo noise exceeds its share of {allowed}: {needed:.0f} samples per pixel "
         f"would keep it, and the study allows {most_spp(study, rows[0].condition.scene)}."

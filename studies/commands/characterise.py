@@ -125,7 +125,8 @@ def characterise(
     # The last column is measured less configured in standard errors; a figure without an error has none.
     rows = []
     for figure in chip.figures:
-        error, off = f"{figure.error:.2g}", f"{(figure.measured - figure.configured) / (figure.error or 1.0):+.1f}"
+        error = f"{figure.error:.2g}"
+        off = f"{(figure.measured - figure.configured) / (figure.error or 1.0):+.1f}"
         errors = (error, off) if figure.error > 0 else ("", "")
         rows.append((figure.name, figure.unit, f"{figure.configured:.5g}", f"{figure.measured:.5g}", *errors))
     print_table(HEAD, rows, words=2)

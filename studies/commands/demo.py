@@ -194,8 +194,10 @@ def reference(
     study = read_study(STUDY)
     choice = SceneChoice(scene, define=define)
     study = replace(study, scenes=(choice,), render=replace(study.render, size=size or study.render.size))
-    opened, model = open_choice(choice, study), plan_from_settings(study).renders[choice]
-    film, folder = film_of(opened, model), out or next(reference_folders())
+    opened = open_choice(choice, study)
+    model = plan_from_settings(study).renders[choice]
+    film = film_of(opened, model)
+    folder = out or next(reference_folders())
     assert opened.scene is not None
     path = reference_path(folder, opened.scene, film)
     found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)

@@ -242,7 +242,8 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
     with progress(sys.stderr) as step:
         step(READING, 0.0)
         opened = open_scene(order.source, order.trust_scene, order.extend, chart=order.chart, define=order.define)
-    scene, size = opened.scene, asked_size(opened.size, order.height, order.width)
+    scene = opened.scene
+    size = asked_size(opened.size, order.height, order.width)
     spectra = asked_spectra(scene, order.light)
     lit_at: dict[str, Any] = asked_level(scene, order.level)
     lamps = [spectra.get(name, group.spectrum) for name, group in scene.groups.items()]
@@ -270,9 +271,11 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
     # Render and write
     with kept_beside(order.out) as kept:
         if ready:
-            transport, notes = ready.transport, (*opened.notes, ready.line)
+            transport = ready.transport
+            notes = (*opened.notes, ready.line)
         else:
-            transport, notes = _rendered(order, scene, size, (wavelength_nm, width_nm), kept), opened.notes
+            transport = _rendered(order, scene, size, (wavelength_nm, width_nm), kept)
+            notes = opened.notes
             notes = (*notes, *filter(None, [compile_note(transport.compile_s)]))
         radiance = (
             relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)

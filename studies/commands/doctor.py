@@ -116,7 +116,8 @@ def intruders(home: Path) -> dict[str, str]:
 
 def package_finding(name: str, home: Path, intruder: str | None = None) -> Finding:
     """Check whether the package that Python finds lies in `home`, the folder that holds rodcone's packages."""
-    label, fix = f"package {name}", "install rodcone into an environment of its own"
+    label = f"package {name}"
+    fix = "install rodcone into an environment of its own"
     spec = util.find_spec(name)
     if spec is None:
         return Finding(label, "not found; install rodcone again", False)

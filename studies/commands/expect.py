@@ -41,7 +41,8 @@ class _Cost:
 
     def words(self) -> str:
         """One line: time and memory, and what half of it would take."""
-        half, several = replace(self, levels=max(1, self.levels // 2)), "s" * (self.cameras > 1)
+        half = replace(self, levels=max(1, self.levels // 2))
+        several = "s" * (self.cameras > 1)
         return (
             f"about {duration(self.seconds)}, {_BYTES / GB:.1f} GB: {self.cameras} camera{several} at {self.levels} "
             f"levels, no samples; with half the levels {duration(half.seconds)}"

@@ -112,7 +112,8 @@ class SweepOrder:
         return plan_study(study, cache=self.out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
 
 
-ORDER, WORKERS = SweepOrder(), Workers()
+ORDER = SweepOrder()
+WORKERS = Workers()
 
 
 def sweep(

@@ -34,7 +34,8 @@ from studies.sweep.prepare import SET
 
 MEASURED = tuple(metric for metric in METRICS if metric not in ON_TARGETS)
 EXPECTED_UNDER = "D65"
-FROZEN_LIST, SENSORS = "benchmark", Path(__file__).parents[1] / "configs" / "sensors"
+FROZEN_LIST = "benchmark"
+SENSORS = Path(__file__).parents[1] / "configs" / "sensors"
 ENDINGS = (".png", ".tif", ".tiff", ".npy")
 _OVERSHOOT = 0.01  # of values in an array, beyond 0 to 1
 # What is often mistaken, and what would undo it: pictures that come this much nearer to the truth by it are refused.
@@ -102,7 +103,8 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     samples = [line for line in manifest if line["kind"] == "sample"]
     if len(samples) < manifest[0]["samples"]:
         raise InputError(f"of: {len(samples)} of {manifest[0]['samples']} samples are made; run rodcone dataset again")
-    files, shards = _pictures_of(pictures, samples), shards_of(out / SET, manifest)
+    files = _pictures_of(pictures, samples)
+    shards = shards_of(out / SET, manifest)
     for shard in shards:
         if not is_intact(shard):
             raise InputError(f"of: {shard.path.name} isn't what was written; run rodcone dataset again")
@@ -260,9 +262,11 @@ def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
 def psnr_chart(scores: Sequence[Score]) -> Figure:
     """Draw each developer's PSNR over luminance with its interval; what is expected is a line without one."""
     figure = blank(*CHART)
-    axes, ends = figure.subplots(), []
+    axes = figure.subplots()
+    ends = []
     for index, developer in enumerate(dict.fromkeys(score.developer for score in scores)):
-        line, colour = [score for score in scores if score.developer == developer], COLOURS[index % len(COLOURS)]
+        line = [score for score in scores if score.developer == developer]
+        colour = COLOURS[index % len(COLOURS)]
         values = np.array([score.means["psnr_db"] for score in line])
         halves = np.nan_to_num([score.halves["psnr_db"] for score in line])
         light = [score.luminance_cd_m2 for score in line]

@@ -74,7 +74,8 @@ def make_set(
         Where a file can't be written.
     """
     check_cameras(study, order)
-    scenes, folder = open_all(study), out / SET
+    scenes = open_all(study)
+    folder = out / SET
     for opened in scenes.values() if order.crop else ():
         file, white = opened.choice.source, opened.white
         _windows(opened.size if opened.scene else open_radiance_file(file, white)[0].counts.shape, order.crop)
@@ -85,7 +86,8 @@ def make_set(
         job = Job(study, plan_from_settings(study), out, base)
         require_room(bytes_needed(study, job.plan, scenes.values(), order), out)
         # the files that samples are cut from
-        samples, scene_lines = list[Sample](), Lines()
+        samples = list[Sample]()
+        scene_lines = Lines()
         for index, opened in enumerate(scenes.values()):
             rendering = partial(_show_render, show, index, len(scenes))
             cells = scene_cells(job, opened, rendering)

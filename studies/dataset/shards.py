@@ -132,7 +132,8 @@ def make_shard(shard: Shard) -> Shard:
                     _add(tar, f"{sample.key}.{name}.npy", file.getvalue())
                 _add(tar, f"{sample.key}.json", json.dumps(facts).encode())
                 lines.append({"kind": "sample", **{name: facts[name] for name in _LISTED}})
-        size, made = place.stat().st_size, digest_file(place)
+        size = place.stat().st_size
+        made = digest_file(place)
     head = {"kind": "shard", "name": shard.path.name, "split": shard.samples[0].split, "samples": len(lines)}
     head |= {"bytes": size, "digest": made, "made_from": shard.key}
     return replace(shard, samples=(), lines=[head, *lines])
@@ -179,7 +180,8 @@ def shards_of(folder: Path, lines: Lines) -> list[Shard]:
 
 def is_intact(shard: Shard) -> bool:
     """Whether a shard's file is what was written."""
-    path, head = shard.path, shard.lines[0]
+    path = shard.path
+    head = shard.lines[0]
     return path.is_file() and path.stat().st_size == head["bytes"] and digest_file(path) == head["digest"]
 
 

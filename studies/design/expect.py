@@ -81,7 +81,8 @@ class LitPrior:
 @cache
 def view_of(prior_name: str, light_name: str) -> LitPrior:
     """The prior's coefficients under an illuminant, in bands of 1 nm."""
-    prior, light = load_prior(prior_name), named_light(light_name)
+    prior = load_prior(prior_name)
+    light = named_light(light_name)
     basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, light.wavelength_nm) - 1, 0, len(prior.spectra) - 1)]
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
     xyz = tristimulus(light.spectrum * basis.T, light.wavelength_nm, light.width_nm)
@@ -123,7 +124,8 @@ def _lab_root(relative: Floats) -> Floats:
 def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats:
     """H of a patch: electrons of each sample from each pixel's coefficients, through lens, filters and crosstalk."""
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
-    filters, spread = responses[sites_of(sensor.cfa)], spread_of(sensor.pixel.crosstalk)
+    filters = responses[sites_of(sensor.cfa)]
+    spread = spread_of(sensor.pixel.crosstalk)
     return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, filters, optimize=True))
 
 
@@ -182,9 +184,12 @@ def expect(
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
     if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # else a patch's middle lacks sites
         raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")
-    spectral, forms = load_prior(prior), _forms(prior, light)
-    responses, lens = responses_e(sensor, view_of(prior, light)), lens_of(sensor, blur)
-    sampling, frame_e = sampling_of(sensor, responses, lens), np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
+    spectral = load_prior(prior)
+    forms = _forms(prior, light)
+    responses = responses_e(sensor, view_of(prior, light))
+    lens = lens_of(sensor, blur)
+    sampling = sampling_of(sensor, responses, lens)
+    frame_e = np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
     # Component known, and one Gaussian in the mixture's place.
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     mixtures = ((spectral.patches, forms), (single_gaussian(spectral.patches), pooled_forms))
@@ -214,15 +219,19 @@ def expect(
 @cache
 def _forms(prior: str, light: str) -> Floats:
     """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
-    spectral, seen = load_prior(prior), view_of(prior, light)
+    spectral = load_prior(prior)
+    seen = view_of(prior, light)
     return np.array([[r.swapaxes(-1, -2) @ r for r in metric_rows(spectral, seen, m)] for m in spectral.reflectances])
 
 
 @cache
 def drawn_pixels(prior: str) -> Floats:
     """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
-    spectral, rng, shape = load_prior(prior), np.random.default_rng(0), (METERED, METERED)
-    component, pixel = rng.choice(len(spectral.patches.weights), shape, p=spectral.patches.weights), MIDDLE[0]
+    spectral = load_prior(prior)
+    rng = np.random.default_rng(0)
+    shape = (METERED, METERED)
+    component = rng.choice(len(spectral.patches.weights), shape, p=spectral.patches.weights)
+    pixel = MIDDLE[0]
     factors = spectral.patches.factors[component, pixel]
     off = (factors @ rng.standard_normal((*shape, factors.shape[-1], 1)))[..., 0]
     coefficients = (spectral.patches.means[component, pixel] + off) * rng.choice(spectral.reflectances, (*shape, 1))

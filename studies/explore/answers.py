@@ -53,7 +53,8 @@ def shown(
     shots, used = [], []
     for controls in cameras:
         exposed = expose_scene(rendered.transport, controls, memo)
-        shot, taken = _shot(controls, exposed, memo), controls
+        shot = _shot(controls, exposed, memo)
+        taken = controls
         if shot is None:
             taken = stand_in(controls, exposed.raw.dn.size)
             shot = photograph(rendered.transport, taken, memo)
@@ -96,7 +97,8 @@ def _shot(controls: Controls, exposed: Exposure, memo: Memo) -> Shot | None:
 
 def python_text(rendered: RenderState, controls: Controls, view: str, drops: Path) -> str:
     """Write the Python of a view or a figure; it names a dropped file without folder, to be run beside that file."""
-    text, path = python_of(rendered.code, controls, view), Path(controls.sensor)
+    text = python_of(rendered.code, controls, view)
+    path = Path(controls.sensor)
     return text.replace(str(path), path.name) if drops in path.parents else text
 
 
@@ -130,7 +132,9 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
     view : str
         Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
     """
-    settings, defaults, default_lamp = to_json(controls), to_json(Controls()), vars(Lamp())
+    settings = to_json(controls)
+    defaults = to_json(Controls())
+    default_lamp = vars(Lamp())
     settings["lamps"] = {
         group: {name: value for name, value in lamp.items() if value != default_lamp[name] and value != []}
         for group, lamp in settings["lamps"].items()

@@ -174,7 +174,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     scale = controls.level_cd_m2 * scale_1
     base = memo.of("own camera", optics[:2], lambda: vary(preset(controls.sensor), controls.mosaic))
     sensor = memo.of("camera", camera, camera_of, controls, base)
-    own_gain, speed = sensor.gain, memo.of("speed", camera, iso_speed, sensor)
+    own_gain = sensor.gain
+    speed = memo.of("speed", camera, iso_speed, sensor)
 
     # Lens and filters
     frames = {}
@@ -209,7 +210,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     exposures = []
     for number in numbers:
         memo.check()
-        rng, frame_e = np.random.default_rng([controls.seed, _FRAME, number]), expected_e
+        rng = np.random.default_rng([controls.seed, _FRAME, number])
+        frame_e = expected_e
         if sensor.lens.shake_um:
             frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
         exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
@@ -226,7 +228,8 @@ def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Develop
     fitted = (controls.sensor, controls.mosaic, controls.processor, light.spectrum.tobytes(), sensor.pixel.crosstalk)
     processor = PROCESSORS[controls.processor]
     colours = memo.of("colours", fitted, colour_fit, sensor, processor, light)
-    neutral, options = neutral_electrons(sensor, light, raw.exposure_s), options_of(controls)
+    neutral = neutral_electrons(sensor, light, raw.exposure_s)
+    options = options_of(controls)
     if controls.white_balance == AS_SHOT:
         options["balance"] = neutral
     return partial(develop_to_scale, raw, processor, colours, sensor, neutral, exposed.white_cd_m2, **options)
@@ -252,7 +255,8 @@ def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame
 
 
 def _truth(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
-    groups, light, planes = exposed.transport.groups, exposed.light, []
+    groups, light = exposed.transport.groups, exposed.light
+    planes = []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
         spectrum = (name, lamp.spectrum, lamp.table)

@@ -38,7 +38,9 @@ HEADERS = {
 EXTRA = "explore"
 # What one connection is read of. A page that has one request of each kind under way stays far below; a hostile one
 # leaves the others their turn.
-MOST_A_SECOND, MOST_CHARACTERS_A_SECOND, BURST_S = 400, 20 * MOST_CHARACTERS, 1.0
+MOST_A_SECOND = 400
+MOST_CHARACTERS_A_SECOND = 20 * MOST_CHARACTERS
+BURST_S = 1.0
 
 Scope = MutableMapping[str, Any]
 App = Callable[[Scope, Any, Any], Awaitable[None]]
@@ -66,7 +68,8 @@ def make_app(session: Session, port: int, token: str) -> App:
 
     async def live(socket: Any) -> None:
         await socket.accept()
-        loop, outgoing = asyncio.get_running_loop(), asyncio.Queue[bytes]()
+        loop = asyncio.get_running_loop()
+        outgoing = asyncio.Queue[bytes]()
 
         def send(header: Header, buffers: Sequence[bytes]) -> None:
             loop.call_soon_threadsafe(outgoing.put_nowait, packed(header, buffers))
@@ -177,7 +180,8 @@ def make_server(session: Session, listener: socket.socket) -> tuple[Any, str]:
     """
     uvicorn = optional_library("uvicorn", EXTRA)
     optional_library("websockets", EXTRA)
-    token, port = secrets.token_urlsafe(32), listener.getsockname()[1]
+    token = secrets.token_urlsafe(32)
+    port = listener.getsockname()[1]
     config = uvicorn.Config(
         make_app(session, port, token),
         log_level="warning",
@@ -212,7 +216,8 @@ def explore(transport: Transport) -> Any:
     kind = type(
         "Explorer", (anywidget.AnyWidget,), {"_esm": str(own_file("explore.js")), "_css": str(own_file("explore.css"))}
     )
-    widget, session = kind(), Session(of_transport(transport))
+    widget = kind()
+    session = Session(of_transport(transport))
     loop = _running_loop()
 
     def send(header: Header, buffers: Any) -> None:

@@ -165,7 +165,8 @@ class Session:
             while not self._closed:
                 if kind := self._first_pending():
                     return self._pending.pop(kind), never_cancel
-                act, left_s = left_to_do(), self._asked_s + REST_S - time.monotonic()
+                act = left_to_do()
+                left_s = self._asked_s + REST_S - time.monotonic()
                 if act is not None and not self._alone and (left_s <= 0 or self._rendered is None):
                     return None, act
                 self._changed.wait(None if act is None or self._alone else left_s)
@@ -179,7 +180,8 @@ class Session:
     def _check(self) -> None:
         """Raise `Overtaken` where nobody waits for the work under way any more, or another message goes first."""
         with self._changed:
-            message, pending = self._message, self._first_pending()
+            message = self._message
+            pending = self._first_pending()
             left = self._closed or self._alone or (message and message.get("page", "") != self._page)
             if left or (pending and not message):
                 raise Overtaken
@@ -221,7 +223,8 @@ class Session:
             raise Overtaken
 
     def _answer(self, message: Header) -> Answer:
-        kind, rendered = message["kind"], self._rendered
+        kind = message["kind"]
+        rendered = self._rendered
         if kind == "scene":
             self._choose_scene(message["name"])
         if kind in ("hello", "scene"):
@@ -265,7 +268,8 @@ class Session:
         if message is None or rendered is None:
             return
         for controls in self._cameras(message):
-            key, memo = repr(controls), self._memo
+            key = repr(controls)
+            memo = self._memo
             quick = stand_in(controls, rendered.transport.coverage.mean.size) == controls
             if not quick and memo.kept("slow", key) is None and key not in self._slow:
 

@@ -130,7 +130,8 @@ def open_source(source: str, options: RenderOptions) -> Source:
             notes=tuple(notes),
         )
     opened = open_scene(source, options.trust_scene, define=options.define)
-    size, bands = film_size(opened.size, options.size), _bands(options)
+    size = film_size(opened.size, options.size)
+    bands = _bands(options)
     require_memory(memory(size[0] * size[1], bands[0].size, len(opened.scene.groups)), options.force)
     coloured = _coloured(opened.scene.groups)
     if ready := _ready(source, opened.scene, size, bands, options):

@@ -237,7 +237,8 @@ def pixel(exposed: Exposure, row: int, column: int) -> dict[str, Any]:
         ],
         axis=0,
     )
-    names, channel = sensor.channels, str(channel_map(sensor.cfa, raw.shape)[row, column])
+    names = sensor.channels
+    channel = str(channel_map(sensor.cfa, raw.shape)[row, column])
     return {
         "row": row,
         "column": column,

@@ -116,7 +116,8 @@ def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]
     across = gaussian / gaussian.sum()
     found = []
     for derivative in (-at * gaussian, (at**2 / sigma**2 - 1) * gaussian):
-        positive, negative = np.maximum(derivative, 0.0), np.minimum(derivative, 0.0)
+        positive = np.maximum(derivative, 0.0)
+        negative = np.minimum(derivative, 0.0)
         taps = positive / positive.sum() - negative / negative.sum()
         found.append(np.hypot(_along_both(luminance, across, taps), _along_both(luminance, taps, across)))
     return found[0], found[1]
@@ -148,5 +149,6 @@ def _redistributed(distance: Image) -> Image:
     largest = float(_hyab(green, blue)[0, 0]) ** Q_COLOUR
     knee = P_COLOUR * largest
     power = distance**Q_COLOUR
-    steep, flat = P_KNEE / knee * power, P_KNEE + (power - knee) / (largest - knee) * (1 - P_KNEE)
+    steep = P_KNEE / knee * power
+    flat = P_KNEE + (power - knee) / (largest - knee) * (1 - P_KNEE)
     return np.asarray(np.where(power < knee, steep, flat))

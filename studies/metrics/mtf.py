@@ -88,7 +88,8 @@ def _upright(picture: NDArray[np.float64]) -> NDArray[np.float64]:
 def _fit_line(picture: NDArray[np.float64]) -> tuple[float, float]:
     """Line through the edge, column = start + slope row: centroids of the rows' derivatives under a Hamming window."""
     height, width = picture.shape
-    derivative, column = np.diff(picture, axis=1), np.arange(width - 1) + 0.5
+    derivative = np.diff(picture, axis=1)
+    column = np.arange(width - 1) + 0.5
     rows = np.arange(height)
     centre = np.full(height, (width - 1) / 2)
     line = np.zeros(2)
@@ -119,7 +120,8 @@ def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> ND
         np.arange(width) - centre[:, None]
     ) * cosine * OVERSAMPLING + half  # in bins, from the first one's start
     within = (distance >= 0) & (distance < 2 * half)
-    bins, middles = distance[within].astype(int), np.arange(2 * half) + 0.5
+    bins = distance[within].astype(int)
+    middles = np.arange(2 * half) + 0.5
     counts = np.bincount(bins, minlength=2 * half)
     if not counts.all():
         raise InputError("luminance: some quarter pixels of the edge hold no sample; tilt it by 5 degrees")

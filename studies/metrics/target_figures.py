@@ -209,7 +209,8 @@ def daylight_srgb() -> NDArray[np.float64]:
 
 def _xyz(light: str, surfaces: Iterable[Spectrum]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """XYZ of reflectances under a light, shape (surface, 3), and that of white, shape (3,)."""
-    nm, width = DEFAULT_WAVELENGTH_NM, band_widths(DEFAULT_WAVELENGTH_NM)
+    nm = DEFAULT_WAVELENGTH_NM
+    width = band_widths(DEFAULT_WAVELENGTH_NM)
     watts = illuminant(light).band_average(nm, width)
     reflectances = np.array([surface.band_average(nm, width) for surface in surfaces])
     return tristimulus(reflectances * watts, nm, width), tristimulus(watts, nm, width)

@@ -102,7 +102,8 @@ def _span(metric: Metric, lead: NDArray[np.float64]) -> str:
     sizes = np.sort(lead[np.isfinite(lead)])
     if not sizes.size:
         return f"{metric.name} unknown"
-    name, unit = metric.name.replace(",", ""), f"{NBSP}{metric.unit}" if metric.unit else ""
+    name = metric.name.replace(",", "")
+    unit = f"{NBSP}{metric.unit}" if metric.unit else ""
     if metric.higher:
         return f"{name} {_to(metric, sizes)}{unit}"
     by = _to(metric, np.sort(np.abs(sizes))).replace("+", "")
@@ -236,10 +237,12 @@ def balance_words(group: Group) -> str:
 
     Both are of colour, CIEDE2000: the miss of the worse of the two cameras, and the lead in the pictures' median.
     """
-    lead, cases = group.pair.leads[DELTA_E.key].mean, []
+    lead = group.pair.leads[DELTA_E.key].mean
+    cases = []
     for level, cells in enumerate(zip(group.ours, group.theirs, strict=True)):
         misses = [cell.mean("balance_delta_e") if _balances(cell) == {GRAY_WORLD} else 0.0 for cell in cells]
-        miss, cell = np.nanmax([0.0, *misses]), cells[int(np.argmax(np.nan_to_num(misses)))]
+        miss = np.nanmax([0.0, *misses])
+        cell = cells[int(np.argmax(np.nan_to_num(misses)))]
         if miss >= DELTA_E.threshold and miss > abs(lead[level]):
             cases.append((miss, camera_name(cell.camera), group.pair.levels[level], float(lead[level])))
     if not cases:

@@ -217,7 +217,9 @@ def snr_svg(sensors: Mapping[str, SensorConfig], light: str, exposure_s: float, 
     for index, (name, sensor) in enumerate(sensors.items()):
         for channel, ratio in snr_at(luminance, sensor, light, exposure_s).items():
             colour = CHANNEL_COLOURS.get(channel, SOFT)
-            line, label = LINES[index % len(LINES)], f"{name} {channel}".replace("$", r"\$")  # a formula's sign
+            # a formula's sign
+            line = LINES[index % len(LINES)]
+            label = f"{name} {channel}".replace("$", r"\$")
             axes.semilogx(luminance, 20 * np.log10(ratio), ls=line, color=colour, label=label)
     axes.axhline(20 * np.log10(mark), color=SOFT, linewidth=0.8)
     axes.set(title=f"SNR of a pixel [dB], {light}, {1e3 * exposure_s:g} ms", xlabel="cd/m²", ylim=(-20, None))

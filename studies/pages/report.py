@@ -51,7 +51,8 @@ def balance_text(balance: Mapping[str, str]) -> str:
 
 def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any]:
     """Return what the page says of one picture, as text, and its figures of every seed, as numbers."""
-    row, share = cell.first, cell.mean("mc_share")
+    row = cell.first
+    share = cell.mean("mc_share")
     electrons = json.loads(row.mean_electrons) if row else {}
     return {
         "x": cell.luminance_cd_m2,
@@ -119,7 +120,8 @@ def group_views(report: ReportData) -> list[GroupView]:
 
 def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, Any]:
     """Return what the page's script reads: axes, what is compared at first, and all cells in the order of the axes."""
-    of, per_view = first_comparison(report), len(report.cells) // len(report.truths)
+    of = first_comparison(report)
+    per_view = len(report.cells) // len(report.truths)
     levels = []
     for index in range(len(report.truths)):
         first = report.cells[index * per_view :: len(report.cameras)]
@@ -170,7 +172,8 @@ def known_shares(report: ReportData) -> list[tuple[float, int]]:
 
 def place_name(report: ReportData, groups: Sequence[GroupView], place: int) -> str:
     """Level, group and camera of a cell."""
-    cell, group = report.cells[place], groups[place // len(groups[0].cells)]
+    cell = report.cells[place]
+    group = groups[place // len(groups[0].cells)]
     return f"{report.levels[cell.level].name}, {group.title}, {text.camera_name(cell.camera)}"
 
 
@@ -195,7 +198,8 @@ def budget_share(report: ReportData) -> float | None:
 
 def speed_rows(report: ReportData) -> list[tuple[str, str, float, float]]:
     """Return camera and sensor, and the mean seconds of capture and of development; NaN where a picture isn't made."""
-    cells, rows = grid(report), []
+    cells = grid(report)
+    rows = []
     for sensor, camera in product(range(len(report.sensors)), range(len(report.cameras))):
         firsts = [cell.first for cell in cells[:, :, sensor, ..., camera].ravel()]
         seconds = [[first.capture_s, first.develop_s] if first else [np.nan, np.nan] for first in firsts]
@@ -219,9 +223,11 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         HTML that may fetch nothing but the pictures beside it, and these only where it leaves some out.
     """
     # What several parts of the page show
-    groups, of = group_views(report), first_comparison(report)
+    groups = group_views(report)
+    of = first_comparison(report)
     data = viewer_data(report, groups)
-    shares, per_scene = known_shares(report), len(report.cells) // len(report.scenes)
+    shares = known_shares(report)
+    per_scene = len(report.cells) // len(report.scenes)
     addresses = {name: address("webp", content) for name, content in pictures.files.items()}
     errors = {name: address("webp", content) for name, content in pictures.flip_maps.items()}
     data["flip"] = [errors.get(cell.picture or "", "") for cell in report.cells]

@@ -94,7 +94,8 @@ def grid(report: ReportData) -> NDArray[np.object_]:
 
 def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
     """Return the groups in which two values of an axis other than the light level are compared."""
-    axes, levels = axes_of(report), [level.name for level in report.levels]
+    axes = axes_of(report)
+    levels = [level.name for level in report.levels]
     cells = np.moveaxis(grid(report), (axis, BRIGHTNESS), (0, -1)).reshape(len(axes[axis].values), -1, len(levels))
     groups = []
     for title, *both in zip(group_titles(report, axis), cells[a], cells[b], strict=True):
@@ -130,7 +131,8 @@ def comparison_words(
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
     """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
     drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
-    rest, means = len(groups) // len(report.scenes), []
+    rest = len(groups) // len(report.scenes)
+    means = []
     for words, kind in (("named", False), ("drawn", True)):
         members = [scene for scene, is_drawn in enumerate(drawn) if is_drawn == kind]
         for place in range(rest) if len(members) > 1 else ():
@@ -171,7 +173,8 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
         equal light once; ``means``, for each mean over scenes its title and by metric what ``leads`` has, by light. And
         by "a b": ``answers``, for each group the words.
     """
-    cells, metrics = grid(report), shown_metrics(report.cells)
+    cells = grid(report)
+    metrics = shown_metrics(report.cells)
     by_axis = []
     for axis, length in enumerate(cells.shape):
         across: dict[str, Any] = {"leads": {}, "counts": {}, "means": {}, "answers": {}}
@@ -181,7 +184,8 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
                 metric.key: _flat(leads(metric, sides[i][metric.key], sides[j][metric.key])) for metric in metrics
             }
         for a, b in permutations(range(length), 2) if axis in RIVALS else ():
-            compared, key = comparison_words(report, axis, a, b), f"{a} {b}"
+            compared = comparison_words(report, axis, a, b)
+            key = f"{a} {b}"
             groups = [group for group, _ in compared]
             across["answers"][key] = [
                 {"said": said, "light": light, "balance": balance, "times": " ".join(filter(None, further))}
@@ -248,7 +252,8 @@ def markdown(report: ReportData, command: str, a: int) -> str:
 
 def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
     """Return the leads of one value of an axis over the others: others and places down, light across."""
-    names, rows = axes_of(report)[axis].values, []
+    names = axes_of(report)[axis].values
+    rows = []
     for other in (value for value in range(len(names)) if value != a):
         groups = groups_of(report, axis, a, other)
         counted = [counts(group.pair.ours, group.pair.theirs)[metric.key] for group in groups]

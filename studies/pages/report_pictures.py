@@ -66,7 +66,8 @@ def read_pictures(
     total_bytes = sum(map(len, files.values()))
     for name, truth in pairs if most is None else pairs[:most]:
         picture = opened(read_whole(folder / PICTURES, name))
-        content, errors = as_webp(picture, **LOSSLESS), as_webp(flip_map(picture, halves[truth]), **OF_MAPS)
+        content = as_webp(picture, **LOSSLESS)
+        errors = as_webp(flip_map(picture, halves[truth]), **OF_MAPS)
         total_bytes += len(content) + len(errors)
         if most is None and total_bytes > SHOWN_BYTES and len(maps) >= 2:
             break

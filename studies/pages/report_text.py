@@ -70,7 +70,8 @@ def duration(seconds: float | None) -> str:
 
 def figure_text(cell: ReportCell, key: str, digits: int, unit: str = "") -> str:
     """Write a cell's figure as "20.1 ± 0.3 dB" where seeds give an interval, else as "20.1 dB"."""
-    mean, half = cell.mean(key), cell.half(key)
+    mean = cell.mean(key)
+    half = cell.half(key)
     if isnan(half):
         return fixed(mean, digits, unit)
     return f"{fixed(mean, digits)}{NBSP}±{NBSP}{fixed(half, digits, unit)}"

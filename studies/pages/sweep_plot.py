@@ -132,7 +132,8 @@ def _draw(axes: Axes, part: Panel, lines: Mapping[str, tuple[Floats, Floats]], s
     """Draw means with their intervals over light; `slot` is the first line's among the colours."""
     ends = []
     for index, (name, (mean, half)) in enumerate(lines.items(), slot):
-        colour, style = COLOURS[index % len(COLOURS)], LINES[index // len(COLOURS)]
+        colour = COLOURS[index % len(COLOURS)]
+        style = LINES[index // len(COLOURS)]
         axes.plot(part.light, mean, color=colour, linestyle=style, marker="o", markersize=3.5)
         if np.isfinite(half).any():
             axes.fill_between(part.light, mean - half, mean + half, color=colour, alpha=0.18, linewidth=0)

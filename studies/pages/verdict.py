@@ -39,9 +39,12 @@ class Leads:
 def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
     """Compare figures (..., seed) of pairs of pictures; NaN in one of a pair's seeds leaves its outcome unknown."""
     difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
-    mean, half = difference.mean(axis=-1), half_width(difference)
+    mean = difference.mean(axis=-1)
+    half = half_width(difference)
     size = np.abs(mean)
-    clear, visible, invisible = size > half, size >= metric.threshold, size + half < metric.threshold
+    clear = size > half
+    visible = size >= metric.threshold
+    invisible = size + half < metric.threshold
     cases = [np.isnan(half), clear & visible & (mean > 0), clear & visible, clear | invisible]
     return Leads(mean, half, np.select(cases, [UNKNOWN, AHEAD, BEHIND, LEVEL], UNKNOWN))
 
@@ -65,7 +68,8 @@ def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
 
 def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
     """Count light levels by metric and outcome; levels that give one picture count once, by the mean of their leads."""
-    runs, counted = same_light(ours, theirs), {}
+    runs = same_light(ours, theirs)
+    counted = {}
     for metric in METRICS:
         sides = (np.array([side[metric.key][run].mean(axis=0) for run in runs]) for side in (ours, theirs))
         outcomes = leads(metric, *sides).outcome.tolist()

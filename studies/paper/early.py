@@ -42,12 +42,15 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 
     Read out, the first is where half of the pixels are full, and the second follows from the SNR that W has there.
     """
-    light, names = named_light("D65"), sensor.channels
+    light = named_light("D65")
+    names = sensor.channels
     per_cd_m2 = channel_e(sensor, light, 1.0, EXPOSURE_S)
-    white, colour = per_cd_m2[names.index("W")], per_cd_m2[[name != "W" for name in names]].max()
+    white = per_cd_m2[names.index("W")]
+    colour = per_cd_m2[[name != "W" for name in names]].max()
     dark_cd_m2 = electrons_at_snr(1.0, sensor, EXPOSURE_S) / white
     full_cd_m2 = sensor.pixel.full_well_e / colour
-    rng, shape = np.random.default_rng(0), (FLAT_SIDE, FLAT_SIDE)
+    rng = np.random.default_rng(0)
+    shape = (FLAT_SIDE, FLAT_SIDE)
     device = draw_device(sensor, shape, rng)
     # In the dark the SNR goes with the light, so what one is off by is what the other is.
     dark_e = read_out(np.full(shape, dark_cd_m2 * white), sensor, device, EXPOSURE_S, rng).electrons
@@ -60,12 +63,14 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
     """Noise of linear sRGB about its luminance, grey 1, on an even field: closed form, and read out."""
     sensor = Camera(reading, processor).sensor
-    light, colours = named_light("D65"), NAMED[processor].colours
+    light = named_light("D65")
+    colours = NAMED[processor].colours
     electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[sensor.channels.index(x) for x in colours]]
     matrix = colour_fit(sensor, NAMED[processor], light).matrix(colours) / electrons
     chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB less its luminance
     variance = noise_variance(electrons, sensor, EXPOSURE_S)
-    rng, shape = np.random.default_rng(0), (FLAT_SIDE, FLAT_SIDE)
+    rng = np.random.default_rng(0)
+    shape = (FLAT_SIDE, FLAT_SIDE)
     fields = [
         read_out(np.full(shape, mean_e), sensor, draw_device(sensor, shape, rng), EXPOSURE_S, rng).electrons
         for mean_e in electrons
@@ -97,7 +102,9 @@ def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
     """Light of Kijima's combined colour sample over that of W's, by colour: closed form, and by read out shot noise."""
     per_cd_m2 = channel_e(table1_sensor("table1_output"), named_light("D65"), 1.0, 1.0)
     weights = np.outer(tent(MATCHED_RADIUS), tent(MATCHED_RADIUS))
-    shape, rng, lights = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0), dict[str, tuple[float, float]]()
+    shape = (FLAT_SIDE, FLAT_SIDE)
+    rng = np.random.default_rng(0)
+    lights = dict[str, tuple[float, float]]()
     for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
         sites = mask(tile, channel, shape).astype(np.float64)
         total, squares = (scipy.ndimage.convolve(sites, kernel, mode="wrap") for kernel in (weights, weights**2))

@@ -55,7 +55,8 @@ def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) 
     """W's gain over R, G and B: one pixel of each on a uniform neutral field under D65."""
     sensor = table1_sensor(name) if fixed_pattern else with_even_response(table1_sensor(name))
     electrons = channel_e(sensor, named_light("D65"), luminance_cd_m2, SNR_EXPOSURE_S)
-    values, variance = snr(electrons, sensor, SNR_EXPOSURE_S), noise_variance(electrons, sensor, SNR_EXPOSURE_S)
+    values = snr(electrons, sensor, SNR_EXPOSURE_S)
+    variance = noise_variance(electrons, sensor, SNR_EXPOSURE_S)
     dark = float(noise_variance(np.zeros(1), sensor, SNR_EXPOSURE_S)[0] / variance[3])
     return {
         channel: Gain(float(values[3] / values[i]), dark, float(electrons[i] / variance[i]))

@@ -80,7 +80,8 @@ def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
         if len(rows) > 1 and unit_s / LEVELS_CD_M2[len(rows) - 1] < LONGEST_S:
             rows.append(rows[-1])
             continue
-        lit, time = at_level(subject, level), f"{min(unit_s / level, LONGEST_S) * 1e3:.6g}ms"
+        lit = at_level(subject, level)
+        time = f"{min(unit_s / level, LONGEST_S) * 1e3:.6g}ms"
         rows.append([_row(camera, raw, lit) for raw in exposures(camera, lit, time, setup.seeds)])
     return LevelCurves(*np.moveaxis(np.array(rows), -1, 0))
 
@@ -131,7 +132,8 @@ def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
     (psnr_at, psnr), (delta_at, delta), (flip_at, flip_rise) = (
         largest_step(*pair) for pair in ((curves.psnr_db, -1.0), (curves.delta_e, 1.0), (curves.flip, 1.0))
     )
-    fills_at, log_levels = where_white_fills(curves), np.log2(LEVELS_CD_M2)
+    fills_at = where_white_fills(curves)
+    log_levels = np.log2(LEVELS_CD_M2)
     before, after = (
         np.array([np.interp(log2(fills_at) + side, log_levels, of_seed) for of_seed in curves.psnr_db.T])
         for side in (-0.5, 0.5)
@@ -151,8 +153,10 @@ def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
         *at_most({"share of similarity by W, in full sun": curves.similarity[-1].mean()}, 0.5),
     )
     # What W gains
-    means, margins = curves.gain_db.mean(axis=1), half_width(curves.gain_db)
-    best, least = curves.gain_db[(means - margins).argmax()], curves.gain_db[(means + margins).argmin()]
+    means = curves.gain_db.mean(axis=1)
+    margins = half_width(curves.gain_db)
+    best = curves.gain_db[(means - margins).argmax()]
+    least = curves.gain_db[(means + margins).argmin()]
     gains = (
         *at_least({"gain over the frame without W, largest": best}, GAIN_DB, "dB"),
         *at_least({"gain over the frame without W, least": least}, -LEVEL_DB, "dB"),

@@ -24,7 +24,8 @@ FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
     """Photons of a range of wavelengths from moonlight on the sensor, through f/5.6 [um^-2 s^-1]."""
-    sensor, light = replace(table1_sensor("table1_output"), lens=LensConfig(5.6)), named_light("D65")
+    sensor = replace(table1_sensor("table1_output"), lens=LensConfig(5.6))
+    light = named_light("D65")
     inside = (light.wavelength_nm > first_nm) & (light.wavelength_nm < last_nm)
     return photons(replace(light, spectrum=np.where(inside, light.spectrum, 0.0)), MOONLIGHT_CD_M2, sensor)
 
@@ -32,8 +33,10 @@ def moonlight_photons(first_nm: float, last_nm: float) -> float:
 def measured_snr_db() -> float:
     """SNR of a uniform field of 1000 electrons that is read out twice with no noise but that of light [dB]."""
     sensor = shot_noise_alone(table1_sensor("table1_output"))
-    shape, rng = (FLAT_SIDE, FLAT_SIDE), np.random.default_rng(0)
-    chip, field = Device(np.ones(shape), np.zeros(shape)), np.full((FLAT_SIDE, FLAT_SIDE), 1000.0)
+    shape = (FLAT_SIDE, FLAT_SIDE)
+    rng = np.random.default_rng(0)
+    chip = Device(np.ones(shape), np.zeros(shape))
+    field = np.full((FLAT_SIDE, FLAT_SIDE), 1000.0)
     first, second = (read_out(field, sensor, chip, 0.01, rng).electrons for _ in range(2))
     return decibels((first.mean() + second.mean()) / 2 / (np.std(first - second) / sqrt(2)))
 

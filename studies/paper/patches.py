@@ -90,7 +90,9 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
         windows = np.lib.stride_tricks.sliding_window_view(plane, (PATCH, PATCH))
         return np.asarray(windows[places[:, 0] + down - half, places[:, 1] + across - half])
 
-    centre, along, beyond = patches(0, 0), patches(AWAY, 0), patches(0, -AWAY)
+    centre = patches(0, 0)
+    along = patches(AWAY, 0)
+    beyond = patches(0, -AWAY)
     distances = (np.sqrt(((centre - other) ** 2).sum(axis=(1, 2))) for other in (along, beyond))
     return Triplets(places, *distances)
 
@@ -102,7 +104,8 @@ def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
 
 def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The edge with three patches, under both readings and at two levels."""
-    shares, parts = {}, []
+    shares = {}
+    parts = []
     for name, level in LEVELS.items():
         subject = view(setup, "slanted_edge", level)
         columns = edge_columns(subject.radiance.luminance())

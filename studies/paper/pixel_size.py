@@ -61,7 +61,8 @@ def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tupl
 def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """The photograph under both readings, as it is and with its dark half made as bright as the other."""
     subject = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
-    rows, half = [], subject.radiance.shape[1] // 2
+    rows = []
+    half = subject.radiance.shape[1] // 2
     for reading in READINGS:
         camera = Camera(reading, "bayer")
         linear, _ = develop_view(camera, exposures(camera, subject, "66ms")[0], subject)
@@ -113,7 +114,8 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) 
 def figure_1b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Pictures of the study `paper_1b.toml`, and the SNR."""
     subject = view(setup, "still_life", LUMINANCE_CD_M2)
-    psnr, pictures = {}, []
+    psnr = {}
+    pictures = []
     for pitch in (LARGE_UM, SMALL_UM):
         camera = Camera("table1_output", "bayer", pitch)
         developed = [develop_view(camera, raw, subject)[0] for raw in exposures(camera, subject, "10ms", setup.seeds)]

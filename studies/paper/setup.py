@@ -196,7 +196,8 @@ def at_level(subject: View, luminance_cd_m2: float) -> View:
 
 def exposures(camera: Camera, subject: View, exposure: str, count: int = 1) -> list[RawImage]:
     """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
-    sensor, exposure_s = camera.sensor, parse_exposure(exposure) or 0.0
+    sensor = camera.sensor
+    exposure_s = parse_exposure(exposure) or 0.0
     mosaic = NAMED[camera.processor].mosaic
     electrons = channel_electrons(form_image(subject.radiance, sensor), sensor, exposure_s)
     expected_e = behind_filters(electrons, sensor)
@@ -230,7 +231,8 @@ def develop_view(
     substitution_snr : float, optional
         SNR under which W replaces the luminance, for `CAMERAS`; the reading's own of `READINGS` where left out.
     """
-    sensor, processor = camera.sensor, NAMED[camera.processor]
+    sensor = camera.sensor
+    processor = NAMED[camera.processor]
     options = {}
     if camera.processor in CAMERAS:
         options["substitution_snr"] = READINGS[camera.reading] if substitution_snr is None else substitution_snr

@@ -44,7 +44,8 @@ class Stages:
 
 def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Image, Image]:
     """Figure 3's linear sRGB from R, G and B alone, balanced by calibration, through the plain matrix, and its W."""
-    planes, neutral = bilinear(raw), neutral_electrons(camera.sensor, subject.light, raw.exposure_s)
+    planes = bilinear(raw)
+    neutral = neutral_electrons(camera.sensor, subject.light, raw.exposure_s)
     matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], subject.light).matrix()
     colour = planes[..., :3] / (neutral[:3] * subject.white_cd_m2) @ matrix.T
     index = raw.channels.index("W")
@@ -62,7 +63,8 @@ def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
 def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """Colour image, W image and result under both readings."""
     subject = view(setup, "still_life", LOW_CD_M2)
-    stages, rows = {name: dict[str, Stages]() for name in CAMERAS}, []
+    stages = {name: dict[str, Stages]() for name in CAMERAS}
+    rows = []
     for reading in READINGS:
         raws = exposures(Camera(reading), subject, "20ms", setup.seeds)
         colour, white = zip(*(colour_and_white(raw, subject, Camera(reading)) for raw in raws), strict=True)

@@ -90,7 +90,8 @@ def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
 def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     """R image, W image and result under both readings."""
     subject = view(setup, "still_life", BRIGHT_CD_M2)
-    bright, rows = {name: dict[str, Bright]() for name in CAMERAS}, []
+    bright = {name: dict[str, Bright]() for name in CAMERAS}
+    rows = []
     for reading in READINGS:
         pictures = {}
         for name in CAMERAS:
@@ -99,7 +100,8 @@ def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
             result = develop_view(camera, raw, subject)[0]
             bright[name][reading] = measure_bright(raw, result, subject)
             pictures[RESULT[name]] = encode_srgb(result)
-        planes, full_e = bilinear(raw), camera.sensor.pixel.full_well_e
+        planes = bilinear(raw)
+        full_e = camera.sensor.pixel.full_well_e
         recorded = {"R": planes[..., 0], "W": planes[..., 3]}
         shown = {f"{name}, white is full": encode_srgb(grey_picture(plane, full_e)) for name, plane in recorded.items()}
         (first, picture), *others = (shown | pictures).items()

@@ -83,7 +83,8 @@ def develop(
             "raw: it holds no colour calibration; allowed: one beside it; give calibrate(sensor, illuminant('D65')) too"
         )
     colours = fit_of_calibration(colour, raw.channels, raw.channel_mixing if raw.crosstalk else None)
-    software, response = processor_of(name), _asked_neutral(colour, white_balance or default_balance(name))
+    software = processor_of(name)
+    response = _asked_neutral(colour, white_balance or default_balance(name))
     return software.develop(raw, colours, neutral=colour.neutral, balance=response)
 
 
@@ -145,7 +146,8 @@ def develop_file(
         require_range("ev", ev, -40.0, 40.0, "give stops")
     paths = [path] if isinstance(path, str | Path) else list(path)
     opened = [open_raw(file) for file in paths]
-    raw, file_facts = merged_raw([frame for frame, _ in opened]), opened[0][1]
+    raw = merged_raw([frame for frame, _ in opened])
+    file_facts = opened[0][1]
     if raw.colour is None:
         raise InputError(
             f"{paths[0]}: it holds no colour calibration; allowed: what rodcone capture notes; capture anew"

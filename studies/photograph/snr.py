@@ -125,7 +125,8 @@ def _electrons_of_law(snr: float, reading: PlainReading) -> float:
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
     """
     law = reading.law
-    a, b, lead = law.dark_e**2 + law.fixed_e**2, law.shot, 1 - snr**2 * law.prnu**2
+    a, b = law.dark_e**2 + law.fixed_e**2, law.shot
+    lead = 1 - snr**2 * law.prnu**2
     if lead <= 0:
         return float("inf")
     electrons = (snr**2 * b + np.sqrt((snr**2 * b) ** 2 + 4 * lead * snr**2 * a)) / (2 * lead)

@@ -26,7 +26,8 @@ def schema_of(kind: type, known: Mapping[Any, Mapping[str, Any]], *, single: boo
         Whether one value may stand for a list of one.
     """
     texts = _descriptions(kind)
-    properties, required = {}, []
+    properties = {}
+    required = []
     hints = get_type_hints(kind, include_extras=True)
     for each in fields(kind):
         own = known.get((kind, each.name), _of(hints[each.name], known, single))

@@ -380,7 +380,8 @@ def _check_shares_and_sizes(study: Study) -> None:
         return
     for name in study.sensors:
         pitch_um = preset(name).site_pitch_um
-        across, fix = round(side_um / pitch_um), f"give {16 * pitch_um:g} to {8192 * pitch_um:g}"
+        across = round(side_um / pitch_um)
+        fix = f"give {16 * pitch_um:g} to {8192 * pitch_um:g}"
         require_whole(
             f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, f"{side_um:g} um is given; {fix}"
         )

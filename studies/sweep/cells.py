@@ -131,7 +131,8 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
     It depends on names and values alone, not on their order in the study: one level more leaves the others' noise.
     All automatic exposures share it: where their rules find the same time, the picture is the same.
     """
-    names, (value, unit) = labels(condition), parse_level(condition.level)
+    names = labels(condition)
+    value, unit = parse_level(condition.level)
     exposure = parse_exposure(condition.exposure)
     return _stream("exposure", names["scene"], names["spectrum"], value, unit, exposure, names["sensor"], mosaic, seed)
 

@@ -146,7 +146,8 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
             raise InputError(f"cluster: {worker} has {count} threads; allowed: 1; start dask worker with --nthreads 1")
     with read_errors("cluster: a worker lacks rodcone", "install it there", ImportError):
         workers = client.run(_facts)
-    local, (remote, cores_of, safe_paths) = _facts()[0], zip(*workers.values(), strict=True)
+    local = _facts()[0]
+    remote, cores_of, safe_paths = zip(*workers.values(), strict=True)
     for worker, its in zip(workers, remote, strict=True):
         other = [name for name, version in local.items() if its.get(name) != version]
         if other:

@@ -205,10 +205,12 @@ def last_run(folder: Path) -> LastRun:
     """
     with read_results(folder) as base:
         runs = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
-        cells, wanted = rows(base), base.execute("SELECT count(*) FROM wanted").fetchone()[0]
+        cells = rows(base)
+        wanted = base.execute("SELECT count(*) FROM wanted").fetchone()[0]
     if not runs or not cells:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
-    study, seconds = runs[-1][2], Counter[str]()
+    study = runs[-1][2]
+    seconds = Counter[str]()
     for stages in (json.loads(run[3]) for run in runs if run[2] == study):
         seconds.update(stages)
     return LastRun(json.loads(study), dict(seconds), wanted, cells)

@@ -82,7 +82,8 @@ def results_json(folder: Path) -> bytes:
 
     A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
-    run, cells = last_run(folder), []
+    run = last_run(folder)
+    cells = []
     for row in run.rows:
         values = finite(vars(row))
         cells.append(values | {name: json.loads(values[name]) for name in _JSON_COLUMNS})

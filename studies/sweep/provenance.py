@@ -33,7 +33,8 @@ def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
 
 def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> list[Path]:
     """Modules of `studies` that decide a picture, or another result: those named, and all that these import."""
-    paths, waiting = set[Path](), list(names)
+    paths = set[Path]()
+    waiting = list(names)
     while waiting:
         name = waiting.pop()
         path = root.joinpath(*name.split(".")).with_suffix(".py")

@@ -61,14 +61,16 @@ def run_cell(cell: Cell) -> Row:
     # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
     bins_truth = sensor.sites > 1 and _array(frame.truth).shape[:2] == expected_e.shape
     truth, truth_png = _truth(frame.truth, bins_truth)
-    pixels_e, errors_e = sensor.pixel_sums(expected_e), sensor.pixel_sums(_array(frame.errors)) * light
+    pixels_e = sensor.pixel_sums(expected_e)
+    errors_e = sensor.pixel_sums(_array(frame.errors)) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
 
     def burst() -> RawImage:  # `timed` may call it twice: with the same noise
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
-        hand, raws = shake_stream(cell.seed), []
+        hand = shake_stream(cell.seed)
+        raws = []
         for _ in range(frames):
             frame_e = expected_e
             if sensor.lens.shake_um:
@@ -149,7 +151,8 @@ def run_cell(cell: Cell) -> Row:
 
 
 def _check_provenance(cell: Cell, processor: Processor) -> None:
-    exact, name = cell.made_by.readout_engine == "numpy", cell.processor
+    exact = cell.made_by.readout_engine == "numpy"
+    name = cell.processor
     local = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
     for name, version in in_words(cell.made_by).items():
         if local.get(name) != version:

@@ -138,7 +138,8 @@ def sweep(
     OSError
         Where the folder can't be written, or the disk is full.
     """
-    clock, out = clock or Clock(), Path(out)
+    clock = clock or Clock()
+    out = Path(out)
     for name in study.processors:
         require_libraries(name)
     scenes = open_all(study)
@@ -154,7 +155,8 @@ def sweep(
             [cell.key for cell in cells] if cells else [None] * count for cells in cell_lists
         ]
         want(base, chain.from_iterable(keys))
-        count_made, notes = 0, dict[str, None]()
+        count_made = 0
+        notes = dict[str, None]()
         for index, opened in enumerate(scenes.values()):
             part = _part(show, index, len(scenes))
             cells = cell_lists[index] or scene_cells(job, opened, _rendering(part))
@@ -188,8 +190,10 @@ def _noted(study: Study) -> dict[str, Any]:
 
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
-    count, workers = 0, set[tuple[str, int]]()
-    seconds, on_the_clock = defaultdict[str, float](float), dict[str, float]()
+    count = 0
+    workers = set[tuple[str, int]]()
+    seconds = defaultdict[str, float](float)
+    on_the_clock = dict[str, float]()
     with closing(runner(missing)) as coming:
         for count, row in enumerate(coming, start=1):
             add(job.base, row)

@@ -103,7 +103,8 @@ def run(
     WorkerLostError
         Where the executor broke; rows that were ready have been given.
     """
-    call, waiting = partial(_made, make, threads), dict[Hashable, deque[Task]]()
+    call = partial(_made, make, threads)
+    waiting = dict[Hashable, deque[Task]]()
     for cell in cells:
         waiting.setdefault(cell.kind, deque()).append(cell)
     running: dict[Future[Any], Task] = {}
@@ -182,7 +183,8 @@ def run_in_processes(
     """
     require_whole("workers", workers, 1, MOST_WORKERS, "give processes to run at once")
     threads = max(1, cores() // workers)
-    waiting, deaths = {cell.key: cell for cell in cells}, Counter[str]()
+    waiting = {cell.key: cell for cell in cells}
+    deaths = Counter[str]()
     given_up: list[Task] = []
     while waiting:
         untried = [cell for cell in waiting.values() if not deaths[cell.key]]

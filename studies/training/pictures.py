@@ -100,7 +100,8 @@ def _collected(sensor: SensorConfig, light: str) -> Floats:
 
 def draw_surface(rng: np.random.Generator) -> Floats:
     """Draw a smooth reflectance, shape (band,): grey, an edge, a bump, or seven random points joined."""
-    kind, width = rng.random(), band_widths(NM)
+    kind = rng.random()
+    width = band_widths(NM)
     low, high = np.sort(rng.uniform(0.03, 0.85, 2))
     if kind < 0.35:
         curve = grey(rng.uniform(0.03, 0.9))
@@ -142,7 +143,9 @@ def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Pl
 
 def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: float) -> Floats:
     """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, channel)."""
-    (y, x), colour, kind = at, light.signals(draw_surface(rng)), rng.random()
+    y, x = at
+    colour = light.signals(draw_surface(rng))
+    kind = rng.random()
     if kind < 0.25:
         slope = rng.normal(0, 0.5, 2)
         shade = np.exp(slope[0] * (y - y.mean()) / radius + slope[1] * (x - x.mean()) / radius)
@@ -150,7 +153,8 @@ def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: fl
         grain = rng.normal(0, rng.uniform(0.03, 0.3), (SIDE, SIDE))
         shade = np.exp(grain[y // _FINE, x // _FINE])
     elif kind < 0.55:
-        angle, period = rng.uniform(0, np.pi), rng.uniform(2.2, 10) * _FINE
+        angle = rng.uniform(0, np.pi)
+        period = rng.uniform(2.2, 10) * _FINE
         first = np.sin(2 * np.pi * (np.cos(angle) * y + np.sin(angle) * x) / period) > 0
         return np.asarray(np.where(first[:, None], colour, light.signals(draw_surface(rng))))
     else:
@@ -162,7 +166,8 @@ def gratings(rng: np.random.Generator, light: KnownLight) -> Floats:
     """Draw straight bars of three surfaces whose width grows across the picture, shape (SIDE, SIDE, channel)."""
     y, x = np.mgrid[: SIDE * _FINE, : SIDE * _FINE] / _FINE
     angle = rng.uniform(0, np.pi)
-    across, along = np.cos(angle) * x + np.sin(angle) * y, np.sin(angle) * x - np.cos(angle) * y
+    across = np.cos(angle) * x + np.sin(angle) * y
+    along = np.sin(angle) * x - np.cos(angle) * y
     period = rng.uniform(1.8, 4) + (np.abs(across) % 97) * rng.uniform(0.02, 0.15)
     surfaces = np.stack([light.signals(draw_surface(rng)) for _ in range(3)])
     bars = surfaces[np.floor(across / period).astype(int) % 3]

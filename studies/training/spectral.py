@@ -54,9 +54,11 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
     # Of mean square 1, so that coefficients are of the size of reflectances.
     spectra = np.linalg.svd(surfaces, full_matrices=False)[2][:COEFFICIENTS].T * np.sqrt(BANDS)
     edges_nm = np.linspace(380.0, 780.0, BANDS + 1)
-    middle_nm, width_nm = (edges_nm[1:] + edges_nm[:-1]) / 2, np.diff(edges_nm)
+    middle_nm = (edges_nm[1:] + edges_nm[:-1]) / 2
+    width_nm = np.diff(edges_nm)
     luminous = luminous_efficiency(middle_nm, width_nm)
-    digest, rows = sha256(), []
+    digest = sha256()
+    rows = []
     for picture in draw_pictures(partial(_draw_light, to_bands=to_bands), seed, KINDS_OF[kind]):
         digest.update(picture.tobytes())
         patches = cut_patches(picture, rng)

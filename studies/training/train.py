@@ -79,7 +79,8 @@ def fit_prior(
 
 def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
     """Initial components: one third by contrast, so that flat patches get their own; the rest by k-means."""
-    count, even = len(reduced), COMPONENTS // 3
+    count = len(reduced)
+    even = COMPONENTS // 3
     centres = reduced[rng.choice(count, COMPONENTS - even, replace=False)]
     for _ in range(6):
         distance = (centres**2).sum(axis=1) - 2 * reduced @ centres.T
@@ -96,7 +97,8 @@ def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
 def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
     """Weights, centres, lower factors of the covariances, and each patch's part in each component."""
     count, size = reduced.shape
-    centres, factors = np.empty((COMPONENTS, size), np.float32), np.empty((COMPONENTS, size, size), np.float32)
+    centres = np.empty((COMPONENTS, size), np.float32)
+    factors = np.empty((COMPONENTS, size, size), np.float32)
     for _ in range(STEPS):
         members = parts.sum(axis=0) + 1e-6
         likelihood = np.empty_like(parts)
@@ -132,7 +134,8 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
     seed : int
         Of the pictures, their patches and the fit's start.
     """
-    digest, pictures = sha256(), []
+    digest = sha256()
+    pictures = []
     for picture in draw_pictures(partial(draw_light, sensor=sensor), seed):
         digest.update(picture.tobytes())
         pictures.append(picture)

@@ -74,14 +74,18 @@ class KernelSums:
 
 def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
     """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
-    patch, across, count = shape.patch, shape.tile[1], dr.width(threads.row)
+    patch = shape.patch
+    across = shape.tile[1]
+    count = dr.width(threads.row)
     dense = shape.guide == "shared"
     rows, columns = (range(0, n, 1 if dense else step) for n, step in zip(shape.block, shape.tile, strict=True))
     # Row by row: instructions come in the order in which sums are evaluated, and each row of patches is loaded when
     # the first pixel needs it.
     pixels = [(r, c) for r in rows for c in columns]
     window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
-    under, block = shape.block[1] + patch - 1, shape.block[1]  # values of a packet: of the plane, and samples
+    # values of a packet: of the plane, and samples
+    under = shape.block[1] + patch - 1
+    block = shape.block[1]
 
     # Where things are
     x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
@@ -96,7 +100,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     a, b = threads.phase // across % pair, threads.phase % step
     x_packet = jit.UInt(x_row + a) // pair * inputs.row_packets + jit.UInt(x_column + b) // step
     offsets = jit.UInt(threads.phase)  # a list a phase
-    first_entry, entries = offsets * inputs.length, dr.gather(jit.UInt, inputs.counts, offsets)
+    first_entry = offsets * inputs.length
+    entries = dr.gather(jit.UInt, inputs.counts, offsets)
 
     # What the thread reads at x, once
     patches_at_x = [
@@ -114,7 +119,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
 
     def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
         """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""
-        part, values = min(size, 8), list[Any]()
+        part = min(size, 8)
+        values = list[Any]()
         for k in range(-(-needed // part)):
             index = packet * (size // part) + k
             values.extend(dr.gather(jit.ArrayXf, source, index, shape=(part, count)))
@@ -124,7 +130,8 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
         """Add the samples at y = x + d for offset k of the list."""
         steps, log_spatial = load(inputs.entries, first_entry + k, inputs.entry_values, 2)
         y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # packet
-        distances, samples = list[list[Any]](), dict[int, list[Any]]()
+        distances = list[list[Any]]()
+        samples = dict[int, list[Any]]()
         for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
             patches_at_y = {}
             for line in lines:

@@ -143,11 +143,13 @@ def packet_width(count: int) -> int:
 
 def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
     """Rows of strips that take STRIP_BYTES or less, as even as whole blocks allow."""
-    channels, block = len(pattern.channels), pattern.block
+    channels = len(pattern.channels)
+    block = pattern.block
     # Planes and packets, packets of alpha, bounds and three sums a cell of the tile, results, the strip itself.
     floats = channels * (packet_width(2 * block[1] + patch - 1) + 1) + packet_width(block[1])
     floats += 5 * len(pattern.cells) + 2 * channels + 10
-    most, blocks = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1), -(-shape[0] // block[0])
+    most = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1)
+    blocks = -(-shape[0] // block[0])
     return -(-blocks // -(-blocks // most)) * block[0]
 
 
@@ -155,13 +157,15 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, g
     """What some rows of a frame depend on; without a `guide` the paper's planes a channel."""
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
-    dn, black, gain = raw.dn[part], np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
+    dn = raw.dn[part]
+    black, gain = np.float32(raw.black_dn), np.float32(raw.gain_e_per_dn)
     alpha = None
     if guide is None:
         full = full_at_sites(raw, dn)
         alpha = fraction_of_full(full, raw.cfa, settings.patch) if pattern.white is None or full.any() else None
     dn = dn.astype(np.float32)
-    samples, electrons = dn - black, (dn - black) * gain
+    samples = dn - black
+    electrons = (dn - black) * gain
     bounds = brightest_allowed(electrons, raw, settings)
     return Strip(
         shape=(shape[0], shape[1]),
@@ -198,13 +202,15 @@ def lay_out(
     part = _surroundings(strip.shape, spans, pattern, settings)
     box = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
-    half, block = settings.patch // 2, pattern.block[1]
+    half = settings.patch // 2
+    block = pattern.block[1]
     names = pattern.channels if guide != "shared" else ["W"]  # whose planes are laid out
     samples = _window(strip.samples[box], start, (size[0], size[1] + block), 0, 0.0)
 
     # Packets: one or two rows of a plane under the patches of a block, then as many of the block's samples.
     down, across = packet_step(pattern, guide)
-    row_packets, under = size[1] // across, block + settings.patch - 1
+    row_packets = size[1] // across
+    under = block + settings.patch - 1
     planes = aligned((len(names), *size), np.float32)
     packets = aligned((len(names), size[0] // down, row_packets, packet_width(down * (under + block))), np.float32)
     for name, plane, target in zip(names, planes, packets, strict=True):
@@ -275,7 +281,8 @@ def _surroundings(
 def _window(values: Array, start: Span, size: Span, reflected: int, outside: float, to: Array | None = None) -> Array:
     """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
     source = np.pad(values, reflected, mode="reflect") if reflected else values
-    result, into, out_of = np.empty(size, np.float32) if to is None else to, list[slice](), list[slice]()
+    result = np.empty(size, np.float32) if to is None else to
+    into, out_of = list[slice](), list[slice]()
     for first, count, length in zip(start, source.shape, size, strict=True):
         shift = first + reflected  # result[i] = source[i + shift]
         low = max(-shift, 0)

@@ -79,8 +79,10 @@ class Grid:
 
     def store(self, *values: Any) -> Any:
         """Evaluate some values of each thread, which then lie together."""
-        real, width = type(values[0]), packet_width(len(values))
-        target, index = dr.empty(real, width * self.size), dr.arange(type(self.row), self.size)
+        real = type(values[0])
+        width = packet_width(len(values))
+        target = dr.empty(real, width * self.size)
+        index = dr.arange(type(self.row), self.size)
         packet = dr.array_t(arrays().ArrayXf)([*values, *values[:1] * (width - len(values))])
         dr.scatter(target, packet, index, mode=dr.ReduceMode.NoConflicts)
         dr.eval(target)
@@ -88,7 +90,8 @@ class Grid:
 
     def load(self, source: Any, places: Sequence[Any], values: int) -> list[Numbers]:
         """Read the values that were stored together at some places."""
-        width, kind = packet_width(values), arrays().ArrayXf
+        width = packet_width(values)
+        kind = arrays().ArrayXf
         return [[*dr.gather(kind, source, place, shape=(width, self.size))][:values] for place in places]
 
 
@@ -125,7 +128,8 @@ def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.f
 
     As `isp.interleaved.panchromatic.read_as_white` states them.
     """
-    (height, width), (down, across) = raw.shape, (len(raw.cfa), len(raw.cfa[0]))
+    height, width = raw.shape
+    down, across = len(raw.cfa), len(raw.cfa[0])
     frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)
     shares = np.empty((-(-height // down), -(-width // across), len(ratios)), np.float32)
     guide = np.empty((height, width), np.float32)
@@ -143,9 +147,13 @@ def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.f
 
 
 def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[Any], NDArray[Any]]:
-    jit, raw, (shot, dark, _) = arrays(), frame.raw, channel_noise(frame.raw)
-    height, width, down, across = rows[1] - rows[0], raw.shape[1], len(raw.cfa), len(raw.cfa[0])
-    pixels, near = _grid(height, width, max(DETAIL_PX // 2, *tent_radii(raw.cfa))), range(-1, 2)
+    jit = arrays()
+    raw = frame.raw
+    shot, dark, _ = channel_noise(frame.raw)
+    height, width = rows[1] - rows[0], raw.shape[1]
+    down, across = len(raw.cfa), len(raw.cfa[0])
+    pixels = _grid(height, width, max(DETAIL_PX // 2, *tent_radii(raw.cfa)))
+    near = range(-1, 2)
 
     def opaque(values: Iterable[Any]) -> Numbers:
         """Numbers that are data of the kernel, so that others don't compile it again."""
@@ -189,7 +197,8 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     total = _weighted([w for _, w in eight], EIGHT)
     mean = _weighted([w * v for v, w in eight], EIGHT) / total
     mean_variance = _weighted([w for _, w in eight], [t * t for t in EIGHT]) / dr.square(total)
-    own_variance, difference = variance(mean), value - mean
+    own_variance = variance(mean)
+    difference = value - mean
     inverse = 1.0 / (own_variance + mean_variance)
     spread = pixels.store(dr.square(difference) * inverse, inverse)
     parts = pixels.store(mean, difference, mean_variance, own_variance)
@@ -211,7 +220,9 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dar
 
     `samples` hold each pixel's as a neutral's light, and beside the light around.
     """
-    jit, count, (down, across) = arrays(), len(frame.ratios), (len(frame.raw.cfa), len(frame.raw.cfa[0]))
+    jit = arrays()
+    count = len(frame.ratios)
+    down, across = len(frame.raw.cfa), len(frame.raw.cfa[0])
     height, width = (dr.opaque(jit.UInt, size) for size in shape)
     level, *neutral = (dr.opaque(jit.Float, float(x)) for x in (np.sqrt(dark) + TINY, *frame.ratios))
     sums, squares, counts = ([jit.Float(0.0)] * count for _ in range(3))
@@ -224,7 +235,8 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dar
         sums[channel] = sums[channel] + beside
         squares[channel] = squares[channel] + dr.square(beside)
         counts[channel] = counts[channel] + dr.select(inside, jit.Float(1.0), 0.0)
-        light, light_squares = light + plain, light_squares + dr.square(plain)
+        light = light + plain
+        light_squares = light_squares + dr.square(plain)
     stored = [tiles.store(*values) for values in (sums, squares, counts, [light, light_squares])]
 
     # Means over each channel's samples, and how far they can be wrong.

@@ -44,10 +44,13 @@ def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | 
 
     With a `guide` (h, w), one plane guides all channels; else each has its own, which W's stands for as eq. (6) has it.
     """
-    jit, pattern, (height, width) = arrays(), make_pattern(raw.cfa), raw.dn.shape
+    jit = arrays()
+    pattern = make_pattern(raw.cfa)
+    height, width = raw.dn.shape
     shape = height, width, len(pattern.channels)
     results = [dr.empty(jit.Float, int(np.prod(shape))) for _ in range(2)]
-    step, started = strip_rows((height, width), pattern, settings.patch), list[StartedStrip]()
+    step = strip_rows((height, width), pattern, settings.patch)
+    started = list[StartedStrip]()
     for first in range(0, height, step):
         started.append(_start(jit, raw, (first, min(first + step, height)), pattern, settings, guide))
         if len(started) > 1:
@@ -60,8 +63,10 @@ def _start(
     jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, shared: NDArray[Any] | None
 ) -> StartedStrip:
     """Start the kernels of some rows of the frame; the first row is a whole number of blocks."""
-    columns, launches = (0, raw.dn.shape[1]), list[Launch]()
-    strip, sums = cut_strip(raw, rows, pattern, settings, shared), _empty_sums(jit, rows, columns[1], pattern)
+    columns = (0, raw.dn.shape[1])
+    launches = list[Launch]()
+    strip = cut_strip(raw, rows, pattern, settings, shared)
+    sums = _empty_sums(jit, rows, columns[1], pattern)
     work = list_threads(pattern, strip.shape, rows, strip.alpha, strip.origin[0], settings.reach)
     # Threads of a shared guide read that plane alone. For the others all planes are laid out, around them: mostly few.
     for guides in (["shared"], ["channel", "mixed"]):
@@ -113,7 +118,8 @@ def _finish(jit: Any, started: StartedStrip, raw: RawImage, pattern: Pattern, re
             launch(jit, one.inputs, threads, replace(one.shape, running=True), started.sums)
 
     (down, across), (first, last), sums = pattern.tile, started.rows, started.sums
-    width, gain_e_per_dn = dr.opaque(jit.Int, raw.dn.shape[1]), dr.opaque(jit.Float, raw.gain_e_per_dn)
+    width = dr.opaque(jit.Int, raw.dn.shape[1])
+    gain_e_per_dn = dr.opaque(jit.Float, raw.gain_e_per_dn)
     pixel = dr.arange(jit.Int, (last - first) * raw.dn.shape[1])
     row, column = pixel // width, pixel % width
     stored = [sums.weight, sums.unit, sums.mean, sums.noise_gain]

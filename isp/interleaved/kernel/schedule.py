@@ -74,7 +74,8 @@ class Threads:
 
 def make_pattern(cfa: Tile) -> Pattern:
     """Tile in numbers, with blocks of whole tiles."""
-    names, tile = channels(cfa), (len(cfa), len(cfa[0]))
+    names = channels(cfa)
+    tile = (len(cfa), len(cfa[0]))
     return Pattern(
         cfa=cfa,
         channels=names,
@@ -96,7 +97,9 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     counts : (list,) uint32
         Entries that hold; the rest is padding.
     """
-    down, reach, lists = pattern.tile[0], settings.reach, []
+    down = pattern.tile[0]
+    reach = settings.reach
+    lists = []
     line = np.arange(-reach, reach + 1)
     for phase in np.ndindex(pattern.tile):
         rows, columns = (line[line % size == first] for size, first in zip(pattern.tile, phase, strict=True))
@@ -180,7 +183,8 @@ def _threads(
     guide: Guide,
 ) -> Threads:
     """Threads of the chosen blocks and cells, line by line of blocks; none that holds no pixel to reconstruct."""
-    (down, across), parts = pattern.tile, [np.empty((5, 0), np.int32)]
+    down, across = pattern.tile
+    parts = [np.empty((5, 0), np.int32)]
     for chosen, cells in shares:
         first = [line[at] for line, at in zip(lines, np.nonzero(chosen), strict=True)]
         for number, phase in enumerate(np.ndindex(pattern.tile)):
