@@ -1,6 +1,6 @@
 """Light transport of a scene, rendered once; any spectrum, power and level of its lights afterwards."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias
 
@@ -190,6 +190,29 @@ class Transport:
             for half in (values + difference, values - difference)
         )
         return even, odd
+
+    def relight_part(
+        self,
+        groups: Sequence[str],
+        spectra: Spectra | None = None,
+        *,
+        luminance_cd_m2: float | None = None,
+        illuminance_lux: float | None = None,
+        lux: float | None = None,
+    ) -> SpectralRadiance:
+        """What some light groups give of `relight` with the same arguments; parts of all groups sum to it.
+
+        Beside another lamp's line a part may be under 0 in a band, so it is `signed`.
+        """
+        if not (isinstance(groups, list | tuple) and all(isinstance(name, str) for name in groups)):
+            raise InputError(f"groups: a {type(groups).__name__} is not allowed; give a list of light groups' names")
+        require_keys("groups: light group", groups, self.groups)
+        light, _ = self._at_level(self._emission(spectra), luminance_cd_m2, illuminance_lux, lux)
+        chosen = np.array([name in groups for name in self.groups])
+        planes = combine(light.maps * chosen[:, None, None], self.radiance)
+        return SpectralRadiance(
+            np.moveaxis(planes, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True, light=light.spectrum
+        )
 
     def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
         """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""

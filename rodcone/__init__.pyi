@@ -43,6 +43,9 @@ from sensor.cfa import mosaics as mosaics
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.emva1288.characterise import Characterisation
+from sensor.flicker.figures import FlickerFigures
+from sensor.flicker.waveform import Waveform as Waveform
+from sensor.flicker.waveform import waveform as waveform
 from sensor.optics import SpectralIrradiance
 from sensor.pixel import ChannelReading as ChannelReading
 from sensor.pixel import PixelConfig as PixelConfig
@@ -92,6 +95,7 @@ __all__ = [
     "SpectralRadiance",
     "Spectrum",
     "Study",
+    "Waveform",
     "auto_exposure_s",
     "binned",
     "calibrate",
@@ -108,6 +112,7 @@ __all__ = [
     "explorer_view",
     "expose",
     "finish",
+    "flicker_figures",
     "form_image",
     "grey",
     "illuminant",
@@ -147,6 +152,7 @@ __all__ = [
     "sweep",
     "take",
     "to_world",
+    "waveform",
     "with_channel_readings",
     "with_gain",
     "with_readings",
@@ -184,6 +190,7 @@ def capture(
     shake: str | None = None,
     gain: float | None = None,
     iso: float | None = None,
+    flicker: Waveform | str | None = None,
 ) -> RawImage: ...
 def channel_electrons(irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
 def characterise(
@@ -202,6 +209,7 @@ def expose(
     *,
     exact: bool = False,
 ) -> RawImage: ...
+def flicker_figures(waveform: Waveform | str, exposure_s: _Seconds, tolerance: float = ...) -> FlickerFigures: ...
 def form_image(radiance: SpectralRadiance, sensor: _Sensor, samples_per_pixel: int = 1) -> SpectralIrradiance: ...
 def expect(
     sensor: _Sensor,

@@ -177,7 +177,7 @@ def _shown(value: Any) -> str:
     return text if 0 < len(text) <= 80 else f"a {type(value).__name__}"
 
 
-_ILLUMINANT = "render.illuminants:illuminant"
+_ILLUMINANT, _WAVEFORM = "render.illuminants:illuminant", "sensor.flicker.waveform:waveform"
 _WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give a number")
 _METRES = _range(1e-9, 1e9, "give metres")
 _TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
@@ -202,6 +202,11 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
         "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),
         **dict.fromkeys(("light_for_snr.exposure_s", "score.exposure_s"), _some_seconds),
+        **dict.fromkeys(
+            ("flicker", "flicker_figures.waveform"),
+            _value("sensor.flicker.waveform:Waveform", "give a text such as 'fluorescent@100Hz'", _WAVEFORM),
+        ),
+        "flicker_figures.exposure_s": _some_seconds,
         "only": _each(_TEXT),
         **dict.fromkeys(
             (
@@ -237,6 +242,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
         "ratio": _range(1e-6, 1e6, "give signal over noise"),
         **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
+        "tolerance": _NUMBER,
         "gain": _range(1.0, 1024.0, "give a factor, 1 where a full well reads the converter's top"),
         "iso": _range(1e-3, 1e9, "give a speed, such as 400"),
         **dict.fromkeys(("electrons", "expected_e"), _array(least=0.0)),
@@ -248,7 +254,9 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("render.size", "load_transport.size"), _size_or_side),
         **dict.fromkeys(("size", "shape"), _size),
         **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
-        **dict.fromkeys(("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view"), _TEXT),
+        **dict.fromkeys(
+            ("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view", "text"), _TEXT
+        ),
         **dict.fromkeys(("white_balance", "extend", "engine", "processor", "write_exr.scene"), _TEXT),
         **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything", "blur"), _FLAG),
         **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),

@@ -20,6 +20,7 @@ BLACK_SIGMAS = 5.0  # black level in dark standard deviations, so that clipping 
 METERED_SHARE = 0.8  # of the well: where exposure puts a frame's bright end, and up to which a gain takes it
 METERED_PERCENTILE = 99.0
 MOST_GAIN = 1024.0
+MOST_ROW_US = 1e5  # scanners read a row in less
 LONGEST_S = 0.066  # exposure time that a rule chooses at most: Parmar & Wandell 2009, Figure 5, 66 ms
 
 
@@ -90,6 +91,10 @@ class SensorConfig:
         as the gain rises. `PixelConfig.read_noise_e` is what comes before, the same at every gain.
     gain_limit : float
         Gain up to which an automatic exposure amplifies once its time is the longest; 1 for none.
+    row_time_us : float
+        Time from the start of one row's exposure to that of the next [us]: rows roll from the first to the last, where
+        it is negative from the last to the first; 0 exposes all rows together. Lamps that flicker show it
+        (`sensor.flicker.rows`).
     """
 
     pixel: PixelConfig
@@ -104,6 +109,7 @@ class SensorConfig:
     gain: float = 1.0
     converter_noise_dn: float = 0.0
     gain_limit: float = 1.0
+    row_time_us: float = 0.0
 
     __repr__ = brief
 
@@ -114,6 +120,9 @@ class SensorConfig:
         require_whole("bits", self.bits, 1, 16, "give the converter's resolution")
         require_range("gain", self.gain, 1.0, MOST_GAIN, "give a factor; at 1 a full well reads the converter's top")
         require_range("gain_limit", self.gain_limit, 1.0, MOST_GAIN, "give a factor, 1 for none")
+        require_range(
+            "row_time_us", self.row_time_us, -MOST_ROW_US, MOST_ROW_US, "give microseconds, 0 for all at once"
+        )
         require_range("converter_noise_dn", self.converter_noise_dn, 0.0, 2.0**self.bits, "give DN, 0 for none")
         if self.chip.readings and max(self.gain, self.gain_limit) > 1:
             raise InputError(
@@ -137,6 +146,11 @@ class SensorConfig:
             raise InputError(
                 f"shake_um: {self.lens.shake_um:g} for a camera that reads some charge after a part of the time, which "
                 "the hand would blur less; allowed: 0; leave the shake out, or give every reading the whole time"
+            )
+        if self.lens.shake_um and self.row_time_us:
+            raise InputError(
+                f"shake_um: {self.lens.shake_um:g} with row_time_us {self.row_time_us:g}, whose rows the hand would "
+                "move apart; allowed: one of them; leave the other out"
             )
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(

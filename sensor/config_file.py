@@ -17,7 +17,10 @@ from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_cs
 from sensor.photodiodes import binned
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
-_SETTINGS = (*("bits", "black_level_dn", "white_level_dn", "window_nm"), *("gain", "converter_noise_dn", "gain_limit"))
+_SETTINGS = (
+    *("bits", "black_level_dn", "white_level_dn", "window_nm"),
+    *("gain", "converter_noise_dn", "gain_limit", "row_time_us"),
+)
 MOST_PRNU = 0.1  # of a signal: sensors have 0.003 to 0.02
 MOST_OUTSIDE = 0.01  # share of a response outside the window
 OF_TABLES = ("csv", "quantum_efficiency", "ir_cut")  # keys of [responses] that may name a file
@@ -32,12 +35,12 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
     path : str or Path
         TOML with the tables ``[pixel]`` and ``[lens]`` (fields of `PixelConfig` and `LensConfig`), optionally ``cfa``
         (a name of `sensor.cfa.MOSAICS`, or rows of channels), ``bits``, ``black_level_dn``, ``white_level_dn``,
-        ``window_nm``, ``gain``, ``gain_limit``, ``converter_noise_dn``, ``binning`` ("charge" or "digital"),
-        ``readout`` ("merged" or "switched") with ``[[readings]]`` (fields of `Reading`), ``[[channels]]`` (fields of
-        `ChannelReading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency`` ("included",
-        "relative", a number, or a table), its ``unit`` ("per_photon" by default, or "per_watt") and ``ir_cut``
-        (nm, or a table). The tables are files of curves
-        (`rodcone.curve_file.read_columns`), whose names are relative to the TOML's folder.
+        ``window_nm``, ``gain``, ``gain_limit``, ``converter_noise_dn``, ``row_time_us``, ``binning`` ("charge" or
+        "digital"), ``readout`` ("merged" or "switched") with ``[[readings]]`` (fields of `Reading`), ``[[channels]]``
+        (fields of `ChannelReading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency``
+        ("included", "relative", a number, or a table), its ``unit`` ("per_photon" by default, or "per_watt") and
+        ``ir_cut`` (nm, or a table). The tables are files of curves (`rodcone.curve_file.read_columns`), whose names are
+        relative to the TOML's folder.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -116,6 +119,7 @@ class SensorTable:
     gain: Any = None
     converter_noise_dn: Any = None
     gain_limit: Any = None
+    row_time_us: Any = None
     binning: str = ""
     readout: str = MERGED
     readings: tuple[Reading, ...] = ()

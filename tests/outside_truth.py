@@ -32,3 +32,14 @@ ELECTRONS = {  # under D65 in 10 ms, from RGBW: luminance [cd/m^2], f-number, pi
 }
 # Under D65 at f/5.6, magnification 0; a luminance that gives 10 photons/(um^2 s), 1 a pixel of 2 um in 25 ms.
 MOONLIGHT_PHOTONS_PER_UM2_S_CD_M2, MOONLIGHT_CD_M2 = 276.85698, 0.036119732
+
+# Percent flicker over 100, and flicker index, of single lamps at 120 Hz: Lehman, Wilkins, Berman, Poplawski & Miller,
+# "Proposing measures of flicker in the low frequencies for lighting applications" (IEEE ECCE 2011); facts, no licence.
+FLICKER_OF_LAMPS = {
+    "incandescent": (0.063, 0.02),
+    "fluorescent": (0.284, 0.07),
+    "compact_magnetic": (0.370, 0.11),
+    "compact_electronic": (0.077, 0.02),
+    "metal_halide": (0.520, 0.16),
+    "sodium_high": (0.950, 0.30),
+}

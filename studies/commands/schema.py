@@ -50,7 +50,8 @@ def sensor_schema() -> dict[str, Any]:
     """Return the schema of a sensor file; of a pixel that is read more than once the readings hold the noise."""
     stated = get_type_hints(SensorConfig)
     # What the table leaves to the sensor's own checks has the sensor's types.
-    named = ("bits", "black_level_dn", "white_level_dn", "window_nm", "gain", "converter_noise_dn", "gain_limit")
+    levels = ("bits", "black_level_dn", "white_level_dn", "window_nm")
+    named = (*levels, "gain", "converter_noise_dn", "gain_limit", "row_time_us")
     known: dict[Any, Mapping[str, Any]] = {
         (SensorTable, "cfa"): _MOSAIC,
         (SensorTable, "binning"): {"enum": list(BINNINGS)},

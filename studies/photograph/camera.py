@@ -25,8 +25,11 @@ from sensor.calibration import ColourCalibration
 from sensor.capture import photograph_radiance as frame_of
 from sensor.cfa import mask
 from sensor.config import SensorConfig
-from sensor.device import Device
+from sensor.device import Device, draw_device
 from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
+from sensor.flicker.photograph import frame_starts_s, photograph_flickering
+from sensor.flicker.rows import check_flicker, steady_exposure_s
+from sensor.flicker.waveform import Waveform
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -274,6 +277,7 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     shake: str | None = None,
     gain: float | None = None,
     iso: float | None = None,
+    flicker: Waveform | None = None,
 ) -> RawImage:
     """Take one exposure; the raw image holds what `develop` needs.
 
@@ -297,11 +301,14 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         Fixed gain between pixel and converter, 1 or more; left out, the sensor's own.
     iso : float, optional
         Saturation-based speed in the gain's place.
+    flicker : Waveform or str, optional
+        Of the lamps, such as ``"fluorescent@100Hz"``; `radiance` is then their mean. `rng` gives the time at which the
+        exposure starts by the lamps' clock. Bands appear where the sensor's `row_time_us` isn't 0.
 
     Raises
     ------
     InputError
-        As `sensor.capture.photograph_radiance`.
+        As `sensor.capture.photograph_radiance`, and for flicker with a camera that `sensor.flicker.rows` leaves out.
 
     Warns
     -----
@@ -324,7 +331,17 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         image = form_image(radiance, sensor, samples_per_pixel)
         exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, channel_electrons(image, sensor, 1.0), sensor)
         subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
-    raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
+        exposure_s = exposure_s if flicker is None else steady_exposure_s([flicker], exposure_s)
+    if flicker is None:
+        raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
+    else:
+        check_flicker(sensor)
+        image = form_image(radiance, sensor, samples_per_pixel)
+        shape = (image.values.shape[0], image.values.shape[1])
+        device = device or draw_device(sensor, shape, np.random.default_rng([0, 0]))
+        rng = rng or np.random.default_rng([0, 1])
+        starts_s = frame_starts_s(sensor, shape, exposure_s, rng)
+        (raw,) = photograph_flickering(image, [(flicker, image)], sensor, exposure_s, device, rng, starts_s, exact)
     try:
         colour = calibrate(sensor, light or radiance.light or illuminant("D65"))
     except InputError:

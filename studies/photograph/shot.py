@@ -1,6 +1,6 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -22,18 +22,24 @@ from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
 from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
+from rodcone.time_text import parse_time
 from rodcone.types import Floats
 from sensor.capture import photograph_radiance
 from sensor.config import SensorConfig, check_frame
-from sensor.device import draw_device
+from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
+from sensor.flicker.photograph import frame_starts_s, photograph_flickering
+from sensor.flicker.rows import check_flicker, steady_exposure_s
+from sensor.flicker.waveform import Waveform
 from sensor.optics import SpectralIrradiance, form_image, least_samples, left_out, spreads
 from sensor.presets import preset
+from sensor.raw import RawImage
 from sensor.raw_files.raw_file import check_ending
 from sensor.response import channel_electrons, expected_electrons
 from sensor.shake import held_lens
 from studies.metrics.target_figures import EDGE
 from studies.photograph.camera import calibrate, with_notes
+from studies.photograph.lamps import flicker_of, lamp_parts
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.cost import PictureCost
 from studies.study.gain import at_gain, gain_text
@@ -56,7 +62,12 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
-_DEVICE, _FRAME = 0, 1  # second part of the seed: the chip's patterns, and this exposure's noise
+# Second part of the seed: the chip's patterns, this exposure's noise, and when it starts by the lamps' clock.
+_DEVICE, _FRAME, _START = 0, 1, 2
+_ALL_ROWS = (
+    "flicker: all rows are exposed together, so that the lamps brighten or darken the whole frame; for bands state the "
+    "time from row to row, such as --row-time 15us"
+)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +120,13 @@ class Order:
         Exposures of a burst, each in a file of its own, NAME_1, NAME_2 and so on; develop merges them.
     shake : str, optional
         hand: the camera is held in the hand, whose tremor moves the image during each exposure; none by default.
+    flicker : tuple of str
+        WAVEFORM of all lamps, or GROUP=WAVEFORM of one light group; may be given several times. A waveform is a lamp on
+        the mains such as fluorescent@100Hz, sodium_high@120Hz or incandescent@100Hz, a switched lamp such as
+        pwm@1000Hz:0.25 (lit for a quarter of each period), or a CSV of one period. Levels are means over time.
+    row_time : str, optional
+        Time from one row's exposure to the next's, such as 15us; the sensor's own by default, which is 0 unless its
+        file states row_time_us. Lamps that flicker make bands where it isn't 0.
     seed : int
         Seed of the render, the chip and the exposure.
     trust_scene : bool
@@ -145,6 +163,8 @@ class Order:
     render: bool = False
     frames: Annotated[int, (1, MOST_FRAMES, "give exposures of a burst")] = 1
     shake: str | None = None
+    flicker: tuple[str, ...] = ()
+    row_time: str | None = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     define: tuple[str, ...] = ()
@@ -181,6 +201,8 @@ class Checked:
     samples : int
         Samples of the light along each side of a pixel.
     cost : PictureCost
+    flicker : mapping of str to Waveform
+        Of lamps that flicker, by light group.
     """
 
     order: Order
@@ -190,6 +212,7 @@ class Checked:
     ready: Ready | None
     samples: int
     cost: PictureCost
+    flicker: Mapping[str, Waveform]
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
@@ -265,11 +288,12 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         ]
     samples = checked.samples
     image = form_image(radiance, sensor, samples)
-    exposure_s, sensor = _exposure(order, checked.exposure_s, image, sensor)
+    exposure_s, sensor = _exposure(checked, image)
     subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
     device = draw_device(sensor, image.values.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
-    rng = np.random.default_rng([order.seed, _FRAME])
-    taken = [photograph_radiance(subject, sensor, exposure_s, device, rng) for _ in range(order.frames)]
+    lamps = lamp_parts(transport, spectra, level, checked.flicker)
+    taken = _frames(checked, subject, image, lamps, sensor, exposure_s, device)
+    notes += [_ALL_ROWS] * bool(lamps and sensor.row_time_us == 0)
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)
@@ -309,13 +333,35 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     return Taken(paths, facts, tuple(notes))
 
 
-def _exposure(
-    order: Order, asked_s: float | None, image: SpectralIrradiance, sensor: SensorConfig
-) -> tuple[float, SensorConfig]:
-    """Exposure time [s], asked for or by a rule, and the camera at the gain that it takes."""
-    if asked_s is not None:
-        return asked_s, sensor
-    return exposed_by_rule(order.exposure, channel_electrons(image, sensor, 1.0), sensor)
+def _frames(
+    checked: Checked,
+    subject: SpectralRadiance | SpectralIrradiance,
+    image: SpectralIrradiance,
+    parts: Sequence[tuple[Waveform, SpectralRadiance | None]],
+    sensor: SensorConfig,
+    exposure_s: float,
+    device: Device,
+) -> list[RawImage]:
+    """Exposures of the order; `parts` are of `lamp_parts`."""
+    seed, frames = checked.order.seed, checked.order.frames
+    rng = np.random.default_rng([seed, _FRAME])
+    if not parts:
+        return [photograph_radiance(subject, sensor, exposure_s, device, rng) for _ in range(frames)]
+    imaged = [(lamp, image if lit is None else form_image(lit, sensor, checked.samples)) for lamp, lit in parts]
+    starts_s = frame_starts_s(sensor, device.shape, exposure_s, np.random.default_rng([seed, _START]), frames)
+    return photograph_flickering(image, imaged, sensor, exposure_s, device, rng, starts_s)
+
+
+def _exposure(checked: Checked, image: SpectralIrradiance) -> tuple[float, SensorConfig]:
+    """Exposure time [s], asked for or by a rule, and the camera at the gain that it takes.
+
+    A rule meters the lamps' mean, and cuts its time to whole periods of lamps that flicker.
+    """
+    if checked.exposure_s is not None:
+        return checked.exposure_s, checked.sensor
+    per_second_e = channel_electrons(image, checked.sensor, 1.0)
+    exposure_s, sensor = exposed_by_rule(checked.order.exposure, per_second_e, checked.sensor)
+    return steady_exposure_s(checked.flicker.values(), exposure_s), sensor
 
 
 def _rendered(
@@ -368,6 +414,10 @@ def check(order: Order) -> Checked:
     """
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
+    if order.row_time is not None:
+        sensor = replace(sensor, row_time_us=parse_time(order.row_time, "row_time") * 1e6)
+    if order.flicker:
+        check_flicker(sensor)
     check_ending(Path(order.out), sensor.cfa)
     if order.size is not None:
         require_absent("beside --size", height=order.height, width=order.width)
@@ -394,10 +444,11 @@ def check(order: Order) -> Checked:
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
         cost = PictureCost((1, pixels), bands, groups, 0, _AFTER_S)
-        return Checked(order, sensor, None, exposure_s, None, 1, cost)
+        return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
+    flicker = flicker_of(order.flicker, opened.scene.groups)
     # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
     samples = least_samples(sensor) if order.source == EDGE else 1
     ready = _ready(order, opened, spectra) if samples == 1 else None
@@ -407,7 +458,7 @@ def check(order: Order) -> Checked:
     spp = 0 if ready else order.spp or _SPP
     rendered = (samples * size[0], samples * size[1])
     cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
-    return Checked(order, sensor, opened, exposure_s, ready, samples, cost)
+    return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker)
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

@@ -1,0 +1,1 @@
+"""Lamps that flicker, and rows that are exposed one after another."""

@@ -1,0 +1,99 @@
+"""Exposure row by row: when each row of a frame is exposed, and what it collects of lamps that flicker.
+
+A lens and a mosaic are linear, and a lamp's flicker is the same for all that it lights. So a frame under lamps that
+flicker is the steady frame with the rows of each lamp's own part weighed by the lamp's mean light while they are
+exposed: nothing is rendered again.
+"""
+
+from collections.abc import Iterable
+from math import floor
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.errors import InputError
+from rodcone.types import Floats, Mosaic
+from sensor.config import SensorConfig
+from sensor.flicker.waveform import Waveform
+
+
+def check_flicker(sensor: SensorConfig) -> None:
+    """Raise `InputError` for a camera that lamps which flicker aren't modelled for."""
+    times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
+    if min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels):
+        raise InputError(
+            "flicker: the camera reads some charge after a part of the time, which sees another part of the lamp's "
+            "period; allowed: readings of the whole time; leave flicker out, or give every reading the whole time"
+        )
+    if sensor.lens.shake_um:
+        raise InputError(
+            f"flicker: with shake_um {sensor.lens.shake_um:g}, whose blur would follow the lamp's light; allowed: 0; "
+            "leave one of them out"
+        )
+
+
+def row_starts_s(sensor: SensorConfig, rows: int) -> Floats:
+    """When the exposure of each row of the raw image starts [s], after that of the first one; shape (rows,)."""
+    order = np.arange(rows) if sensor.row_time_us >= 0 else np.arange(rows)[::-1]
+    return np.asarray(order * (abs(sensor.row_time_us) * 1e-6))
+
+
+def frame_interval_s(sensor: SensorConfig, rows: int, exposure_s: float) -> float:
+    """Time from one frame of a burst to the next [s]: the exposure, or the readout of all rows if it takes longer."""
+    return max(exposure_s, rows * abs(sensor.row_time_us) * 1e-6)
+
+
+def row_weights(waveform: Waveform, sensor: SensorConfig, rows: int, exposure_s: float, start_s: float = 0.0) -> Floats:
+    """Light that a lamp gives each row of photodiodes within its exposure, over the lamp's mean; shape (rows,).
+
+    Parameters
+    ----------
+    waveform : Waveform
+    sensor : SensorConfig
+        Its `row_time_us` parts the rows' starts; photodiodes that bin are exposed together.
+    rows : int
+        Of photodiodes.
+    exposure_s : float
+    start_s : float
+        When the exposure of the first row starts, by the lamp's clock.
+    """
+    if exposure_s == 0:
+        return np.ones(rows)
+    starts = row_starts_s(sensor, rows // sensor.sites)
+    return np.repeat(waveform.mean(start_s + starts, exposure_s), sensor.sites)
+
+
+def flickering(
+    steady_e: Mosaic,
+    parts: Iterable[tuple[Waveform, Mosaic]],
+    sensor: SensorConfig,
+    exposure_s: float,
+    start_s: float = 0.0,
+) -> NDArray[np.float64]:
+    """Expected electrons of one exposure under lamps that flicker, shape (h, w).
+
+    Parameters
+    ----------
+    steady_e : (h, w) float64
+        Expected electrons if every lamp gave its mean all the time.
+    parts : iterable of (Waveform, (h, w) float64)
+        Each lamp that flickers, and its part of `steady_e`.
+    sensor, exposure_s, start_s
+        As `row_weights` takes them.
+    """
+    result = np.array(steady_e, np.float64)
+    for waveform, part_e in parts:
+        weights = row_weights(waveform, sensor, result.shape[0], exposure_s, start_s)
+        result += (weights - 1)[:, None] * part_e
+    return np.maximum(result, 0.0)  # the parts are images of their own, whose rounding differs
+
+
+def steady_exposure_s(waveforms: Iterable[Waveform], exposure_s: float) -> float:
+    """Exposure time of a rule that knows the lamps [s]: cut to whole periods of the slowest, where it holds one.
+
+    Every row then collects the same. Cameras call it anti-banding. Lamps whose frequencies are no multiples of one
+    another keep bands, of the faster ones only.
+    """
+    slowest_s = max((x.period_s for x in waveforms), default=0.0)
+    periods = floor(exposure_s / slowest_s + 1e-9) if slowest_s else 0
+    return periods * slowest_s if periods else exposure_s

@@ -1,0 +1,62 @@
+"""Lamps of a scene that flicker: which they are by an order's texts, and the part of the light that each gives."""
+
+from collections.abc import Collection, Mapping, Sequence
+
+from render.radiance import SpectralRadiance
+from render.spectrum import Spectrum
+from render.transport import Transport
+from rodcone.errors import InputError, require_name
+from sensor.flicker.waveform import Waveform, waveform
+
+ALL = ""  # in a light group's place: every lamp
+
+
+def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Waveform]:
+    """Waveforms by light group, or `ALL`.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        ``GROUP=WAVEFORM``, or ``WAVEFORM`` alone for every lamp; a later one takes the place of an earlier.
+    groups : collection of str
+        The scene's; none for a picture, whose lamps aren't known apart.
+
+    Raises
+    ------
+    InputError
+        For an unknown group or waveform.
+    """
+    found: dict[str, Waveform] = {}
+    for text in texts:
+        group, equals, name = text.rpartition("=")
+        if equals and not groups:
+            raise InputError(
+                f"flicker: {text!r} for a picture, whose lamps aren't known apart; allowed: a waveform of all its "
+                f"light; write {name}"
+            )
+        if equals:
+            require_name("flicker: light group", group, groups)
+        found |= dict.fromkeys([group] if equals else (groups or [ALL]), waveform(name))
+    return found
+
+
+def lamp_parts(
+    transport: Transport, spectra: Mapping[str, Spectrum], level: Mapping[str, float], flicker: Mapping[str, Waveform]
+) -> list[tuple[Waveform, SpectralRadiance | None]]:
+    """Light of each waveform's lamps alone, as bright as they are among all lamps; nothing is rendered.
+
+    None stands for the whole light, where one waveform is that of every lamp.
+
+    Parameters
+    ----------
+    transport : Transport
+    spectra, level : mapping
+        As `Transport.relight` takes them.
+    flicker : mapping of str to Waveform
+        Of `flicker_of`.
+    """
+    apart = list(dict.fromkeys(flicker.values()))
+    if len(apart) == 1 and (ALL in flicker or set(flicker) == set(transport.groups)):
+        return [(apart[0], None)]
+    groups = {lamp: [name for name, its in flicker.items() if its == lamp] for lamp in apart}
+    return [(lamp, transport.relight_part(names, spectra, **level)) for lamp, names in groups.items()]
