@@ -16,7 +16,8 @@ _require_no_shadow()
 
 # Public name: module and attribute. Its strings are the one exemption from the layers (rodcone is the ground that
 # the other packages stand on): import-linter sees no imports here, since nothing is imported until a user asks.
-# `__init__.pyi` states the same names with their types. No module of this package may bear one of them.
+# docs/make/public_stub.py writes `__init__.pyi`, the same names with their types, from them and from the functions. No
+# module of this package may bear one of them.
 _PUBLIC = {
     name: tuple(place.split(":"))
     for name, place in tomllib.loads(_Path(__file__).with_name("public.toml").read_text("utf-8")).items()
@@ -27,6 +28,9 @@ __all__ = sorted(_PUBLIC)  # noqa: PLE0605
 
 def __getattr__(name: str) -> Any:
     """Import a public name from its module: a class, or a function with the checks of `rodcone.doors` before it."""
+    if name == "__version__":
+        globals()[name] = imported("importlib.metadata").version("rodcone")
+        return globals()[name]
     if name not in _PUBLIC:
         raise AttributeError(f"module 'rodcone' has no attribute {name!r}")
     module, attribute = _PUBLIC[name]
@@ -36,5 +40,5 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    """Names that tab shows."""
-    return __all__
+    """Return the names that tab shows."""
+    return [*__all__, "__version__"]

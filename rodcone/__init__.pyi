@@ -1,21 +1,21 @@
-"""Public names with their types; `rodcone.doors` takes a name in place of some values."""
+"""Public names with their types, as docs/make/public_stub.py writes them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import WhiteBalance
 from isp.converters import write_with_bayer as write_raw
 from isp.picture import Picture as Picture
-from isp.picture import finish as finish
 from isp.processors.catalogue import Processor as Processor
 from isp.processors.catalogue import processor_names as processors
 from isp.remosaic import remosaic as remosaic
 from render.denoised.relight import relight_denoised as relight_denoised
 from render.geometry import look_at as look_at
-from render.geometry import to_world as to_world
 from render.illuminants import illuminant as illuminant
 from render.illuminants import illuminant_names as illuminants
 from render.illuminants import lines_nm as lines_nm
@@ -23,18 +23,19 @@ from render.radiance import SpectralRadiance as SpectralRadiance
 from render.radiance_files.exr import write_exr as write_exr
 from render.radiance_files.radiance_source import load_radiance as load_radiance
 from render.scene import LightGroup as LightGroup
+from render.scene import Node
 from render.scene import Scene as Scene
 from render.spectrum import Spectrum as Spectrum
 from render.spectrum import line_bands as line_bands
 from render.transport import Transport
 from render.user_scene.scene_file import load_scene_file as load_scene_file
-from rodcone.colour_spaces import encode_srgb as encode_srgb
 from rodcone.errors import InputError as InputError
+from rodcone.jit import Backend
 from rodcone.progress import Step
+from rodcone.types import Floats, Progress
 from scenes.catalogue import load as load
 from scenes.catalogue import scene_names as scenes
 from scenes.materials import matte as matte
-from scenes.materials import panel as panel
 from scenes.reflectances import grey as grey
 from sensor.burst import merged_raw as merged_raw
 from sensor.calibration import ColourCalibration
@@ -66,7 +67,6 @@ from studies.metrics.compare import measure as measure
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
 from studies.photograph.develop import develop_file as develop_file
-from studies.photograph.picture_file import write_picture as write_picture
 from studies.photograph.shot import Order as Order
 from studies.photograph.shot import take as take
 from studies.photograph.snr import LightForSnr
@@ -161,6 +161,8 @@ __all__ = [
     "write_raw",
 ]
 
+__version__: str
+
 _Sensor: TypeAlias = SensorConfig | str | Path
 _Seconds: TypeAlias = float | str
 _Light: TypeAlias = Spectrum | str
@@ -194,9 +196,18 @@ def capture(
 ) -> RawImage: ...
 def channel_electrons(irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds) -> NDArray[np.float64]: ...
 def characterise(
-    sensor: _Sensor, shape: tuple[int, int] = ..., seed: int = 0, exposure_s: _Seconds = ..., exact: bool = False
+    sensor: _Sensor, shape: tuple[int, int] = ..., seed: int = 0, exposure_s: _Seconds = 0.01, exact: bool = False
 ) -> Characterisation: ...
 def draw_device(sensor: _Sensor, shape: tuple[int, int], rng: np.random.Generator) -> Device: ...
+def encode_srgb(linear: ArrayLike) -> NDArray[np.float64]: ...
+def expect(
+    sensor: _Sensor,
+    levels_cd_m2: ArrayLike,
+    light: str = "D65",
+    exposure: str | float = ...,
+    prior: str = "drawn",
+    blur: bool = False,
+) -> list[ExpectedError]: ...
 def expected_electrons(
     irradiance: SpectralIrradiance, sensor: _Sensor, exposure_s: _Seconds
 ) -> NDArray[np.float64]: ...
@@ -209,20 +220,23 @@ def expose(
     *,
     exact: bool = False,
 ) -> RawImage: ...
+def finish(
+    raw: RawImage,
+    planes: ArrayLike,
+    matrix: ArrayLike | ColourFit,
+    *,
+    neutral: ArrayLike | None = None,
+    balance: ArrayLike | WhiteBalance | None = None,
+    engine: Backend = "numpy",
+    noise_gain: ArrayLike | None = None,
+) -> Picture: ...
 def flicker_figures(waveform: Waveform | str, exposure_s: _Seconds, tolerance: float = ...) -> FlickerFigures: ...
 def form_image(radiance: SpectralRadiance, sensor: _Sensor, samples_per_pixel: int = 1) -> SpectralIrradiance: ...
-def expect(
-    sensor: _Sensor,
-    levels_cd_m2: ArrayLike,
-    light: str = "D65",
-    exposure: str | float = ...,
-    prior: str = "drawn",
-    blur: bool = False,
-) -> list[ExpectedError]: ...
 def light_for_snr(ratio: float, sensor: _Sensor, light: str, exposure_s: _Seconds) -> list[LightForSnr]: ...
+def panel(pose: ArrayLike, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node: ...
 def plan(study: _Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan: ...
-def reference_plan(study: _Study) -> Plan: ...
 def reference_picture(radiance: SpectralRadiance, light: _Light | None = None) -> ReferencePicture: ...
+def reference_plan(study: _Study) -> Plan: ...
 def render(
     scene: Scene | str,
     size: tuple[int, int] | int,
@@ -237,15 +251,13 @@ def render(
     seed: int = 0,
     cache: str | Path | None = None,
     resume: Transport | None = None,
-    progress: Callable[[float, float], None] | None = None,
+    progress: Progress | None = None,
     denoise: bool = False,
 ) -> Transport: ...
 def score(
     sensor: _Sensor, light: str = "D65", exposure_s: _Seconds = 0.033, only: Sequence[str] = (), seed: int = 0
 ) -> list[Merit]: ...
-def snr(
-    electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = ...
-) -> NDArray[np.float64]: ...
+def snr(electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = None) -> Floats: ...
 def sweep(
     study: _Study,
     out: str | Path,
@@ -255,6 +267,8 @@ def sweep(
     *,
     clock: Clock | None = None,
 ) -> SweepResult: ...
+def to_world(*transforms: ArrayLike) -> Any: ...
 def with_channel_readings(sensor: _Sensor, readings: Sequence[ChannelReading]) -> SensorConfig: ...
 def with_gain(sensor: _Sensor, gain: float) -> SensorConfig: ...
 def with_readings(sensor: _Sensor, readings: Sequence[Reading], readout: str = ...) -> SensorConfig: ...
+def write_picture(picture: Picture | ArrayLike, path: str | Path, bits: int = 8, encoding: str = "srgb") -> None: ...

@@ -64,7 +64,7 @@ if _early := _loaded_too_early():
         f"Dr.Jit was imported before rodcone and loaded {_early}, which aborts: nothing is rendered, reconstruction "
         f"runs its slow form; import rodcone first, or set DRJIT_LIBLLVM_PATH={LIBLLVM}",
         RuntimeWarning,
-        stacklevel=2,
+        stacklevel=3,  # the line that imports rodcone, whose own is the second
     )
     LIBLLVM = None
 # Without a usable library Dr.Jit would search by itself and may load one that aborts the process: name one that isn't.

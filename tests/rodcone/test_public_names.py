@@ -1,7 +1,8 @@
 """`import rodcone`: the public names, what it loads, and that LLVM is chosen first whatever is imported."""
 
 import ast
-from importlib import import_module
+import sys
+from importlib import import_module, metadata
 from inspect import signature, unwrap
 from pathlib import Path
 
@@ -11,8 +12,12 @@ from command_line import in_new_python
 from refusal import refusal
 
 import rodcone as public
+from rodcone.doors import CHECKS
 
 ROOT = Path(public.__file__).resolve().parent
+sys.path.insert(0, str(ROOT.parent / "docs" / "make"))
+from public_stub import WIDER, stub_text  # noqa: E402
+
 HEAVY = ("mitsuba", "drjit", "colour", "numpy", "scipy", "skimage", "OpenEXR", "render", "scenes", "sensor", "isp")
 
 
@@ -36,11 +41,58 @@ def test_tab_the_star_and_the_stub_show_the_same_names() -> None:
     named = {node.name: node.args for node in stub.body if isinstance(node, ast.FunctionDef)}
     assert typed == {name: place for name, place in public._PUBLIC.items() if name not in named}
     for name, arguments in named.items():
-        assert [one.arg for one in arguments.args + arguments.kwonlyargs] == list(
-            signature(getattr(public, name)).parameters
-        )
+        stated = [*arguments.args, arguments.vararg, *arguments.kwonlyargs, arguments.kwarg]
+        assert [one.arg for one in stated if one] == list(signature(getattr(public, name)).parameters)
     (listed,) = (ast.literal_eval(node.value) for node in stub.body if isinstance(node, ast.Assign))
-    assert dir(public) == public.__all__ == listed == sorted(public._PUBLIC)
+    assert public.__all__ == listed == sorted(public._PUBLIC)
+    assert dir(public) == sorted([*public.__all__, "__version__"])
+
+
+def test_the_stub_is_what_its_program_writes() -> None:
+    """One list, `public.toml`, says what is public; docs/make/public_stub.py makes the stub of it."""
+    assert (ROOT / "__init__.pyi").read_text("utf-8") == stub_text(), "run python docs/make/public_stub.py"
+
+
+# A type of a parameter, and one thing of another type that the door takes for it.
+STAND_INS = {
+    "SensorConfig": "low_noise",
+    "Scene": "flat_field",
+    "Spectrum": "D65",
+    "float": "20ms",
+    "Waveform": "fluorescent@100Hz",
+}
+
+
+def test_the_stub_lets_a_name_stand_where_the_door_takes_one_and_nowhere_else() -> None:
+    asked = 0
+    for name in public.__all__:
+        function = unwrap(getattr(public, name))
+        if isinstance(function, type):
+            continue
+        for parameter in signature(function).parameters.values():
+            said = str(parameter.annotation).split(" | ")[0].removeprefix("<class '").removesuffix("'>").split(".")[-1]
+            if said not in STAND_INS or "| str" in str(parameter.annotation):
+                continue
+            asked += 1
+            wide = (parameter.name, said) in WIDER
+            assert passes(name, parameter.name, STAND_INS[said]) == wide, f"{name}.{parameter.name}: {said}"
+    assert asked > 40
+
+
+def passes(name: str, parameter: str, value: object) -> bool:
+    """Return whether a public function's door takes a value for a parameter."""
+    check = CHECKS.get(f"{name}.{parameter}") or CHECKS[parameter]
+    try:
+        check(parameter, value)
+    except public.InputError:
+        return False
+    return True
+
+
+def test_the_version_is_the_installed_one_and_is_read_when_it_is_asked_for() -> None:
+    assert public.__version__ == metadata.version("rodcone")
+    code = "import rodcone; print('__version__' in vars(rodcone), rodcone.__version__, '__version__' in vars(rodcone))"
+    assert in_new_python(code) == f"False {metadata.version('rodcone')} True"
 
 
 def test_no_ground_module_bears_a_public_name() -> None:
