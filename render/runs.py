@@ -119,9 +119,10 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def scene_means_of(means: Means) -> SceneMeans:
-    """Return the picture's mean light but for lamps that are seen directly, and the share of it without a lamp.
+    """Return the mean over the picture of all light except that of directly visible lamps, and its covariance.
 
-    Pixels are independent of each other.
+    `uncovered` is the share of the picture in which no lamp is visible. The errors of different pixels are independent,
+    so that the covariance of the mean is the sum of the pixels' covariances over the square of their number.
     """
     groups, bands, *size = means.light.mean.shape
     scattered = np.empty((groups, bands))

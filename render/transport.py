@@ -327,7 +327,7 @@ class Transport:
         }
 
     def _emission(self, spectra: Spectra | None = None, powers: Powers | None = None) -> BandLight:
-        """Emission of the lights asked for."""
+        """Return what the chosen lights emit, in the transport's bands."""
         return self._in_bands(self._lights(spectra, powers))
 
     def _in_bands(self, lights: Mapping[str, LightGroup]) -> BandLight:

@@ -115,7 +115,7 @@ def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
 
 
 def _decoded(content: bytes) -> str:
-    """Text in UTF-8, in UTF-16 where it says so, else in Latin-1, whose µ and Å instruments write."""
+    """Decode a file's bytes: UTF-16 if they begin with its mark, else UTF-8, else Latin-1 (instruments' µ and Å)."""
     if content.startswith((b"\xff\xfe", b"\xfe\xff")):
         return content.decode("utf-16")
     try:

@@ -67,14 +67,14 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: 
     other = _RENDER_BYTES + _DENOISER_BYTES * denoised
     rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + other) + _RUN_BYTES * groups
     worker = PROCESS_BYTES + _CELL_BYTES * pixels
-    if workers <= 1:  # the render is let go of before the first cell
+    if workers <= 1:  # the process frees the render before it develops the first cell
         peak_bytes = max(rendering, workers * worker)
         return Memory(peak_bytes, peak_bytes)
     return Memory(rendering + workers * worker, max(rendering, worker))
 
 
 def file_extent(path: str | Path) -> tuple[int, int, int]:
-    """Pixels, bands and light groups that a picture file counts as, by its bytes: its header isn't read yet."""
+    """Estimate a picture file's pixels, bands and light groups from its size in bytes, before its header is read."""
     values = Path(path).stat().st_size * _FILE_PACKING / 4
     return round(values / _FILE_BANDS), _FILE_BANDS, 0
 

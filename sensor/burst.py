@@ -101,24 +101,27 @@ def merge_frames(frames: Sequence[RawImage]) -> Merged:
 
 
 def merged_raw(frames: Sequence[RawImage]) -> RawImage:
-    """Merge frames into one raw image, which is developed as any other: the exposure that they are together.
+    """Merge frames into one raw image that looks like a single exposure of their total time.
 
-    Its electrons are the merged rate times the sum of the exposure times, so that shot noise stays what an exposure of
-    this time has, and the full well is what the shortest frame's stands for. Read noise and DSNU are those of a dark
-    pixel. In a bracket they are too small where a long frame is full; in a burst of equal times they hold everywhere.
-    Of several readings the variance between two of `RawImage.noise_steps` is up to 6 % off in one frame, up to 12 % too
-    small in 64: shot noise and PRNU miss there in opposite ways, and PRNU grows faster.
-    The scene has to stand still: frames are not aligned.
+    Its electrons are the merged rate times the sum of the exposure times. Shot noise is therefore that of one exposure
+    of the total time, and the full well is the shortest frame's, scaled from its time to the total.
+
+    Read noise and DSNU are stated for a dark pixel. They hold everywhere in a burst of equal times; in a bracket they
+    are too small where a long frame is full. For a sensor of several readings, the variance that is stated between two
+    `RawImage.noise_steps` is up to 6 % off for one frame and up to 12 % too small for 64, because the errors in shot
+    noise and in PRNU have opposite signs and the latter grows faster.
+
+    The scene must not move: frames are not aligned.
 
     Parameters
     ----------
     frames : sequence of RawImage
-        As `merge_frames`; one alone is given back as it is.
+        As `merge_frames` takes them; a single frame is returned unchanged.
 
     Raises
     ------
     InputError
-        As `merge_frames`; for frames of several readings each and different times.
+        Where `merge_frames` raises it, and for sensors of several readings with different exposure times.
     """
     if len(frames) == 1:
         return frames[0]

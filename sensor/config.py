@@ -242,7 +242,8 @@ class SensorConfig:
         if self.black_level_dn is not None:
             return int(self.black_level_dn)
         dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)
-        # The converter spans black and top: b / white = dark / (dark + top). Rounding errors make no DN more.
+        # White is the black level and the top together, so that black / white = dark / (dark + top). The 1e-9 keeps a
+        # rounding error from adding a whole DN.
         least = self.white_dn * dark_e / (self.top_e + dark_e)
         least = hypot(least, BLACK_SIGMAS * self.converter_noise_dn)
         return min(ceil(least - 1e-9), self.white_dn - 1)

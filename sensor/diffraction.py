@@ -39,7 +39,7 @@ _FIT = _fit()
 
 
 def fast_otf(s: Floats) -> Floats:
-    """`diffraction_otf` at shares s of the limit, within 2e-9, in 0.4 of its time: without an arccosine."""
+    """Approximate `diffraction_otf` at frequencies s, in shares of the cut-off: within 2e-9, and 2.5 times as fast."""
     under = np.maximum(1 - s, 0.0)
     value = np.full_like(s, _FIT[0])
     for factor in _FIT[1:]:

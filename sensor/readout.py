@@ -225,16 +225,20 @@ def frame_moments(expected_e: NDArray[np.float64], readings: Sequence[PlainReadi
 
 
 def light_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """Variance of the light that each sample tells [e-^2]: of the clipped sample, over the square of its mean's slope.
+    """Return the variance of the light as estimated from each sample [e-^2].
 
-    An error of the light reaches a sample beside the well by that slope; from there on it grows without end.
+    It is the clipped sample's variance over the square of the slope with which the sample's mean follows the light.
+    Near the full well this slope falls towards 0, so that the variance grows without bound.
     """
     moments = frame_moments(expected_e, readings)
     return np.asarray(moments.variance_e2 / np.maximum(moments.slope, LEAST_SLOPE) ** 2)
 
 
 def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """Variance of a frame's samples as if nothing clipped [e-^2]: what tells how far a mean is from the well."""
+    """Return the variance that a frame's samples would have without clipping [e-^2].
+
+    In units of its root, callers state how far a pixel's mean is from the full well.
+    """
     light_e = collected_e(expected_e, readings)
     if several(readings):
         return merged_variance(light_e, readings)
@@ -242,7 +246,10 @@ def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[Plain
 
 
 def collected_e(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """Expected photo-electrons of each pixel in the raw image's electrons, its neighbours' crosstalk among them."""
+    """Return the photo-electrons that each pixel is expected to collect, those from its neighbours' crosstalk included.
+
+    Both are in the raw image's electrons, which count the light before the pixel's share of it (`density`) is taken.
+    """
     density = by_site([1.0 if several(readings) else x.light_share for x in readings], readings, expected_e.shape)
     return np.asarray(spread_charge(expected_e * density, readings[0].pixel.crosstalk) / density)
 

@@ -88,11 +88,12 @@ def single_gaussian(prior: Gaussians) -> Gaussians:
 
 
 def opening(distance: Floats) -> tuple[Floats, Floats]:
-    """Share o of a sample's variance that reading it explains, by how far its mean is from the well; and its slope.
+    """Return the share of information that is left in a sample that may be clipped, and that share's slope.
 
-    That is the Fisher information of a Gaussian censored at the well, over that of one that isn't. With
-    a = (well - mean) / sigma, o = Phi(a) + phi(a) (hazard(a) - a): first the open samples' part, then the full ones',
-    each of which is a lower bound. Its slope is phi(a) (hazard(a) - a)^2.
+    The share o is the Fisher information about the mean in a Gaussian that is censored at the well, over that in one
+    that isn't. With a = (well - mean) / sigma ("distance"), o = Phi(a) + phi(a) (hazard(a) - a): the first term comes
+    from samples below the well, the second from full ones, which say only that the light was at least so much. The
+    slope do/da is phi(a) (hazard(a) - a)^2.
     """
     a = np.minimum(distance, FAR)
     density = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi)
@@ -102,12 +103,11 @@ def opening(distance: Floats) -> tuple[Floats, Floats]:
 
 
 def sample_variance(mean_e: Floats, spread_e2: Floats, noise: Noise) -> Floats:
-    """Variance of the Gaussian noise that leaves as much unknown as a sample does that may be full [e-^2].
+    """Return the noise variance of an unclipped sample that would say as little as this one, which may clip [e-^2].
 
-    A full sample is a lower bound. Of the variance w of signal and noise together, a sample explains the share o of
-    `opening`: for a known signal the Fisher information of a censored Gaussian over that of an open one. So does noise
-    of w / o less the signal's variance. That is exact for a lone sample, and a little harsh where neighbours know the
-    signal.
+    Let w be the variance of signal and noise together. Clipping leaves the share o of the sample's information
+    (`opening`), as if w were w / o; what of it isn't the signal's own variance is the equivalent noise, w / o - spread.
+    This is exact for a sample alone. Where neighbouring samples determine the signal already, it is slightly too large.
 
     Parameters
     ----------

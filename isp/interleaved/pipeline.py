@@ -1,4 +1,4 @@
-"""The two cameras' pipelines: raw image in, scene-linear RGB out."""
+"""Pipelines of the paper's two cameras, from a raw image to linear sRGB: interleaved RGBW, and conventional Bayer."""
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights

@@ -23,7 +23,7 @@ def denoise_means(
         Where the denoiser isn't installed.
     """
     assert means.indirect is not None
-    # Folds are split too, so that they run the kernel that is compiled for the render.
+    # Folds split light into direct and indirect as the render does, so that its compiled kernel serves them too.
     folds = no_means(scene, film, means.rates, split=True)
     if earlier is not None:
         folds.count, folds.light = earlier.fold_points, earlier.folds.copy()

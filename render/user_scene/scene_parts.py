@@ -284,7 +284,7 @@ def _same(a: Spectrum | None, b: Spectrum | None) -> bool:
 
 def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
     """Spectrum of an emitter, as Mitsuba evaluates it; None where its colour varies over position or direction."""
-    if emitter["type"] not in EMISSION_PARAMETER or "texture" in emitter:  # a spot may hold a slide
+    if emitter["type"] not in EMISSION_PARAMETER or "texture" in emitter:  # a spot's texture varies by direction
         return None
     value: Any = emitter.get(EMISSION_PARAMETER[emitter["type"]])
     while type_of(value) == "ref":

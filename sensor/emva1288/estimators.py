@@ -77,7 +77,7 @@ def dsnu(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
 
 
 def prnu(dark: Stack, bright: Stack) -> Estimate:
-    """Spread of the pixels' response above the dark's, over its mean; column gains included."""
+    """Estimate PRNU: the spread of the pixels' response to light over its mean, with that of the column gains."""
     signal = float(bright.mean_dn.mean() - dark.mean_dn.mean())
     error = _spread_error(_squares(bright.mean_dn) - _squares(dark.mean_dn))
     return _root((bright.spatial_dn2 - dark.spatial_dn2) / signal**2, error / signal**2)
@@ -89,7 +89,7 @@ def column_offset(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
 
 
 def column_gain(dark: Stack, bright: Stack) -> Estimate:
-    """Spread of the columns' gains: of what light adds to each column's mean."""
+    """Estimate the relative spread of the columns' gains from what light adds to each column's mean."""
     added = bright.mean_dn - dark.mean_dn
     variance, error = column_variance(added)
     return _root(variance / added.mean() ** 2, error / added.mean() ** 2)
@@ -98,11 +98,12 @@ def column_gain(dark: Stack, bright: Stack) -> Estimate:
 def well(
     full: Stack, dark: Stack, gain_dn_per_e: Estimate, column_spread: float, dark_e: float, beyond_e: float
 ) -> Estimate:
-    """Electrons at the converter's top [e-] from the mean of frames in which every pixel is clipped.
+    """Estimate the electrons at the converter's top [e-] from the mean of frames in which every pixel is clipped.
 
-    Where a full well reads the top, that cuts the upper half of the noise behind the well off: the mean of min(0, x) of
-    a normal x is -sigma / sqrt(2 pi), and -sigma (phi(a) - a Phi(-a)) where the well holds a sigma, `beyond_e`, more.
-    `dark_e` are the electrons that a dark frame collects.
+    The converter clips read noise that goes over its top, which lowers the mean of full pixels. If a full well reads
+    exactly the top, this loss is sigma / sqrt(2 pi), the mean of the noise's upper half; if the well holds `beyond_e`
+    = a sigma more than the top, the loss is sigma (phi(a) - a Phi(-a)). The estimate adds it back. `dark_e` are the
+    electrons that a dark frame collects.
     """
     slope, error = gain_dn_per_e
     full_e = float(full.mean_dn.mean() - dark.mean_dn.mean()) / slope + dark_e
@@ -114,7 +115,7 @@ def well(
 
 
 def dark_current(slopes: NDArray[np.float64], gain_dn_per_e: Estimate) -> tuple[Estimate, Estimate, Estimate]:
-    """Dark current of ordinary pixels [e-/s], share of hot pixels, and what these have on top [e-/s]."""
+    """Estimate the dark current of ordinary pixels [e-/s], the share of hot pixels, and their excess [e-/s]."""
     hot = hot_pixels(slopes)
     share = float(hot.mean())
     rest = slopes[~hot] / gain_dn_per_e[0]

@@ -1,4 +1,4 @@
-"""Frames of a chip on a bench, and the statistics that EMVA Standard 1288 (release 4.0 Linear) takes from them."""
+"""Simulate a sensor's frames on a test bench, with the statistics of EMVA Standard 1288 (release 4.0 Linear)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

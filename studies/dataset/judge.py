@@ -161,12 +161,12 @@ def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
 
 
 def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
-    """Picture as encoded values from 0 to 1, (h, w, 3).
+    """Read a picture file as encoded values from 0 to 1, (h, w, 3).
 
     Raises
     ------
     InputError
-        For a file that can't be read, of another size or with values beyond.
+        For a file that can't be read, that has another size, or whose values lie outside 0 to 1.
     """
     # damaged files fail in many ways
     with read_errors(f"{path}: it is no picture of this set", "write it again", Exception):

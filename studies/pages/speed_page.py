@@ -21,7 +21,7 @@ def bench_page(results: Mapping[str, Any]) -> str:
 
 @rc_context(STYLE)
 def plane(stage: Mapping[str, Any]) -> Figure:
-    """Draw one stage's share of the noise variance over time; what has next to none stands in the table alone."""
+    """Draw one stage's share of the noise variance over time; choices with almost no noise are only in the table."""
     points = [x for x in stage["points"] if x["share_of_noise_variance"] >= LEAST_SHARE and x["seconds"] > 0]
     figure = blank(*CHART)
     axes = figure.subplots()

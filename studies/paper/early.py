@@ -108,7 +108,7 @@ def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
     for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
         sites = mask(tile, channel, shape).astype(np.float64)
         total, squares = (scipy.ndimage.convolve(sites, kernel, mode="wrap") for kernel in (weights, weights**2))
-        samples = 1 / float((squares / total**2).mean())  # that a weighted mean is worth
+        samples = 1 / float((squares / total**2).mean())  # as many as a plain mean of equal noise has
         combined = tent_means(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
         lights[channel] = samples * mean_e / WHITE_E, float(combined.mean() ** 2 / combined.var()) / WHITE_E
     return lights

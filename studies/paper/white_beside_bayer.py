@@ -51,7 +51,7 @@ class Outcome:
 
 @dataclass(frozen=True)
 class Swap:
-    """What luminance substitution does: noise without it over that with it, and the median colour shift."""
+    """Effect of luminance substitution: by what factor it lowers noise, and the median colour shift that it causes."""
 
     noise_ratio: float
     delta_e: float

@@ -141,9 +141,9 @@ def default_white(path: str | Path) -> AdoptedWhite:
 
 
 def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
-    """Light of a picture file: the one that was given, else the file's own, else D65.
+    """Return the light under which a picture file is seen: `light` if it is given, else the file's own, else D65.
 
-    One that is given takes the place of the lamp that an ISETCam scene holds.
+    A given light replaces the illuminant that an ISETCam scene holds.
 
     Raises
     ------

@@ -131,7 +131,7 @@ def run(
 
 
 def _made(make: Callable[[Any], Any], threads: int | None, task: Task) -> Any:
-    """Result of a task, by so many threads of Dr.Jit; by all that it has where none are given."""
+    """Run a task with so many threads of Dr.Jit (None: as many as it has already), and return its result."""
     if threads is not None:
         _limit_threads(threads)
     return make(task)

@@ -83,7 +83,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     # the first pixel needs it.
     pixels = [(r, c) for r in rows for c in columns]
     window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
-    # values of a packet: of the plane, and samples
+    # How many columns a packet of the plane reaches over, and one of samples.
     under = shape.block[1] + patch - 1
     block = shape.block[1]
 
