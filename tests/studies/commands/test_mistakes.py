@@ -1,12 +1,24 @@
 """51 mistakes as people type them: one line each, exit status 2, and the line names the remedy."""
 
+import json
+import re
 import shlex
+import shutil
+import socket
+import urllib.request
 import warnings
 from pathlib import Path
+from threading import Thread
+from typing import Any
 
 import numpy as np
 import pytest
 from command_line import call, check_refusals
+
+from rodcone.colour_spaces import encode_srgb
+from sensor.presets import preset_file
+from studies.commands import explore as explore_command
+from studies.dataset.shards import read_shard
 
 PIXEL = "[pixel]\npitch_um=2\nfill_factor=1\nfull_well_e=5000\nread_noise_e=2\ndsnu_e=0\nprnu=0.01\n"
 LENS = "[lens]\nf_number=2\n"
@@ -187,3 +199,100 @@ def test_the_remedy_of_each_mistake_is_typed_and_works(tmp_path: Path, monkeypat
             if code != 0:
                 failed.append(f"{command} {row}: {err.splitlines()[-1:]}")
     assert not failed
+
+
+def _works(*words: object) -> str:
+    """What a command prints that ends well."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("default")  # wide bands are told of, and taken
+        code, out, err = call(words)
+    assert code == 0, f"{words}: {err}"
+    return out
+
+
+def _refused(*words: object) -> str:
+    """Line of a command that is refused."""
+    code, out, err = call(words)
+    assert (code, out, err.count("\n")) == (2, "", 1), f"{words}: {err}"
+    return err
+
+
+@pytest.mark.thorough
+def test_what_judge_says_to_do_is_done_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    # rows of light, so that an upside-down picture is another one
+    np.save("a.npy", np.linspace(0.1, 0.9, 20)[:, None, None] * np.linspace(0.5, 1, 20)[:, None] * [0.3, 0.6, 0.9])
+    Path("a.toml").write_text(MENDED["a.toml"], "utf-8")
+    study = MENDED["r.toml"].replace("flat_field", "a.npy").replace("5lux", "5cd/m2")
+    Path("r.toml").write_text('sensors=["own.toml"]\n' + study, "utf-8")
+    (mine := tmp_path / "mine").mkdir()
+    shutil.copy(preset_file("low_noise"), "own.toml")  # for whose like no closed form is computed: a second each
+    judged = ("judge", "mine", "--of", "whole", "--workers", 1)
+    _works("dataset", "r.toml", "--out", "set", "--shards", 1, "--truth", "depth")
+    (remedy,) = re.findall("make one with (--truth rgb)", _refused(*judged[:3], "set"))
+    _works("dataset", "r.toml", "--out", "whole", "--shards", 1, *remedy.split())
+    (path,) = Path("whole/set").glob("*.tar")
+    ((truth, facts),) = ((arrays["rgb"].astype(float), facts) for arrays, facts in read_shard(path))
+    # named as the line says, encoded as it says, turned as it says
+    (key,) = re.findall(r"named such as '([^']+)'", _refused(*judged))
+    assert key == facts["key"]
+    linear = np.clip(truth, 0, 1)
+    for name, picture, words in (
+        ("holiday", encode_srgb(linear), f"such as '{key}'; rename it"),
+        (key, linear, "linear values; encode them as sRGB"),
+        (key, encode_srgb(encode_srgb(linear)), "encoded twice; encode them once"),
+        (key, encode_srgb(linear)[::-1], "upside down"),
+        (key, encode_srgb(linear)[..., ::-1], "write R, G, B"),
+        (key, 255 * encode_srgb(linear), "allowed: 0 to 1, 1 is white"),
+    ):
+        np.save(mine / f"{name}.npy", picture)
+        assert words in _refused(*judged)
+        (mine / f"{name}.npy").unlink()
+    np.save(mine / f"{key}.npy", encode_srgb(linear))
+    assert "allowed: .html, .csv" in _refused(*judged, "--out", "a.txt")
+    _works(*judged, "--out", "a.csv")
+    told = json.loads(_works(*judged, "--out", "a.html", "--json"))
+    assert [score["developer"] for score in told["scores"]] == ["mine"]
+
+
+@pytest.mark.thorough
+def test_what_paper_says_to_do_is_done_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert "allowed: 1a, 1b, 2, 3" in _refused("paper", "--figure", "7")
+    for words, option, allowed in (
+        ("16 to 1024; give the side", "--size", 16),
+        ("1 to 65536; give samples per pixel", "--spp", 1),
+        ("2 to 1000; give 2 exposures or more", "--seeds", 2),
+    ):
+        assert words in _refused("paper", "--figure", "2", option, allowed - 1), option
+    # figure 2 is computed from spectra alone
+    least = ("--size", 16, "--spp", 1, "--seeds", 2)
+    assert _works("paper", "--figure", "2", *least, "--out", "paper").strip().endswith("paper.html")
+
+
+@pytest.mark.thorough
+def test_what_explore_says_to_do_is_done_and_works(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The page answers at the address that is printed; the server then ends, as by Ctrl-C."""
+    monkeypatch.chdir(tmp_path)
+    answers: list[int] = []
+    make = explore_command.make_server
+
+    def make_and_ask(session: Any, listener: Any) -> tuple[Any, str]:
+        server, address = make(session, listener)
+
+        def ask() -> None:
+            with urllib.request.urlopen(address, timeout=60) as page:
+                answers.append(page.status)
+            server.should_exit = True
+
+        Thread(target=ask).start()
+        return server, address
+
+    monkeypatch.setattr(explore_command, "make_server", make_and_ask)
+    (name,) = re.findall("did you mean '([a-z_]+)'", _refused("explore", "flat_fild", "--no-browser"))
+    small = ("--size", 16, "--spp", 1, "--no-browser")
+    with socket.create_server(("127.0.0.1", 0)) as taken:
+        line = _refused("explore", name, *small, "--port", taken.getsockname()[1])
+        assert "leave it out for a free one" in line
+        assert _works("explore", name, *small).startswith("http://127.0.0.1:")
+    assert answers == [200]
