@@ -6,6 +6,7 @@ import shutil
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,9 @@ from command_line import call
 from refusal import refusal
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
-from sensor.presets import low_noise, preset_file, vary
+from rodcone.digests import digest_inputs
+from sensor.presets import low_noise, preset, preset_file, vary
+from studies.dataset import judge as judge_module
 from studies.dataset.judge import MEASURED, Score, expected, judge, scores, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
@@ -134,6 +137,34 @@ def test_samples_of_a_scene_are_averaged_before_scenes_are(out: Path) -> None:
     (score,) = scores([row | {"scene": scene, "psnr_db": db, "mosaic": "bayer"} for scene, db in values], "mine")
     assert (score.scenes, score.means["psnr_db"]) == (2, 30.0)
     assert score.halves["psnr_db"] == pytest.approx(12.7062 * 10.0, rel=1e-5)
+
+
+def test_the_closed_form_is_asked_for_each_conditions_own_camera_light_and_time(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(
+        judge_module, "expect", lambda *asks: asked.append(asks) or [SimpleNamespace(psnr_db=20.0 + len(asked))]
+    )
+    line = {"sensor": "low_noise", "mosaic": "cmyw", "spectrum": "own", "level": "5cd/m2", "exposure": "20ms"}
+    lines = [
+        line | {"luminance_cd_m2": 5.0},
+        line | {"luminance_cd_m2": 90.0, "level": "90cd/m2", "sensor": "table1_output", "exposure": "auto:W"},
+        line | {"luminance_cd_m2": 5.0, "sensor": "mine.toml"},
+    ]
+    told = expected([*lines, lines[0]], "mine")
+    assert [asks for _, *asks in asked] == [[[5.0], "D65", 0.02], [[90.0], "D65", "auto:W"]]
+    for (sensor, *_), name in zip(asked, ("low_noise", "table1_output"), strict=True):
+        assert digest_inputs(sensor) == digest_inputs(vary(preset(name), "cmyw"))
+    assert [(x.camera, x.level, x.luminance_cd_m2, x.scenes, x.means["psnr_db"]) for x in told] == [
+        ("low_noise, cmyw, own, 20ms", "5cd/m2", 5.0, 0, 21.0),
+        ("table1_output, cmyw, own, auto:W", "90cd/m2", 90.0, 0, 22.0),
+    ]
+    assert all(np.isnan(value) for x in told for key, value in x.means.items() if key != "psnr_db")
+    asked.clear()
+    own = line | {"luminance_cd_m2": 5.0, "sensor": "low_noise_rgbw.toml", "mosaic": "own"}
+    assert [len(expected([own], study)) for study in ("mine", "benchmark")] == [0, 1]
+    assert digest_inputs(asked[0][0]) == digest_inputs(preset(str(judge_module.SENSORS / "low_noise_rgbw.toml")))
 
 
 @pytest.mark.thorough

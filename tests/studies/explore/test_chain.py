@@ -19,7 +19,7 @@ from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
 from sensor.optics import form_image
-from sensor.presets import preset
+from sensor.presets import preset, preset_file
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, camera_of, controls_from, mosaics_of
@@ -123,6 +123,31 @@ def test_frames_of_a_burst_have_noise_of_their_own():
         off_e = raw.electrons / scale - exposed.expected_e
         spread_e.append(off_e[exposed.expected_e < 0.5 * exposed.sensor.pixel.full_well_e].std())
     assert spread_e[1] / spread_e[0] == pytest.approx(0.5, rel=0.09)
+
+
+def test_in_the_hand_each_frame_has_a_path_of_its_own_and_the_light_of_the_still_one(tmp_path):
+    """Nothing but the path moves: a sharp edge is blurred more by a longer time, and the sum of light is kept."""
+    path = tmp_path / "held.toml"
+    text = preset_file("low_noise").read_text("utf-8")
+    assert text.count("[lens]") == 1
+    path.write_text(text.replace("[lens]", "[lens]\nshake_um = 100.0"), "utf-8")
+    quiet = {"read_noise_e": 0.0, "dsnu_e": 0.0, "prnu": 0.0, "dark_current_e_per_s": 0.0}
+    start = Controls(
+        processor="interleaved", pixel=quiet, shot_noise=False, bits=16, exposure=TIME, exposure_s=0.02, level_cd_m2=1.0
+    )
+
+    def sharpness(**changes):
+        controls = replace(start, **{"sensor": str(path)} | changes)
+        raw = expose_scene(small_transport(), controls, Memo()).raw
+        white_e = raw.electrons[1::2, 1::2]
+        return np.abs(np.diff(white_e)).mean() / white_e.mean(), raw
+
+    (still, fixed), (moved, first) = sharpness(sensor="low_noise"), sharpness()
+    assert first.electrons.sum() == pytest.approx(fixed.electrons.sum(), rel=0.01)
+    assert sharpness(exposure_s=0.2, level_cd_m2=0.1)[0] < moved < still
+    assert np.array_equal(first.dn, sharpness()[1].dn)
+    for other in ({"exposure_number": 1}, {"seed": 1}):
+        assert np.abs(sharpness(**other)[1].electrons - first.electrons).max() > 5
 
 
 @pytest.mark.sample(2)

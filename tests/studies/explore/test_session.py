@@ -1,6 +1,7 @@
 """One explorer's thread: a render that fails, pages that take over from one another."""
 
 import json
+import pickle
 import threading
 from collections.abc import Callable, Iterator
 from dataclasses import replace
@@ -332,6 +333,44 @@ def test_what_takes_seconds_has_a_stand_in_while_it_is_at_work_where_it_can_be_e
         (Controls(processor="bayer_bm3d", mosaic="bayer"), 64**2, Controls(processor="any_mosaic", mosaic="bayer")),
     ]:
         assert stand_in(controls, pixels) == shown, (controls, pixels, shown)
+
+
+def test_a_slow_processors_result_is_shown_where_its_stand_in_was(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its task is the development of the very exposure; the picture, its facts and Python are then its own."""
+    begun: list[tuple[str, Any, Callable[[Any], None]]] = []
+    there = threading.Event()
+
+    def begin(name: str, development: Any, report: Callable[[Any], None]) -> Callable[[], None]:
+        begun.append((name, development, report))
+        there.set()
+        return lambda: None
+
+    monkeypatch.setattr("studies.explore.session.begin", begin)
+    controls = Controls(seed=4, exposure="time", exposure_s=0.004)
+    camera = {"seed": 4, "exposure": "time", "exposure_s": 0.004}
+    session = Session(of_transport(small_transport()))
+    page = connected(session)
+    first = page.ask(session, "show", 1, cameras=[camera])["cameras"][0]
+    assert (first["controls"]["processor"], first["waiting_for"]) == ("any_mosaic", controls.processor)
+    assert there.wait(30)
+    ((name, development, report),) = begun
+    wanted = chain.development_of(expose_scene(small_transport(), controls, Memo()), controls, Memo())
+    assert name == controls.processor
+    assert pickle.dumps((development.args, development.keywords)) == pickle.dumps((wanted.args, wanted.keywords))
+    with page.came:
+        sent = len(page.headers)
+    quick = photograph(small_transport(), replace(controls, processor="any_mosaic"))
+    linear, picture = quick.linear, quick.developed
+    report((linear / 2, picture))
+    with page.came:
+        assert page.came.wait_for(lambda: len(page.headers) > sent, 30)
+        last = page.headers[-1]
+    session.close()
+    told = last["cameras"][0]
+    assert (told["controls"]["processor"], told["waiting_for"]) == (controls.processor, None)
+    assert last["facts"][0]["snr_db"] == picture.snr_db
+    assert page.buffers[-1][0] == chain.to_bytes(linear / 2).tobytes()
+    assert len(begun) == 1
 
 
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):
