@@ -24,7 +24,6 @@ from studies.paper.pixel_size import gain_db
 from studies.paper.setup import READINGS, Setup, noise, table1_sensor
 from studies.photograph.snr import channel_e
 
-pytestmark = pytest.mark.thorough
 FIGURES = ["1a", "1b", "2", "3", "4", "5", "6", "A", "B"]
 
 
@@ -50,6 +49,7 @@ def paper(folder: Path, fewer: None) -> Paper:
     return made
 
 
+@pytest.mark.thorough
 def test_every_figure_is_written_as_svg_and_png(paper: Paper, folder: Path) -> None:
     assert [figure.name for figure in paper.figures] == FIGURES
     for name in FIGURES:
@@ -64,6 +64,7 @@ def test_every_figure_is_written_as_svg_and_png(paper: Paper, folder: Path) -> N
             assert np.asarray(picture.convert("L")).std() > 5  # not blank
 
 
+@pytest.mark.thorough
 def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Paper, folder: Path) -> None:
     page = (folder / "paper.html").read_text("utf-8")
     assert "default-src 'none'; img-src data:; style-src 'unsafe-inline'" in page
@@ -74,6 +75,7 @@ def test_page_is_self_contained_and_names_every_claim_with_its_verdict(paper: Pa
         assert claim.verdict.capitalize() in page
 
 
+@pytest.mark.thorough
 def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> None:
     assert len(paper.claims) == 35  # and as many rows in test_claims.py: a new claim needs one there
     places = {claim.where for claim in paper.claims}
@@ -85,6 +87,7 @@ def test_claims_cover_the_figures_the_table_and_both_readings(paper: Paper) -> N
     assert all(reading in told for reading in READINGS)
 
 
+@pytest.mark.thorough
 def test_table_has_a_row_for_each_check_under_its_claims_number(paper: Paper, folder: Path) -> None:
     with (folder / "paper.csv").open(encoding="utf-8", newline="") as file:
         rows = list(csv.DictReader(file))
@@ -101,6 +104,7 @@ def number(words: str) -> float:
     )
 
 
+@pytest.mark.thorough
 def test_every_number_of_the_page_and_the_table_is_recounted_from_the_checks(paper: Paper, folder: Path) -> None:
     page = (folder / "paper.html").read_text("utf-8")
     cells = r'<tr><th scope="row">([^<]*)</th><td class="n">([^<]*)(?:<span class="note">([^<]*)</span>)?</td>'
@@ -132,6 +136,7 @@ def test_every_number_of_the_page_and_the_table_is_recounted_from_the_checks(pap
     assert f"Of {len(held)} claims: {words}" in page
 
 
+@pytest.mark.thorough
 def test_the_lines_of_the_figures_are_recounted_from_the_claims(paper: Paper) -> None:
     axes = {
         (figure.name, one.get_title("left")): [line.get_ydata() for line in one.lines]
@@ -158,6 +163,7 @@ def test_the_lines_of_the_figures_are_recounted_from_the_claims(paper: Paper) ->
     assert np.subtract(ours_db, bayer_db) == pytest.approx(better)
 
 
+@pytest.mark.thorough
 def test_the_curves_and_gains_of_figure_2_are_recounted_from_curves_and_data_sheets(paper: Paper) -> None:
     (drawing,) = (figure.drawing for figure in paper.figures if figure.name == "2")
     axes = {one.get_title("left"): one.lines for one in drawing.axes}
@@ -176,12 +182,14 @@ def test_the_curves_and_gains_of_figure_2_are_recounted_from_curves_and_data_she
         np.testing.assert_allclose(root.get_ydata(), np.sqrt(lit_e[3] / lit_e[1]), rtol=1e-9)
 
 
+@pytest.mark.thorough
 def test_another_run_takes_up_the_renders_and_gives_the_same_numbers(paper, folder, monkeypatch):
     monkeypatch.setattr("render.engine._render", lambda *_, **__: pytest.fail("rendered again"))
     again = make(Setup(folder, size=24, spp=4, band_nm=100.0, seeds=2))
     assert again.claims == paper.claims
 
 
+@pytest.mark.thorough
 def test_failed_write_leaves_no_file(paper: Paper, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     real = Path.write_bytes
 
@@ -245,6 +253,7 @@ def test_full_command_judges_every_claim(tmp_path: Path) -> None:
     assert verdicts["The voltage swing is what a full well gives"] == "not reproduced"
 
 
+@pytest.mark.thorough
 def test_one_figure_alone_has_its_own_claims_and_no_other(tmp_path: Path) -> None:
     code, out, _ = call(["paper", "--figure", "2", "-o", str(tmp_path)])
     assert (code, out) == (0, f"{tmp_path / 'paper.html'}\n")

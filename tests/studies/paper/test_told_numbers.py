@@ -1,0 +1,273 @@
+"""Numbers that the paper's page tells, counted by hand in views of a few pixels, and where each stands on it."""
+
+import csv
+import json
+import re
+from html import unescape
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from skimage.color import deltaE_ciede2000, rgb2lab
+from skimage.metrics import peak_signal_noise_ratio
+
+from render.illuminants import illuminant
+from render.radiance import SpectralRadiance
+from rodcone.colour_spaces import encode_srgb
+from rodcone.types import Image
+from scenes.levels import DEMO_LEVELS
+from sensor.capture import expose
+from sensor.device import draw_device
+from sensor.optics import form_image
+from sensor.response import expected_electrons
+from studies.metrics.flip import flip
+from studies.metrics.truth import light_in_bands, named_light
+from studies.paper import best_exposure, early, light_levels, patches
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure
+from studies.paper.figure2 import bright_cd_m2, signal_ratios, snr_gains
+from studies.paper.numbers import measured_snr_db, number_claims, range_spans
+from studies.paper.paper import Paper, as_csv, as_json, write
+from studies.paper.pixel_size import gain_db, half_snr_db
+from studies.paper.setup import READINGS, Camera, Setup, View, at_level, close_up, exposures, table1_sensor
+from studies.photograph.snr import channel_e
+from studies.study.study import OWN, Condition, SceneChoice
+from studies.sweep.cells import device_stream, exposure_stream
+
+NM = np.arange(390.0, 771.0, 20.0)
+LIGHT = light_in_bands(illuminant("D65"), NM, np.full(NM.size, 20.0))
+CHECKS = (
+    ClaimCheck("alone", 0.94996, 0.95, np.inf, "dB", default=3.25),
+    ClaimCheck("with spread", 12.5, 10.0, 20.0, "×", margin=1.5),
+    ClaimCheck("no more", 7.0, -np.inf, 8.0),
+    ClaimCheck("exact", 1.0, 1.0, 1.0),
+    ClaimCheck("spread leaves", 10.5, 10.0, 20.0, margin=0.75),
+)
+CLAIMS = (
+    Claim("Figure 9", "all of it", CHECKS[1:4], "a note"),
+    Claim("Table 1", "some of it", CHECKS[:3]),
+    Claim("Section 3.1", "none of it", (CHECKS[0], CHECKS[4])),
+)
+
+
+def view_of(luminance_cd_m2: Image) -> View:
+    """A grey view under daylight; white is at 2 cd/m^2."""
+    values = luminance_cd_m2[..., None] * LIGHT.spectrum
+    return View("grey", "1cd/m2", SpectralRadiance(values.astype(np.float32), NM), LIGHT, 2.0)
+
+
+def test_page_table_and_object_hold_each_checks_numbers(tmp_path: Path) -> None:
+    facts = {"size": 21, "spp": 22, "seeds": 23, "rodcone": "9.8", "environment": {}}
+    paper = Paper((PaperFigure("9", "a caption", Figure((1, 1))),), CLAIMS, facts)
+    page = write(paper, tmp_path).read_text("utf-8")
+    cells = r'<tr><th scope="row">([^<]*)</th><td class="n">([^<]*)(?:<span class="note">([^<]*)</span>)?</td>'
+    cells += r'<td class="range">([^<]*)</td><td class="sign \w+">([^<]*)</td></tr>'
+    found = [tuple(unescape(x).replace("\N{NO-BREAK SPACE}", " ") for x in row) for row in re.findall(cells, page)]
+    alone = ("alone", "0.94996 dB", "default: 3.25 dB", "at least 0.95", "✗ fails")
+    spread = ("with spread", "12.5 ± 1.5 ×", "", "10 to 20", "✓ holds")
+    no_more, exact = ("no more", "7", "", "at most 8", "✓ holds"), ("exact", "1", "", "exactly 1", "✓ holds")
+    leaves = ("spread leaves", "10.5 ± 0.75", "", "10 to 20", "✗ fails")
+    rows = [spread, no_more, exact, alone, spread, no_more, alone, leaves]
+    assert [tuple(x.strip() for x in row) for row in found] == rows
+    words = "1 reproduced, 1 reproduced under a condition, 1 not reproduced."
+    assert f"Of 3 claims: {words}" in page
+    verdicts = dict.fromkeys(("reproduced", "reproduced under a condition", "not reproduced"), 1)
+    told = as_json(paper)
+    assert json.loads((tmp_path / "paper.json").read_text("utf-8")) == json.loads(json.dumps(told))
+    assert {key: told[key] for key in (*facts, "verdicts")} == facts | {"verdicts": verdicts}
+    for claim, of in zip(CLAIMS, told["claims"], strict=True):
+        assert (of["where"], of["claim"], of["note"]) == (claim.where, claim.text, claim.note)
+        for check, one in zip(claim.checks, of["checks"], strict=True):
+            ends = [None if np.isinf(end) else end for end in (check.low, check.high)]
+            assert [one["value"], one["low"], one["high"], one["margin"]] == [check.value, *ends, check.margin]
+            assert (one["default"], one["unit"]) == (check.default, check.unit)
+    table = list(csv.DictReader(as_csv(paper).splitlines()))
+    assert [row["number"] for row in table] == list("11122233")
+    for row, wanted in zip(table, rows, strict=True):
+        plain = [row[key].replace("\N{NO-BREAK SPACE}", " ") for key in ("condition", "computed", "default", "claimed")]
+        assert plain == list(wanted[:4])
+        assert row["check"] == wanted[4].split()[1]
+
+
+@pytest.mark.parametrize("name", READINGS)
+def test_ratios_of_figure_2_are_those_of_the_data_sheet(name: str) -> None:
+    """20 ms of D65: n / sqrt(n + dark^2 + (PRNU n)^2), dark^2 with the converter's rounding."""
+    sensor = table1_sensor(name)
+    pixel, lit_e = sensor.pixel, channel_e(sensor, named_light("D65"), 1.0, 0.02)
+    assert list(signal_ratios("D65").values()) == pytest.approx(lit_e[3] / lit_e[:3])
+    assert bright_cd_m2(name) * lit_e[3] == pytest.approx(0.9 * pixel.full_well_e)
+    for level, fixed in ((0.5, True), (40.0, True), (40.0, False)):
+        n, dark_e2 = level * lit_e, pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
+        variance = n + dark_e2 + (pixel.prnu * n * fixed) ** 2
+        for i, gain in enumerate(snr_gains(name, level, fixed_pattern=fixed).values()):
+            ratio = n[3] / n[i] * np.sqrt(variance[i] / variance[3])
+            assert (gain.ratio, gain.dark, gain.shot) == pytest.approx(
+                (ratio, dark_e2 / variance[3], n[i] / variance[i]), rel=1e-6
+            )
+
+
+def test_larger_pixels_gain_what_their_areas_and_noise_give() -> None:
+    assert gain_db("table1_output", shot_alone=True) == pytest.approx(20 * np.log10(3), abs=1e-6)
+    for name in READINGS:
+        ratio = []
+        for pitch in (6, 2):
+            sensor = table1_sensor(name, "bayer", pitch)
+            pixel, n = sensor.pixel, channel_e(sensor, named_light("D65"), 100.0, 0.01)[1]
+            dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
+            ratio.append(n / np.sqrt(n + dark_e2 + (pixel.prnu * n) ** 2))
+        assert gain_db(name) == pytest.approx(20 * np.log10(ratio[0] / ratio[1]), abs=1e-6)
+
+
+def test_halves_of_figure_1a_are_the_left_and_the_right_ones_green() -> None:
+    """66 ms of an even field in each half."""
+    luminance = np.repeat([[0.4] * 16 + [1.6] * 16], 32, axis=0)
+    sensor = table1_sensor("table1_output", "bayer")
+    pixel, per_cd_m2 = sensor.pixel, channel_e(sensor, LIGHT, 1.0, 0.066)[1]
+    for dark, level in ((True, 0.4), (False, 1.6)):
+        n = per_cd_m2 * level
+        ratio = n / np.sqrt(
+            n + pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12 + (pixel.prnu * n) ** 2
+        )
+        assert half_snr_db(view_of(luminance), "table1_output", dark) == pytest.approx(20 * np.log10(ratio), abs=0.05)
+    assert np.isnan(half_snr_db(view_of(1e5 * luminance), "table1_output", False))
+
+
+def test_numbers_of_the_text_are_counted_from_levels_and_pixels() -> None:
+    """1000 electrons read out: five standard errors of 65 536 differences are 0.12 dB."""
+    assert measured_snr_db() == pytest.approx(30.0, abs=0.13)
+    luminance = np.linspace(0.01, 5.0, 40 * 50).reshape(40, 50)
+    low, high = np.percentile(luminance, [0.1, 99.9])
+    day_over_moon = DEMO_LEVELS[-1].luminance_cd_m2 / DEMO_LEVELS[0].luminance_cd_m2
+    spans = list(range_spans(view_of(luminance)).values())
+    assert spans == pytest.approx([day_over_moon, 1e5 / 0.002, day_over_moon * high / low], rel=2e-3)
+    photons, in_pixels, _, decades, swings = number_claims(view_of(luminance))
+    for one, factor in ((photons, 1.0), (in_pixels, 4 * 0.025)):  # 4 um^2 in 25 ms
+        values = {check.condition: check.value for check in one.checks}
+        assert values["D65, 400-700 nm"] == pytest.approx(9.71 * factor, rel=2e-3)
+    assert [check.value for check in decades.checks] == pytest.approx(np.log10(spans))
+    checks = {check.condition: check.value for check in swings.checks}
+    pixel = table1_sensor(next(iter(READINGS))).pixel
+    assert checks[next(iter(READINGS))] == pytest.approx(pixel.swing_e / pixel.full_well_e)
+
+
+def test_levels_scale_light_and_white_alike_and_a_close_up_is_the_middle() -> None:
+    subject = view_of(np.arange(80.0 * 60).reshape(80, 60))
+    lit = at_level(subject, 8.0)
+    assert (lit.level, lit.white_cd_m2) == ("8cd/m2", 16.0)
+    np.testing.assert_allclose(lit.radiance.values, 8 * subject.radiance.values, rtol=1e-6)
+    np.testing.assert_allclose(lit.truth, subject.truth, rtol=1e-5)
+    near = close_up(subject).radiance.values
+    np.testing.assert_array_equal(near, subject.radiance.values[20:60, 15:45])
+
+
+def test_exposures_are_those_of_a_sweeps_chips_and_streams() -> None:
+    subject, camera = view_of(np.full((16, 20), 3.0)), Camera("table1_output", "interleaved")
+    expected_e = expected_electrons(form_image(subject.radiance, camera.sensor), camera.sensor, 0.02)
+    condition = Condition(
+        scene=SceneChoice("grey"), spectrum=OWN, level="1cd/m2", exposure="20ms", sensor="table1_output"
+    )
+    found = exposures(camera, subject, "20ms", 2)
+    assert len(found) == 2
+    for seed, raw in enumerate(found):
+        device = draw_device(camera.sensor, expected_e.shape, device_stream("table1_output", "rgbw", seed))
+        stream = exposure_stream(condition, "rgbw", seed)
+        wanted = expose(expected_e, camera.sensor, 0.02, device, stream, exact=True)
+        np.testing.assert_array_equal(raw.dn, wanted.dn)
+        assert raw.exposure_s == 0.02
+
+
+def test_each_curve_over_light_is_of_its_own_measure(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A developed picture that is off by a tenth of white, and one without W that is off by a fifth."""
+    subject, setup = view_of(np.linspace(0.2, 1.8, 32 * 40).reshape(32, 40)), Setup(Path("unused"), seeds=2)
+    camera, asked = Camera("table1_output", "interleaved_paper"), []
+
+    def develop(_: Any, raw: Any, lit: View, substitution_snr: float | None = None) -> tuple[Image, Any]:
+        asked.append((raw, substitution_snr))
+        bare = substitution_snr == 0.0
+        return lit.truth + (0.2 if bare else 0.1), SimpleNamespace(substitution=0.375)
+
+    monkeypatch.setattr(light_levels, "develop_view", develop)
+    monkeypatch.setattr(light_levels, "LEVELS_CD_M2", np.array([0.1, 10.0, 1e4, 1e5]))
+    curves = light_levels.curves(setup, subject, camera)
+    truth = encode_srgb(subject.truth)
+    shown, bare = (encode_srgb(subject.truth + off) for off in (0.1, 0.2))
+    psnr, psnr_bare = (peak_signal_noise_ratio(truth, np.clip(x, 0, 1), data_range=1.0) for x in (shown, bare))
+    apart = deltaE_ciede2000(rgb2lab(np.clip(shown, 0, 1)), rgb2lab(np.clip(truth, 0, 1)))
+    assert curves.weight.shape == (4, 2)
+    assert (curves.weight == 0.375).all()
+    np.testing.assert_allclose(curves.psnr_db, psnr, atol=0.02)
+    np.testing.assert_allclose(curves.gain_db, psnr - psnr_bare, atol=0.02)
+    np.testing.assert_allclose(curves.delta_e, np.median(apart), rtol=0.02)
+    np.testing.assert_allclose(curves.flip, flip(np.clip(shown, 0, 1), truth).mean(), rtol=0.02)
+    for (raw, _), white_full, similarity in zip(
+        asked[::2], curves.white_full.ravel(), curves.similarity.ravel(), strict=False
+    ):
+        white_e = raw.electrons[1::2, 1::2]
+        assert (raw.dn[1::2, 1::2] >= raw.white_dn).mean() <= white_full <= (white_e > 0.9 * raw.full_well_e).mean()
+        assert 0 <= similarity <= 1
+    assert (curves.similarity[0] == 1).all()
+    # brighter levels than the one from which the time falls have the same electrons
+    np.testing.assert_array_equal(curves.white_full[3], curves.white_full[2])
+    without = [raw for raw, snr in asked if snr == 0.0]
+    assert all((raw.dn[1::2, 1::2] == raw.white_dn).all() for raw in without)
+
+
+def test_the_best_time_by_hand_is_of_each_levels_own_pictures(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Quality falls with the square of the octaves from 40 ms over the level, of the second seed from twice that."""
+    asked: list[tuple[str, str, int]] = []
+
+    def shoot(_: Any, lit: View, time: str, count: int) -> list[tuple[float, float]]:
+        asked.append((lit.level, time, count))
+        level, time_s = float(lit.level.removesuffix("cd/m2")), float(time.removesuffix("ms")) / 1e3
+        return [(time_s, factor * 0.04 / level) for factor in (1.0, 2.0)]
+
+    monkeypatch.setattr(best_exposure, "exposures", shoot)
+    monkeypatch.setattr(best_exposure, "develop_view", lambda _, raw, lit: (raw, None))
+    monkeypatch.setattr(
+        best_exposure, "quality_db", lambda raws, _: [30 - np.log2(time / best) ** 2 for time, best in raws]
+    )
+    monkeypatch.setattr(best_exposure, "LEVELS_CD_M2", (1.0, 2.0))
+    camera = Camera("table1_output", "bayer", shake="hand")
+    found = best_exposure.measure_best(Setup(Path("unused"), seeds=2), view_of(np.ones((4, 4))), camera)
+    assert list(found) == [1.0, 2.0]
+    for level, best in found.items():
+        assert best.time_s == pytest.approx([0.04 / level, 0.08 / level])
+        assert best.psnr_db == pytest.approx([30.0, 30.0])
+        assert best.blur_px == pytest.approx(best_exposure.blur_px(camera.sensor, 0.06 / level))
+    assert {count for *_, count in asked} == {2}
+
+
+def test_patches_beside_the_edge_are_compared_along_and_across_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A plane that rises by 1 a row and by 3 a column: 25 pixels, each 8 rows or 8 columns away."""
+    rows, columns = np.mgrid[0:40, 0:40].astype(float)
+    monkeypatch.setattr(patches, "white_plane", lambda _: rows + 3 * columns + rows * columns)
+    found = patches.triplets(SimpleNamespace(), np.full(40, 17))  # type: ignore[arg-type]
+    assert found.places.tolist() == [[row, 21] for row in range(2, 30)]
+    near = np.arange(-2, 3.0)
+    for (row, column), to_y, to_z in zip(found.places, found.to_y, found.to_z, strict=True):
+        assert to_y == pytest.approx(np.sqrt(5 * ((8 + 8 * (column + near)) ** 2).sum()))
+        assert to_z == pytest.approx(np.sqrt(5 * ((24 + 8 * (row + near)) ** 2).sum()))
+    assert found.share == (found.to_y < found.to_z).sum() / 28
+
+
+def test_ratios_of_early_designs_are_of_each_light_and_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    def noise(reading: str, design: str, luminance_cd_m2: float) -> tuple[float, float]:
+        first = {"cmyw_yamagami_published": 3.0, "rgbw_sato_published": 2.0}[design]
+        return first * luminance_cd_m2, first**2 / luminance_cd_m2
+
+    monkeypatch.setattr(early, "colour_noise", noise)
+    found = early.colour_noise_ratios("table1_pixel")
+    lights = ("moonlight", "low light", "25 cd/m²")
+    assert found == {
+        f"table1_pixel, {light}, {how}": ratio
+        for light in lights
+        for how, ratio in (("closed form", 1.5), ("read out", 2.25))
+    }
+    assert early.COLOUR_LIGHTS["25 cd/m²"] == 25.0
+    assert sorted(early.COLOUR_LIGHTS.values()) == list(early.COLOUR_LIGHTS.values())
+    monkeypatch.setattr(early, "range_db", lambda sensor: (70.0, 71.0) if "W" in sensor.cfa[1] else (60.0, 60.5))
+    assert set(early.ranges_lost_db("table1_pixel")) == {
+        f"table1_pixel, {mosaic}, {how}" for mosaic in ("rgbw_nd", "cmyw") for how in ("closed form", "read out")
+    }
