@@ -39,8 +39,9 @@ def score(
 ) -> None:
     """Print a camera's figures of merit, each in closed form beside the same figure measured on simulated frames.
 
-    Conversion (ISO 14524), speeds (ISO 12232), SNR10 and SNR1s, dynamic range and SNR (ISO 15739), sharpness (ISO
-    12233, IEEE 1858), contrast transfer accuracy (IEEE 2020), colour (ISO 17321), and the figures of EMVA 1288.
+    Conversion (ISO 14524), speeds (ISO 12232), SNR10 and SNR1s, dynamic range and SNR (ISO 15739), stops, bits and
+    low-light speed as test houses print them, flare (ISO 9358), sharpness (ISO 12233, IEEE 1858), contrast transfer
+    accuracy (IEEE 2020), colour (ISO 17321), and the figures of EMVA 1288.
 
     Parameters
     ----------
@@ -92,6 +93,10 @@ def score(
         return
     for name, of in found.items():
         _print_merits(name if len(found) > 1 else "", of)
+    for name, of in found.items():
+        for one in of:
+            if one.missing:
+                print(f"{name}: {one.title} is left out: {one.missing}.")
     checked = [one.agrees for of in found.values() for one in of if one.agrees is not None]
     print(f"{sum(checked)} of {len(checked)} closed forms lie inside their interval; one in twenty misses by chance.")
 
@@ -102,6 +107,7 @@ def _print_merits(name: str, merits: Sequence[Merit]) -> None:
     rows = [
         (one.title, one.unit, *map(number_text, (one.computed, one.measured, one.low, one.high)), one.standard)
         for one in merits
+        if not one.missing
     ]
     print_table(HEAD, rows, words=2)
 

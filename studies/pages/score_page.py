@@ -18,14 +18,19 @@ def score_page(
 ) -> str:
     """Write the sheet: a row for each figure, its closed form and its measurement for each camera."""
     rows: dict[str, dict[str, Merit]] = {}
+    missing: dict[str, list[str]] = {}
     for camera, found in scores.items():
         for one in found:
-            rows.setdefault(one.name, {})[camera] = one
+            if one.missing:
+                missing.setdefault(f"{one.title}: {one.missing}", []).append(camera)
+            else:
+                rows.setdefault(one.name, {})[camera] = one
     return write_out(
         "score.html.j2",
         cameras=list(scores),
         rows=[(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values()],
         chart=svg_address(curves_svg(curves)),
+        missing=[(reason, of if len(scores) > 1 else []) for reason, of in missing.items()],
         number=number_text,
         set_up=set_up,
         version=version,

@@ -4,6 +4,7 @@ Noise of a patch's mean adds to its difference of colour, which `without_noise_b
 """
 
 from dataclasses import replace
+from math import nan
 
 import numpy as np
 from skimage.color import deltaE_cie76, deltaE_ciede2000, xyz2lab
@@ -21,17 +22,38 @@ from sensor.optics import form_image
 from sensor.response import electrons_per_irradiance, expected_electrons, mixing_of
 from studies.metrics.truth import Light, named_light
 from studies.photograph.camera import calibrate
-from studies.score.figure import Definition, Merit, without_noise_bias
+from studies.score.figure import Definition, Merit, not_measured, without_noise_bias
 
 GREYS = 6  # the chart's last row
 SIDE_PX, CHIPS = 64, 8  # pixels of a patch, and chips that see it in one measurement
+FRAMES_SHARE, MOST_FRAMES = 0.003, 16  # read noise over the top from which on a chip takes several frames; most of them
 ACROSS, BORDER = 5, 2  # patches, and pixels of a patch's border that crosstalk reaches
 WHITE_SHARE = 0.7  # of the converter's top, for a perfect white in the most sensitive channel
 INDEX_FACTOR = 5.5  # ISO 17321-1
+COLOURS = 3  # channels that tell colours
+INDEX = Merit(
+    "iso_17321.index",
+    "sensitivity metamerism index",
+    "1",
+    "like ISO 17321-1: 100 - 5.5 x mean CIELAB difference",
+    "",
+    nan,
+)
+DIFFERENCE = Merit(
+    "color_checker.delta_e",
+    "mean CIEDE2000 of the 24 patches",
+    "1",
+    "CIE 142; ISO 17321's patches and balance",
+    "",
+    nan,
+)
 
 
 def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Definition:
     """Define the figures of a camera that tells three colours."""
+    if len(sensor.channels) < COLOURS:
+        missing = f"the mosaic has {', '.join(sensor.channels)} alone, which tells no colours"
+        return Definition(tuple(replace(x, missing=missing) for x in (INDEX, DIFFERENCE)), not_measured)
     # What the camera and the standard observer see of the patches, without noise.
     known = named_light(light)
     plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
@@ -42,20 +64,27 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     signals = _signals(plain, known, surfaces)
     chart_e = _chart_e(plain, known, surfaces, exposure_s)
     white = f"white at {100 * WHITE_SHARE:.0f} % of the top"
-    words = f"raw channels balanced on {light}, the matrix fitted on the 24 patches, {white}"
+    words = f"raw channels balanced on {light}, the matrix fitted on the 24 patches, {white}, dark frames subtracted"
 
     def errors(measured: Floats) -> tuple[Floats, Floats]:
         balanced = measured[:, :3] / signals[-1, :3]
         lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
         return np.asarray(deltaE_ciede2000(true_lab, lab)), np.asarray(deltaE_cie76(true_lab, lab))
 
-    # The same on frames.
+    # The same on frames, less the chip's dark. A noisy camera takes several, for differences of colour are curved.
+    frames = int(np.clip((plain.read_noise_e / plain.top_e / FRAMES_SHARE) ** 2, 1, MOST_FRAMES))
+
     def means_of(chips: int, rng: np.random.Generator) -> Floats:
         """Return the chips' mean samples of each patch and, last, of white: (25, channel)."""
         total = np.zeros_like(signals)
         for _ in range(chips):
-            raw = expose(chart_e, plain, exposure_s, draw_device(plain, chart_e.shape, rng), rng)
-            channels = [np.where(mask(raw.cfa, name, raw.shape), raw.electrons, np.nan) for name in raw.channels]
+            chip = draw_device(plain, chart_e.shape, rng)
+            lit_e, dark_e = (
+                np.mean([expose(light_e, plain, exposure_s, chip, rng).electrons for _ in range(frames)], axis=0)
+                for light_e in (chart_e, np.zeros_like(chart_e))
+            )
+            seen_e = lit_e - dark_e
+            channels = [np.where(mask(plain.cfa, name, seen_e.shape), seen_e, np.nan) for name in plain.channels]
             total += np.transpose([_patch_means(samples) for samples in channels])
         return total / chips
 
@@ -69,22 +98,8 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     # The figures.
     index, difference = _figures(*errors(signals[:-1]))
     merits = (
-        Merit(
-            "iso_17321.index",
-            "sensitivity metamerism index",
-            "1",
-            "like ISO 17321-1: 100 - 5.5 x mean CIELAB difference",
-            f"the chart's 18 coloured patches, {words}",
-            index,
-        ),
-        Merit(
-            "color_checker.delta_e",
-            "mean CIEDE2000 of the 24 patches",
-            "1",
-            "CIE 142; ISO 17321's patches and balance",
-            words,
-            difference,
-        ),
+        replace(INDEX, conditions=f"the chart's 18 coloured patches, {words}", computed=index),
+        replace(DIFFERENCE, conditions=words, computed=difference),
     )
     return Definition(merits, measure)
 

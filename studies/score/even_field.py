@@ -1,6 +1,7 @@
 """An even neutral field before a camera: the light that it sees, and samples of simulated frames of it."""
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -36,6 +37,8 @@ class EvenField:
         Whose samples are measured.
     frame_e : (h, w) float64
         Photo-electrons behind each filter at 1 cd/m^2.
+    means_e : (channel,) float64
+        Mean photo-electrons of the channels' samples at 1 cd/m^2, crosstalk included.
     """
 
     sensor: SensorConfig
@@ -43,14 +46,14 @@ class EvenField:
     exposure_s: float
     channel: str
     frame_e: Floats
+    means_e: Floats
 
-    @property
+    @cached_property
     def electrons_per_cd_m2(self) -> float:
         """Mean photo-electrons of the channel's samples at 1 cd/m^2, crosstalk included."""
-        means = neutral_electrons(self.sensor, self.light, self.exposure_s)
-        return float(means[self.sensor.channels.index(self.channel)])
+        return float(self.means_e[self.sensor.channels.index(self.channel)])
 
-    @property
+    @cached_property
     def lux_s_per_cd_m2(self) -> float:
         """Luminous exposure of the sensor at 1 cd/m^2 [lux s]."""
         return camera_equation(self.sensor.lens) * self.exposure_s
@@ -68,17 +71,17 @@ class EvenField:
         samples = raw.electrons[mask(raw.cfa, self.channel, raw.shape)]
         return np.asarray(samples / (collected_share(self.readings) if several(self.readings) else 1.0), np.float64)
 
-    @property
+    @cached_property
     def readings(self) -> tuple[PlainReading, ...]:
         """Readings of the channel's pixels that the chip can take."""
         return tuple(at_channel(chip_readings(self.sensor, self.exposure_s), self.channel))
 
-    @property
+    @cached_property
     def headroom_e(self) -> float:
         """Photo-electrons of the whole pixel that the largest reading holds."""
         return max(reading.headroom_e for reading in self.readings)
 
-    @property
+    @cached_property
     def temporal_dark_e(self) -> float:
         """Standard deviation over frames of a dark pixel [e-]."""
         if not several(self.readings):
@@ -99,4 +102,5 @@ def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: s
     )
     tile_e = expected_electrons(form_image(radiance, plain), plain, exposure_s)
     repeats = SIDE_PX // tile_rows, SIDE_PX // tile_columns
-    return EvenField(plain, light, exposure_s, channel, np.tile(tile_e, repeats))
+    means_e = neutral_electrons(plain, light, exposure_s)
+    return EvenField(plain, light, exposure_s, channel, np.tile(tile_e, repeats), means_e)

@@ -25,10 +25,12 @@ class Merit:
     conditions : str
         What was photographed, and how each choice was made that the standard leaves open.
     computed : float
-        In closed form; nan where the camera doesn't have the figure.
+        In closed form; nan where there is none: of the camera, or of what a processor does.
     measured, low, high : float
         Mean over simulated measurements, and the limits of its interval of `CONFIDENCE`; nan before it is measured, and
         the limits of a figure that EMVA 1288 derives from others.
+    missing : str
+        Why the camera doesn't have the figure; empty where it has it.
     """
 
     name: str
@@ -40,11 +42,12 @@ class Merit:
     measured: float = nan
     low: float = nan
     high: float = nan
+    missing: str = ""
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the closed form lies within the measurement's interval; None where there is no interval."""
-        return self.low <= self.computed <= self.high if isfinite(self.low) else None
+        """Whether the closed form lies within the measurement's interval; None where either is not there."""
+        return self.low <= self.computed <= self.high if isfinite(self.low) and isfinite(self.computed) else None
 
 
 @dataclass(frozen=True)
@@ -56,7 +59,8 @@ class Definition:
     merits : tuple of Merit
         Computed, and not yet measured.
     measure : callable
-        Takes a generator, and returns each figure as one measurement on fresh chips gives it.
+        Takes a generator, and returns each figure as one measurement on fresh chips gives it. It isn't called where all
+        figures are missing.
     """
 
     merits: tuple[Merit, ...]
@@ -66,10 +70,10 @@ class Definition:
 def measured(definition: Definition, seed: int) -> list[Merit]:
     """Measure figures `REPEATS` times, and give each mean with its interval by Student's t distribution.
 
-    Figures that the camera doesn't have are left out.
+    Figures that the camera doesn't have come back as they are.
     """
-    if not any(isfinite(merit.computed) for merit in definition.merits):
-        return []
+    if all(merit.missing for merit in definition.merits):
+        return list(definition.merits)
     # A stream per name, so that a figure doesn't depend on which others are asked for.
     key = int.from_bytes(definition.merits[0].name.encode(), "little") % 2**63
     seeds = [np.random.SeedSequence((seed, key, repeat)) for repeat in range(REPEATS)]
@@ -77,10 +81,14 @@ def measured(definition: Definition, seed: int) -> list[Merit]:
     means, spreads = values.mean(axis=0), values.std(axis=0, ddof=1)
     halves = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, REPEATS - 1) * spreads / REPEATS**0.5
     return [
-        replace(merit, measured=mean, low=mean - half, high=mean + half)
+        merit if merit.missing else replace(merit, measured=mean, low=mean - half, high=mean + half)
         for merit, mean, half in zip(definition.merits, means.tolist(), halves.tolist(), strict=True)
-        if isfinite(merit.computed)
     ]
+
+
+def not_measured(rng: np.random.Generator) -> list[float]:
+    """Stand in for the measurement of figures that the camera doesn't have."""
+    raise AssertionError("a missing figure is measured")
 
 
 def without_noise_bias(whole: Sequence[float], first: Sequence[float], second: Sequence[float]) -> list[float]:

@@ -9,7 +9,6 @@ from dataclasses import replace
 from math import isfinite, log10, nan, pi, sqrt
 
 import numpy as np
-from scipy.optimize import brentq
 
 from sensor.config import SensorConfig
 from studies.metrics.truth import GREY, named_light
@@ -21,7 +20,7 @@ from studies.study.gain import ISO_SATURATION_LUX_S
 ISO_NOISE_LUX_S = 10.0  # the noise-based speed is 10 over the exposure that has the signal-to-noise ratio
 REFERENCE_SHARE = 0.13  # of the saturation luminance, at which ISO 15739 takes the signal-to-noise ratio
 RAMP = (0.1, 0.2, 0.35, 0.5, 0.65)  # of saturation: light at which the response is measured
-LADDER = (0.8, 0.9, 1.0, 1.11, 1.25)  # of the light that the closed form gives, around which a ratio is searched
+LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # of the light that the closed form gives, around which a figure is searched
 SNR1S = ("3200 K", 1 / 60, 1.4)  # of SNR1s: colour temperature, exposure time, f-number
 
 
@@ -31,7 +30,7 @@ Named = tuple[Merit, Callable[[float], float]]  # a figure before it is computed
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
     """Define the figures of one channel's samples under a light and an exposure time."""
     field = even_field(sensor, named_light(light), exposure_s, channel)
-    words = f"{channel}, raw samples of one pixel, {light}, {exposure_s * 1e3:.4g} ms, fixed patterns included"
+    words = field_words(field, light)
     at_saturation = field.headroom_e / field.electrons_per_cd_m2
     e_per_lux_s = field.electrons_per_cd_m2 / field.lux_s_per_cd_m2
     slope = Merit(
@@ -76,6 +75,13 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
     yield from _iso_15739(field, words, at_saturation)
 
 
+def field_words(field: EvenField, light: str) -> str:
+    """Say what an even field's figures are measured on."""
+    return (
+        f"{field.channel}, raw samples of one pixel, {light}, {field.exposure_s * 1e3:.4g} ms, fixed patterns included"
+    )
+
+
 def _iso_15739(field: EvenField, words: str, at_saturation: float) -> Iterator[Definition]:
     reference = REFERENCE_SHARE * at_saturation
     reference_e = np.array([reference * field.electrons_per_cd_m2])
@@ -96,7 +102,7 @@ def _iso_15739(field: EvenField, words: str, at_saturation: float) -> Iterator[D
         f"{field.channel}, raw, {field.exposure_s * 1e3:.4g} ms, noise of frames without light",
         20 * log10(field.headroom_e / field.temporal_dark_e),
     )
-    yield Definition((grey,), lambda rng: [20 * log10(_ratio_at(field, reference, rng))])
+    yield Definition((grey,), lambda rng: [20 * log10(ratio_at(field, reference, rng))])
     yield Definition((span,), lambda rng: [20 * log10(_measured_range(field, rng))])
 
 
@@ -112,7 +118,8 @@ def _slope_e(field: EvenField, rng: np.random.Generator) -> float:
     return float(np.polyfit(light * field.lux_s_per_cd_m2, electrons, 1)[0])
 
 
-def _ratio_at(field: EvenField, luminance: float, rng: np.random.Generator) -> float:
+def ratio_at(field: EvenField, luminance: float, rng: np.random.Generator) -> float:
+    """Measure the ratio of mean to standard deviation of one frame's samples, of a fresh chip."""
     samples = field.samples_e(field.shoot(luminance, field.draw_chip(rng), rng))
     return float(samples.mean() / samples.std(ddof=1))
 
@@ -129,27 +136,29 @@ def _light_for_ratio(field: EvenField, ratio: float, figures: Sequence[Named]) -
     """Define figures of the light at which a pixel reaches a ratio, each by what it makes of the luminance."""
     luminance = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
     reached = isfinite(luminance)
-    merits = [replace(merit, computed=of_light(luminance) if reached else nan) for merit, of_light in figures]
+    reason = "" if reached else f"no light reaches a ratio of {ratio:g}: PRNU is in the way, or the well is full before"
+    merits = [
+        replace(merit, computed=of_light(luminance) if reached else nan, missing=reason) for merit, of_light in figures
+    ]
 
     def measure(rng: np.random.Generator) -> list[float]:
-        found = _light_for(field, ratio, luminance, rng)
+        found = light_for(lambda x: ratio_at(field, x, rng), ratio, luminance)
         return [of_light(found) for _, of_light in figures]
 
     return Definition(tuple(merits), measure)
 
 
-def _light_for(field: EvenField, ratio: float, about_cd_m2: float, rng: np.random.Generator) -> float:
-    """Measure the ratio on a ladder of light, and solve a parabola through it in logarithms for the light [cd/m^2].
+def light_for(measured_at: Callable[[float], float], goal: float, about_cd_m2: float) -> float:
+    """Measure a figure on a ladder of light, and solve a line through it in logarithms for the light [cd/m^2].
 
-    A light beyond the ladder counts as its end.
+    The ladder is narrow, so that a merge's seam is straight on it. A light beyond the ladder counts as its end.
     """
     light = np.log(np.array(LADDER))
-    ratios = np.log([_ratio_at(field, about_cd_m2 * x, rng) for x in LADDER])
-    parabola = np.polynomial.Polynomial.fit(light, ratios - np.log(ratio), 2)
-    ends = parabola(light[[0, -1]])
-    if np.all(ends > 0) or np.all(ends < 0):
-        return about_cd_m2 * LADDER[int(np.argmin(np.abs(ends))) * (len(LADDER) - 1)]
-    return about_cd_m2 * float(np.exp(float(brentq(parabola, light[0], light[-1]))))
+    figures = np.log([measured_at(about_cd_m2 * x) for x in LADDER])
+    slope, at_middle = np.polyfit(light, figures - np.log(goal), 1)
+    if slope <= 0:
+        return about_cd_m2 * LADDER[0 if at_middle > 0 else -1]
+    return about_cd_m2 * float(np.exp(np.clip(-at_middle / slope, light[0], light[-1])))
 
 
 def _snr1s(sensor: SensorConfig, channel: str) -> Definition:

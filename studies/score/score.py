@@ -7,10 +7,15 @@ from rodcone.errors import InputError, require_whole
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import characterise
 from sensor.readings.resolve import at_channel, chip_readings
+from studies.metrics.truth import named_light
 from studies.score.colour import colour_figures
 from studies.score.contrast import contrast_figures
+from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit, measured
-from studies.score.noise_figures import noise_figures
+from studies.score.flare import flare
+from studies.score.noise_figures import field_words, noise_figures
+from studies.score.output_speeds import output_speeds
+from studies.score.print_figures import print_figures
 from studies.score.sharpness import sharpness
 
 # Groups of figures, by the first part of their names.
@@ -20,6 +25,8 @@ GROUPS = (
     "snr10",
     "snr1s",
     "iso_15739",
+    "print",
+    "iso_9358",
     "iso_12233",
     "ieee_1858",
     "ieee_2020",
@@ -28,7 +35,6 @@ GROUPS = (
     "emva_1288",
 )
 NORMAL_95 = 1.959964  # standard errors on either side, of an interval of 95 %
-COLOURS = 3  # channels that tell colours
 
 
 def score(
@@ -51,8 +57,8 @@ def score(
     Returns
     -------
     list of Merit
-        Figures that the camera doesn't have are left out: colours of fewer than three channels, light for a ratio that
-        no light reaches, contrast of merged readings in closed form.
+        `Merit.missing` says why a camera doesn't have a figure: colours of fewer than three channels, light for a ratio
+        that no light reaches, flare of a lens that states none.
 
     Raises
     ------
@@ -91,11 +97,18 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
     channel = sensor.unit_channel
     if any(_group_wanted(group, only) for group in ("oecf", "iso_12232", "snr10", "snr1s", "iso_15739")):
         yield from noise_figures(sensor, light, exposure_s, channel)
+    field = even_field(sensor, named_light(light), exposure_s, channel)
+    if _group_wanted("iso_12232", only):
+        yield from output_speeds(field, field_words(field, light))
+    if _group_wanted("print", only):
+        yield from print_figures(field, field_words(field, light))
+    if _group_wanted("iso_9358", only):
+        yield flare(sensor, light, exposure_s, channel)
     if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858")):
         yield sharpness(sensor, light, exposure_s, channel)
     if _group_wanted("ieee_2020", only):
         yield from contrast_figures(sensor, light, exposure_s, channel)
-    if len(sensor.channels) >= COLOURS and any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
+    if any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
         yield colour_figures(sensor, light, exposure_s)
 
 

@@ -35,7 +35,7 @@ CSF_POWER, CSF_DECAY = 0.8, 0.2
 def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the figures of an edge that one channel sees at every pixel."""
     seen = _every_pixel(sensor, channel)
-    bands = _bands(light)
+    bands = bands_of(light)
     edge_e = _edge_electrons(seen, bands, exposure_s)
     frequency, mtf = _windowed(_transfer(seen, bands, exposure_s))
     lens = seen.lens
@@ -85,7 +85,8 @@ def _every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
     return replace(plain, lens=replace(plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
 
 
-def _bands(light: str) -> Light:
+def bands_of(light: str) -> Light:
+    """Return a named illuminant of 1 cd/m^2 in the bands of pictures."""
     centres = np.arange(VISIBLE_NM[0] + BAND_NM / 2, VISIBLE_NM[1], BAND_NM)
     return light_in_bands(illuminant(light), centres, np.full(centres.size, BAND_NM))
 
