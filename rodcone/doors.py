@@ -1,13 +1,13 @@
 """What stands before a public function: names become the values they stand for, and each argument's kind is checked.
 
 `rodcone.capture` is a function of the packages with these checks before it; the packages themselves trust what they are
-given. One table says what a parameter may be, whichever function it belongs to. Like the table of public names it
-points up by strings, which are imported when they are needed.
+given. A parameter's own annotation says what it may be: a class, or a number within limits. A table holds what no type
+says. Like the table of public names it points up by strings, which are imported when they are needed.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Mapping
-from functools import wraps
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import cache, wraps
 from importlib import import_module
 from importlib.util import find_spec
 from inspect import Parameter, signature
@@ -15,8 +15,8 @@ from math import inf
 from numbers import Integral
 from os import PathLike
 from pathlib import Path
-from types import MappingProxyType, ModuleType
-from typing import Any, TypeVar, cast
+from types import MappingProxyType, ModuleType, NoneType, UnionType
+from typing import Annotated, Any, Literal, TypeVar, Union, cast, get_args, get_origin, get_type_hints
 
 from rodcone.errors import InputError, require_kind, require_range
 from rodcone.time_text import parse_time
@@ -66,13 +66,13 @@ def imported(module: str) -> ModuleType:
         raise ImportError(_shadow_words(file, package)) from None
 
 
-def _value(kind: str, fix: str, by_name: str = "") -> Check:
-    """Check for an object of the class at ``module:name``; the function at `by_name` makes one of a name or path."""
+def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
+    """Check for an object of a class, or of that at ``module:name``; the function at `by_name` makes one of a name."""
 
     def check(name: str, value: Any) -> Any:
         if by_name and isinstance(value, str | Path):
             return at(by_name)(str(value))
-        require_kind(name, value, at(kind), fix)
+        require_kind(name, value, at(kind) if isinstance(kind, str) else kind, fix)
         return value
 
     return check
@@ -171,110 +171,82 @@ def _each(kind: Check, least: int = 0) -> Check:
     return check
 
 
+def _as_it_is(_: str, value: Any) -> Any:
+    """Take any argument."""
+    return value
+
+
 def _shown(value: Any) -> str:
     """A value as an error names it: itself where that is short, its class elsewhere."""
     text = repr(value) if isinstance(value, str | bytes | int | float | complex | tuple | list) else ""
     return text if 0 < len(text) <= 80 else f"a {type(value).__name__}"
 
 
-_ILLUMINANT, _WAVEFORM = "render.illuminants:illuminant", "sensor.flicker.waveform:waveform"
+_ILLUMINANT = "render.illuminants:illuminant"
 _WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give a number")
-_METRES = _range(1e-9, 1e9, "give metres")
 _TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
 _PATH, _CALL = _plain((str, PathLike), "a path in quotes"), _plain(Callable, "a function")
-_RAW = _value("sensor.raw:RawImage", "give what capture or read_raw gives")
 
-# By the parameter's name, or the function's and the parameter's where it means something else there. What may be left
-# out may be None.
+# What stands for a class of which a caller gives no object: the remedy, and what makes an object of a name or a path.
+KINDS: Mapping[str, tuple[str, str]] = MappingProxyType(
+    {
+        "ChannelReading": ("give rodcone.ChannelReading(...)", ""),
+        "Clock": ("leave it out", ""),
+        "ColourCalibration": ("give calibrate(sensor, light)", ""),
+        "Device": ("give draw_device(sensor, radiance.shape, rng)", ""),
+        "Generator": ("give numpy.random.default_rng(1)", ""),
+        "Order": ("give rodcone.Order(...)", ""),
+        "Plan": ("give rodcone.plan(study)", ""),
+        "RawImage": ("give what capture or read_raw gives", ""),
+        "Reading": ("give rodcone.Reading(...)", ""),
+        "ReferencePicture": ("give rodcone.reference_picture(radiance)", ""),
+        "Scene": ("give rodcone.load(name), or the name alone", "scenes.catalogue:load"),
+        "SensorConfig": ("give a preset's name or file", "sensor.presets:preset"),
+        "SpectralIrradiance": ("give form_image(radiance, sensor)", ""),
+        "SpectralRadiance": ("give SpectralRadiance(...), or call its relight()", ""),
+        "Spectrum": ("give rodcone.illuminant(name)", _ILLUMINANT),
+        "Study": ("give a study's file", "studies.study.study_file:read_study"),
+        "Transport": ("give rodcone.render(...)", ""),
+        "Waveform": ("give a text such as 'fluorescent@100Hz'", "sensor.flicker.waveform:waveform"),
+    }
+)
+# What a type doesn't say, by the parameter's name, or the function's and the parameter's where it means something else
+# there. All other parameters are checked by their types: a class of `KINDS`, a number within the limits of its
+# `Annotated`, a text, a path.
 CHECKS: Mapping[str, Check] = MappingProxyType(
     {
-        "radiance": _value("render.radiance:SpectralRadiance", "give SpectralRadiance(...), or call its relight()"),
-        "irradiance": _value("sensor.optics:SpectralIrradiance", "give form_image(radiance, sensor)"),
-        "transport": _value("render.transport:Transport", "give rodcone.render(...)"),
         "resume": _value("render.transport:Transport", "give what render gave before"),
-        "scene": _value("render.scene:Scene", "give rodcone.load(name), or the name alone", "scenes.catalogue:load"),
-        "sensor": _value("sensor.config:SensorConfig", "give a preset's name or file", "sensor.presets:preset"),
+        "readings": _each(_value("sensor.pixel:Reading", "give rodcone.Reading(...)"), least=1),
         "with_channel_readings.readings": _each(
             _value("sensor.pixel:ChannelReading", "give rodcone.ChannelReading(...)")
         ),
-        "readings": _each(_value("sensor.pixel:Reading", "give rodcone.Reading(...)"), least=1),
-        "device": _value("sensor.device:Device", "give draw_device(sensor, radiance.shape, rng)"),
-        "rng": _value("numpy.random:Generator", "give numpy.random.default_rng(1)"),
-        "light": _value("render.spectrum:Spectrum", "give rodcone.illuminant(name)", _ILLUMINANT),
-        **dict.fromkeys(("light_for_snr.exposure_s", "score.exposure_s"), _some_seconds),
-        **dict.fromkeys(
-            ("flicker", "flicker_figures.waveform"),
-            _value("sensor.flicker.waveform:Waveform", "give a text such as 'fluorescent@100Hz'", _WAVEFORM),
-        ),
-        "flicker_figures.exposure_s": _some_seconds,
-        "only": _each(_TEXT),
-        **dict.fromkeys(
-            (
-                "load_radiance.light",
-                "load_radiance.spectra",
-                "load_transport.light",
-                "light_for_snr.light",
-                "score.light",
-                "expect.light",
-            ),
-            _TEXT,
-        ),
-        "reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
-        "grey.reflectance": _range(0.0, 1.0, "give a share of the light"),
-        "raw": _RAW,
-        "frames": _each(_RAW, least=1),
-        "calibration": _value("sensor.calibration:ColourCalibration", "give calibrate(sensor, light)"),
+        "frames": _each(_value("sensor.raw:RawImage", "give what capture or read_raw gives"), least=1),
+        "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),
+        "matte.reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
+        "spectra": _spectra,
+        "load_radiance.spectra": _TEXT,
+        "exposure_s": _seconds,
+        **dict.fromkeys(("light_for_snr.exposure_s", "score.exposure_s", "flicker_figures.exposure_s"), _some_seconds),
+        "exposure": _exposure,
         "picture": _array(or_kind="isp.picture:Picture"),
         "matrix": _array(or_kind="isp.colour.colour_fit:ColourFit"),
         "balance": _array(or_kind="isp.colour.white_balance:WhiteBalance"),
-        "reference": _value("studies.metrics.compare:ReferencePicture", "give rodcone.reference_picture(radiance)"),
-        "order": _value("studies.photograph.shot:Order", "give rodcone.Order(...)"),
-        "study": _value("studies.study.study:Study", "give a study's file", "studies.study.study_file:read_study"),
-        "plan": _value("studies.budget.ledger:Plan", "give rodcone.plan(study)"),
-        "clock": _value("studies.photograph.clock:Clock", "leave it out"),
+        **dict.fromkeys(("neutral", "wavelength_nm", "width_nm", "lines_nm"), _array()),
+        "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
         **dict.fromkeys(("origin", "target", "up"), _array(3)),
         "transforms": _each(_array(4, 4)),
         "pose": _array(4, 4),
         "range_nm": _array(2),
-        **dict.fromkeys(("linear", "planes", "neutral", "noise_gain"), _array()),
-        **dict.fromkeys(("wavelength_nm", "width_nm", "lines_nm"), _array()),
-        **dict.fromkeys(("width_m", "height_m"), _METRES),
-        "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
-        "ratio": _range(1e-6, 1e6, "give signal over noise"),
-        **dict.fromkeys(("ev", "noise", "max_seconds", "longest_s", "percentile", "well_share"), _NUMBER),
-        "tolerance": _NUMBER,
-        "gain": _range(1.0, 1024.0, "give a factor, 1 where a full well reads the converter's top"),
-        "iso": _range(1e-3, 1e9, "give a speed, such as 400"),
         **dict.fromkeys(("electrons", "expected_e"), _array(least=0.0)),
         "levels_cd_m2": lambda name, value: _array(least=1e-9)(name, value).ravel(),
-        "exposure": _exposure,
-        "exposure_s": _seconds,
-        **dict.fromkeys(("spp", "max_spp", "max_depth", "seed", "samples_per_pixel", "bits", "height"), _WHOLE),
-        **dict.fromkeys(("width", "workers", "pictures", "frame"), _WHOLE),
-        **dict.fromkeys(("render.size", "load_transport.size"), _size_or_side),
-        **dict.fromkeys(("size", "shape"), _size),
-        **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
-        **dict.fromkeys(
-            ("name", "encoding", "channel", "isp", "readout", "way", "shake", "prior", "view", "text"), _TEXT
-        ),
-        **dict.fromkeys(("white_balance", "extend", "engine", "processor", "write_exr.scene"), _TEXT),
-        **dict.fromkeys(("exact", "denoise", "trust", "trust_code", "everything", "blur"), _FLAG),
-        **dict.fromkeys(("path", "cache", "out", "folder", "preset.name"), _PATH),
-        **dict.fromkeys(("progress", "step", "runner", "make"), _CALL),
-        "develop_file.path": _paths,
-        "read_study.changes": _each(_TEXT),
-        "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),
-        "spectra": _spectra,
-        "powers": _plain(Mapping, "a dict by light group"),
-        **dict.fromkeys(("luminance_cd_m2", "illuminance_lux", "lux"), _NUMBER),
-        "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
-        **dict.fromkeys(("self", "options", "more", "controls"), lambda _, value: value),
-        **dict.fromkeys(("Picture.encode.white", "row"), lambda _, value: value),  # checked where they are used
-        "axes": _value("matplotlib.axes:Axes", "give axes of Matplotlib, or leave it out"),
-        "emission": _plain(Mapping, "a dict by light group"),
-        "define": _plain(Mapping, "a dict of texts by name"),
-        "index": _each(_WHOLE),
         "values": _value("numpy:ndarray", "give an array (..., h, w)"),
+        **dict.fromkeys(("render.size", "load_transport.size"), _size_or_side),
+        **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
+        "develop_file.path": _paths,
+        "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
+        "define": _plain(Mapping, "a dict of texts by name"),
+        "axes": _value("matplotlib.axes:Axes", "give axes of Matplotlib, or leave it out"),
+        **dict.fromkeys(("more", "Picture.encode.white", "row"), _as_it_is),  # checked where they are used
     }
 )
 # Functions that look at the result, and warn.
@@ -284,6 +256,34 @@ RESULTS = MappingProxyType(
         "expose": ("sensor.exposure:warn_if_full",),
     }
 )
+
+
+def check_of(name: str, parameter: str, hint: Any) -> Check:
+    """Return the check of a function's parameter: that of `CHECKS` where it has one, else what its type says."""
+    return CHECKS.get(f"{name}.{parameter}") or CHECKS.get(parameter) or _by_type(hint)
+
+
+def _by_type(hint: Any) -> Check:  # noqa: PLR0911  one for each kind of type
+    """Return the check that a type stands for; KeyError for one that stands for none."""
+    origin, parts = get_origin(hint), [x for x in get_args(hint) if x is not NoneType]
+    if origin is Annotated:
+        return _range(*hint.__metadata__[0])
+    if origin in (Union, UnionType):
+        return _PATH if set(parts) == {str, Path} else _by_type(*parts)
+    if origin is Literal:
+        return _TEXT
+    if origin is Sequence:
+        return _each(_by_type(*parts))
+    if hint in _OF_TYPE:
+        return _OF_TYPE[hint]
+    if origin is not None:  # Callable, Mapping, or NumPy's array, which isn't imported here
+        return _OF_ORIGIN[origin.__name__]
+    fix, by_name = KINDS[hint.__name__]
+    return _value(hint, fix, by_name)
+
+
+_OF_TYPE = {bool: _FLAG, int: _WHOLE, float: _NUMBER, str: _TEXT, tuple[int, int]: _size, Any: _as_it_is}
+_OF_ORIGIN = {"Callable": _CALL, "Mapping": _plain(Mapping, "a dict by light group"), "ndarray": _array()}
 
 
 def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -297,8 +297,12 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         At a call: for too many or too few arguments.
     """
     call = signature(function)
-    checks = {parameter: CHECKS.get(f"{name}.{parameter}") or CHECKS[parameter] for parameter in call.parameters}
     order = f"{name}({', '.join(call.parameters)})"
+
+    @cache  # at the first call, for a method's own class has to be there
+    def checks() -> dict[str, Check]:
+        hints = get_type_hints(function, include_extras=True)
+        return {parameter: check_of(name, parameter, hints.get(parameter, Any)) for parameter in call.parameters}
 
     @wraps(function)
     def checked(*arguments: Any, **named: Any) -> Any:
@@ -309,10 +313,10 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         given = {key: value for key, value in bound.arguments.items() if not _left_out(call.parameters[key], value)}
         for key, value in given.items():
             try:
-                bound.arguments[key] = checks[key](key, value)
+                bound.arguments[key] = checks()[key](key, value)
             except InputError:
                 for other, its in given.items():
-                    if other != "self" and _passes(checks[key], its) and _passes(checks[other], value):
+                    if other != "self" and _passes(checks()[key], its) and _passes(checks()[other], value):
                         raise InputError(
                             f"{name}: {key} and {other} stand in each other's place; write {order}"
                         ) from None

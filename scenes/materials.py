@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from math import radians, tan
+from typing import Annotated, TypeAlias
 
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
@@ -11,6 +12,7 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from scenes.reflectances import grey, resampled
 
+Metres: TypeAlias = Annotated[float, (1e-9, 1e9, "give metres")]
 SKY_LUMINANCE_CD_M2 = 100.0
 
 
@@ -79,7 +81,7 @@ def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn
     return {"type": "twosided", "bsdf": {"type": "blendbsdf", "weight": share, "a": dark_side, "b": bright_side}}
 
 
-def panel(pose: Floats, width_m: float, height_m: float, bsdf: Node, **more: Node) -> Node:
+def panel(pose: Floats, width_m: Metres, height_m: Metres, bsdf: Node, **more: Node) -> Node:
     """Rectangle centred on the origin of `pose`, facing its +z."""
     size = scale(width_m / 2, height_m / 2, 1.0)
     return {"type": "rectangle", "to_world": to_world(pose, size), "bsdf": bsdf, **more}

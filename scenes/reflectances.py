@@ -2,6 +2,7 @@
 
 from functools import cache
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
@@ -49,7 +50,7 @@ def held(curve: Spectrum) -> Spectrum:
     return Spectrum(np.concatenate([curve.wavelength_nm, beyond]), values)
 
 
-def grey(reflectance: float) -> Spectrum:
+def grey(reflectance: Annotated[float, (0.0, 1.0, "give a share of the light")]) -> Spectrum:
     """Same reflectance, 0 to 1, at every wavelength.
 
     Examples

@@ -9,6 +9,7 @@ times the black and the white level, four read noises and four roundings.
 
 from dataclasses import replace
 from math import hypot, inf, lcm, sqrt
+from typing import Annotated, TypeAlias
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from sensor.cfa import Tile, channel_map
 from sensor.config import SensorConfig
 from sensor.pixel import BINNINGS, CHARGE, DIGITAL, Binning
 
+Gain: TypeAlias = Annotated[float, (1.0, 1024.0, "give a factor, 1 where a full well reads the converter's top")]
 MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw image holds 16
 
 
@@ -85,7 +87,7 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
     )
 
 
-def with_gain(sensor: SensorConfig, gain: float) -> SensorConfig:
+def with_gain(sensor: SensorConfig, gain: Gain) -> SensorConfig:
     """Camera at a fixed gain, which no automatic exposure raises; converter, black level and noise follow it.
 
     Parameters

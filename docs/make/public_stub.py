@@ -66,12 +66,21 @@ def wider(parameter: str, annotation: str) -> str:
     return " | ".join([x for x in others if x != "None"] + ["ArrayLike"] + [x for x in others if x == "None"])
 
 
+class _Plain(ast.NodeTransformer):
+    """Leave an `Annotated` type's limits out."""
+
+    def visit_Subscript(self, node: ast.Subscript) -> ast.expr:
+        """Return the type that `Annotated` holds, or what stands there."""
+        annotated = ast.unparse(node.value) == "Annotated" and isinstance(node.slice, ast.Tuple)
+        return node.slice.elts[0] if annotated else node
+
+
 def widened(function: ast.FunctionDef) -> bool:
     """Write into a function's signature what a caller may give; return whether that is more than the function says."""
     arguments, more = function.args, False
     for argument in [*arguments.posonlyargs, *arguments.args, *arguments.kwonlyargs, arguments.vararg, arguments.kwarg]:
         if argument is not None and argument.annotation is not None:
-            said = ast.unparse(argument.annotation)
+            said = ast.unparse(_Plain().visit(argument.annotation))
             given = wider(argument.arg, said)
             more |= given != said
             argument.annotation = ast.parse(given, mode="eval").body

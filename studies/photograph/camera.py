@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -31,6 +31,7 @@ from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
+from sensor.photodiodes import Gain
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import spread_charge
@@ -275,8 +276,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     exact: bool = False,
     samples_per_pixel: int = 1,
     shake: str | None = None,
-    gain: float | None = None,
-    iso: float | None = None,
+    gain: Gain | None = None,
+    iso: Annotated[float, (1e-3, 1e9, "give a speed, such as 400")] | None = None,
     flicker: Waveform | None = None,
 ) -> RawImage:
     """Take one exposure; the raw image holds what `develop` needs.

@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import pi
+from typing import Annotated
 
 import numpy as np
 
@@ -66,7 +67,9 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
     return np.reshape(ratios, electrons.shape)
 
 
-def light_for_snr(ratio: float, sensor: SensorConfig, light: str, exposure_s: float) -> list[LightForSnr]:
+def light_for_snr(
+    ratio: Annotated[float, (1e-6, 1e6, "give signal over noise")], sensor: SensorConfig, light: str, exposure_s: float
+) -> list[LightForSnr]:
     """Light for an SNR by channel, in the order of `sensor.cfa.channels`.
 
     Parameters

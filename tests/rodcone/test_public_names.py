@@ -2,9 +2,11 @@
 
 import ast
 import sys
+from functools import partial
 from importlib import import_module, metadata
 from inspect import signature, unwrap
 from pathlib import Path
+from typing import Any, get_type_hints
 
 import numpy as np
 import pytest
@@ -12,7 +14,11 @@ from command_line import in_new_python
 from refusal import refusal
 
 import rodcone as public
-from rodcone.doors import CHECKS
+from rodcone.doors import CHECKS, check_of
+from sensor.calibration import ColourCalibration
+from sensor.config import SensorConfig
+from sensor.curves import Responses
+from sensor.emva1288.characterise import Characterisation
 
 ROOT = Path(public.__file__).resolve().parent
 sys.path.insert(0, str(ROOT.parent / "docs" / "make"))
@@ -79,9 +85,32 @@ def test_the_stub_lets_a_name_stand_where_the_door_takes_one_and_nowhere_else() 
     assert asked > 40
 
 
+def test_each_parameter_has_a_check_and_each_rule_a_parameter() -> None:
+    """A parameter is checked by its type; what a type doesn't say is a rule of `CHECKS`."""
+    used = set()
+    classes = [SensorConfig, ColourCalibration, Characterisation, Responses]
+    classes += [found for found in map(partial(getattr, public), public.__all__) if isinstance(found, type)]
+    doors = {name: unwrap(getattr(public, name)) for name in public.__all__}
+    doors |= {
+        f"{kind.__name__}.{name}": unwrap(found)
+        for kind in classes
+        for name, found in vars(kind).items()
+        if hasattr(found, "__wrapped__") and not name.startswith("__")
+    }
+    for name, function in doors.items():
+        if isinstance(function, type):
+            continue
+        hints = get_type_hints(function, include_extras=True)
+        for parameter in signature(function).parameters:
+            assert check_of(name, parameter, hints.get(parameter, Any)), f"{name}.{parameter}"
+            used |= {f"{name}.{parameter}", parameter}
+    assert CHECKS.keys() <= used
+
+
 def passes(name: str, parameter: str, value: object) -> bool:
     """Return whether a public function's door takes a value for a parameter."""
-    check = CHECKS.get(f"{name}.{parameter}") or CHECKS[parameter]
+    hints = get_type_hints(unwrap(getattr(public, name)), include_extras=True)
+    check = check_of(name, parameter, hints[parameter])
     try:
         check(parameter, value)
     except public.InputError:
