@@ -10,6 +10,7 @@ import time
 from collections.abc import Generator, Sequence
 from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -375,6 +376,24 @@ def test_a_manifest_that_lacks_what_is_read_is_refused(stored: Path, tmp_path: P
             text = "".join(f"{json.dumps(x)}\n" for x in (*lines[:index], short, *lines[index + 1 :]))
             (tmp_path / MANIFEST).write_text(text)
             refusal(read_manifest, tmp_path, match="no manifest of a set")
+
+
+def test_the_room_of_rendered_scenes_is_counted_by_planes_bands_lamps_and_channels(tmp_path: Path) -> None:
+    """By hand: three planes of float32 for each lamp and band; raw, truth and 20 kB for each sample."""
+    choice = SceneChoice("diorama-5")
+    levels, seeds = ("1cd/m2", "9cd/m2", "25cd/m2"), (0, 1)
+    study = SAMPLE.small_study(
+        tmp_path, levels=levels, seeds=seeds, exposures=("auto", "20ms"), processors=("bayer", "interleaved")
+    )  # fmt: skip
+    groups = {"sun": None, "sky": None, "lamp": None}
+    opened: Any = SimpleNamespace(choice=choice, size=(30, 50), scene=SimpleNamespace(groups=groups))
+    plan: Any = SimpleNamespace(renders={choice: SimpleNamespace(wavelength_nm=np.arange(7.0))})
+    order = SetOrder(truth="mosaic_e,channels_e,rgb,depth,normals,ids,shares")
+    wanted = 3 * 4 * 1500 * 7 * 3
+    for channels in (3, 4):
+        planes = 2 + 4 + 4 * channels + 12 + 4 + 12 + 4 + 4 * 3
+        wanted += 3 * 2 * 2 * (1500 * planes + 20_000) + 4 * 1500 * (20 + channels)
+    assert order_module.bytes_needed(study, plan, [opened], order) == wanted
 
 
 def test_drawn_scenes_are_counted_from_a_seed() -> None:

@@ -17,6 +17,7 @@ from scipy.io import savemat
 import rodcone as public
 from isp.settings import PAPER
 from rodcone.errors import InputError
+from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.photodiodes import with_gain
 from sensor.presets import low_noise, preset, preset_file, vary
@@ -30,6 +31,7 @@ from studies.explore.messages import first_message
 from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
+from studies.explore.views import histogram, pixel
 from studies.photograph.picture_file import to_png
 from studies.study.gain import iso_speed
 
@@ -171,6 +173,18 @@ def test_what_is_told_of_two_cameras_is_each_ones_own(session):
     assert ["0.02" in python for python in told["python"]] == [True, False]
     transport = small_transport()
     assert (told["spp"], told["render_error"]) == (transport.spp, transport.relative_mc_error)
+
+
+def test_a_pixels_figures_and_a_histogram_are_those_of_the_frame_that_is_asked_for(session: Session) -> None:
+    camera = {"exposure": "time", "exposure_s": 0.004, "level_cd_m2": 40.0, "seed": 3} | QUICK
+    exposed = expose_scene(small_transport(), Controls(**camera), Memo())  # type: ignore[arg-type]
+    page = connected(session)
+    for number, (row, column) in enumerate(((3, 31), (38, 7)), 1):
+        told = page.ask(session, "pixel", number, cameras=[camera], row=row, column=column)
+        assert json.dumps(told["pixel"]) == json.dumps(pixel(exposed, row, column))
+        assert f"pixel {row} {column}" in told["python"]
+    told = page.ask(session, "histogram", 9, cameras=[camera])
+    assert json.dumps(told["histogram"]) == json.dumps(histogram(exposed.raw))
 
 
 def test_the_page_is_told_every_sensors_and_processors_own_terms():
@@ -444,10 +458,19 @@ def test_a_scene_is_shown_small_first_and_then_whole():
     assert next(states, None) is None
 
 
+def _bands(transport: Any) -> dict[str, Any]:
+    return {"wavelength_nm": transport.wavelength_nm, "width_nm": transport.width_nm}
+
+
 def test_the_python_of_a_render_has_its_samples_and_its_seed():
     options = RenderOptions(size=16, spp=2, seed=5, band_nm=100.0)
     (state,) = open_source("flat_field", options).states(lambda: None)
     assert "rodcone.render(scene, (16, 16), spp=2, seed=5, **bands)" in state.code
+    transport = state.transport
+    assert (transport.spp, transport.coverage.mean.shape) == (2.0, (16, 16))
+    assert (transport.width_nm == 100.0).all()
+    ours = public.render(load("flat_field"), (16, 16), spp=2, seed=5, **_bands(transport))
+    assert np.array_equal(transport.radiance, ours.radiance)
 
 
 def test_a_file_of_radiance_is_photographed_as_it_is(tmp_path: Path):

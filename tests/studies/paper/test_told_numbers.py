@@ -26,7 +26,7 @@ from sensor.response import expected_electrons
 from studies.metrics.flip import flip
 from studies.metrics.truth import light_in_bands, named_light
 from studies.paper import best_exposure, early, light_levels, patches
-from studies.paper.claims import Claim, ClaimCheck, PaperFigure
+from studies.paper.claims import Claim, ClaimCheck, PaperFigure, with_default, within
 from studies.paper.figure2 import bright_cd_m2, signal_ratios, snr_gains
 from studies.paper.numbers import measured_snr_db, number_claims, range_spans
 from studies.paper.paper import Paper, as_csv, as_json, write
@@ -271,3 +271,32 @@ def test_ratios_of_early_designs_are_of_each_light_and_way(monkeypatch: pytest.M
     assert set(early.ranges_lost_db("table1_pixel")) == {
         f"table1_pixel, {mosaic}, {how}" for mosaic in ("rgbw_nd", "cmyw") for how in ("closed form", "read out")
     }
+
+
+def test_the_default_stands_beside_a_check_where_it_differs() -> None:
+    told = with_default(
+        lambda factor: [Claim("a", "b", tuple(within({"one": 2.0 * factor, "two": 5.0})))],
+        {"interleaved": 3.0, "interleaved_paper": 1.0},
+    )
+    assert [(check.value, check.default) for claim in told for check in claim.checks] == [(2.0, 6.0), (5.0, None)]
+
+
+def test_a_range_read_out_is_off_by_what_its_ends_are_off_by(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A read out whose SNR in the dark is a half, where it should be 1, and which is half full at 1.05 of the well."""
+    sensor = table1_sensor("table1_output")
+
+    def read(field: Image, *_: Any) -> SimpleNamespace:
+        mean = field.mean()
+        half_full = np.clip((mean / sensor.pixel.full_well_e - 0.95) / 0.2, 0.0, 1.0)
+        return SimpleNamespace(electrons=np.array([-mean, 3 * mean]), saturated=np.array([half_full]))
+
+    monkeypatch.setattr(early, "read_out", read)
+    computed, measured = early.range_db(sensor)
+    pixel, lit_e = sensor.pixel, channel_e(sensor, named_light("D65"), 1.0, 0.02)
+    dark_e2 = pixel.read_noise_e**2 + pixel.dsnu_e**2 + sensor.gain_e_per_dn**2 / 12
+    # n = sqrt(n + dark^2 + (PRNU n)^2)
+    a = 1 - pixel.prnu**2
+    least_e = (1 + np.sqrt(1 + 4 * a * dark_e2)) / (2 * a)
+    ratio = pixel.full_well_e / lit_e[:3].max() / (least_e / lit_e[3])
+    assert computed == pytest.approx(20 * np.log10(ratio), abs=0.01)
+    assert measured == pytest.approx(computed + 20 * np.log10(1.05 / 2), abs=0.01)

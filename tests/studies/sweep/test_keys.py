@@ -9,12 +9,15 @@ import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 
+from isp.processors.catalogue import PROCESSORS
+from render.illuminants import illuminant
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset
 from sensor.response import expected_electrons
 from studies.dataset import sample as sample_module
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2
+from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import open_all, under
 from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
@@ -199,3 +202,39 @@ def test_a_frame_that_is_read_back_is_the_frame_that_was_made(tmp_path: Path) ->
 def replace_diffraction(sensor: Any) -> Any:
     """One time for all models of the lens."""
     return replace(sensor, lens=replace(sensor.lens, diffraction=0.0))
+
+
+def test_the_brightest_share_is_asked_for_in_the_brightest_light_over_the_longest_burst(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Of the sensor of as many frames, over their time together; the largest of the answers is the share."""
+    asked: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(
+        prepare_module, "render_share", lambda *asks: asked.append(asks) or (3.0, 7.0, 5.0)[len(asked) - 1]
+    )
+    levels, exposures = ("1cd/m2", "25cd/m2", "9cd/m2"), ("auto", "20ms", "5ms")
+    study = SAMPLE.small_study(
+        tmp_path, levels=levels, exposures=exposures, frames=(1, 4, 2), longest_exposure_s=0.125
+    )  # fmt: skip
+    with open_results(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        (opened,) = open_all(study).values()
+        transport, _ = prepare_module.scene_transport(job, opened, lambda *_: None)
+        assert prepare_module._brightest_share(job, opened, transport) == 7.0
+    assert [(level, longest_s, time_s) for _, _, level, longest_s, time_s in asked] == [
+        (25.0, 0.5, None),
+        (25.0, 0.5, pytest.approx(0.08)),
+        (25.0, 0.5, pytest.approx(0.02)),
+    ]
+    for _, sensor, *_ in asked:
+        assert sensor.pixel.full_well_e == pytest.approx(4 * low_noise().pixel.full_well_e)
+        assert sensor.pixel.read_noise_e == pytest.approx(2 * low_noise().pixel.read_noise_e)
+
+
+def test_a_sweeps_colours_are_those_of_fine_bands() -> None:
+    """10 nm are near 2 nm: a matrix that differs by less than 2 % of white."""
+    sensor, processor, lamp = low_noise("bayer"), PROCESSORS["bayer"], illuminant("A")
+    nm = np.arange(360.0, 801.0, 2.0)
+    fine = colour_fit(sensor, processor, light_in_bands(lamp, nm, np.full(nm.size, 2.0)))
+    found = frames_module.colours_under(sensor, processor, lamp)
+    np.testing.assert_allclose(found.matrix("RGB"), fine.matrix("RGB"), atol=0.02)
