@@ -14,8 +14,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+import scipy
 import sweep_sample as SAMPLE
 from command_line import call
+from matplotlib.figure import Figure
 from PIL import Image
 
 from rodcone.progress import duration
@@ -25,6 +27,8 @@ from sensor.presets import preset, vary
 from studies.commands import dataset as dataset_command
 from studies.commands import demo as reference_command
 from studies.commands import expect as expect_command
+from studies.commands import export as export_command
+from studies.commands import plot as plot_command
 from studies.commands import score as score_command
 from studies.commands.demo import STUDY
 from studies.dataset.order import SetOrder
@@ -251,14 +255,16 @@ def test_reference_asks_for_samples_by_the_share_so_far_and_certifies_each_step(
         monkeypatch.setattr(reference_command, name, stub)
     worst = 600.0 / min(luminances)  # over samples
     until = worst / 900
-    code, out, err = call(["reference", "flat_field", "--size", 32, "--until", until, "--out", tmp_path])
+    code, out, err = call(
+        ["reference", "flat_field", "--size", 32, "--until", until, "--max-seconds", "90s", "--out", tmp_path]
+    )
     assert code == 0
     steps = [asked["max_spp"] for _, asked in renders]
     assert steps == [512, int(min(1024, 512 * MARGIN * (worst / 512) / until + 1))]
     (size, first), (_, second) = renders
     assert size == (32, 32)
     assert (first["resume"], second["resume"]) == (None, kept[0][1])
-    assert (first["seed"], first["max_seconds"]) == (reference_command.SEED, None)
+    assert (first["seed"], first["max_seconds"]) == (reference_command.SEED, 90.0)
     assert str(kept[0][0]) == out.strip()
     for spp, (_, _, facts) in zip(steps, kept, strict=True):
         assert facts["share"] == pytest.approx(worst / spp)
@@ -274,3 +280,45 @@ def test_reference_asks_for_samples_by_the_share_so_far_and_certifies_each_step(
         f"{duration(left_s)} more to {until:g}",
         f"rodcone: {steps[1]} samples a pixel: {worst / steps[1]:.3g} of the sensor's variance in 95 % of pixels",
     ]
+
+
+def test_table_tells_the_mean_over_seeds_and_students_interval(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of the chosen cells alone, by the axes and figures that are typed, with three digits."""
+    psnr = {"1cd/m2": (20.0, 21.0, 24.0), "25cd/m2": (30.0, 30.5, 31.5)}
+    rows = [
+        SAMPLE.row(processor, seed, level=level, psnr_db=db + 5 * (processor == "ple"), mean_electrons='{"W": 40.0}')
+        for processor in ("bayer", "ple")
+        for level, values in psnr.items()
+        for seed, db in enumerate(values)
+    ]
+    monkeypatch.setattr(export_command, "read_rows", lambda folder: rows if folder == tmp_path else [])
+    out = printed(
+        "table", tmp_path, "--by", "processor,level", "--show", "psnr_db,electrons_W", "--where", "processor=ple"
+    )  # fmt: skip
+    head, _, *lines = ([cell.strip() for cell in line.strip("|").split("|")] for line in out.splitlines())
+    assert [head[0], head[1], head[2].replace("\\", ""), head[3].replace("\\", "")] == [
+        "processor",
+        "level",
+        "psnr_db",
+        "electrons_W",
+    ]
+    assert len(lines) == 2
+    for (level, values), line in zip(psnr.items(), lines, strict=True):
+        mean = np.mean(values) + 5
+        low, high = scipy.stats.t.interval(0.95, 2, mean, scipy.stats.sem(values))
+        assert line == ["ple", level, f"{mean:.1f} ± {(high - low) / 2:.1f}", "40.0"]
+
+
+def test_plot_draws_the_metric_lines_and_cells_that_are_typed(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Any] = []
+    monkeypatch.setattr(plot_command, "read_rows", lambda folder: [folder])
+    monkeypatch.setattr(plot_command, "panels", lambda *asks: asked.append(asks) or ["a panel"])
+    monkeypatch.setattr(plot_command, "metric_figure", lambda *asks: asked.append(asks) or Figure((1, 1)))
+    out = tmp_path / "a.svg"
+    words = ("--metric", "flip_mean", "--by", "sensor", "--first", "low_noise", "--where", "level=10lux")
+    assert printed("plot", tmp_path, "-o", out, *words).strip() == str(out)
+    (rows, metric, by, where, first), (parts, drawn) = asked
+    assert (rows, by, where, first) == ([tmp_path], "sensor", {"level": "10lux"}, "low_noise")
+    assert metric.key == drawn.key == "flip_mean"
+    assert parts == ["a panel"]
+    assert "<svg" in out.read_text("utf-8")

@@ -37,7 +37,7 @@ def test_a_frame_without_white_has_alpha_1_and_its_colours() -> None:
     np.testing.assert_array_equal(bare.dn[~sites], raw.dn[~sites])
 
 
-@pytest.mark.sample(1)
+@pytest.mark.thorough  # test_told_numbers counts both ends by hand
 @pytest.mark.parametrize("mosaic", ["rgbw", "rgbw_nd", "cmyw"])
 def test_dynamic_range_read_out_is_that_of_the_closed_form(mosaic: str) -> None:
     closed, measured = range_db(table1_sensor("table1_output", mosaic))
@@ -51,6 +51,7 @@ def test_matching_w_to_g_costs_just_what_w_gathers_more() -> None:
     assert rgbw - matched == pytest.approx(20 * np.log10(4.88), abs=0.02)  # W over G under D65
 
 
+@pytest.mark.sample(1)
 @pytest.mark.parametrize("processor", ["cmyw_yamagami_published", "rgbw_sato_published"])
 def test_colour_noise_read_out_is_that_of_the_closed_form(processor: str) -> None:
     closed, measured = colour_noise("table1_output", processor, 2.5)
