@@ -5,7 +5,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
-from studies.sweep.export import axis_values, lines, markdown, read_rows, write_csv
+from studies.sweep.export import axis_values, lines, markdown, read_rows, stream_rows, write_csv
 
 
 def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
@@ -20,7 +20,7 @@ def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(
     everything
         Also write the cells of earlier runs that the last run didn't ask for.
     """
-    write_csv(read_rows(folder, everything), out)
+    write_csv(stream_rows(folder, everything), out)
     print(out)
 
 

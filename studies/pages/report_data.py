@@ -3,6 +3,7 @@
 import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -87,8 +88,15 @@ class ReportCell:
 
     def samples(self, key: str) -> Floats:
         """Return a row's figure by seed, (seed,); all NaN where one is unknown or not finite."""
-        values = np.array([getattr(row, key, None) for row in self.rows], dtype=np.float64)
-        return values if np.isfinite(values).all() else np.full_like(values, np.nan)
+        if key not in self._known:
+            values = np.array([getattr(row, key, None) for row in self.rows], dtype=np.float64)
+            self._known[key] = values if np.isfinite(values).all() else np.full_like(values, np.nan)
+        return self._known[key]
+
+    @cached_property
+    def _known(self) -> dict[str, Floats]:
+        """Figures that were asked for: a page asks for each a hundred times."""
+        return {}
 
     def mean(self, key: str) -> float:
         """Mean of a figure over the seeds; NaN where it is unknown for one of them."""

@@ -5,6 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import metadata
 from itertools import product
+from math import prod
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.loader import variant
-from rodcone.errors import InputError
+from rodcone.errors import InputError, require_keys, unknown
 from rodcone.jit import backend
 from scenes.levels import DEMO_LEVELS
 from sensor.config import LensConfig
@@ -29,11 +30,15 @@ from studies.study.study import OWN, label
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import in_words, made_by, require_alike, threads, versions
-from studies.sweep.row import Row
+from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
+MOST_CELLS = 1000  # pictures of a first seed on one page: its words compare any two values of an axis
 
-def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[ReportData, ReportPictures]:
+
+def sweep_report(
+    folder: Path, most_pictures: int | None = None, where: Mapping[str, str] | None = None
+) -> tuple[ReportData, ReportPictures]:
     """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
@@ -42,18 +47,21 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         Of the sweep.
     most_pictures : int, optional
         Beside the truths; left out, as many as a page may hold. The numbers are of all cells in any case.
+    where : mapping of str to str, optional
+        Axes, and the one value of each that is shown. Of a study of more than `MOST_CELLS` pictures a part is shown,
+        and a note says which.
 
     Raises
     ------
     InputError
-        Where there is no results database, one of another version, none of the last run's cells is made yet, they were
-        made by different versions, variants or engines, or a picture is gone.
+        For an unknown axis or value, where there is no results database, one of another version, none of the last
+        run's cells is made yet, they were made by different versions, variants or engines, or a picture is gone.
     """
     run = last_run(folder)
     rows, brightness = run.rows, {row.level: row.luminance_cd_m2 for row in reversed(run.rows)}
     require_alike(rows)
-    study = {**run.study, "levels": sorted(run.study["levels"], key=lambda level: brightness.get(level, np.inf))}
-
+    levels = sorted(run.study["levels"], key=lambda level: brightness.get(level, np.inf))
+    study, thinned = shown_part({**run.study, "levels": levels, "ways": _ways(run.study)}, where or {})
     names = [label(choice["source"]) for choice in study["scenes"]]
     of_views = {(row.scene, row.spectrum): row.truth for row in rows}
     truths = [of_views.get(view) for view in product(names, study["spectra"])]
@@ -70,7 +78,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         scenes=tuple(ReportScene(name, *size) for name, size in zip(names, sizes, strict=True)),
         spectra=tuple(study["spectra"]),
         sensors=tuple(sensor_of(name) for name in study["sensors"]),
-        exposures=tuple(way_name(*way) for way in _ways(study)),
+        exposures=tuple(way_name(*way) for way in study["ways"]),
         balances=tuple(study["white_balances"]),
         levels=tuple(NAMED.get(level) or ReportLevel(level_text(level), "") for level in study["levels"]),
         cameras=tuple(study["processors"]),
@@ -83,7 +91,7 @@ def sweep_report(folder: Path, most_pictures: int | None = None) -> tuple[Report
         configuration=configuration(run.study),
         exposure_rule=_exposure_rules(study),
         left_out=lenses_left_out(rows, study["sensors"]),
-        notes=(*dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())), *unmade),
+        notes=(*dict.fromkeys(note for row in rows for note in _further(row).get("notes", ())), *unmade, *thinned),
         denoised=study["render"]["denoise"],
         looked_at=next((busiest(truth) for truth in true.values()), (0, 0)),
     )
@@ -104,7 +112,7 @@ def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[s
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in row_list}
     levels, sensors = study["levels"], [label(name) for name in study["sensors"]]
-    axes = (study["spectra"], sensors, _ways(study), study["white_balances"], levels, study["processors"])
+    axes = (study["spectra"], sensors, study["ways"], study["white_balances"], levels, study["processors"])
     cells = []
     for place in product(scenes, *axes):
         scene, spectrum, *_, level, camera = place
@@ -113,6 +121,73 @@ def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[s
         luminance_cd_m2, illuminance_lux = light.get((scene, spectrum, level), (None, None))
         cells.append(ReportCell(levels.index(level), camera, luminance_cd_m2, illuminance_lux, rows, picture))
     return cells
+
+
+def shown_part(study: Mapping[str, Any], where: Mapping[str, str]) -> tuple[dict[str, Any], list[str]]:
+    """Return a study with the values that a page shows of each axis, and a note that says what it leaves out.
+
+    Until at most `MOST_CELLS` pictures are left, the longest axis keeps every other value, its first among them;
+    cameras, which are what a reader compares, count as an axis of a third of their number.
+
+    Parameters
+    ----------
+    study : mapping
+        As the results database notes it, with its exposures, frames and gains together as ``ways``.
+    where : mapping of str to str
+        Axes, and the one value of each that is shown.
+    """
+    require_keys("axis", where, AXES)
+    part = dict(study)
+    for axis, wanted in where.items():
+        name, at = _PLACES[axis]
+        kept = [value for value in part[name] if _value(value, axis, at) == wanted]
+        if not kept:
+            values = dict.fromkeys(_value(value, axis, at) for value in part[name])
+            raise unknown(f"where: {axis}", wanted, list(values))
+        part[name] = kept
+    while prod(len(part[name]) for name in _SHOWN) > MOST_CELLS:
+        longest = max(_SHOWN, key=lambda name: len(part[name]) / (3 if name == "processors" else 1))
+        part[longest] = part[longest][::2]
+    before, after = (prod(len(of[name]) for name in _SHOWN) for of in (study, part))
+    if after == before:
+        return part, []
+    lengths = [
+        f"{len(part[name])} of {len(study[name])} {_SHOWN[name]}" for name in _SHOWN if part[name] != study[name]
+    ]
+    return part, [
+        f"This page shows {after} of {before} pictures: {', '.join(lengths)}. Another part: rodcone report FOLDER "
+        "--where AXIS=VALUE; all numbers: rodcone export FOLDER -o rows.csv."
+    ]
+
+
+# What a page shows of a study, and its name in words; for each axis of a row where it stands there.
+_SHOWN = {
+    "scenes": "scenes",
+    "spectra": "lights",
+    "sensors": "sensors",
+    "ways": "exposures, frames and gains",
+    "white_balances": "white balances",
+    "levels": "levels",
+    "processors": "processors",
+}
+_PLACES: dict[str, tuple[str, int | None]] = {
+    "scene": ("scenes", None),
+    "spectrum": ("spectra", None),
+    "level": ("levels", None),
+    "exposure": ("ways", 0),
+    "sensor": ("sensors", None),
+    "white_balance": ("white_balances", None),
+    "frames": ("ways", 1),
+    "gain": ("ways", 2),
+    "processor": ("processors", None),
+}
+
+
+def _value(value: Any, axis: str, at: int | None) -> str:
+    """Return a value of a study's axis as its rows write it."""
+    if axis == "scene":
+        return label(value["source"])
+    return label(value) if at is None else str(value[at])
 
 
 def _ways(study: Mapping[str, Any]) -> list[tuple[str, int, str]]:

@@ -172,13 +172,13 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
     """Which of these cells have an undamaged row and undamaged pictures, which a power cut may have taken."""
-    wanted = set(keys)
-    sound = (row for row in _sound_rows(base) if row.key in wanted)
+    one = f"SELECT {_COLUMNS} FROM cells WHERE key = ?"
+    sound = (Row(*values[:-1]) for key in keys for values in base.execute(one, (key,)) if _is_sound(values))
     return {row.key for row in sound if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
 
 
-def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
-    """Rows of the cells that the last run asked for, in the study's order; with `everything` all rows.
+def rows(base: sqlite3.Connection, everything: bool = False) -> Iterator[Row]:
+    """Give the rows of the cells that the last run asked for, in the study's order; with `everything` all rows.
 
     Raises
     ------
@@ -190,7 +190,14 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> list[Row]:
         if everything
         else f"SELECT {_COLUMNS} FROM wanted JOIN cells USING (key) ORDER BY place"
     )
-    return [Row(*_require_sound(values, f"row {values[0]!r}")) for values in base.execute(chosen)]
+    for values in base.execute(chosen):
+        yield Row(*_require_sound(values, f"row {values[0]!r}"))
+
+
+def row_count(folder: Path) -> int:
+    """Count the cells of the last run that are made."""
+    with read_results(folder) as base:
+        return int(base.execute("SELECT count(*) FROM wanted JOIN cells USING (key)").fetchone()[0])
 
 
 def last_run(folder: Path) -> LastRun:
@@ -205,7 +212,7 @@ def last_run(folder: Path) -> LastRun:
     """
     with read_results(folder) as base:
         runs = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
-        cells = rows(base)
+        cells = list(rows(base))
         wanted = base.execute("SELECT count(*) FROM wanted").fetchone()[0]
     if not runs or not cells:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
@@ -220,7 +227,14 @@ def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
     """Note which cells this run asks for, in place of the last run's; None where a key is not known yet."""
     base.execute("BEGIN IMMEDIATE")
     base.execute("DELETE FROM wanted")
-    base.executemany("INSERT INTO wanted (key) VALUES (?)", ((key,) for key in keys))
+    base.executemany("INSERT INTO wanted VALUES (?, ?)", enumerate(keys))
+    base.execute("COMMIT")
+
+
+def note_keys(base: sqlite3.Connection, first: int, keys: Iterable[str]) -> None:
+    """Note the keys of a scene's cells, known now that it is rendered, from the place of its first cell on."""
+    base.execute("BEGIN IMMEDIATE")
+    base.executemany("UPDATE wanted SET key = ? WHERE place = ?", ((key, at) for at, key in enumerate(keys, first)))
     base.execute("COMMIT")
 
 
@@ -277,6 +291,6 @@ def _require_sound(values: tuple[Any, ...], what: str) -> tuple[Any, ...]:
     return values[:-1]
 
 
-def _sound_rows(base: sqlite3.Connection) -> list[Row]:
-    """All rows but the damaged ones."""
-    return [Row(*values[:-1]) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if _is_sound(values)]
+def _sound_rows(base: sqlite3.Connection) -> Iterator[Row]:
+    """Give all rows but the damaged ones."""
+    return (Row(*values[:-1]) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if _is_sound(values))

@@ -4,7 +4,7 @@ each combination of axes.
 
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields
 from html import escape
 from importlib import metadata
@@ -16,10 +16,10 @@ import numpy as np
 from PIL import Image
 
 from rodcone.colour_spaces import decode_srgb
-from rodcone.csv_file import csv_text
+from rodcone.csv_file import write_table
 from rodcone.curve_file import is_curve_file
 from rodcone.errors import InputError, require_keys, unknown
-from rodcone.files import finite, require_ending, write_files
+from rodcone.files import finite, replacing, require_ending
 from scenes.catalogue import load
 from scenes.metamers import TWINS_UNDER
 from studies.metrics.confidence import half_width
@@ -35,6 +35,12 @@ _JSON_COLUMNS = ("render", "lens", "balance", "mean_electrons", "versions")
 _FORMULA = ("=", "+", "-", "@", "\t", "\r")  # what spreadsheets take for the start of a formula (OWASP, CSV injection)
 
 
+def stream_rows(folder: Path, everything: bool = False) -> Iterator[Row]:
+    """Give the rows that `read_rows` returns one after the other, so that memory holds one at a time."""
+    with read_results(folder) as base:
+        yield from rows(base, everything)
+
+
 def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
     """Rows of a sweep's folder: those of its last run, or all.
 
@@ -43,8 +49,7 @@ def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
     InputError
         Where there is no results database, or one of another version.
     """
-    with read_results(Path(folder)) as base:
-        return rows(base, everything)
+    return list(stream_rows(Path(folder), everything))
 
 
 def axis_values(texts: Sequence[str]) -> dict[str, str]:
@@ -58,13 +63,10 @@ def axis_values(texts: Sequence[str]) -> dict[str, str]:
     return values
 
 
-def to_csv(table: Sequence[Row]) -> str:
-    """Rows as CSV (RFC 4180) with a header; a text that a spreadsheet would run as a formula gets a quote in front."""
-    return csv_text(COLUMNS, ([_harmless(value) for value in vars(row).values()] for row in table))
+def write_csv(table: Iterable[Row], path: Path) -> None:
+    """Write rows to a ``.csv`` file (RFC 4180, with a header) as they come, whole or not at all.
 
-
-def write_csv(table: Sequence[Row], path: Path) -> None:
-    """Write rows to a ``.csv`` file, whole or not at all.
+    A text that a spreadsheet would run as a formula gets a quote in front.
 
     Raises
     ------
@@ -74,7 +76,8 @@ def write_csv(table: Sequence[Row], path: Path) -> None:
         Where the file can't be written.
     """
     require_ending(path, ".csv")
-    write_files({path: to_csv(table)})
+    with replacing(path) as (place,), place.open("w", encoding="utf-8", newline="") as file:
+        write_table(file, COLUMNS, ([_harmless(value) for value in vars(row).values()] for row in table))
 
 
 def results_json(folder: Path) -> bytes:
@@ -97,6 +100,7 @@ def _harmless(value: Any) -> Any:
 
 SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
 ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
+MOST_ROWS = 10_000  # in results.json: 2.5 kB each; a larger sweep's go into CSV
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
 TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
 FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")

@@ -5,7 +5,7 @@ import json
 import os
 import platform
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -24,7 +24,18 @@ from studies.study.lit_scene import open_all
 from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
 from studies.sweep.cells import Cell
-from studies.sweep.database import FILE, add, done, forget_old, note_run, note_stages, open_results, rows, want
+from studies.sweep.database import (
+    FILE,
+    add,
+    done,
+    forget_old,
+    note_keys,
+    note_run,
+    note_stages,
+    open_results,
+    rows,
+    want,
+)
 from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
@@ -151,10 +162,7 @@ def sweep(
         number = note_run(base, now, platform.node(), json.dumps(_noted(study)))
         cell_lists = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
-        keys: list[Sequence[str | None]] = [
-            [cell.key for cell in cells] if cells else [None] * count for cells in cell_lists
-        ]
-        want(base, chain.from_iterable(keys))
+        want(base, chain.from_iterable([cell.key for cell in cells or ()] or [None] * count for cells in cell_lists))
         count_made = 0
         notes = dict[str, None]()
         for index, opened in enumerate(scenes.values()):
@@ -162,8 +170,8 @@ def sweep(
             cells = cell_lists[index] or scene_cells(job, opened, _rendering(part))
             asked_keys = [cell.key for cell in cells]
             notes.update(dict.fromkeys(cells[0].render.notes))
-            keys[index] = asked_keys
-            want(base, chain.from_iterable(keys))
+            if not cell_lists[index]:
+                note_keys(base, index * count, asked_keys)
             stored = done(base, out / PICTURES, asked_keys)
             count_made += _run(job, number, [cell for cell in cells if cell.key not in stored], runner, part)
         forget_old(base)
@@ -173,7 +181,7 @@ def sweep(
     return SweepResult(out, count * len(scenes), count_made, sum(stages.values()), tuple(notes))
 
 
-def _noise_notes(cells: Sequence[Row]) -> list[str]:
+def _noise_notes(cells: Iterable[Row]) -> list[str]:
     """For each scene whose render's noise exceeds a sensor's, where it does so most."""
     worst: dict[str, Row] = {}
     for row in cells:

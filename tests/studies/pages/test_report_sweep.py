@@ -20,12 +20,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from refusal import refusal
 
+from studies.commands.report import write_report, write_results
 from studies.metrics.flip import seen
 from studies.pages.report import group_views, render_report
 from studies.pages.report_compare import Comparison
 from studies.pages.report_data import ReportRender, ReportSensor
 from studies.pages.report_pictures import busiest, flip_map, opened, view_order
-from studies.pages.report_sweep import render_of, sensor_of, sweep_report
+from studies.pages.report_sweep import render_of, sensor_of, shown_part, sweep_report
 from studies.study.study import SceneChoice
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
@@ -86,6 +87,63 @@ def test_cells_come_by_scene_exposure_level_and_camera(out: Path) -> None:
     titles = [f"{name}, {time}" for name in FILES for time in ("automatic", "2\N{NO-BREAK SPACE}ms")]
     assert [group.title for group in group_views(report)] == titles
     assert [group.truth for group in group_views(report)] == [0, 0, 1, 1]
+
+
+LARGE = {
+    "scenes": [{"source": "desk.exr"}],
+    "spectra": ["own"],
+    "sensors": ["low_noise", "table1_output"],
+    "ways": [(time, 1, gain) for time in ("auto", "2ms", "4ms") for gain in ("1", "2", "4", "8")],
+    "white_balances": ["gray_world"],
+    "levels": [f"{light}cd/m2" for light in range(1, 101)],
+    "processors": ["interleaved", "bayer"],
+}
+
+
+def test_a_page_of_a_large_study_thins_its_longest_axes_and_says_what_it_leaves_out() -> None:
+    # 2 x 12 x 100 x 2 = 4800 pictures; 100 levels -> 50 -> 25 leave 1200, then levels are still the longest: 13, 624
+    part, (note,) = shown_part(LARGE, {})
+    assert part["levels"] == LARGE["levels"][::8]
+    assert part | {"levels": LARGE["levels"]} == LARGE
+    assert note.startswith("This page shows 624 of 4800 pictures: 13 of 100 levels.")
+    # 2 x 3 x 100 x 2 = 1200 at one gain: every other level
+    part, (note,) = shown_part(LARGE, {"gain": "4"})
+    assert part["ways"] == [(time, 1, "4") for time in ("auto", "2ms", "4ms")]
+    assert part["levels"] == LARGE["levels"][::2]
+    assert note.startswith(
+        "This page shows 600 of 4800 pictures: 3 of 12 exposures, frames and gains, 50 of 100 levels."
+    )
+    part, notes = shown_part(LARGE | {"levels": ["1cd/m2"]}, {})
+    assert (part, notes) == (LARGE | {"levels": ["1cd/m2"]}, [])
+    refusal(shown_part, LARGE, {"gain": "3"}, match="where: gain: '3' is unknown; allowed: 1, 2, 4, 8")
+    refusal(shown_part, LARGE, {"seed": "3"}, match="'seed'")
+
+
+@pytest.mark.thorough
+def test_the_part_that_is_asked_for_is_all_that_the_page_shows(out: Path, tmp_path: Path) -> None:
+    report, _ = sweep_report(out, where={"exposure": "2ms", "scene": FILES[1]})
+    whole, _ = sweep_report(out)
+    asked = [
+        cell for cell in whole.cells if cell.first and (cell.first.exposure, cell.first.scene) == ("2ms", FILES[1])
+    ]
+    assert [cell.first for cell in report.cells] == [cell.first for cell in asked]
+    assert len(report.cells) == 4
+    assert report.notes[-1].startswith("This page shows 4 of 16 pictures: 1 of 2 scenes, 1 of 2 exposures")
+    page = write_report(out, tmp_path / "part.html", where={"exposure": "2ms"}).read_text("utf-8")
+    assert "This page shows 8 of 16 pictures" in page
+
+
+@pytest.mark.thorough
+def test_a_sweep_of_too_many_rows_for_json_says_how_to_export_them(
+    out: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    part = copied(out, tmp_path)
+    write_results(part)
+    assert len(json.loads((part / "results.json").read_text("utf-8"))["rows"]) == 32
+    monkeypatch.setattr("studies.commands.report.MOST_ROWS", 31)
+    write_results(part)
+    assert not (part / "results.json").exists(), "one of fewer rows would say less than the sweep"
+    assert f"32 rows are too many for results.json: rodcone export {part} -o rows.csv" in capsys.readouterr().err
 
 
 @pytest.mark.thorough

@@ -22,6 +22,7 @@ from studies.sweep.database import (
     done,
     forget_old,
     last_run,
+    note_keys,
     note_render,
     note_run,
     note_stages,
@@ -40,8 +41,8 @@ def test_rows_outlive_the_connection_and_a_key_stands_once(tmp_path: Path) -> No
         add(base, replace(ROW, ssim=0.5))
         add(base, replace(ROW, key="1"))
     with open_results(tmp_path) as base:
-        assert rows(base, everything=True) == [replace(ROW, ssim=0.5), replace(ROW, key="1")]
-        assert rows(base) == []  # none were asked for
+        assert list(rows(base, everything=True)) == [replace(ROW, ssim=0.5), replace(ROW, key="1")]
+        assert list(rows(base)) == []  # none were asked for
 
 
 @pytest.mark.parametrize("column", ["picture", "truth"])
@@ -66,6 +67,10 @@ def test_what_the_last_run_wants_takes_the_place_of_the_ones_before(tmp_path: Pa
             add(base, replace(ROW, key=key))
         want(base, ["a", "missing", "b"])
         want(base, ["c", "b"])
+        assert [row.key for row in rows(base)] == ["c", "b"]
+        want(base, ["c", None, None])  # the second scene isn't rendered yet
+        assert [row.key for row in rows(base)] == ["c"]
+        note_keys(base, 1, ["b", "missing"])
         assert [row.key for row in rows(base)] == ["c", "b"]
 
 
@@ -173,14 +178,14 @@ def test_reading_changes_nothing_and_sees_what_a_sweep_writes_meanwhile(tmp_path
         add(writer, ROW)
         assert writer.execute("PRAGMA journal_mode").fetchone()[0] == "wal"
         with read_results(tmp_path) as reader:
-            assert rows(reader, everything=True) == [ROW]
+            assert list(rows(reader, everything=True)) == [ROW]
             add(writer, replace(ROW, key="1"))
-            assert len(rows(reader, everything=True)) == 2
+            assert len(list(rows(reader, everything=True))) == 2
             with pytest.raises(sqlite3.OperationalError, match="readonly"):
                 reader.execute("DELETE FROM cells")
     before = (tmp_path / FILE).read_bytes()
     with read_results(tmp_path) as reader:
-        assert len(rows(reader, everything=True)) == 2
+        assert len(list(rows(reader, everything=True))) == 2
     assert (tmp_path / FILE).read_bytes() == before
     assert [path.name for path in tmp_path.iterdir()] == [FILE]
 
@@ -198,4 +203,4 @@ def test_what_a_sweep_never_writes_is_refused(change: str, words: str, tmp_path:
         add(base, ROW)
         base.execute(change)
     with pytest.raises(InputError, match=words), read_results(tmp_path) as base:
-        rows(base, everything=True)
+        list(rows(base, everything=True))

@@ -17,20 +17,26 @@ from scenes.catalogue import load
 from studies.metrics.target_figures import daylight_srgb, patch_masks
 from studies.photograph.picture_file import to_png
 from studies.sweep.database import COLUMNS
-from studies.sweep.export import lines, markdown, to_csv
+from studies.sweep.export import lines, markdown, write_csv
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
 from studies.sweep.stored import keep
 
 
-def test_a_text_that_a_spreadsheet_would_run_is_quoted() -> None:
+def as_csv(rows: list[Row], folder: Path) -> list[list[str]]:
+    """Lines of the file that rows are written to."""
+    write_csv(iter(rows), folder / "rows.csv")
+    return list(csv.reader(StringIO((folder / "rows.csv").read_bytes().decode(), newline="")))
+
+
+def test_a_text_that_a_spreadsheet_would_run_is_quoted(tmp_path: Path) -> None:
     for start in ["=", "+", "-", "@", "\t", "\r"]:
-        table = list(csv.reader(StringIO(to_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")]), newline="")))
+        table = as_csv([replace(ROW, scene=f"{start}cmd|' /C calc'!A0")], tmp_path)
         assert table[1][COLUMNS.index("scene")] == f"'{start}cmd|' /C calc'!A0", start
 
 
-def test_csv_holds_every_value_and_numbers_as_they_are() -> None:
-    header, values = csv.reader(StringIO(to_csv([ROW]), newline=""))
+def test_csv_holds_every_value_and_numbers_as_they_are(tmp_path: Path) -> None:
+    header, values = as_csv([ROW], tmp_path)
     assert tuple(header) == COLUMNS
     found = dict(zip(header, values, strict=True))
     assert (found["scene"], found["ssim"], found["snr_db"]) == ("desk, lit.exr", "-0.25", "-3.5")
