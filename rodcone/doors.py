@@ -245,6 +245,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "develop_file.path": _paths,
         "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
         "define": _plain(Mapping, "a dict of texts by name"),
+        "where": _plain(Mapping, "a dict of values by axis"),
         "axes": _value("matplotlib.axes:Axes", "give axes of Matplotlib, or leave it out"),
         **dict.fromkeys(("more", "Picture.encode.white", "row"), _as_it_is),  # checked where they are used
     }
