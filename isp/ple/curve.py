@@ -19,13 +19,13 @@ TOGETHER = 100  # patches, so that arrays are small ones to malloc: others are f
 
 
 def on_the_curve(
-    at: Table, component: NDArray[np.int16], evidence: Singles, noise: Singles, straight: Singles
+    components: Table, component: NDArray[np.int16], evidence: Singles, noise: Singles, straight: Singles
 ) -> Singles:
     """Bring estimates of patches to the curve of their readings.
 
     Parameters
     ----------
-    at : Table
+    components : Table
     component : (patch,) int16
         Sorted.
     evidence, noise : as for `isp.ple.pick.pick`
@@ -37,21 +37,23 @@ def on_the_curve(
     (patch, value) float32
         Over black, times the window.
     """
-    taper, dark_e = at.taper, at.sampling.dark_e
-    average = at.average.T.astype(np.float32)
-    slope, start = (part[component] for part in at.roots)
+    taper, dark_e = components.taper, components.sampling.dark_e
+    average = components.average.T.astype(np.float32)
+    slope, start = (part[component] for part in components.roots)
     bounds = np.flatnonzero(np.diff(component, prepend=-1, append=-1)).tolist()
     parts = [(slice(*ends), int(component[ends[0]])) for ends in pairwise(bounds)]
-    sure = np.concatenate([1.0 / (noise[part, None] + at.whitening(k).spread) for part, k in parts]).astype(np.float32)
+    sure = np.concatenate([1.0 / (noise[part, None] + components.whitening(k).spread) for part, k in parts]).astype(
+        np.float32
+    )
     for _ in range(ROUNDS):
         bend = straight / taper
         bend -= over_black(straight * slope + start, dark_e)
         rows = evidence.copy()
-        rows[:, : len(at.rows)] += bend[:, at.rows]
+        rows[:, : len(components.rows)] += bend[:, components.rows]
         rows[:, -4:] += bend @ average
         for part, k in parts:
-            rows[part, -4:] = rows[part] @ at.whitening(k).reads[:, -4:] * sure[part]
-            np.matmul(rows[part], at.estimator(k).linear, out=straight[part])
+            rows[part, -4:] = rows[part] @ components.whitening(k).reads[:, -4:] * sure[part]
+            np.matmul(rows[part], components.estimator(k).linear, out=straight[part])
     return over_black(straight * slope + start, dark_e) * taper
 
 

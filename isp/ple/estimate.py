@@ -1,17 +1,17 @@
 """One scale: each patch picks a component and takes its estimate, and overlapping patches are averaged.
 
-A patch counts by how sure it is, v its posterior variance, the mean over pixels and channels: over the patches p that
-cover a pixel
+The estimate X of a pixel is a weighted mean of the estimates x_p by all patches p that cover it,
 
-    X = sum_p w_p h x_p / sum_p w_p h,   w = 1 / (max(1, misfit)^DOUBT (v + LEAST_VARIANCE)),
+    X = sum_p w_p h x_p / sum_p w_p h,   w_p = 1 / (max(1, misfit)^DOUBT (v + LEAST_VARIANCE)).
 
-h the window that falls towards a patch's edges (`isp.ple.tables.window`), misfit the mean squared residual in standard
-deviations, 1 for a patch that its component explains (`isp.ple.pick.pick`).
+Here v is the patch's posterior variance, averaged over pixels and channels; h is a window that falls towards the edges
+of the patch (`isp.ple.tables.window`); misfit is the mean squared residual over its expected value, which is 1 for a
+patch that its component explains (`isp.ple.pick.pick`).
 
-Words: a *sampling* says which channels a patch's samples are of, and their gains and noise; patches whose place within
-the tile is the same share it. The *pilot* is the coarser scale's word on a patch: its four channels' means. *Light* is
-a patch's mean brightness: electrons of a G sample under a white of that brightness. A *table* holds the prior's
-components at one light. *Full* is a saturated W: a lower bound.
+Words: A *sampling* says which channels the samples of a patch belong to, with their gains and noise; all patches at the
+same place within the tile share one. The *pilot* is what the coarser scale estimated for a patch: the means of its four
+channels. *Light* is a patch's mean brightness, in electrons that a G sample collects from a white of that brightness. A
+*table* holds the prior's components at one light. A *full* sample is a saturated W, which is only a lower bound.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -251,32 +251,35 @@ def _solve_by_light(
 
 
 def _solve_one_light(
-    at: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
+    components: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
-    """Estimate the patches `index`, whose samples are y, from one table."""
-    # Patches whose linear estimate falls under black: `on_the_curve` redoes them
+    """Estimate the patches `index`, whose samples are y, from the prior's components at one light."""
     noise = None
+    # Patches whose linear estimate falls under black: `on_the_curve` estimates them again.
     below = [np.empty(0, np.intp)]
     parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
     if pilot is not None:
-        noise = (INFLATE * pilot.variance + at.pilot_floor) / (PILOT_VARIANCE + at.pilot_floor)
+        noise = (INFLATE * pilot.variance + components.pilot_floor) / (PILOT_VARIANCE + components.pilot_floor)
         parts.append(pilot.means)
     evidence = np.concatenate(parts, axis=1)
-    component, misfit = pick(at, evidence, noise)
+    component, misfit = pick(components, evidence, noise)
     block, values = (np.empty((BLOCK, width), np.float32) for width in (evidence.shape[1], patches.values.shape[1]))
     order = np.argsort(component, kind="stable")
     bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
     for first, last in pairwise(bounds.tolist()):
         k = int(component[order[first]])
-        by = at.estimator(k)
-        whitening = at.whitening(k)
-        linear = by.linear[: evidence.shape[1]]
+        estimator = components.estimator(k)
+        whitening = components.whitening(k)
+        linear = estimator.linear[: evidence.shape[1]]
         for group in blocks(order[first:last]):
-            variance, inner = by.variance, by.inner
+            variance, inner = estimator.variance, estimator.inner
             rows = np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
             if noise is not None:
                 precision = 1.0 / (noise[group, None] + whitening.spread)
-                variance, inner = by.variance - precision @ by.pilot_variance, by.inner - precision @ by.pilot_inner
+                variance, inner = (
+                    estimator.variance - precision @ estimator.pilot_variance,
+                    estimator.inner - precision @ estimator.pilot_inner,
+                )
                 # The pilot's means give way to their innovation times its precision.
                 rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
             # A patch that no component explains has a larger posterior variance, by `doubt`.
@@ -285,16 +288,16 @@ def _solve_one_light(
             weight = (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32)
             rows *= weight[:, None]
             weighted = np.matmul(rows, linear, out=values[: group.size])
-            if noise is not None and at.mix.size == PATCH:
+            if noise is not None and components.mix.size == PATCH:
                 below.append(group[(weighted < 0.0).any(axis=1)])  # the finest scale: its output is seen
             patches.weight[place] = weight
             patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
-            patches.noise[place] = variance * (by.noise / by.variance)
+            patches.noise[place] = variance * (estimator.noise / estimator.variance)
             patches.values[place] = weighted  # times the window, which `linear` holds
     if noise is not None:
         for group in blocks(np.concatenate(below), TOGETHER):
             place = index[group]
             weight = patches.weight[place, None]
             straight = patches.values[place] / weight
-            curved = on_the_curve(at, component[group], evidence[group], noise[group], straight)
+            curved = on_the_curve(components, component[group], evidence[group], noise[group], straight)
             patches.values[place] = weight * curved

@@ -1,4 +1,4 @@
-"""Which of the prior's components a patch comes from: first by a few directions, then exactly among the likeliest."""
+"""Pick the prior's component that a patch comes from: candidates by a few directions, then exactly among these."""
 
 from collections.abc import Iterator
 
@@ -8,16 +8,16 @@ from numpy.typing import NDArray
 from isp.ple.tables import Table
 from rodcone.types import Singles
 
-BLOCK = 1000  # patches whose numbers stay in a core's cache; lines a power of two apart would share its places
-MOST = 12  # components that a patch is held against, of the likeliest in a few directions
+BLOCK = 1000  # patches at once, which fit a core's cache; a power of two would map their lines to the same places of it
+MOST = 12  # candidates per patch, the likeliest in a few directions
 
 
-def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
+def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[np.int16], Singles]:
     """Pick each patch's likeliest component.
 
     Parameters
     ----------
-    at : Table
+    components : Table
     evidence : (patch, sample + 1) or (patch, sample + 5) float32
         Samples in units of noise, 1, and with a pilot its means.
     noise : (patch,) float32 or None
@@ -30,7 +30,7 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
     (patch,) float32
         Its misfit: squared whitened samples over their number, 1 in the mean of patches that it explains.
     """
-    count, size = len(evidence), len(at.rows)
+    count, size = len(evidence), len(components.rows)
     best = np.full(count, -np.inf, np.float32)
     component = np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
@@ -38,19 +38,19 @@ def pick(at: Table, evidence: Singles, noise: Singles | None) -> tuple[NDArray[n
     # Arrays are made once: fresh memory costs as much as the sums.
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
     # Without a pilot patches are few.
-    candidates = np.ones((len(at.quick), count), bool) if noise is None else _candidates(at, evidence)
-    at.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
+    candidates = np.ones((len(components.quick), count), bool) if noise is None else _candidates(components, evidence)
+    components.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
-        by = at.whitening(k)
+        whitening = components.whitening(k)
         np.take(evidence, group, axis=0, out=block[: group.size], mode="clip")
-        read = np.matmul(block[: group.size], by.reads[: evidence.shape[1], :width], out=reads[: group.size])
+        read = np.matmul(block[: group.size], whitening.reads[: evidence.shape[1], :width], out=reads[: group.size])
         square = np.vecdot(read[:, :size], read[:, :size])
-        likelihood = by.log_scale - 0.5 * square
+        likelihood = whitening.log_scale - 0.5 * square
         if noise is not None:
-            # A row a direction, for sums along them.
-            news = read[:, size:].T.copy()
-            spread = noise[group] + by.spread[:, None].astype(np.float32)
-            likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (news * news / spread).sum(axis=0))
+            # One row per direction of the pilot, for sums along them.
+            innovation = read[:, size:].T.copy()
+            spread = noise[group] + whitening.spread[:, None].astype(np.float32)
+            likelihood -= 0.5 * (np.log(spread.prod(axis=0)) + (innovation * innovation / spread).sum(axis=0))
         wins = likelihood > best[group]
         winners = group[wins]
         best[winners], component[winners], misfit[winners] = likelihood[wins], k, square[wins] / size
@@ -62,25 +62,25 @@ def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.
     return (index[first : first + length] for first in range(0, len(index), length))
 
 
-def _candidates(at: Table, evidence: Singles) -> NDArray[np.bool_]:
-    """Which components may be the likeliest, shape (component, patch), by the likelihood in a few directions."""
-    size = len(at.rows)
-    quick = np.empty((len(at.quick), len(evidence)), np.float32)
-    count = at.directions.shape[1]
+def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
+    """Return which components may be the likeliest, (component, patch), by their likelihood in a few directions."""
+    size = len(components.rows)
+    quick = np.empty((len(components.quick), len(evidence)), np.float32)
+    count = components.directions.shape[1]
     starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
-    products = np.empty((at.quick.shape[1], BLOCK), np.float32)
+    products = np.empty((components.quick.shape[1], BLOCK), np.float32)
     for first in range(0, len(evidence), BLOCK):
         rows = evidence[first : first + BLOCK]
-        off = np.concatenate([rows[:, :size], rows[:, size + 1 :] @ at.white.T], axis=1) - at.centre
-        coordinates = np.ascontiguousarray((off @ at.directions).T)
+        off = np.concatenate([rows[:, :size], rows[:, size + 1 :] @ components.white.T], axis=1) - components.centre
+        coordinates = np.ascontiguousarray((off @ components.directions).T)
         features = products[:, : len(off)]
         for i, start in enumerate(starts[:-1]):
             np.multiply(coordinates[i], coordinates[i:], out=features[start : starts[i + 1]])
         features[starts[-1] : starts[-1] + count] = coordinates
         features[-2] = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->j", coordinates, coordinates)
         features[-1] = 1.0
-        quick[:, first : first + BLOCK] = at.quick @ features
-    candidates = np.asarray(quick > quick.max(axis=0) - at.margin)
+        quick[:, first : first + BLOCK] = components.quick @ features
+    candidates = np.asarray(quick > quick.max(axis=0) - components.margin)
     crowded = np.flatnonzero(candidates.sum(axis=0, dtype=np.int8) > MOST)
     least = np.full(len(evidence), -np.inf, np.float32)
     least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]

@@ -11,7 +11,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from isp.ple.estimate import PatchPilot, ScaleEstimate, estimate
-from isp.ple.guide import blend_with_lines
 from isp.ple.mosaic import (
     CELLS,
     Cells,
@@ -24,6 +23,7 @@ from isp.ple.mosaic import (
 )
 from isp.ple.overlap import STRIDE, border
 from isp.ple.prior import LETTERS, PATCH, Prior
+from isp.ple.residual_lines import blend_with_lines
 from isp.ple.tables import PILOT_ERROR, Sampling
 from isp.ple.twicing import twice_colours
 from isp.ple.units import readings

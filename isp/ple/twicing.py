@@ -25,14 +25,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
-from isp.ple.guide import GUIDES
+from isp.ple.residual_lines import GUIDES
 from rodcone.types import Singles
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 CELL = 4  # pixels a side: a tile has at most as many
 REACH = 4  # cells on each side of one
-SURE = 1.5  # chi^2 up to which nothing is added: at 1 hues are a little nearer, and black has coloured clouds
+SURE = 1.5  # chi^2 up to which nothing is added: with 1, hues are a little nearer, but black has coloured clouds
 LIKELY_BIAS = 0.5  # of a colour's estimate, standard deviation [share of its light]
 ALIKE = 1.0  # between cells of one colour [units of a sample's noise]
 TOGETHER = 16  # rows of cells that are worked on together
@@ -41,7 +41,7 @@ _LEAST = np.float32(1e-12)
 
 
 def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
-    """Add to each colour what samples of like places hold beyond the estimate.
+    """Add to each colour the mean of what samples in similar places hold beyond the estimate.
 
     Parameters
     ----------
@@ -67,24 +67,25 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     def variance_of(light: Singles) -> Singles:
         return np.asarray(shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
 
-    off = np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0))
-    count, residual = _sums(sites), _sums(off)
+    residuals = np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0))
+    n, r = _sums(sites), _sums(residuals)
     of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
-    mean, like = _sums(planes) / of_cell, _sums(stable) / of_cell
+    mean, x = _sums(planes) / of_cell, _sums(stable) / of_cell
     light = np.maximum(mean, 0.0)
-    spread = _sums(off * off) - residual**2 / np.maximum(count, 1.0)
+    # Where residuals spread more than noise makes them, there is no even surface.
+    spread = _sums(residuals * residuals) - r**2 / np.maximum(n, 1.0)
     surface = np.all(spread < LAMP_SIGMAS**2 * variance_of(light), axis=-1, keepdims=True)
-    count, residual = count * surface, residual * surface
-    variance = count * variance_of(light)
+    n, r = n * surface, r * surface
+    variance = n * variance_of(light)
 
     sides = ((REACH, REACH), (REACH, REACH), (0, 0))
-    wide = [np.pad(values, sides, mode="symmetric") for values in (like, residual, count, variance)]
+    wide = [np.pad(values, sides, mode="symmetric") for values in (x, r, n, variance)]
     bias = np.empty_like(mean)
 
     def strip(first: int) -> None:
         rows = slice(first, first + TOGETHER)
         bias[rows] = _bias(
-            like[rows], [values[first : first + TOGETHER + 2 * REACH] for values in wide], light[rows], guide, colours
+            x[rows], [values[first : first + TOGETHER + 2 * REACH] for values in wide], light[rows], guide, colours
         )
 
     with ThreadPoolExecutor(cpu_count()) as threads:
@@ -96,30 +97,41 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
         planes[..., c] = np.maximum(planes[..., c] + added, np.minimum(planes[..., c], 0.0))  # no light is the least
 
 
-def _bias(like: Singles, wide: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
-    """Shrunken d_c of each cell [e-], 0 in the guide; `wide` holds likeness, residuals, counts and variances."""
-    others, *parts = wide
-    height, width = like.shape[:2]
-    residual, count, variance = (np.zeros_like(like) for _ in range(3))
+def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
+    """Return the shrunken d_c of each cell [e-], 0 in the guide.
+
+    Parameters
+    ----------
+    x : (row, column, channel) float32
+        Mean estimate of each cell [units of noise].
+    wide : list of arrays
+        x, the sums r_c of residuals, the counts n_c and n_c times the variance of a sample, with `REACH` cells around.
+    light : like `x`
+        The mean estimate x_c [e-], 0 or more.
+    guide, colours : int, and list of int
+        Which channels they are.
+    """
+    x_wide, *sums_wide = wide
+    height, width = x.shape[:2]
+    r, n, variance = (np.zeros_like(x) for _ in range(3))
     for dy, dx in np.ndindex(2 * REACH + 1, 2 * REACH + 1):
         window = slice(dy, dy + height), slice(dx, dx + width)
-        off = others[window] - like
-        weight = np.exp(np.vecdot(off, off) * np.float32(-0.5 / ALIKE**2))[..., None]
-        for total, values, by in zip(
-            (residual, count, variance), parts, (weight, weight, weight * weight), strict=True
-        ):
+        difference = x_wide[window] - x
+        w = np.exp(np.vecdot(difference, difference) * np.float32(-0.5 / ALIKE**2))[..., None]
+        for total, values, by in zip((r, n, variance), sums_wide, (w, w, w * w), strict=True):
             np.add(total, by * values[window], out=total)
-    count = np.maximum(count, _LEAST)
-    mean = residual / count
-    variance = variance / count**2
+    n = np.maximum(n, _LEAST)
+    b = r / n
+    variance = variance / n**2
+    # x_c / x_g, the guide's light at least its standard deviation
     guide_light = np.maximum(light[..., guide], np.sqrt(variance[..., guide]))[..., None] + _LEAST
     share = light / guide_light
-    off = mean - share * mean[..., guide, None]
-    error = variance + share**2 * variance[..., guide, None] + _LEAST
-    square = (off[..., colours] ** 2 / error[..., colours]).mean(axis=-1, keepdims=True)
-    known = (np.float32(LIKELY_BIAS) * light) ** 2
-    off *= np.maximum(1.0 - SURE / np.maximum(square, _LEAST), 0.0) * known / (known + error)
-    result = np.maximum(off, -light)
+    d = b - share * b[..., guide, None]
+    d_variance = variance + share**2 * variance[..., guide, None] + _LEAST
+    chi2 = (d[..., colours] ** 2 / d_variance[..., colours]).mean(axis=-1, keepdims=True)
+    prior_variance = (np.float32(LIKELY_BIAS) * light) ** 2
+    d *= np.maximum(1.0 - SURE / np.maximum(chi2, _LEAST), 0.0) * prior_variance / (prior_variance + d_variance)
+    result = np.maximum(d, -light)
     result[..., guide] = 0.0
     return np.asarray(result, np.float32)
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from isp.ple import guide, pyramid
+from isp.ple import pyramid, residual_lines
 from isp.ple.prior import own_prior
 from sensor.cfa import BAYER, MOSAICS, RGBW, Tile, channels, mask
 from sensor.raw import RawImage
@@ -24,7 +24,7 @@ def test_a_colour_that_is_a_line_of_the_guide_is_that_line_whatever_the_estimate
     names, white = channels(RGBW), planes[..., 3].copy()
     for c, name in enumerate(names[:3]):
         planes[..., c] = np.where(mask(RGBW, name, white.shape), (0.5, 1.0, 0.2)[c] * white + 30, planes[..., c])
-    guide.blend_with_lines(planes, RGBW, np.ones(4), [0.0] * 4, coloured)
+    residual_lines.blend_with_lines(planes, RGBW, np.ones(4), [0.0] * 4, coloured)
     for c, (slope, least) in enumerate(((0.5, 30), (1.0, 30), (0.2, 30))):
         np.testing.assert_allclose(planes[..., c], slope * white + least, atol=2.0)
 
@@ -34,7 +34,7 @@ def test_an_estimate_stays_where_neighbouring_samples_say_opposites():
     planes = planes_of(RGBW)
     y, x = np.indices(planes.shape[:2]) // 2
     planes[..., 3], planes[..., 0] = 500, np.where(mask(RGBW, "R", y.shape), 200 + 200 * ((x + y) % 2), 310)
-    guide.blend_with_lines(planes, RGBW, np.ones(4), [0.0] * 4, coloured)
+    residual_lines.blend_with_lines(planes, RGBW, np.ones(4), [0.0] * 4, coloured)
     inside = np.s_[8:-8, 8:-8]
     np.testing.assert_allclose(planes[..., 0][inside][~mask(RGBW, "R", y.shape)[inside]], 310, atol=0.2)
 
@@ -43,13 +43,13 @@ def test_an_estimate_stays_where_neighbouring_samples_say_opposites():
 def test_samples_and_guide_stay_and_strips_change_nothing(monkeypatch, tile):
     planes = planes_of(tile)
     before, twice = planes.copy(), planes.copy()
-    guide.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, coloured)
+    residual_lines.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, coloured)
     kept = np.stack([mask(tile, name, planes.shape[:2]) for name in channels(tile)], axis=-1)
     kept[..., channels(tile).index("W" if tile is RGBW else "G")] = True
     np.testing.assert_array_equal(planes[kept], before[kept])
     assert not np.any(planes[~kept] == before[~kept])
-    monkeypatch.setattr(guide, "TOGETHER", 20)
-    guide.blend_with_lines(twice, tile, np.ones(4), [0.0] * 4, coloured)
+    monkeypatch.setattr(residual_lines, "TOGETHER", 20)
+    residual_lines.blend_with_lines(twice, tile, np.ones(4), [0.0] * 4, coloured)
     np.testing.assert_array_equal(twice, planes)
 
 
@@ -57,7 +57,7 @@ def test_samples_and_guide_stay_and_strips_change_nothing(monkeypatch, tile):
 def test_mosaics_without_a_guide_or_a_colour_on_one_site_are_left_alone(tile):
     planes = planes_of(tile)
     before = planes.copy()
-    guide.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, coloured)
+    residual_lines.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, coloured)
     np.testing.assert_array_equal(planes, before)
 
 
@@ -65,7 +65,7 @@ def test_mosaics_without_a_guide_or_a_colour_on_one_site_are_left_alone(tile):
 def test_the_estimate_stays_where_the_light_is_grey(tile):
     planes = planes_of(tile)
     before = planes.copy()
-    guide.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, lambda values: np.full(values.shape, 7.0))
+    residual_lines.blend_with_lines(planes, tile, np.ones(4), [0.0] * 4, lambda values: np.full(values.shape, 7.0))
     np.testing.assert_array_equal(planes, before)
 
 
@@ -78,7 +78,7 @@ def test_fine_grey_stripes_are_as_near_to_the_truth_as_the_prior_takes_them(monk
     held = sum(mask(BAYER, name, light.shape) * truth[..., "RGBW".index(name)] for name in channels(BAYER))
     raw = RawImage(np.random.default_rng(3).poisson(held) + 200.0, BAYER, 200.0, 60_000.0, 1.0, 1.5, 0.0, 0.0, 0.01)
     errors = []
-    for step in (guide.blend_with_lines, lambda *_: None):
+    for step in (residual_lines.blend_with_lines, lambda *_: None):
         monkeypatch.setattr(pyramid, "blend_with_lines", step)
         planes, _ = pyramid.reconstruct(raw, own_prior(), neutral_e)
         errors.append(np.mean(((planes - truth[..., :3]) / neutral_e[:3]) ** 2))
@@ -100,7 +100,7 @@ def test_slanted_stripes_of_strong_colours_are_nearer_to_the_truth(monkeypatch, 
     held = np.random.default_rng(2).poisson(held)
     raw = RawImage(held + 200.0, tile, 200.0, 60_000.0, 1.0, 1.5, 0.0, 0.0, 0.01)
     errors = []
-    for step in (guide.blend_with_lines, lambda *_: None):
+    for step in (residual_lines.blend_with_lines, lambda *_: None):
         monkeypatch.setattr(pyramid, "blend_with_lines", step)
         planes, _ = pyramid.reconstruct(raw, own_prior(), own_prior().neutral_e)
         errors.append(np.sqrt(np.mean(((planes - truth)[..., :3] / own_prior().neutral_e[:3]) ** 2)))
