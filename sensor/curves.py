@@ -92,7 +92,7 @@ def rgbw() -> Responses:
 
 @cache
 def built_in() -> Responses:
-    """`rgbw`'s curves, and those of C and Y that `with_channels` makes of them."""
+    """Return the project's own curves: R, G, B and W of `rgbw`, and C and Y as `with_channels` derives them."""
     return with_channels(rgbw(), ("C", "Y"))
 
 

@@ -35,9 +35,9 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
     component = np.zeros(count, np.int16)
     misfit = np.empty(count, np.float32)
     width = size if noise is None else size + 4
-    # Arrays are made once: fresh memory costs as much as the sums.
+    # These arrays are reused for all blocks, because allocating them anew would take as long as the sums.
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
-    # Without a pilot patches are few.
+    # Without a pilot there are few patches, so that every component is a candidate.
     candidates = np.ones((len(components.quick), count), bool) if noise is None else _candidates(components, evidence)
     components.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):

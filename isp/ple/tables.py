@@ -96,13 +96,13 @@ def window(size: int) -> Singles:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """What takes a patch's evidence to numbers of variance 1, if the patch is of one component.
+    """Linear map from a patch's evidence to independent numbers of variance 1, for a patch of one component.
 
     Attributes
     ----------
     reads : (sample + 5, sample + 4) float32
-        On the samples, 1, and the pilot's means; gives whitened samples, and the pilot's innovations in four directions
-        that are independent given the samples.
+        Applied to the samples, 1 and the pilot's means. It gives whitened samples and the pilot's innovations (what the
+        samples don't predict of it) in four directions that are independent given the samples.
     log_scale : float
         Log likelihood of samples at the component's mean, its weight included.
     spread : (4,) float64
@@ -119,7 +119,7 @@ class Whitening:
 
 @dataclass(frozen=True, eq=False)
 class Among:
-    """A mixture's moments of which a sampling's tables are made, whatever the light.
+    """Moments of a mixture that don't depend on the light, from which the tables of a sampling are made.
 
     Attributes
     ----------
@@ -139,8 +139,8 @@ class Among:
 class Table:
     """All components at one light, and the quick likelihood that picks among them.
 
-    What tells a component exactly, and its estimator, are made when a patch first asks for them: most tables are asked
-    for a quarter of their components.
+    A component's whitening and estimator are made when a patch first needs them, because most tables need only one in
+    four of their components.
     """
 
     def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
@@ -186,9 +186,10 @@ class Table:
         self._estimators: dict[int, Estimator] = {}
 
     def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
-        """Log likelihood of samples and pilot in `DIRECTIONS` directions and the rest's length.
+        """Return the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
 
-        It is one matrix on products of coordinates.
+        The other directions count by their summed squares alone. The likelihood of all components is then one matrix
+        times the products of pairs of coordinates, the coordinates, that sum, and 1.
         """
         at = self.rows
         own = len(self.rows)
@@ -233,7 +234,7 @@ class Table:
         return self._whitenings[k]
 
     def make_whitenings(self, components: Sequence[int]) -> None:
-        """Make those that aren't made yet: together they take a third of the time."""
+        """Make the whitenings that don't exist yet; made together they take a third of the time."""
         ks = [k for k in components if k not in self._whitenings]
         if not ks:
             return
@@ -288,7 +289,7 @@ class Table:
         covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
         half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
         linear = half @ factor
-        # What is left given the samples: of every pixel, of the pilot's means and of the middle's.
+        # Posterior covariances given the samples: of every pixel, of the pilot's means and of the middle's.
         variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
         means = np.concatenate([self.average, self.inner])
         left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T

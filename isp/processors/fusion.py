@@ -111,7 +111,8 @@ def tent_means(values: Plane, cfa: Tile, channel: str) -> Plane:
 def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
     """W's luminance with the colours' differences; where W is full, with their ratios.
 
-    Differences that belong to a much larger luminance than a full W can tell would turn noise into colour.
+    A full W says only that the luminance is at least so much. Differences that belong to a much larger luminance would
+    then turn noise into colour, which ratios don't.
     """
     of_colours = luminance_of_srgb(rgb)
     scale = np.where(of_colours > luminance, luminance / np.maximum(of_colours, 1e-12), 1.0)

@@ -282,7 +282,7 @@ def _check_geometry(header: Mapping[str, Any]) -> None:
 
 
 def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
-    """Height and width, once memory for all channels may be taken."""
+    """Return height and width, or raise `InputError` if all channels would need more memory than is allowed."""
     kind, channels = header["type"], header["channels"]
     if kind not in (OpenEXR.scanlineimage, OpenEXR.tiledimage):
         raise InputError(f"it holds deep data ({kind}); allowed: one value a pixel; flatten it")

@@ -6,7 +6,7 @@ from math import ceil
 from studies.budget.scaled_effects import ScaledEffects
 from studies.study.study import BudgetShares, Condition
 
-FEWEST_SPP = 128  # fewer samples are less even than the pilot's, by which their noise is predicted
+FEWEST_SPP = 128  # with fewer, samples are spread less evenly than the pilot's, from which their noise is predicted
 
 
 def samples_per_pixel(

@@ -135,8 +135,8 @@ def _where(levels: Sequence[str], first: int, last: int) -> str:
 def in_light(pair: Pair) -> str:
     """Say how much less light the better one needs for the other's PSNR, and in which light nobody sees a difference.
 
-    Nothing is said where nothing is seen at any level, nor where the sweep can't tell, its levels don't rise or one
-    isn't known.
+    It says nothing if no difference is visible at any level, or if the sweep can't tell: because its levels don't rise,
+    or one of them isn't known.
     """
     lights = [light for light in pair.light_cd_m2 if light]
     if len(lights) < max(2, len(pair.levels)) or lights != sorted(set(lights)):

@@ -168,7 +168,7 @@ def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exp
 
 
 def _reconstruction(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exposure_s: float) -> Stage:
-    """Compare neighbourhoods and patches with the noise-free channels."""
+    """Measure the error of the reconstruction by neighbourhood and patch, against the noise-free channels."""
     raw = _capture(bench, sensor, radiance, exposure_s)()
     noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
     truth = channel_electrons(form_image(radiance, sensor), sensor, exposure_s)

@@ -26,7 +26,7 @@ FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart
 APART = 9.0  # squared standard deviations by which a sample stands out of its plane
 # Contrast from which on light is small: at 1 edges of windows show their tile, at 2 halos of lamps have 15 % more hues.
 SMALL = 1.5
-FEW = 4.0  # samples; more tell a plane's light: with 1 lamps have hues, with more walls have the window's
+FEW = 4.0  # samples; a plane that averages more is trusted. With 1, lamps get hues; with more, walls get the window's
 UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
 TINY = 1e-9  # where there is neither light nor noise
 # Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
