@@ -257,7 +257,14 @@ def render(
     denoise: bool = False,
 ) -> Transport: ...
 def score(
-    sensor: _Sensor, light: str = "D65", exposure_s: _Seconds = 0.033, only: Sequence[str] = (), seed: int = 0
+    sensor: _Sensor,
+    light: str = "D65",
+    exposure_s: _Seconds = 0.033,
+    only: Sequence[str] = (),
+    seed: int = 0,
+    *,
+    processor: str | None = None,
+    trust_code: bool = False,
 ) -> list[Merit]: ...
 def snr(electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = None) -> Floats: ...
 def sweep(

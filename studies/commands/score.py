@@ -32,6 +32,8 @@ def score(
     exposure: Time = 0.033,
     f_number: float | None = None,
     diffraction: float | None = None,
+    processor: str | None = None,
+    trust_code: bool = False,
     sweep: bool = False,
     seed: int = 0,
     out: Path | None = None,
@@ -40,8 +42,8 @@ def score(
     """Print a camera's figures of merit, each in closed form beside the same figure measured on simulated frames.
 
     Conversion (ISO 14524), speeds (ISO 12232), SNR10 and SNR1s, dynamic range and SNR (ISO 15739), stops, bits and
-    low-light speed as test houses print them, flare (ISO 9358), sharpness (ISO 12233, IEEE 1858), contrast transfer
-    accuracy (IEEE 2020), colour (ISO 17321), and the figures of EMVA 1288.
+    low-light speed as test houses print them, flare (ISO 9358), sharpness (ISO 12233, IEEE 1858), texture (ISO/TS
+    19567), contrast transfer accuracy (IEEE 2020), colour (ISO 17321), and the figures of EMVA 1288.
 
     Parameters
     ----------
@@ -57,6 +59,10 @@ def score(
         F-number of the lens; the preset's own by default.
     diffraction
         Width of the lens's point image over an ideal one's, 0 for none; the preset's own by default.
+    processor
+        Measure pictures developed by it as well: of rodcone list processors, or mine.py:develop.
+    trust_code
+        Run the Python file that --processor names; it may do all that you may.
     sweep
         Print the signal-to-noise ratio and the accuracy of contrast over light instead.
     seed
@@ -66,20 +72,26 @@ def score(
     json
         Print one JSON object: a list of figures for each sensor.
     """
+    # What was asked for.
     require_range("exposure", exposure, 1e-9, 1e6, "give a time such as 33ms")
     require_place(out, ".html", ".csv")
     if len(sensors) > MOST_SENSORS:
         raise InputError(f"sensors: {len(sensors)} are too many; allowed: {MOST_SENSORS}; score them in two calls")
+    if sweep and processor:
+        raise InputError(
+            "processor: one beside --sweep, which is of raw samples; allowed: one of the two; leave one out"
+        )
     if sweep and only:
         raise InputError("only: figures beside --sweep, which has its own; allowed: one of the two; leave one out")
     cameras = {name: _with_lens(preset(name), f_number, diffraction) for name in sensors}
     if sweep:
         _print_sweep(cameras, light, exposure, seed, out, json=json)
         return
+    # Figures, and where they go.
     found = {}
     for name, sensor in cameras.items():
         say(f"{name}: measuring, some 10 s" if not only else f"{name}: measuring")
-        found[name] = merits_of(sensor, light, exposure, only or (), seed)
+        found[name] = merits_of(sensor, light, exposure, only or (), seed, processor=processor, trust_code=trust_code)
     if out is not None and out.suffix.lower() == ".html":
         curves = {name: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}
         lens = "; ".join(f"{name} at f/{sensor.lens.f_number:g}" for name, sensor in cameras.items())

@@ -60,7 +60,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     matrix = calibrate(plain, known.lamp).to_srgb
     named = color_checker_reflectances()
     surfaces = np.array([held(x).band_average(known.wavelength_nm, known.width_nm) for _, x in named])
-    true_lab = _true_lab(surfaces, known)
+    standard_lab = true_lab(surfaces, known)
     signals = _signals(plain, known, surfaces)
     chart_e = _chart_e(plain, known, surfaces, exposure_s)
     white = f"white at {100 * WHITE_SHARE:.0f} % of the top"
@@ -69,7 +69,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     def errors(measured: Floats) -> tuple[Floats, Floats]:
         balanced = measured[:, :3] / signals[-1, :3]
         lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
-        return np.asarray(deltaE_ciede2000(true_lab, lab)), np.asarray(deltaE_cie76(true_lab, lab))
+        return np.asarray(deltaE_ciede2000(standard_lab, lab)), np.asarray(deltaE_cie76(standard_lab, lab))
 
     # The same on frames, less the chip's dark. A noisy camera takes several, for differences of colour are curved.
     frames = int(np.clip((plain.read_noise_e / plain.top_e / FRAMES_SHARE) ** 2, 1, MOST_FRAMES))
@@ -109,7 +109,8 @@ def _figures(ciede2000: Floats, cielab: Floats) -> list[float]:
     return [100 - INDEX_FACTOR * float(cielab[:-GREYS].mean()), float(ciede2000.mean())]
 
 
-def _true_lab(surfaces: Floats, light: Light) -> Floats:
+def true_lab(surfaces: Floats, light: Light) -> Floats:
+    """Return CIELAB of surfaces under a light that the standard observer is adapted to, (surface, 3)."""
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
     xyz = tristimulus(surfaces * light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
     return np.asarray(xyz2lab(adapt_to_d65(xyz, white) / white[1]))

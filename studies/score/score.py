@@ -10,6 +10,7 @@ from sensor.readings.resolve import at_channel, chip_readings
 from studies.metrics.truth import named_light
 from studies.score.colour import colour_figures
 from studies.score.contrast import contrast_figures
+from studies.score.developed import developed_figures
 from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit, measured
 from studies.score.flare import flare
@@ -17,6 +18,8 @@ from studies.score.noise_figures import field_words, noise_figures
 from studies.score.output_speeds import output_speeds
 from studies.score.print_figures import print_figures
 from studies.score.sharpness import sharpness
+from studies.score.texture import texture
+from studies.score.visual_noise import raw_visual_noise
 
 # Groups of figures, by the first part of their names.
 GROUPS = (
@@ -28,17 +31,26 @@ GROUPS = (
     "print",
     "iso_9358",
     "iso_12233",
+    "iso_19567",
     "ieee_1858",
     "ieee_2020",
     "iso_17321",
     "color_checker",
     "emva_1288",
+    "developed",
 )
 NORMAL_95 = 1.959964  # standard errors on either side, of an interval of 95 %
 
 
 def score(
-    sensor: SensorConfig, light: str = "D65", exposure_s: float = 0.033, only: Sequence[str] = (), seed: int = 0
+    sensor: SensorConfig,
+    light: str = "D65",
+    exposure_s: float = 0.033,
+    only: Sequence[str] = (),
+    seed: int = 0,
+    *,
+    processor: str | None = None,
+    trust_code: bool = False,
 ) -> list[Merit]:
     """Compute a camera's figures of merit, and measure each on simulated frames.
 
@@ -53,6 +65,10 @@ def score(
         Groups, such as ``iso_12232``, or whole names; all figures by default.
     seed : int
         Of the chips and frames.
+    processor : str, optional
+        Of `rodcone.processors()`, or ``mine.py:develop``: whose pictures are measured too (``developed``).
+    trust_code : bool
+        Consent to run ``mine.py``, which may do all that its user may.
 
     Returns
     -------
@@ -63,7 +79,8 @@ def score(
     Raises
     ------
     InputError
-        For a name that isn't known, or a seed below 0.
+        For a name that isn't known, ``developed`` without a processor, a seed below 0, or a processor that is unknown
+        or a file of one's own without consent.
 
     Examples
     --------
@@ -76,9 +93,12 @@ def score(
     for name in only:
         if name.partition(".")[0] not in GROUPS:
             raise InputError(f"only: {name!r} is not known; allowed: {', '.join(GROUPS)}; write one of them")
-    found = [
-        merit for definition in definitions(sensor, light, exposure_s, only) for merit in measured(definition, seed)
-    ]
+    if processor is None and any(name.partition(".")[0] == "developed" for name in only):
+        raise InputError("only: 'developed' without a processor; allowed beside one; name it, as --processor ple")
+    wanted = list(definitions(sensor, light, exposure_s, only))
+    if processor is not None and _group_wanted("developed", only):
+        wanted += developed_figures(sensor, light, exposure_s, processor, trust_code=trust_code)
+    found = [merit for definition in wanted for merit in measured(definition, seed)]
     if _group_wanted("emva_1288", only):
         found += _emva(sensor, exposure_s, seed)
     return [merit for merit in found if _wanted(merit.name, only)]
@@ -104,8 +124,12 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield from print_figures(field, field_words(field, light))
     if _group_wanted("iso_9358", only):
         yield flare(sensor, light, exposure_s, channel)
+    if _group_wanted("iso_15739", only):
+        yield raw_visual_noise(sensor, light, exposure_s)
     if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858")):
         yield sharpness(sensor, light, exposure_s, channel)
+    if _group_wanted("iso_19567", only):
+        yield texture(sensor, light, exposure_s, channel)
     if _group_wanted("ieee_2020", only):
         yield from contrast_figures(sensor, light, exposure_s, channel)
     if any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):

@@ -34,10 +34,12 @@ CSF_POWER, CSF_DECAY = 0.8, 0.2
 
 def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the figures of an edge that one channel sees at every pixel."""
-    seen = _every_pixel(sensor, channel)
+    seen = every_pixel(sensor, channel)
     bands = bands_of(light)
     edge_e = _edge_electrons(seen, bands, exposure_s)
-    frequency, mtf = _windowed(_transfer(seen, bands, exposure_s))
+    angle = np.radians(ANGLE_DEG)
+    along, down = GRID * np.cos(angle), GRID * np.sin(angle)
+    frequency, mtf = _windowed(transfer_at(seen, bands, exposure_s, along, down))
     lens = seen.lens
     blur = f"diffraction {lens.diffraction:g}, defocus {lens.defocus_um:g} um"
     words = (
@@ -47,7 +49,7 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
 
     def figures(edge: EdgeResponse) -> list[float]:
         shown = edge.frequency_cycles_per_px, edge.mtf
-        return [edge.mtf50_cycles_per_px, float(np.interp(0.25, *shown)), _acutance(*shown)]
+        return [edge.mtf50_cycles_per_px, float(np.interp(0.25, *shown)), acutance(*shown)]
 
     def measure(rng: np.random.Generator) -> list[float]:
         first, second = (
@@ -73,13 +75,13 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
             "1",
             "IEEE 1858 (CPIQ): MTF weighted by the contrast sensitivity, up to Nyquist",
             f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree, the display taken as perfect",
-            _acutance(frequency, mtf),
+            acutance(frequency, mtf),
         ),
     )
     return Definition(merits, measure)
 
 
-def _every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
+def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
     """Return the camera whose every pixel is the channel's, with a lens that an even part of the picture sees."""
     plain = with_tile(sensor, (channel,), sensor.responses)
     return replace(plain, lens=replace(plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
@@ -94,16 +96,21 @@ def bands_of(light: str) -> Light:
 def _edge_electrons(sensor: SensorConfig, bands: Light, exposure_s: float) -> Floats:
     """Return an edge's expected photo-electrons, the bright side at a share of the well."""
     samples = least_samples(sensor)
-    coverage = edge_coverage(SIDE_PX * sensor.sites * samples)
-    reflectance = (1 + (CONTRAST - 1) * coverage) / CONTRAST
-    radiance = SpectralRadiance(
-        (reflectance[..., None] * bands.spectrum).astype(np.float32),
-        bands.wavelength_nm,
-        width_nm=bands.width_nm,
-        light=bands.lamp,
-    )
+    radiance = grey_radiance(edge_reflectance(SIDE_PX * sensor.sites * samples), bands)
     electrons = expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s)
     return np.asarray(electrons * BRIGHT_SHARE * sensor.top_e / sensor.sites**2 / electrons.max())
+
+
+def edge_reflectance(side: int) -> Floats:
+    """Return reflectances of an edge through the middle of side x side squares, 1 on its bright side."""
+    return np.asarray((1 + (CONTRAST - 1) * edge_coverage(side)) / CONTRAST)
+
+
+def grey_radiance(reflectance: Floats, bands: Light) -> SpectralRadiance:
+    """Light a chart of reflectances, (h, w) of grey or (h, w, band)."""
+    lit = reflectance if reflectance.ndim == 3 else reflectance[..., None]
+    values = (lit * bands.spectrum).astype(np.float32)
+    return SpectralRadiance(values, bands.wavelength_nm, width_nm=bands.width_nm, light=bands.lamp)
 
 
 def edge_coverage(side: int) -> Floats:
@@ -125,18 +132,17 @@ def edge_coverage(side: int) -> Floats:
     return np.asarray((ramp(wide) - ramp(narrow) - ramp(-narrow) + ramp(-wide)) / (2 * cosine * sine))
 
 
-def _transfer(sensor: SensorConfig, bands: Light, exposure_s: float) -> Floats:
-    """Return the transfer of lens, pixel aperture and crosstalk across the edge at `GRID` [cycles per raw pixel]."""
+def transfer_at(sensor: SensorConfig, bands: Light, exposure_s: float, along: Floats, down: Floats) -> Floats:
+    """Return the transfer of lens, pixel aperture and crosstalk at frequencies along and down [cycles/px]."""
     weights = electrons_per_irradiance(sensor, bands.wavelength_nm, bands.width_nm, exposure_s, bands.lamp)[0]
     weights = weights * bands.spectrum
-    angle, share = np.radians(ANGLE_DEG), sensor.pixel.crosstalk
-    along, down = GRID * np.cos(angle), GRID * np.sin(angle)
+    share = sensor.pixel.crosstalk
     spread = 1 - 4 * share + 2 * share * (np.cos(2 * np.pi * along) + np.cos(2 * np.pi * down))
-    per_um = np.abs(GRID) / sensor.pixel.pitch_um
+    per_um = np.hypot(along, down) / sensor.pixel.pitch_um
     lens = defocus_otf(per_um, sensor.lens.defocus_um)
     if sensor.lens.diffraction:
-        by_band = np.array([diffraction_otf(per_um, nm, sensor.lens) for nm in bands.wavelength_nm])
-        lens = lens * (weights @ by_band) / weights.sum()
+        by_band = [diffraction_otf(per_um, nm, sensor.lens) for nm in bands.wavelength_nm]
+        lens = lens * np.tensordot(weights / weights.sum(), np.array(by_band), axes=1)
     return np.asarray(lens * np.sinc(along) * np.sinc(down) * spread)
 
 
@@ -155,7 +161,7 @@ def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
     return GRID[middle : last + 1], np.abs(shown[middle : last + 1] / shown[middle])
 
 
-def _acutance(frequency: Floats, mtf: Floats) -> float:
+def acutance(frequency: Floats, mtf: Floats) -> float:
     """Return the integral of sensitivity x transfer over that of the sensitivity, both up to Nyquist."""
     grid = np.linspace(0.0, 0.5, 501)
     per_degree = grid * PIXELS_PER_DEGREE

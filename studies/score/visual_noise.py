@@ -1,0 +1,103 @@
+"""Visual noise: how the eye sees an even field's noise, in closed form beside simulated frames.
+
+Like ISO 15739:2013, annex B: the picture's XYZ is blurred as the eye does in opponent planes, and the standard
+deviations of CIELUV are added, V = s(L*) + 0.852 s(u*) + 0.323 s(v*). The blur is that of S-CIELAB, on which the
+standard's is based; its own table of sensitivities, and the CIELAB form of 2023, were not at hand.
+"""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+from numpy.typing import NDArray
+from skimage.color.colorconv import xyz2luv
+
+from rodcone.colour_spaces import SRGB_TO_XYZ
+from rodcone.types import Floats
+from sensor.config import SensorConfig
+from sensor.readings.noise import merged_variances
+from sensor.readings.resolve import several
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, XYZ_TO_OPPONENT, eye_xyz, transfer
+from studies.metrics.truth import GREY, named_light
+from studies.photograph.camera import calibrate
+from studies.score.even_field import SIDE_PX, EvenField, even_field
+from studies.score.figure import Definition, Merit, not_measured
+from studies.score.sharpness import every_pixel
+
+WEIGHTS = np.array([1.0, 0.852, 0.323])  # of L*, u* and v*
+WHITE_SHARE = 0.7  # of the well, in the channel that fills first
+COLUMNS = ("column gains", "column offsets")  # sources that all pixels of a column share
+STANDARD = "like ISO 15739:2013, annex B: s(L*) + 0.852 s(u*) + 0.323 s(v*)"
+STEP = 1e-6  # of XYZ, for the slopes of CIELUV
+
+
+def visual_noise(linear: NDArray[np.float64]) -> float:
+    """Measure the visual noise of an even field's picture, linear sRGB (h, w, 3) in which white is 1."""
+    luv = xyz2luv(np.clip(eye_xyz(linear @ SRGB_TO_XYZ.T), 0.0, None))
+    return float(WEIGHTS @ luv.reshape(-1, 3).std(axis=0))
+
+
+def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Definition:
+    """Define the visual noise of a camera whose pixels have all three colours, developed by its matrix alone."""
+    names = sensor.channels[:3]
+    merit = Merit(
+        "iso_15739.visual_noise",
+        "visual noise of 18 % grey",
+        "1",
+        STANDARD,
+        f"{', '.join(names)} at every pixel, balanced on {light} and taken to sRGB by the matrix, white at "
+        f"{100 * WHITE_SHARE:.0f} % of the well, the eye's blur of S-CIELAB, {PIXELS_PER_DEGREE:.0f} pixels per degree",
+        nan,
+    )
+    if len(names) < 3:
+        return Definition((replace(merit, missing="the mosaic tells no colours"),), not_measured)
+    known = named_light(light)
+    fields = [even_field(every_pixel(sensor, name), known, exposure_s, name) for name in names]
+    matrix = calibrate(sensor, known.lamp).to_srgb
+    white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
+    whites_e = np.array([white_cd_m2 * field.electrons_per_cd_m2 for field in fields])
+
+    def measure(rng: np.random.Generator) -> list[float]:
+        planes = [
+            field.samples_e(field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)).reshape(SIDE_PX, SIDE_PX)
+            for field in fields
+        ]
+        return [visual_noise(np.stack(planes, axis=-1) / whites_e @ matrix.T)]
+
+    variances = np.array(
+        [
+            _variances(field, GREY * white_e) / white_e**2
+            for field, white_e in zip(fields, whites_e.tolist(), strict=True)
+        ]
+    )
+    return Definition((replace(merit, computed=_expected(variances, matrix)),), measure)
+
+
+def _variances(field: EvenField, electrons: float) -> Floats:
+    """Return the variances that each pixel has by itself, and that a column's pixels share [e-^2]."""
+    light_e, readings = np.array([electrons]), field.readings
+    if several(readings):
+        by_source = {name: float(values[0]) for name, values in merged_variances(light_e, readings).items()}
+    else:
+        by_source = {name: float(law.variance(light_e)[0]) for name, law in readings[0].sources.items()}
+    shared = sum(by_source[name] for name in COLUMNS)
+    return np.array([sum(by_source.values()) - shared, shared])
+
+
+def _expected(variances: Floats, matrix: Floats) -> float:
+    """Return the visual noise of relative variances of the channels, (channel, 2): of pixels, and of columns.
+
+    In cosine space, where the eye's blur is a product, noise is the same at all frequencies, that of columns at those
+    that don't change down a column.
+    """
+    cycles = np.arange(SIDE_PX) / (2 * SIDE_PX) * PIXELS_PER_DEGREE
+    passed = np.stack([transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
+    passed[0, 0] = 0.0  # the mean isn't noise
+    kept = (np.einsum("hwi,hwj->ij", passed, passed) / SIDE_PX**2, passed[0].T @ passed[0] / SIDE_PX)
+    to_xyz = SRGB_TO_XYZ @ matrix
+    to_opponent, to_eye = XYZ_TO_OPPONENT @ to_xyz, np.linalg.inv(XYZ_TO_OPPONENT)
+    opponent = sum(to_opponent * of @ to_opponent.T * share for of, share in zip(variances.T, kept, strict=True))
+    grey = GREY * to_xyz.sum(axis=1)
+    slopes = (xyz2luv(grey + STEP * np.eye(3)) - xyz2luv(grey - STEP * np.eye(3))).T / (2 * STEP)
+    covariance = slopes @ to_eye @ opponent @ to_eye.T @ slopes.T
+    return float(WEIGHTS @ np.sqrt(np.diag(covariance)))

@@ -1,0 +1,118 @@
+"""Dead leaves, visual noise and developed pictures: known spectra, other libraries, a processor with closed forms."""
+
+from dataclasses import replace
+from math import sqrt
+from pathlib import Path
+
+import colour
+import numpy as np
+import pytest
+from refusal import refusal
+
+import rodcone as public
+from rodcone.colour_spaces import SRGB_TO_XYZ
+from studies.metrics.s_cielab import eye_xyz
+from studies.photograph.snr import snr
+from studies.score.dead_leaves import autocovariance, draw_leaves, texture_response
+from studies.score.figure import measured
+from studies.score.score import score
+from studies.score.visual_noise import raw_visual_noise, visual_noise
+
+
+@pytest.mark.thorough
+def test_drawn_leaves_have_the_autocovariance_of_the_closed_form() -> None:
+    """24 charts at five distances, five standard errors each: one in 350 000."""
+    samples, side = 2, 96
+    distances = np.array([0.0, 1.0, 3.0, 8.0, 20.0])
+    found = np.empty((24, distances.size))
+    for number in range(24):
+        chart = draw_leaves(side, samples, np.random.default_rng((7, number))) - 0.5
+        steps = (distances * samples).astype(int)
+        found[number] = [np.mean(chart[:, step:] * chart[:, : chart.shape[1] - step]) for step in steps]
+    expected = autocovariance(distances)
+    assert expected[0] == pytest.approx(0.9**2 / 12)
+    assert np.all(np.abs(found.mean(axis=0) - expected) < 5 * found.std(axis=0, ddof=1) / sqrt(24))
+    assert np.all(found.std(axis=0, ddof=1) / sqrt(24) < 0.05 * expected[0])
+
+
+def test_the_response_of_pixels_that_average_a_chart_is_their_apertures() -> None:
+    """sin(pi f) / (pi f) on either axis, around a circle; eight charts."""
+    side, samples = 96, 6
+    charts = [draw_leaves(side, samples, np.random.default_rng((8, number))) for number in range(8)]
+    seen = [texture_response(x.reshape(side, samples, side, samples).mean(axis=(1, 3)), x) for x in charts]
+    mtf = np.mean([x.mtf for x in seen], axis=0)
+    frequency = seen[0].frequency_cycles_per_px
+    turn = np.linspace(0, np.pi / 2, 91)
+    for at in (0.06, 0.12, 0.25, 0.4):
+        expected = np.mean(np.sinc(at * np.cos(turn)) * np.sinc(at * np.sin(turn)))
+        assert np.interp(at, frequency, mtf) == pytest.approx(expected, abs=0.015)
+
+
+def test_noise_leaves_the_texture_s_response_as_it_is() -> None:
+    """Of a picture with as much noise as contrast; five standard errors of 16 draws."""
+    side, samples, rng = 96, 4, np.random.default_rng(9)
+    chart = draw_leaves(side, samples, rng)
+    clean = chart.reshape(side, samples, side, samples).mean(axis=(1, 3))
+    alone = texture_response(clean, chart).mtf
+    noisy = np.array([texture_response(clean + rng.normal(0, 0.25, clean.shape), chart).mtf for _ in range(16)])
+    assert np.all(np.abs(noisy.mean(axis=0) - alone)[1:] < 5 * noisy.std(axis=0, ddof=1)[1:] / 4)
+
+
+def test_visual_noise_is_that_of_colour_science_s_cieluv() -> None:
+    rng = np.random.default_rng(10)
+    picture = 0.18 + rng.normal(0, 0.01, (32, 32, 3))
+    luv = colour.XYZ_to_Luv(eye_xyz(picture @ SRGB_TO_XYZ.T), colour.CCS_ILLUMINANTS["cie_2_1931"]["D65"])
+    by_hand = luv[..., 0].std() + 0.852 * luv[..., 1].std() + 0.323 * luv[..., 2].std()
+    assert visual_noise(picture) == pytest.approx(by_hand, rel=5e-3)
+    assert visual_noise(np.full((8, 8, 3), 0.18)) == pytest.approx(0.0, abs=1e-9)
+
+
+@pytest.mark.thorough
+def test_visual_noise_with_stripes_of_columns_is_what_frames_show() -> None:
+    """Within 12 standard errors of the mean of eight measurements: columns make stripes, which the eye sees best."""
+    sensor = public.low_noise()
+    striped = replace(sensor, pixel=replace(sensor.pixel, column_gain_spread=0.01))
+    (merit,) = measured(raw_visual_noise(striped, "D65", 0.033), 0)
+    (plain,) = raw_visual_noise(sensor, "D65", 0.033).merits
+    assert merit.computed > 1.2 * plain.computed
+    assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
+
+
+AS_READ = """
+import numpy as np
+
+def develop(raw, matrix, *, balance):
+    return np.repeat(raw.electrons[..., None], 3, axis=2)
+"""
+
+
+@pytest.mark.thorough
+def test_a_processor_that_passes_samples_on_has_the_raw_figures(tmp_path: Path) -> None:
+    """A person's own file, of a grey camera: its ratio and its sharpness are those of the pixels themselves."""
+    path = tmp_path / "mine.py"
+    path.write_text(AS_READ, "utf-8")
+    sensor = public.low_noise("mono")
+    found = score(
+        sensor,
+        only=["developed", "iso_12233", "iso_19567"],
+        processor=f"{path}:develop",
+        trust_code=True,
+        exposure_s=0.01,
+    )
+    rows = {row.name: row for row in found}
+    grey_e = np.array([0.18 * 0.7 * sensor.pixel.full_well_e])
+    expected_db = 20 * np.log10(snr(grey_e, sensor, 0.01)[0])
+    assert rows["developed.snr_18"].measured == pytest.approx(expected_db, abs=0.3)  # 8 times 6400 samples: 0.03
+    for name in ("mtf_half_nyquist", "acutance"):
+        raw = rows[f"iso_12233.{name}" if name != "acutance" else "iso_19567.texture_acutance"]
+        seen = rows[f"developed.{name}" if name != "acutance" else "developed.texture_acutance"]
+        assert seen.measured == pytest.approx(raw.computed, abs=0.02)
+    assert all(row.agrees is None for row in found if row.name.startswith("developed"))
+
+
+def test_processors_that_cannot_be_scored_are_refused(tmp_path: Path) -> None:
+    path = tmp_path / "mine.py"
+    path.write_text(AS_READ, "utf-8")
+    assert "--trust-code" in refusal(lambda: public.score("low_noise", only=["developed"], processor=f"{path}:develop"))
+    assert "without a processor" in refusal(lambda: public.score("low_noise", only=["developed"]))
+    assert "plee" in refusal(lambda: public.score("low_noise", only=["developed"], processor="plee"))
