@@ -33,6 +33,7 @@ GROUPS = (
     "iso_12233",
     "iso_19567",
     "ieee_1858",
+    "information",
     "ieee_2020",
     "iso_17321",
     "color_checker",
@@ -126,7 +127,7 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield flare(sensor, light, exposure_s, channel)
     if _group_wanted("iso_15739", only):
         yield raw_visual_noise(sensor, light, exposure_s)
-    if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858")):
+    if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858", "information")):
         yield sharpness(sensor, light, exposure_s, channel)
     if _group_wanted("iso_19567", only):
         yield texture(sensor, light, exposure_s, channel)

@@ -14,13 +14,18 @@ from sensor.config import SensorConfig, with_tile
 from sensor.device import draw_device
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency
 from sensor.optics import form_image, least_samples
+from sensor.readings.noise import collected_share
+from sensor.readings.resolve import at_channel, chip_readings, several
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.metrics.mtf import EdgeResponse, edge_response
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 from studies.metrics.truth import Light, light_in_bands
+from studies.photograph.snr import snr
 from studies.score.figure import Definition, Merit, without_noise_bias
+from studies.score.information import information, information_merits
 
 SIDE_PX = 192
+QUARTER_PX = SIDE_PX // 4  # columns at either side, whose noise is measured
 ANGLE_DEG, CONTRAST = 5.0, 4.0  # of ISO 12233's edge
 FRAMES = (
     8  # each of a chip of its own, whose mean is measured: noise lowers the first frequency at which a transfer is half
@@ -34,6 +39,7 @@ CSF_POWER, CSF_DECAY = 0.8, 0.2
 
 def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the figures of an edge that one channel sees at every pixel."""
+    # The camera, and the edge in closed form.
     seen = every_pixel(sensor, channel)
     bands = bands_of(light)
     edge_e = _edge_electrons(seen, bands, exposure_s)
@@ -47,17 +53,26 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
         f"f/{lens.f_number:g}, {blur}, crosstalk {seen.pixel.crosstalk:g}"
     )
 
-    def figures(edge: EdgeResponse) -> list[float]:
+    readings = at_channel(chip_readings(seen, exposure_s), channel)
+    levels_e = BRIGHT_SHARE * seen.top_e * np.array([1.0, 1 / CONTRAST])
+    bright_e, dark_e = levels_e.tolist()
+    noise_e2 = float(np.mean((levels_e / snr(levels_e, seen, exposure_s, channel)) ** 2))
+
+    def figures(edge: EdgeResponse, seen_noise_e2: float) -> list[float]:
         shown = edge.frequency_cycles_per_px, edge.mtf
-        return [edge.mtf50_cycles_per_px, float(np.interp(0.25, *shown)), acutance(*shown)]
+        told = information(*shown, bright_e, dark_e, seen_noise_e2)
+        return [edge.mtf50_cycles_per_px, float(np.interp(0.25, *shown)), acutance(*shown), *told]
 
     def measure(rng: np.random.Generator) -> list[float]:
-        first, second = (
-            np.mean([expose(edge_e, seen, exposure_s, chip, rng).electrons for chip in chips], axis=0)
-            for chips in ([draw_device(seen, edge_e.shape, rng) for _ in range(FRAMES // 2)] for _ in range(2))
-        )
-        return without_noise_bias(*(figures(edge_response(x)) for x in ((first + second) / 2, first, second)))
+        chips = [draw_device(seen, edge_e.shape, rng) for _ in range(FRAMES)]
+        frames = np.array([expose(edge_e, seen, exposure_s, chip, rng).electrons for chip in chips], np.float64)
+        frames /= collected_share(readings) if several(readings) else 1.0
+        variances = frames.var(axis=0, ddof=1)
+        noise = float(variances[:, :QUARTER_PX].mean() + variances[:, -QUARTER_PX:].mean()) / 2
+        halves = frames[: FRAMES // 2].mean(axis=0), frames[FRAMES // 2 :].mean(axis=0)
+        return without_noise_bias(*(figures(edge_response(x), noise) for x in (frames.mean(axis=0), *halves)))
 
+    # The figures.
     e_sfr = "ISO 12233:2017, annex D (e-SFR)"
     merits = (
         Merit("iso_12233.mtf50", "MTF50", "cycles/px", e_sfr, words, half_frequency(frequency, mtf)),
@@ -76,6 +91,10 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
             "IEEE 1858 (CPIQ): MTF weighted by the contrast sensitivity, up to Nyquist",
             f"{words}; seen at {PIXELS_PER_DEGREE:.0f} pixels per degree, the display taken as perfect",
             acutance(frequency, mtf),
+        ),
+        *information_merits(
+            f"{words}, bright side at {100 * BRIGHT_SHARE:.0f} % of the well, fixed patterns included",
+            information(frequency, mtf, bright_e, dark_e, noise_e2),
         ),
     )
     return Definition(merits, measure)

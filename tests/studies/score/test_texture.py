@@ -8,6 +8,7 @@ import colour
 import numpy as np
 import pytest
 from refusal import refusal
+from scipy.integrate import quad
 
 import rodcone as public
 from rodcone.colour_spaces import SRGB_TO_XYZ
@@ -15,6 +16,7 @@ from studies.metrics.s_cielab import eye_xyz
 from studies.photograph.snr import snr
 from studies.score.dead_leaves import autocovariance, draw_leaves, texture_response
 from studies.score.figure import measured
+from studies.score.information import information
 from studies.score.score import score
 from studies.score.visual_noise import raw_visual_noise, visual_noise
 
@@ -56,6 +58,16 @@ def test_noise_leaves_the_texture_s_response_as_it_is() -> None:
     alone = texture_response(clean, chart).mtf
     noisy = np.array([texture_response(clean + rng.normal(0, 0.25, clean.shape), chart).mtf for _ in range(16)])
     assert np.all(np.abs(noisy.mean(axis=0) - alone)[1:] < 5 * noisy.std(axis=0, ddof=1)[1:] / 4)
+
+
+def test_information_of_a_perfect_transfer_is_shannon_s_by_hand() -> None:
+    """M = 1: q = mean^2 / n; s^2 = contrast^2 x the square's area in the band / n; c = pi / 4 log2(1 + S / N)."""
+    frequency, flat = np.linspace(0.0, 1.0, 11), np.ones(11)
+    quanta, ratio_db, capacity = information(frequency, flat, 900.0, 100.0, 400.0)
+    assert quanta == pytest.approx(500.0**2 / 400)
+    inside, _ = quad(lambda f: 9 * np.sinc(3 * f) ** 2, -0.5, 0.5)
+    assert 10 ** (ratio_db / 10) == pytest.approx(800.0**2 * inside**2 / 400, rel=1e-3)
+    assert capacity == pytest.approx(np.pi / 4 * np.log2(1 + 800.0**2 / 12 / 400), rel=1e-5)
 
 
 def test_visual_noise_is_that_of_colour_science_s_cieluv() -> None:
