@@ -106,7 +106,7 @@ def test_score_asks_for_the_lens_and_light_that_are_typed_and_tells_each_figure(
     asked: list[tuple[Any, ...]] = []
 
     def stand_in(result: Any) -> Callable[..., Any]:
-        return lambda sensor, *rest: asked.append((sensor, *rest)) or result
+        return lambda sensor, *rest, **_: asked.append((sensor, *rest)) or result
 
     monkeypatch.setattr(score_command, "merits_of", stand_in(MERITS))
     monkeypatch.setattr(score_command, "over_light", stand_in(CURVE))
