@@ -19,6 +19,7 @@ import numpy as np
 from render.combine import emission
 from render.denoised.denoise import Denoised
 from render.error_estimates import Halves, SharedPaths, relative_error
+from render.geometry import horizontal_view_deg
 from render.level import Irradiance, SceneMeans
 from render.loader import INTEGRATOR, Film, variant
 from render.scene import Node, Scene, walk
@@ -60,6 +61,7 @@ def read_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoise
         relative_mc_error=relative_error(lights, arrays["light_mean"], arrays["variance"], shared),
         shared=shared,
         denoised=_denoised(arrays, values) if denoised else None,
+        horizontal_view_deg=horizontal_view_deg(scene.geometry["sensor"], film.size) or None,
     )
 
 

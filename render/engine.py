@@ -17,6 +17,7 @@ from render.combinations import check_combinations
 from render.combine import emission
 from render.denoised.denoise import denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
+from render.geometry import horizontal_view_deg
 from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import INTEGRATOR, Film, load_groups, own_mitsuba_variant, variant
@@ -252,6 +253,7 @@ def _render(
         integrator=INTEGRATOR,
         variant=variant(),
         denoised=denoised,
+        horizontal_view_deg=horizontal_view_deg(scene.geometry["sensor"], film.size) or None,
     )
 
 

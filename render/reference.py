@@ -21,11 +21,12 @@ from render.cache import ENGINE_VERSION, read_arrays, scene_terms, write_arrays
 from render.combine import emission
 from render.denoised.relight import sums_over_blocks
 from render.error_estimates import Halves
+from render.geometry import horizontal_view_deg
 from render.level import SceneMeans
 from render.loader import Film
 from render.meter import Meter
 from render.runs import Means, fields_of
-from render.scene import LightGroup, Scene
+from render.scene import LightGroup, Node, Scene
 from render.spectrum import Spectrum
 from render.transport import Transport
 from rodcone.digests import digest_inputs
@@ -92,7 +93,7 @@ def find_reference(scene: Scene, film: Film) -> Reference | None:
 def read_reference(path: Path, scene: Scene) -> Reference | None:
     """Reference of a scene in a file; None where the file is missing or isn't what was written."""
     arrays = read_arrays(path)
-    return None if arrays is None else _unpacked(path, arrays, scene.groups)
+    return None if arrays is None else _unpacked(path, arrays, scene.groups, scene.geometry["sensor"])
 
 
 def ready_light(scene: Scene, film: Film) -> Reference | None:
@@ -107,7 +108,7 @@ def ready_light(scene: Scene, film: Film) -> Reference | None:
             path = reference_path(folder, scene, larger)
             if (arrays := read_arrays(path)) is None:
                 continue
-            found = _unpacked(path, averaged(arrays, times), scene.groups)
+            found = _unpacked(path, averaged(arrays, times), scene.groups, scene.geometry["sensor"])
             meter = Meter(scene, film, 0, None) if scene.reference_plane and backend() != "numpy" else None
             return replace(found, transport=replace(found.transport, meter=meter))
     return None
@@ -206,7 +207,9 @@ def _error_plane(light: Halves, error: Planes) -> Planes:
     return np.asarray(plane * np.sqrt(np.maximum(lost, 1.0))[:, None, None], np.float32)
 
 
-def _unpacked(path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightGroup]) -> Reference:
+def _unpacked(
+    path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightGroup], camera: Node | None = None
+) -> Reference:
     """Light of a file; variances are pooled from the error plane as a render's from its difference."""
     certificate = json.loads(str(arrays["certificate"]))
     wavelength_nm, width_nm = (np.array(certificate[name]) for name in ("wavelength_nm", "width_nm"))
@@ -231,6 +234,7 @@ def _unpacked(path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightG
         seconds=certificate["seconds"],
         integrator=f"reference light: {certificate['integrator']}",
         variant=certificate["variant"],
+        horizontal_view_deg=None if camera is None else horizontal_view_deg(camera, rates.shape) or None,
     )
     return Reference(path, transport, certificate)
 

@@ -62,6 +62,8 @@ class Transport:
         Gives the irradiance on the scene's reference plane, traced at its first call; None without a plane.
     denoised : Denoised or None
         Denoised light beside the unbiased, where it was asked for (`render.denoised.relight`).
+    horizontal_view_deg : float or None
+        Angle of view of the scene's camera across the picture; None where it has none.
     compile_s : float
         Seconds in which kernels were compiled for it; 0 where they were there already, or the light was.
     """
@@ -83,6 +85,7 @@ class Transport:
     shared: SharedPaths | None = None
     meter: Callable[[], Irradiance] | None = None
     denoised: Denoised | None = None
+    horizontal_view_deg: float | None = None
     compile_s: float = 0.0
 
     __repr__ = brief
@@ -164,6 +167,7 @@ class Transport:
             width_nm=self.width_nm,
             relative_level_error=level_error,
             light=light.spectrum,
+            horizontal_view_deg=self.horizontal_view_deg,
         )
 
     def relight_halves(
@@ -183,12 +187,7 @@ class Transport:
         """
         light, _ = self._at_level(self._emission(spectra, powers), luminance_cd_m2, illuminance_lux, lux)
         values, difference = combine(light.maps, self.radiance), combine(light.maps, self.light.difference)
-        even, odd = (
-            SpectralRadiance(
-                np.moveaxis(half, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True, light=light.spectrum
-            )
-            for half in (values + difference, values - difference)
-        )
+        even, odd = (self._signed(half, light) for half in (values + difference, values - difference))
         return even, odd
 
     def relight_part(
@@ -210,8 +209,16 @@ class Transport:
         light, _ = self._at_level(self._emission(spectra), luminance_cd_m2, illuminance_lux, lux)
         chosen = np.array([name in groups for name in self.groups])
         planes = combine(light.maps * chosen[:, None, None], self.radiance)
+        return self._signed(planes, light)
+
+    def _signed(self, planes: Planes, light: BandLight) -> SpectralRadiance:
         return SpectralRadiance(
-            np.moveaxis(planes, 0, -1), self.wavelength_nm, width_nm=self.width_nm, signed=True, light=light.spectrum
+            np.moveaxis(planes, 0, -1),
+            self.wavelength_nm,
+            width_nm=self.width_nm,
+            signed=True,
+            light=light.spectrum,
+            horizontal_view_deg=self.horizontal_view_deg,
         )
 
     def relight_variance(self, *, luminance_cd_m2: float) -> Planes:

@@ -40,6 +40,14 @@ class LensConfig:
         Diameter of the disc on the sensor that a point out of focus becomes.
     veiling_glare : float
         Share of the light that scatters evenly over the picture, about the index of ISO 9358.
+    scatter : float
+        Share of the light that the lens scatters into wings around each lamp (`sensor.lens.scatter`), beside the even
+        share of `veiling_glare`.
+    scatter_slope, scatter_shoulder_deg : float
+        Power by which the wings fall with the angle, and the angle [degrees] from which on they do.
+    eye_age_years, eye_pigmentation : float
+        Wings of an eye of this age in the lens's place, by the CIE's equation of disability glare; 0 years for a lens.
+        The pigmentation is 0 for black eyes, 0.5 for brown, 1 for blue, 1.2 for very light ones.
     shake_um : float
         Standard deviation of the image's place on the sensor along each axis, by the hand (`sensor.shake`).
     """
@@ -51,12 +59,22 @@ class LensConfig:
     diffraction: Annotated[float, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = 0.0
     defocus_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for none")] = 0.0
     veiling_glare: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
+    scatter: Annotated[float, (0.0, 0.99, "give a fraction, 0 for none")] = 0.0
+    scatter_slope: Annotated[float, (0.5, 6.0, "give the power of the angle, 2 for stars in telescopes")] = 2.0
+    scatter_shoulder_deg: Annotated[float, (1e-4, 45.0, "give degrees")] = 0.1
+    eye_age_years: Annotated[float, (0.0, 120.0, "give years, 0 for a lens")] = 0.0
+    eye_pigmentation: Annotated[float, (0.0, 1.2, "give 0 for black eyes to 1.2 for very light ones")] = 0.5
     shake_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for a camera that stands still")] = 0.0
 
     __repr__ = brief
 
     def __post_init__(self) -> None:
         require_fields(self)
+        if self.scatter and self.eye_age_years:
+            raise InputError(
+                f"scatter: {self.scatter:g} beside eye_age_years {self.eye_age_years:g}; allowed: a lens's wings or an "
+                "eye's; leave one out"
+            )
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from rodcone.errors import InputError, require_whole
 from rodcone.types import Floats
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency, limit_per_um, sampled_otf
+from sensor.lens.scatter import scatterer, scatters
 from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
@@ -96,11 +97,11 @@ def falloff(lens: LensConfig, shape: tuple[int, int]) -> NDArray[np.float64]:
 
 def spreads(lens: LensConfig) -> bool:
     """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
-    return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0
+    return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0 or scatters(lens)
 
 
 def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pixel: int = 1) -> SpectralIrradiance:
-    """Image a scene onto the sensor: camera equation, cos^4, diffraction and defocus, veiling glare, in this order.
+    """Image a scene onto the sensor: camera equation, cos^4, diffraction and defocus, scatter, veiling glare.
 
     Parameters
     ----------
@@ -117,12 +118,12 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     -------
     SpectralIrradiance
         One value a sensor pixel and band, in the radiance's precision. Light is neither gained nor lost at the border,
-        where the picture goes on as its mirror image.
+        where the picture goes on as its mirror image; what a lens scatters beyond the border is lost.
 
     Raises
     ------
     InputError
-        Where the samples don't make whole pixels.
+        Where the samples don't make whole pixels; for a lens that scatters and an angle of view that isn't known.
 
     Examples
     --------
@@ -160,6 +161,7 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     per_radiance = camera_equation(lens) * falloff(lens, radiance.shape)
     height, width = (size // samples for size in radiance.shape)
     planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
+    scattered = scatterer(lens, (height, width), radiance.horizontal_view_deg) if scatters(lens) else None
     blurs = bool(lens.diffraction or lens.defocus_um)
     otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1) if blurs else None
 
@@ -174,6 +176,9 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
                 light = kept * (total / kept.sum() if total > 0 else 0.0)
         if samples > 1:
             light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
+        if scattered is not None:
+            light = scattered(light)
+            light = light if radiance.signed else np.maximum(light, 0.0)  # rounding beside a lamp
         planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
 
     with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
@@ -201,7 +206,7 @@ def left_out(sensor: SensorConfig) -> tuple[str, ...]:
         lines.append(
             f"cos^4 falloff: a picture of 4:3, {VIEW_DEG:g} degrees wide, would lose {1 - corner:.0%} in its corners"
         )
-    if not lens.veiling_glare:
+    if not lens.veiling_glare and not scatters(lens):
         lines.append("veiling glare: each per cent would add 1 % of the picture's mean irradiance to every pixel")
     if not lens.defocus_um:
         disc = float(defocus_otf(nyquist, sensor.site_pitch_um))

@@ -79,9 +79,7 @@ def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]
     """Average radiance over wide bands, as bands would hold it that follow light and scene within themselves."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
-    return SpectralRadiance(
-        values, nm, radiance.relative_mc_error, width_nm, signed=radiance.signed, light=radiance.light
-    )
+    return replace(radiance, values=values, wavelength_nm=nm, width_nm=width_nm)
 
 
 def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:

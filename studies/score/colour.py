@@ -56,7 +56,12 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
         return Definition(tuple(replace(x, missing=missing) for x in (INDEX, DIFFERENCE)), not_measured)
     # What the camera and the standard observer see of the patches, without noise.
     known = named_light(light)
-    plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
+    plain = replace(
+        sensor,
+        lens=replace(
+            sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0
+        ),
+    )
     matrix = calibrate(plain, known.lamp).to_srgb
     named = color_checker_reflectances()
     surfaces = np.array([held(x).band_average(known.wavelength_nm, known.width_nm) for _, x in named])

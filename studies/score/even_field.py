@@ -92,7 +92,9 @@ class EvenField:
 
 def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: str) -> EvenField:
     """Put an even neutral field before a camera."""
-    plain = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0))
+    plain = replace(
+        sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, scatter=0.0, eye_age_years=0.0)
+    )
     tile_rows, tile_columns = (side * plain.sites for side in (len(plain.cfa), len(plain.cfa[0])))
     radiance = SpectralRadiance(
         np.broadcast_to(light.spectrum, (tile_rows, tile_columns, light.spectrum.size)).copy(),

@@ -103,7 +103,12 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
 def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
     """Return the camera whose every pixel is the channel's, with a lens that an even part of the picture sees."""
     plain = with_tile(sensor, (channel,), sensor.responses)
-    return replace(plain, lens=replace(plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
+    return replace(
+        plain,
+        lens=replace(
+            plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0
+        ),
+    )
 
 
 def bands_of(light: str) -> Light:

@@ -41,6 +41,8 @@ class LensTerms:
         Share of the light.
     horizontal_view_deg : float, optional
         Angle of view for cos^4.
+    scatter : float, optional
+        Share of the light in the wings of glare.
     shake : str, optional
         ``hand``: cameras are held in the hand (`sensor.shake`).
     """
@@ -48,6 +50,7 @@ class LensTerms:
     diffraction: Annotated[float | None, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = None
     veiling_glare: Annotated[float | None, (0.0, 1.0, "give a fraction, 0 for none")] = None
     horizontal_view_deg: Annotated[float | None, (0.0, 175.0, "give degrees, 0 for none")] = None
+    scatter: Annotated[float | None, (0.0, 0.99, "give a fraction, 0 for none")] = None
     shake: str | None = None
 
     def on(self, lens: LensConfig) -> LensConfig:
@@ -73,6 +76,7 @@ def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: s
     It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that
     their pictures can be compared.
     """
-    bare = replace(preset.lens, diffraction=0.0, veiling_glare=0.0, horizontal_view_deg=0.0, defocus_um=0.0)
+    none = {"diffraction": 0.0, "veiling_glare": 0.0, "horizontal_view_deg": 0.0, "defocus_um": 0.0}
+    bare = replace(preset.lens, **none, scatter=0.0, eye_age_years=0.0)
     plain = replace(preset, lens=bare)
     return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S, channel=channel)

@@ -144,6 +144,23 @@ def test_illuminance_of_a_mean_luminance_is_the_one_that_gives_it():
     assert transport(irradiance=None).illuminance_lux(25.0) is None
 
 
+def test_the_camera_s_angle_of_view_goes_along_with_the_light():
+    seen = transport(horizontal_view_deg=50.0)
+    for light in (seen.relight(), *seen.relight_halves(), seen.relight_part(["sky"])):
+        assert light.horizontal_view_deg == 50.0
+    assert transport().relight().horizontal_view_deg is None
+
+
+def test_parts_of_the_groups_sum_to_the_light_and_others_are_refused():
+    made = transport()
+    parts = [made.relight_part([name], luminance_cd_m2=7.0).values for name in ("sky", "lamp")]
+    np.testing.assert_allclose(parts[0] + parts[1], made.relight(luminance_cd_m2=7.0).values, rtol=1e-6)
+    both = made.relight_part(["lamp", "sky"], luminance_cd_m2=7.0)
+    np.testing.assert_array_equal(both.values, made.relight(luminance_cd_m2=7.0).values)
+    refusal(made.relight_part, ["moon"], match="groups: light group: 'moon' is unknown")
+    refusal(made.relight_part, "sky", match="groups: a str is not allowed")
+
+
 def test_the_mean_radiance_at_a_level_is_that_of_the_relit_picture():
     made = transport()
     values = made.relight(luminance_cd_m2=12.0).values

@@ -1,0 +1,1 @@
+"""What a lens does to light beyond an ideal one: light that it scatters."""
