@@ -76,6 +76,7 @@ def check_cameras(study: Study, order: SetOrder) -> None:
         frames=None if study.frames == (1,) else list(study.frames),
         sensor_side_um=study.sensor_side_um,
         shake=study.lens.shake,
+        flicker=study.flicker or None,
     )
     for name in study.sensors:
         sensor = preset(name)

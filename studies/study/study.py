@@ -1,6 +1,6 @@
 """A study: scenes, spectra, levels, exposures, sensors, ..., processors and seeds; every combination is a cell."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
@@ -25,6 +25,8 @@ from rodcone.errors import (
 )
 from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
+from sensor.flicker.rows import check_flicker
+from sensor.flicker.waveform import waveform
 from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
@@ -202,6 +204,8 @@ class Study:
     `gains` are fixed gains between pixel and converter, `isos` saturation-based speeds in their place; without either
     each sensor has its own.
     `white_balances` left out are those that `default_balance` has for the processors.
+    `flicker` is the waveform of all lamps, such as ``fluorescent@100Hz`` (`sensor.flicker.waveform`); left out, they
+    are steady. Each seed starts its exposures at a time of its own.
     `title` heads the report; where it is empty, `name` does. `compare` names the two processors that the report sets
     beside each other at first; left out, the same method on both mosaics where the study holds it.
 
@@ -231,6 +235,7 @@ class Study:
     isos: tuple[float, ...] = ()
     name: str = "study"
     title: str = ""
+    flicker: str = ""
     compare: tuple[str, ...] = ()
     longest_exposure_s: Annotated[float, (1e-9, 1e6, "give seconds above 0")] = LONGEST_S
     sensor_side_um: Annotated[float | None, (1.0, 1e6, "give micrometres, or leave it out")] = None
@@ -357,8 +362,13 @@ def _check_cameras(study: Study) -> None:
     for name in study.processors:
         require_consent("processors", name, study.trust_code)
         processor_of(name)
+    if study.flicker:
+        waveform(study.flicker)
     for name in study.sensors:
         sensor = preset(name)
+        if study.flicker:
+            with in_place(f"sensor {label(name)}"):
+                check_flicker(replace(sensor, lens=study.lens.on(sensor.lens)))
         # sensors of one size are compared at the coarsest's pixels
         if study.sensor_side_um is None and sensor.sites != preset(study.sensors[0]).sites:
             raise InputError(

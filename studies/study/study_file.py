@@ -60,7 +60,7 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         if "trust_code" in content:
             raise InputError("trust_code: no file may ask for it; leave it out, and give --trust-code")
         content["trust_code"] = trust_code
-        for axis in ("scenes", "sensors", "spectra", "processors", "compare"):
+        for axis in ("scenes", "sensors", "spectra", "processors", "compare", "flicker"):
             content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
         return structured(content, Study, _CONVERTER, "see rodcone new study")
     except InputError as error:

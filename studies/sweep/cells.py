@@ -9,6 +9,7 @@ import numpy as np
 
 from isp.colour.colour_fit import ColourFit
 from rodcone.digests import digest, digest_inputs
+from sensor.flicker.waveform import Waveform
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.render_facts import RenderFacts
 from studies.study.study import Condition, label
@@ -75,6 +76,8 @@ class Cell:
         For the row.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
+    flicker : Waveform or None
+        Of all lamps; None where they are steady.
     """
 
     key: str
@@ -91,6 +94,7 @@ class Cell:
     pictures: Path
     render: RenderRecord
     budget_share: float | None = None
+    flicker: Waveform | None = None
 
     @property
     def kind(self) -> tuple[str, Condition]:
@@ -112,12 +116,15 @@ def cell_key(
     luminance_cd_m2: float,
     exposure_s: float,
     made_by: Provenance,
+    flicker: Waveform | None = None,
 ) -> str:
     """Key of a cell: its place in the study, which decides its noise, and all that its picture is made from.
 
     The processor's colours follow from the frame's sensor and light.
     """
-    return digest_inputs([labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, made_by])
+    lamps: list[object] = [] if flicker is None else [flicker]
+    inputs = [labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, made_by]
+    return digest_inputs(inputs + lamps)
 
 
 def device_stream(sensor: str, mosaic: str, seed: int) -> np.random.Generator:
@@ -140,6 +147,11 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
 def shake_stream(seed: int) -> np.random.Generator:
     """Stream of the hand's paths: one hand holds every camera of a seed, in every light and for every time."""
     return _stream("shake", seed)
+
+
+def flicker_stream(seed: int) -> np.random.Generator:
+    """Stream of the time at which a seed's exposures start by the lamps' clock: the same for every camera."""
+    return _stream("flicker", seed)
 
 
 def _stream(*parts: object) -> np.random.Generator:

@@ -18,6 +18,8 @@ from rodcone.jit import backend
 from rodcone.types import Progress
 from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
+from sensor.flicker.rows import steady_exposure_s
+from sensor.flicker.waveform import waveform
 from sensor.presets import preset, vary
 from studies.budget.ledger import Plan
 from studies.metrics.truth import light_in_bands
@@ -176,7 +178,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         for name, software in job.software.items():
             if software.mosaic == imaged[-1]:
                 colours[imaged, name] = colours_under(frame.sensor, software, light)
-    cells = []
+    cells, lamps = [], waveform(job.study.flicker) if job.study.flicker else None
     for condition in conditions(job.study, opened.choice):
         image = job.plan.images[condition]
         for name, software in job.software.items():
@@ -186,10 +188,12 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             exposure_s, sensor = exposure_of(
                 frame, condition.exposure, condition.gain, luminance, job.study.longest_exposure_s
             )
+            if lamps is not None and parse_exposure(condition.exposure) is None:
+                exposure_s = steady_exposure_s([lamps], exposure_s)
             made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
             cells += [
                 Cell(
-                    key=cell_key(condition, label(name), seed, frame.key, luminance, exposure_s, made_by),
+                    key=cell_key(condition, label(name), seed, frame.key, luminance, exposure_s, made_by, lamps),
                     condition=condition,
                     processor=str(Path(name).resolve()) if user_file(name) else name,
                     seed=seed,
@@ -203,6 +207,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
                     pictures=(job.out / PICTURES).resolve(),
                     render=record,
                     budget_share=job.plan.shares.get(condition),
+                    flicker=lamps,
                 )
                 for seed in job.study.seeds
             ]

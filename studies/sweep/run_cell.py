@@ -14,11 +14,13 @@ from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from rodcone.types import Image
+from rodcone.types import Image, Mosaic
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import block_sums, mask
 from sensor.device import draw_device
+from sensor.flicker.photograph import frame_starts_s
+from sensor.flicker.rows import flickering
 from sensor.raw import RawImage
 from sensor.readings.resolve import resolve
 from sensor.response import behind_filters
@@ -33,7 +35,7 @@ from studies.study.equal_area import area_average
 from studies.study.gain import iso_speed
 from studies.study.render_noise import monte_carlo_bound
 from studies.study.study import AS_SHOT, label
-from studies.sweep.cells import Cell, device_stream, exposure_stream, labels, render_text, shake_stream
+from studies.sweep.cells import Cell, device_stream, exposure_stream, flicker_stream, labels, render_text, shake_stream
 from studies.sweep.provenance import in_words, provenance, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
@@ -71,8 +73,8 @@ def run_cell(cell: Cell) -> Row:
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
         hand = shake_stream(cell.seed)
         raws = []
-        for _ in range(frames):
-            frame_e = expected_e
+        for start_s in frame_starts_s(sensor, shape, cell.exposure_s, flicker_stream(cell.seed), frames):
+            frame_e = _under_lamps(cell, expected_e, start_s)
             if sensor.lens.shake_um:
                 frame_e = behind_filters(shaken(unmoved_e, sensor, cell.exposure_s, hand), sensor)
             raws.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
@@ -148,6 +150,13 @@ def run_cell(cell: Cell) -> Row:
         machine=machine(),
         worker=threading.get_native_id(),
     )
+
+
+def _under_lamps(cell: Cell, expected_e: Mosaic, start_s: float) -> Mosaic:
+    """Expected electrons of an exposure that starts at a time of the lamps' clock."""
+    if cell.flicker is None:
+        return expected_e
+    return flickering(expected_e, [(cell.flicker, expected_e)], cell.frame.sensor, cell.exposure_s, start_s)
 
 
 def _check_provenance(cell: Cell, processor: Processor) -> None:

@@ -101,6 +101,12 @@ def test_faults_are_told_in_one_line() -> None:
         ({"render": replace(STUDY.render, size=8)}, "render.size"),
         ({"render": replace(STUDY.render, noise_share=0.0)}, "render.noise_share"),
         ({"lens": replace(STUDY.lens, veiling_glare=2.0)}, "lens.veiling_glare"),
+        ({"flicker": "neon@100Hz"}, "lamp: 'neon' is unknown"),
+        (
+            {"flicker": "fluorescent@100Hz", "sensors": ("staggered",)},
+            "staggered: flicker: the camera reads some charge",
+        ),
+        ({"flicker": "fluorescent@100Hz", "lens": replace(STUDY.lens, shake="hand")}, "flicker: with shake_um"),
         ({"lens": replace(STUDY.lens, shake="tripod")}, "lens.shake: 'tripod' is unknown; allowed: hand"),
         ({"budget": replace(STUDY.budget, monte_carlo=0.2)}, "within budget.total"),
     ]:

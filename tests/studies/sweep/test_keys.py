@@ -12,6 +12,7 @@ import sweep_sample as SAMPLE
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from sensor.exposure import auto_exposure_s
+from sensor.flicker.waveform import Waveform
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset
 from sensor.response import expected_electrons
@@ -101,7 +102,8 @@ def test_a_cells_key_changes_with_each_of_its_inputs_alone() -> None:
         "luminance_cd_m2": 2.0, "exposure_s": 0.02, "made_by": "n",
     }  # fmt: skip
     keys = {cell_key(**inputs)} | {cell_key(**inputs | {name: value}) for name, value in other.items()}
-    assert len(keys) == 1 + len(other)
+    keys |= {cell_key(**inputs, flicker=lamp) for lamp in (Waveform(100.0, 0.5), Waveform(120.0, 0.5))}
+    assert len(keys) == 3 + len(other)
 
 
 def test_a_stream_of_noise_has_a_draw_of_its_own_for_each_of_its_coordinates() -> None:

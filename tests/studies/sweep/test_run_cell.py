@@ -30,6 +30,9 @@ from sensor.burst import merged_raw
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.exposure import auto_exposure_s
+from sensor.flicker.photograph import frame_starts_s
+from sensor.flicker.rows import row_weights
+from sensor.flicker.waveform import Waveform
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from sensor.readout import read_out
@@ -42,7 +45,7 @@ from studies.pages.report_pictures import opened
 from studies.photograph.camera import develop_to_scale
 from studies.study.model import LensTerms
 from studies.study.study import Condition, RenderLimits, SceneChoice
-from studies.sweep.cells import Cell, cell_key, device_stream, exposure_stream, shake_stream
+from studies.sweep.cells import Cell, cell_key, device_stream, exposure_stream, flicker_stream, shake_stream
 from studies.sweep.provenance import Provenance
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import keep
@@ -259,6 +262,25 @@ def test_a_burst_is_merged_and_shows_less_noise_and_its_first_frame_is_the_singl
     assert one.picture == run_cell(alone[0]).picture
     assert (one.exposure_s, many.exposure_s) == (0.005, 0.005)
     assert many.psnr_db > one.psnr_db + 3.0
+
+
+def test_lamps_of_a_study_flicker_in_every_exposure_and_rules_take_whole_periods(tmp_path: Path) -> None:
+    lamps = {"flicker": "sodium_high@100Hz", "seeds": (0,), "levels": ("25cd/m2",)}
+    (cell,) = made(tmp_path, **lamps, exposures=("2ms",))
+    assert cell.flicker == Waveform(100.0, 0.95)
+    sensor = replace(cell.frame.sensor, row_time_us=200.0)
+    cell = replace(cell, frame=replace(cell.frame, sensor=sensor))
+    expected_e = np.load(cell.frame.electrons) * cell.luminance_cd_m2 * 0.002
+    (start_s,) = frame_starts_s(sensor, expected_e.shape, 0.002, flicker_stream(0))
+    frame = expected_e * row_weights(cell.flicker, sensor, len(expected_e), 0.002, start_s)[:, None]
+    device = draw_device(sensor, frame.shape, device_stream(cell.condition.sensor, "bayer", 0))
+    raw = read_out(frame, sensor, device, 0.002, exposure_stream(cell.condition, "bayer", 0))
+    assert run_cell(cell).saturated == raw.saturated.mean()
+    (steady,) = made(tmp_path, **lamps | {"flicker": ""}, exposures=("2ms",))
+    assert steady.flicker is None
+    assert run_cell(cell).picture != run_cell(steady).picture
+    (by_rule,) = made(tmp_path, **lamps | {"levels": ("0.1cd/m2",)}, exposures=("auto",))
+    assert by_rule.exposure_s == pytest.approx(0.06)  # of the longest time, 66 ms
 
 
 def test_cells_of_a_hand_held_study_are_moved_alike_and_a_dark_frame_is_the_still_one(tmp_path: Path) -> None:
