@@ -186,7 +186,7 @@ def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int)
     return np.moveaxis(planes, 0, -1)
 
 
-def left_out(sensor: SensorConfig) -> tuple[str, ...]:
+def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:
     """One line for each effect of a lens that `form_image` leaves out, or approximates at one sample a pixel: its cost.
 
     MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
@@ -196,7 +196,7 @@ def left_out(sensor: SensorConfig) -> tuple[str, ...]:
     if not lens.diffraction:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
         lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
-    if (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
+    if samples_per_pixel == 1 and (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
         lines.append(
             f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist"
             f"{_edge_words(sensor)}; {least_samples(sensor)} samples a pixel don't"

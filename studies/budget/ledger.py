@@ -1,13 +1,14 @@
 """The error budget's ledger: each approximation in electrons, and as a share of the sensor's own noise variance."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from html import escape
 
 from rodcone.display import brief
+from sensor.presets import preset
 from studies.budget.effects import KERNEL
 from studies.budget.scaled_effects import ScaledEffects
-from studies.study.model import ImageModel, RenderModel
+from studies.study.model import ImageModel, RenderModel, samples_a_side
 from studies.study.study import Condition, SceneChoice, label
 
 MONTE_CARLO, LEVEL = "Monte Carlo", "level"
@@ -136,6 +137,12 @@ class Plan:
     summary: tuple[str, ...] = ()
 
     __repr__ = brief
+
+    def samples_a_side(self, scene: SceneChoice) -> int:
+        """Samples of a scene's light along each side of a pixel, by the lenses that its images hold."""
+        images = ((condition, image) for condition, image in self.images.items() if condition.scene == scene)
+        sensors = (replace(preset(condition.sensor), lens=image.lens) for condition, image in images)
+        return samples_a_side(str(scene.source), sensors)
 
     def _repr_html_(self) -> str:
         if not self.ledgers:

@@ -103,7 +103,7 @@ def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order:
         else:
             pixels, groups = prod(opened.size), len(opened.scene.groups)
             bands = len(plan.renders[opened.choice].wavelength_nm)
-        total += 3 * 4 * pixels * bands * groups
+        total += 3 * 4 * plan.samples_a_side(opened.choice) ** 2 * pixels * bands * groups
         for sensor in _cameras(study):
             by = {**_BYTES, "channels_e": 4 * len(sensor.channels), "shares": 4 * groups}
             of_sample = pixels * (2 + sum(by[name] for name in order.planes)) + _SAMPLE_BYTES

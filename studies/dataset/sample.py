@@ -12,10 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.ndimage import uniform_filter
 
+from render.band_weights import transport_weights
 from render.cache import file_digests
 from render.combine import emission
 from render.radiance_files.radiance_source import files_of
-from render.spectrum import luminance, tristimulus
+from render.spectrum import OBSERVER_NM, observer, tristimulus
 from render.surfaces import see_surfaces
 from render.transport import Transport
 from rodcone.digests import digest, digest_file, digest_inputs
@@ -27,6 +28,7 @@ from sensor.raw import RawImage
 from sensor.readings.resolve import PlainReading, at_channel, resolve
 from sensor.readout import frame_variance, light_variance, read, sources_of
 from sensor.response import channel_electrons
+from studies.study.equal_area import area_average, in_pixels
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, monte_carlo_bound
 from studies.study.study import OWN, Condition
@@ -239,7 +241,7 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
         return {name: keep_array(job.out / PLANES, plane) for name, plane in planes.items()}
 
     facts: dict[str, Any] = {"hash": scene_hash(opened), "illuminants": {}, "objects": (), "materials": (), "files": {}}
-    surfaces = {}
+    surfaces, samples = {}, job.plan.samples_a_side(opened.choice)
     if opened.scene is not None:
         seen = see_surfaces(opened.scene, opened.size)
         ids = np.stack([seen.object_id, seen.material_id], axis=-1)
@@ -248,23 +250,24 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
     for spectrum in job.study.spectra:
         lit = under(transport, spectrum)
         view = photographed(lit, 1.0)
-        xyz = tristimulus(view.values, view.wavelength_nm, view.widths_nm, view.light)
-        of_light = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit).astype(np.float32))
+        of_pixels = in_pixels(view, samples)
+        xyz = tristimulus(of_pixels.values, view.wavelength_nm, view.widths_nm, view.light)
+        of_light = kept(xyz=xyz.astype(np.float32), shares=group_shares(lit, xyz.shape[:2]).astype(np.float32))
         facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():
             if cell.condition.spectrum == spectrum:
-                electrons = channel_electrons(form_image(view, cell.frame.sensor), cell.frame.sensor, 1.0)
+                electrons = channel_electrons(form_image(view, cell.frame.sensor, samples), cell.frame.sensor, 1.0)
                 facts["files"][name] = surfaces | of_light | kept(channels_e=electrons.astype(np.float32))
     return facts
 
 
-def group_shares(lit: Transport) -> NDArray[np.float64]:
-    """Share of each light group in the luminance of each pixel, (h, w, group); 0 in pixels without light."""
-    nm, width_nm = lit.wavelength_nm, lit.width_nm
-    weights = emission(lit.groups, nm, width_nm)
-    # The eye's weights of bands follow each group's own lamp.
-    weights = weights * [luminance(np.eye(nm.size), nm, width_nm, group.spectrum) for group in lit.groups.values()]
-    planes = np.einsum("gb,gbhw->hwg", weights, (lit.denoised or lit).radiance, dtype=np.float64, optimize=True)
+def group_shares(lit: Transport, shape: tuple[int, int]) -> NDArray[np.float64]:
+    """Share of each light group in the luminance of each of `shape` pixels, (h, w, group); 0 in those without light."""
+    bands = OBSERVER_NM, lit.wavelength_nm, lit.width_nm
+    # The eye's weights of bands follow each group's own lamp, to its lines.
+    weights = [x.power * transport_weights(observer, *bands, x.spectrum)[0][1] for x in lit.groups.values()]
+    radiance = (lit.denoised or lit).radiance
+    planes = area_average(np.einsum("gb,gbhw->hwg", weights, radiance, dtype=np.float64, optimize=True), shape)
     total = planes.sum(axis=-1, keepdims=True)
     return np.asarray(np.divide(planes, total, out=np.zeros_like(planes), where=total > 0))
 

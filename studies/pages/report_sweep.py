@@ -26,6 +26,7 @@ from studies.pages.report_pictures import ReportPictures, busiest, opened, read_
 from studies.pages.report_text import exposure_name, level_text, way_name, with_signs
 from studies.photograph.clock import machine
 from studies.study.gain import gain_text
+from studies.study.model import samples_a_side
 from studies.study.study import OWN, label
 from studies.sweep.database import last_run
 from studies.sweep.prepare import PICTURES
@@ -250,12 +251,13 @@ def environment_of(rows: Sequence[Row]) -> dict[str, str]:
 def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> tuple[str, ...]:
     """Return what the lenses, as they were modelled, leave out, each once; of a sensor file that is gone nothing."""
     lines: list[str] = []
-    for name, lens in dict.fromkeys((row.sensor, row.lens) for row in rows):
+    for scene, name, lens in dict.fromkeys((row.scene, row.sensor, row.lens) for row in rows):
         try:
             sensor = preset(next(given for given in sensors if label(given) == name))
         except InputError:
             continue
-        lines += left_out(replace(sensor, lens=LensConfig(**json.loads(lens))))
+        sensor = replace(sensor, lens=LensConfig(**json.loads(lens)))
+        lines += left_out(sensor, samples_a_side(scene, [sensor]))
     return tuple(with_signs(line) for line in dict.fromkeys(lines))
 
 

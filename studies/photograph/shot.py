@@ -31,13 +31,12 @@ from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, war
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
-from sensor.optics import SpectralIrradiance, form_image, least_samples, left_out, spreads
+from sensor.optics import SpectralIrradiance, form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import check_ending
 from sensor.response import channel_electrons, expected_electrons
 from sensor.shake import held_lens
-from studies.metrics.target_figures import EDGE
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.lamps import flicker_of, lamp_parts
 from studies.photograph.ready_light import Ready, find_ready
@@ -45,6 +44,7 @@ from studies.study.cost import PictureCost
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
+from studies.study.model import samples_a_side
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
     LIGHT,
@@ -328,7 +328,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         "relative_mc_error": radiance.relative_mc_error,
         "relative_level_error": radiance.relative_level_error,
         "saturated": saturated,
-        "left_out": list(left_out(sensor)),
+        "left_out": list(left_out(sensor, samples)),
     }
     return Taken(paths, facts, tuple(notes))
 
@@ -450,7 +450,7 @@ def check(order: Order) -> Checked:
     spectra = asked_spectra(opened.scene, order.light)
     flicker = flicker_of(order.flicker, opened.scene.groups)
     # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
-    samples = least_samples(sensor) if order.source == EDGE else 1
+    samples = samples_a_side(str(order.source), [sensor])
     ready = _ready(order, opened, spectra) if samples == 1 else None
     size = ready.size if ready else _size(order, opened)
     check_frame(sensor, size)

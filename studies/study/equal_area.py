@@ -83,6 +83,14 @@ def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]
     return np.ascontiguousarray(np.moveaxis(np.tensordot(columns, along, axes=(1, 1)), 0, 1))
 
 
+def in_pixels(radiance: SpectralRadiance, samples: int) -> SpectralRadiance:
+    """Radiance at whole pixels of `samples` along each side."""
+    if samples == 1:
+        return radiance
+    height, width = radiance.shape
+    return replace(radiance, values=area_average(radiance.values, (height // samples, width // samples)))
+
+
 def _overlaps(pixels: int, other: int) -> NDArray[np.float64]:
     """Share of each of `pixels` intervals in each of `other` on the same length, (other, pixels); rows sum to 1."""
     ends, starts = np.arange(1, pixels + 1) / pixels, np.arange(pixels) / pixels

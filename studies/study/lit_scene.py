@@ -139,6 +139,7 @@ def make_transport(
     cache: Path,
     progress: Progress,
     share: Callable[[Transport], float] | None = None,
+    samples: int = 1,
 ) -> tuple[Transport, tuple[str, ...]]:
     """Render a scene, or read a picture file, with what had to be assumed of the file.
 
@@ -152,6 +153,9 @@ def make_transport(
         As of `render.engine.render`; called before it with an infinite error, since the first passes may compile.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
+    samples : int
+        Samples of the light along each side of a pixel (`studies.study.model.samples_a_side`); each is rendered like a
+        pixel.
 
     Raises
     ------
@@ -179,26 +183,27 @@ def make_transport(
         "progress": progress,
         "denoise": model.denoise,
     }
-    if limits.reference and (reference := find_reference(opened.scene, film_of(opened, model))):
+    film = film_of(opened, model, samples)
+    if limits.reference and (reference := find_reference(opened.scene, film)):
         if backend() == "numpy":
             return reference.transport, (f"light: the reference {reference.path.name}; nothing here can test it",)
-        live = render(opened.scene, opened.size, **terms | {"max_spp": LIVE_SPP, "max_seconds": None})
+        live = render(opened.scene, film.size, **terms | {"max_spp": LIVE_SPP, "max_seconds": None})
         return replace(reference.transport, meter=live.meter), (require_agreement(live, reference),)
     if limits.noise_share is None or share is None:
-        transport = render(opened.scene, opened.size, **terms)
+        transport = render(opened.scene, film.size, **terms)
     else:
-        transport = render_quietly(opened.scene, opened.size, share, most_share=limits.noise_share, **terms)
+        transport = render_quietly(opened.scene, film.size, share, most_share=limits.noise_share, **terms)
     if transport.stopped_by == "interrupt":
         raise KeyboardInterrupt
     return transport, ()
 
 
-def film_of(opened: OpenedScene, model: RenderModel) -> Film:
-    """Film on which a scene is rendered."""
+def film_of(opened: OpenedScene, model: RenderModel, samples: int = 1) -> Film:
+    """Film on which a scene is rendered, with so many samples of its light along each side of a pixel."""
     if opened.scene is None:
         raise InputError(f"scene: {opened.choice.source!r} is a picture; allowed: a scene; it needs no render")
     return Film(
-        size=opened.size,
+        size=(samples * opened.size[0], samples * opened.size[1]),
         wavelength_nm=np.array(model.wavelength_nm),
         width_nm=np.array(model.width_nm),
         max_depth=opened.scene.max_depth,

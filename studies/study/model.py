@@ -1,5 +1,6 @@
 """What is modelled: how each scene is rendered, and what each condition's image holds."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Annotated
 
@@ -7,8 +8,9 @@ from render.radiance import SpectralRadiance
 from rodcone.types import Floats
 from sensor.config import LensConfig, SensorConfig
 from sensor.exposure import auto_exposure_s
-from sensor.optics import form_image
+from sensor.optics import form_image, least_samples
 from sensor.shake import held_lens
+from studies.metrics.target_figures import EDGE
 
 _DARK_S = 1e7  # longer than any exposure
 
@@ -68,6 +70,15 @@ class ImageModel:
 
     lens: LensConfig
     exact: bool = True
+
+
+def samples_a_side(scene: str, sensors: Iterable[SensorConfig]) -> int:
+    """Samples of the light along each side of a pixel that cameras need of a scene, by its name.
+
+    A scene that measures sharpness takes as many as the sharpest lens asks for (`sensor.optics.least_samples`): by one
+    sample per pixel its MTF50 would be too low. All others take one.
+    """
+    return max((least_samples(sensor) for sensor in sensors), default=1) if scene == EDGE else 1
 
 
 def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str | None = None) -> float:

@@ -108,6 +108,8 @@ def render_share(
     luminance_cd_m2: float,
     longest_s: float,
     exposure_s: float | None = None,
+    *,
+    samples: int = 1,
 ) -> float:
     """Monte Carlo share that `OF_PIXELS` of the pixels stay under at a mean luminance, over every channel.
 
@@ -123,11 +125,17 @@ def render_share(
         Of the auto exposure [s].
     exposure_s : float, optional
         Left out, the auto exposure.
+    samples : int
+        Samples of the light along each side of a pixel.
     """
-    irradiance = form_image(transport.relight(luminance_cd_m2=luminance_cd_m2), sensor)
+    irradiance = form_image(transport.relight(luminance_cd_m2=luminance_cd_m2), sensor, samples)
     time_s = auto_exposure_s(irradiance, sensor, longest_s) if exposure_s is None else exposure_s
     expected_e = np.moveaxis(channel_electrons(irradiance, sensor, time_s), -1, 0)
     variance = transport.relight_variance(luminance_cd_m2=luminance_cd_m2)
+    if samples > 1:  # the errors of a pixel's samples are independent
+        bands, height, width = variance.shape
+        blocks = variance.reshape(bands, height // samples, samples, width // samples, samples)
+        variance = blocks.mean(axis=(2, 4)) / samples**2
     weights = electrons_per_irradiance(sensor, transport.wavelength_nm, transport.width_nm, time_s, irradiance.light)
     weights = weights * camera_equation(sensor.lens)
     error_e = np.tensordot(weights, np.sqrt(np.maximum(variance, 0.0)), axes=1)

@@ -155,10 +155,12 @@ def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:
     if opened.scene is None:
         pixels, bands, groups = extent_of(opened.choice.source)
         return _Part(pixels, pixels, bands, groups, 0)
-    model, pixels = plan.renders[opened.choice], opened.size[0] * opened.size[1]
+    model, samples = plan.renders[opened.choice], plan.samples_a_side(opened.choice)
+    film = film_of(opened, model, samples)
+    pixels = prod(film.size)
     shapes = {} if study.equal_area is None else sensor_shapes(study.equal_area, study.sensors, opened.size)
     groups, bands = len(opened.scene.groups), len(model.wavelength_nm)
-    found = study.render.reference and find_reference(opened.scene, film_of(opened, model)) is not None
+    found = study.render.reference and find_reference(opened.scene, film) is not None
     spp = _LIVE_SPP if found else model.spp
     return _Part(pixels, max(pixels, *map(prod, shapes.values()), 0), bands, groups, spp, model.denoise)
 

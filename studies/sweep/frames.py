@@ -26,7 +26,7 @@ from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
-from studies.study.equal_area import site_grid
+from studies.study.equal_area import in_pixels, site_grid
 from studies.study.gain import at_gain
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
@@ -107,6 +107,7 @@ def make_frames(
     light: Light,
     wanted: Mapping[str, tuple[SensorConfig, SensorConfig]],
     study: Study,
+    samples: int = 1,
 ) -> None:
     """Make and keep the frames of one lit scene.
 
@@ -120,13 +121,15 @@ def make_frames(
         By key: the preset, whose auto exposure it is whatever mosaic and lens it gets, and the sensor as modelled.
     study : Study
         Its levels, and the sensors' size.
+    samples : int
+        Samples of the light along each side of a pixel.
     """
     if transport.denoised is None:
         views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
     else:
         views = relight_denoised(transport, luminance_cd_m2=1.0)
     white, area = shown_white_cd_m2(transport, 1.0), study.equal_area
-    picture = views[0] if area is None else area.view(views[0], area.coarsest_um)
+    picture = in_pixels(views[0], samples) if area is None else area.view(views[0], area.coarsest_um)
     scene = {
         "light": {name: getattr(light, name).tolist() for name in ("wavelength_nm", "width_nm", "spectrum")},
         "lamp": (light.lamp.wavelength_nm.tolist(), light.lamp.values.tolist()),
@@ -137,13 +140,15 @@ def make_frames(
     for key, (preset, sensor) in wanted.items():
         radiances: tuple[SpectralRadiance, ...] = views
         if area is not None:
-            radiances = tuple(area.view(view, *site_grid(sensor)) for view in views)
-        unmoved, *halves = (channel_electrons(form_image(view, sensor), sensor, 1.0) for view in radiances)
+            pitch_um, block = site_grid(sensor)
+            radiances = tuple(area.view(view, pitch_um / samples, block * samples) for view in views)
+        of_pixels = in_pixels(radiances[0], samples)
+        unmoved, *halves = (channel_electrons(form_image(view, sensor, samples), sensor, 1.0) for view in radiances)
         whole, first, second = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
         errors = [(first - second) / 2] if transport.denoised is None else [whole - first, whole - second]
         facts = scene | {
-            "auto_s": unit_exposure_s(radiances[0], preset),
-            "auto_w_s": unit_exposure_s(radiances[0], sensor, "W" if "W" in sensor.channels else None),
+            "auto_s": unit_exposure_s(of_pixels, preset),
+            "auto_w_s": unit_exposure_s(of_pixels, sensor, "W" if "W" in sensor.channels else None),
             "electrons": keep_array(folder, unmoved if sensor.lens.shake_um else whole),
             "errors": keep_array(folder, np.stack(errors).astype(np.float32)),
         }

@@ -113,12 +113,13 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
 def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
     """Transport of a scene, rendered or out of the folder of renders; with what had to be assumed of a file."""
     model, share = job.plan.renders.get(opened.choice), partial(_brightest_share, job, opened)
-    return make_transport(opened, job.study, model, job.out / RENDERS, progress, share)
+    samples = job.plan.samples_a_side(opened.choice)
+    return make_transport(opened, job.study, model, job.out / RENDERS, progress, share, samples)
 
 
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
     """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
-    study, shares = job.study, []
+    study, samples, shares = job.study, job.plan.samples_a_side(opened.choice), []
     for (spectrum, *_), (_, sensor) in _imaged(job, opened).items():
         lit = under(transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
@@ -127,12 +128,14 @@ def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> flo
         for exposure in study.exposures:
             time_s, longest_s = parse_exposure(exposure), study.longest_exposure_s * most
             whole_s = None if time_s is None else time_s * most
-            shares.append(render_share(lit, merged_sensor(sensor, most), brightest, longest_s, whole_s))
+            burst = merged_sensor(sensor, most)
+            shares.append(render_share(lit, burst, brightest, longest_s, whole_s, samples=samples))
     return max(shares)
 
 
 def _request(job: Job, opened: OpenedScene) -> str:
-    terms = [opened.identity, job.plan.renders.get(opened.choice), job.study.render]
+    samples = job.plan.samples_a_side(opened.choice)
+    terms = [opened.identity, job.plan.renders.get(opened.choice), job.study.render, samples]
     return digest_inputs([*terms, backend(), versions()])
 
 
@@ -162,7 +165,8 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
         absent = {key: sensors for key, sensors in keyed.items() if load_frame(folder, key, sensors[1]) is None}
         if absent:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            make_frames(folder, under(transport, spectrum), light, absent, job.study)
+            samples = job.plan.samples_a_side(opened.choice)
+            make_frames(folder, under(transport, spectrum), light, absent, job.study, samples)
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:

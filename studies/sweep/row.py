@@ -18,7 +18,8 @@ class Row:
     gain_factor, iso : float
         Gain that the frame was read with, and the speed that it gives; no speed of a mosaic without green.
     spp : float
-        Samples a pixel of the render, in the mean.
+        Samples per pixel of the render, in the mean; where the render is finer than the sensor's pixels (an edge's),
+        per pixel of the render.
     bands : int
         Of the render.
     render : str

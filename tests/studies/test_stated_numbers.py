@@ -52,13 +52,13 @@ def test_an_automatic_exposure_fills_the_well_or_ends_at_the_longest(tmp_path: P
 def test_the_results_state_the_render_that_was_made(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     paths, made = count_paths(monkeypatch), []
     monkeypatch.setattr(render_noise, "render", lambda *a, **k: made.append(render(*a, **k)) or made[-1])
-    size = 16
+    size = 16  # of the sensor: an edge's render has two samples along each side of its pixels
     limits = RenderLimits(size=size, spp=33, noise_share=1e-6)
     study = Study((SceneChoice("slanted_edge"),), ("0.001cd/m2", "1000cd/m2"), render=limits)
     swept(study, tmp_path)
     found = json.loads(results_json(tmp_path))["rows"]
     (transport,), told = made, found[0]["render"]
-    assert found[0]["spp"] == paths["camera"] / size**2 / len(transport.groups)
+    assert found[0]["spp"] == paths["camera"] / (2 * size) ** 2 / len(transport.groups)
     assert told["stopped_by"] == "samples"
     assert told["brightest_share"] > 1e-6
     bands = found[0]["bands"]

@@ -7,12 +7,16 @@ from typing import Any
 import numpy as np
 import pytest
 import sweep_sample as SAMPLE
+from builders import transport_of
 from explore_sample import small_transport
 from loop import loop
 
 from render.engine import render
-from render.spectrum import luminance
+from render.illuminants import illuminant
+from render.scene import LightGroup
+from render.spectrum import even_bands, luminance, observer
 from scenes.catalogue import load
+from scenes.reflectances import color_checker_reflectances
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.pixel import ChannelReading
 from sensor.presets import low_noise
@@ -215,7 +219,7 @@ def test_shares_of_lights_sum_to_the_picture_and_each_is_what_it_gives_alone() -
     scene = load("night_street")
     transport = render(scene, (16, 24), wavelength_nm=[450, 550, 650], width_nm=[100] * 3, spp=8)
     assert len(transport.groups) > 2
-    shares = group_shares(transport)
+    shares = group_shares(transport, (16, 24))
 
     def y(**powers: float) -> np.ndarray:
         view = transport.relight(powers=powers or None)
@@ -239,7 +243,7 @@ def test_shares_follow_each_lamps_own_spectrum_within_the_bands() -> None:
     lamps = {"sun": red, "sky": Lamp("D65")}  # each at its own luminance
     groups = {name: lit_group(group, lamps[name]) for name, group in transport.groups.items()}
     lit = replace(transport, groups=groups)
-    shares = group_shares(lit)
+    shares = group_shares(lit, lit.radiance.shape[2:])
     alone = []
     for name in groups:
         powers = {other: groups[other].power * (other == name) for other in groups}
@@ -250,6 +254,24 @@ def test_shares_follow_each_lamps_own_spectrum_within_the_bands() -> None:
     for index, plane in enumerate(alone):
         np.testing.assert_allclose(shares[bright, index], (plane / np.maximum(whole, 1e-9))[bright], atol=5e-3)
     assert shares[bright].mean(axis=0).min() > 0.05
+
+
+def test_shares_of_a_lamp_of_lines_beside_a_sky_are_those_of_surfaces_at_its_lines() -> None:
+    """Low-pressure sodium in bands of 20 nm: the band of the line holds what surfaces do 7 nm beside it, too."""
+    nm, width_nm = even_bands((380.0, 780.0), 20)
+    lamp, sky = illuminant("sodium_low"), illuminant("D65")
+    patches = [curve for _, curve in color_checker_reflectances()]
+    means = np.array([curve.band_average(nm, width_nm) for curve in patches]).T.reshape(1, 20, 4, 6)
+    groups = {"lamp": LightGroup(("lamp",), lamp), "sky": LightGroup(("sky",), sky)}
+    found = group_shares(transport_of(means.astype(np.float32).repeat(2, axis=0), groups, nm, width_nm), (4, 6))
+    y = []
+    for group, at in ((groups["lamp"], np.arange(588.9, 589.7, 1e-4)), (groups["sky"], np.arange(380.0, 780.0, 0.1))):
+        light = group.power * np.interp(at, group.spectrum.wavelength_nm, group.spectrum.values, left=0.0, right=0.0)
+        surfaces = np.array([np.interp(at, curve.wavelength_nm, curve.values) for curve in patches])
+        y.append(surfaces @ (light * observer(at)[1]) * (at[1] - at[0]))
+    share = (y[0] / np.sum(y, axis=0)).reshape(4, 6)
+    assert 0.2 < share.min() < share.max() < 0.8
+    np.testing.assert_allclose(found[..., 0], share, rtol=0.01)
 
 
 def test_a_scene_has_one_hash_whatever_lights_it_and_another_for_other_shapes(tmp_path: Path) -> None:

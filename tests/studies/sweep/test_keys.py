@@ -59,13 +59,14 @@ def test_a_frames_key_changes_with_each_of_its_inputs_alone(tmp_path: Path, monk
 def test_the_request_for_a_render_changes_with_each_of_its_inputs_alone(monkeypatch: pytest.MonkeyPatch) -> None:
     """Of a render that is noted for a request nothing is made anew, whatever limits the study asks for now."""
 
-    def request(identity: str = "a", model: str = "b", limits: RenderLimits | None = None) -> str:
+    def request(identity: str = "a", model: str = "b", limits: RenderLimits | None = None, samples: int = 1) -> str:
         study = SimpleNamespace(render=limits or RenderLimits())
-        job: Any = SimpleNamespace(plan=SimpleNamespace(renders={"scene": model}), study=study)
+        job: Any = SimpleNamespace(plan=SimpleNamespace(renders={"scene": model}, samples_a_side=lambda _: samples))
+        job.study = study
         opened: Any = SimpleNamespace(identity=identity, choice="scene")
         return prepare_module._request(job, opened)
 
-    found = [request(), request("c"), request(model="c"), request(limits=RenderLimits(spp=17))]
+    found = [request(), request("c"), request(model="c"), request(limits=RenderLimits(spp=17)), request(samples=2)]
     for name in ("backend", "versions"):
         monkeypatch.setattr(prepare_module, name, lambda: "another")
         found.append(request())

@@ -246,11 +246,12 @@ def test_a_finer_request_goes_on_from_the_coarser_render_and_makes_its_cells_ane
     assert (coarse.spp, fine.spp) == (16, 64)
     model = SAMPLE.stated(finer).renders[study.scenes[0]]
     bands = {"wavelength_nm": model.wavelength_nm, "width_nm": model.width_nm}
-    transport = render(load("slanted_edge"), (16, 16), **bands, max_spp=64, cache=tmp_path / "out" / "renders")
+    # two samples of an edge's light along each side of a pixel
+    transport = render(load("slanted_edge"), (32, 32), **bands, max_spp=64, cache=tmp_path / "out" / "renders")
     sensor = preset("low_noise", "bayer")
-    whole = expected_electrons(form_image(transport.relight(luminance_cd_m2=1.0), sensor), sensor, fine.exposure_s)
+    whole = expected_electrons(form_image(transport.relight(luminance_cd_m2=1.0), sensor, 2), sensor, fine.exposure_s)
     halves = transport.relight_halves(luminance_cd_m2=1.0)
-    even, odd = (expected_electrons(form_image(half, sensor), sensor, fine.exposure_s) for half in halves)
+    even, odd = (expected_electrons(form_image(half, sensor, 2), sensor, fine.exposure_s) for half in halves)
     share = monte_carlo_share((even - odd) / 2, whole, sensor, fine.exposure_s)
     assert fine.mc_share == pytest.approx(share, rel=1e-4)  # float32 halves
     assert 0 < fine.mc_share < coarse.mc_share
