@@ -42,7 +42,7 @@ def main() -> None:
             found = costs(given.scene, side, Path(folder))
             print(row(side, *found), flush=True)
     times = (seconds * (LARGE / side) ** 2 for seconds in found[:3])
-    print(row(LARGE, *times, memory(LARGE**2, BANDS, 1).total) + " computed")
+    print(row(LARGE, *times, memory(LARGE**2, BANDS, 1, spp=SAMPLES).total) + " computed")
 
 
 def costs(scene: str, side: int, folder: Path) -> tuple[float, float, float, float]:

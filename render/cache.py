@@ -90,14 +90,23 @@ def kept_beside(out: Path) -> Iterator[Path]:
     The folder lies beside the file, and goes once the file is there. What fails says that the same command goes on from
     it; a refusal of the render itself leaves no folder.
     """
-    folder = out.with_name(f".{out.name}.render")
+    folder = _folder_beside(out)
     try:
         yield folder
     except BaseException as error:
-        if folder.is_dir():
-            error.add_note(f"the render is kept in {folder}, from which the same command goes on")
+        note_kept(error, out)
         raise
     shutil.rmtree(folder, ignore_errors=True)
+
+
+def note_kept(error: BaseException, out: Path) -> None:
+    """Note on an error where the render of a file is kept, if it is (`kept_beside`)."""
+    if out.name and (folder := _folder_beside(out)).is_dir():
+        error.add_note(f"the render is kept in {folder}, from which the same command goes on")
+
+
+def _folder_beside(out: Path) -> Path:
+    return out.with_name(f".{out.name}.render")
 
 
 def _kind(denoised: bool) -> str:

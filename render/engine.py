@@ -28,7 +28,7 @@ from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
 from render.transport import Transport
 from rodcone.errors import InputError, is_out_of_memory, one_line, require_whole
-from rodcone.jit import compiling
+from rodcone.jit import compiling, release_memory
 from rodcone.progress import Step, progress_bar, render_words
 from rodcone.types import Progress
 
@@ -149,6 +149,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
             clear_traceback(error)
             raise MemoryError(one_line(error)) from None
         transport = replace(transport, compile_s=compiled_s())
+    release_memory()  # before it is kept and looked at: what Dr.Jit keeps for its next launch is as much as the light
     if cache is not None:
         save_transport(Path(cache), scene, film, seed, transport)
     return replace(transport, meter=meter)

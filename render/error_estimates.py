@@ -45,8 +45,9 @@ class Halves:
 
     def add(self, even: Planes, odd: Planes, weight: np.float32) -> None:
         """Add a chunk's two means, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
-        for planes, twice in ((self.mean, even + odd), (self.difference, even - odd)):
-            step = np.multiply(twice, np.float32(0.5), out=twice)
+        for planes, combined in ((self.mean, np.add), (self.difference, np.subtract)):
+            step = combined(even, odd)
+            np.multiply(step, np.float32(0.5), out=step)
             np.subtract(step, planes, out=step)
             np.multiply(step, weight, out=step)
             np.add(planes, step, out=planes)

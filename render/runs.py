@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from render.error_estimates import Halves, group_errors, relative_error, shared_paths
+from render.error_estimates import Halves, SharedPaths, group_errors, relative_error, shared_paths
 from render.integrator.allocation import rates_of
 from render.integrator.wavefront import Span, seed_of, traced, tracers
 from render.level import SceneMeans
@@ -110,12 +110,21 @@ def means_of(transport: Transport, *, split: bool = False) -> Means:
 
 def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
     """Return the fields of a `Transport` that hold the means and their Monte Carlo error under lights (group, band)."""
-    errors = group_errors(means.light, means.seen, means.coverage.mean, means.rates)
-    variance = np.stack([group.covariance(group, means.rates) for group in errors])
-    shared = shared_paths(means.shared, errors, variance, means.rates) if means.shared else None
+    light, rates = means.light, means.rates
+    variance = np.empty(light.mean.shape, np.float32)
+    correlation = np.empty(light.mean.shape[1:], np.float32)
+    for band in range(light.mean.shape[1]):  # one by one: all at once would take twice the memory of the render
+        at = slice(band, band + 1)
+        seen = [lamp if len(lamp.mean) == 1 else Halves(lamp.mean[at], lamp.difference[at]) for lamp in means.seen]
+        of_band = Halves(light.mean[:, at], light.difference[:, at])
+        errors = group_errors(of_band, seen, means.coverage.mean, rates)
+        variance[:, at] = [group.covariance(group, rates) for group in errors]
+        if means.shared:
+            correlation[at] = shared_paths(means.shared, errors, variance[:, at], rates).correlation
+    shared = SharedPaths(means.shared, correlation) if means.shared else None
     error = relative_error(lights, means.light.mean, variance, shared)
-    light = {"light": means.light, "coverage": means.coverage, "seen": tuple(means.seen)}
-    return light | {"variance": variance, "shared": shared, "relative_mc_error": error}
+    halves = {"light": light, "coverage": means.coverage, "seen": tuple(means.seen)}
+    return halves | {"variance": variance, "shared": shared, "relative_mc_error": error}
 
 
 def scene_means_of(means: Means) -> SceneMeans:
@@ -125,20 +134,24 @@ def scene_means_of(means: Means) -> SceneMeans:
     so that the covariance of the mean is the sum of the pixels' covariances over the square of their number.
     """
     groups, bands, *size = means.light.mean.shape
+    pixels = size[0] * size[1]
     scattered = np.empty((groups, bands))
-    errors = []
-    for group in range(groups):
-        light, seen = means.light[group], means.seen[group]
-        scattered[group] = (light.mean - seen.mean).mean(axis=(1, 2), dtype=np.float64)
-        errors.append((light.difference - seen.difference).reshape(bands, -1))
-    error = np.concatenate([*errors, -means.coverage.difference.reshape(1, -1)])
-    covariance = np.zeros((len(error),) * 2)
+    for group, band in np.ndindex(groups, bands):
+        seen = means.seen[group].mean
+        of_band = means.light.mean[group, band] - seen[band % len(seen)]
+        scattered[group, band] = of_band.mean(dtype=np.float64)
+    lit = means.light.difference.reshape(groups, bands, pixels)
+    lamps = [seen.difference.reshape(-1, pixels) for seen in means.seen]
+    covered = means.coverage.difference.reshape(1, pixels)
+    covariance = np.zeros((groups * bands + 1,) * 2)
     with ThreadpoolController().limit(limits=1, user_api="blas"):  # because its threads would wait for Dr.Jit's
-        for first in range(0, error.shape[1], BLOCK):
-            part = error[:, first : first + BLOCK].astype(np.float64)
+        for first in range(0, pixels, BLOCK):
+            at = slice(first, first + BLOCK)
+            errors = [of_group[:, at] - lamp[:, at] for of_group, lamp in zip(lit, lamps, strict=True)]
+            part = np.concatenate([*errors, -covered[:, at]]).astype(np.float64)
             covariance += part @ part.T
     uncovered = 1 - float(means.coverage.mean.mean(dtype=np.float64))
-    return SceneMeans(scattered, uncovered, covariance / (size[0] * size[1]) ** 2)
+    return SceneMeans(scattered, uncovered, covariance / pixels**2)
 
 
 def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed: int) -> None:

@@ -1,5 +1,7 @@
 """Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit."""
 
+import ctypes
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
@@ -12,7 +14,17 @@ from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
 
-__all__ = ["Backend", "Matrix4", "arrays", "at_least_two_threads", "backend", "compiler_version", "compiling", "dr"]
+__all__ = [
+    "Backend",
+    "Matrix4",
+    "arrays",
+    "at_least_two_threads",
+    "backend",
+    "compiler_version",
+    "compiling",
+    "dr",
+    "release_memory",
+]
 
 Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
 
@@ -69,3 +81,11 @@ def at_least_two_threads() -> Iterator[None]:
         yield
     finally:
         dr.set_thread_count(count)
+
+
+def release_memory() -> None:
+    """Give free memory of Dr.Jit and the C library back: of a render, or of many small calls in a row."""
+    if backend() != "numpy":
+        dr.flush_malloc_cache()
+    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's
+        library.malloc_trim(0)

@@ -9,18 +9,27 @@ from pathlib import Path
 from rodcone.errors import InputError
 
 GB = 1e9
-# Bytes a pixel, counted from the arrays held at once; `tests/rodcone/test_memory.py` compares them with measured peaks.
+# Counted from the arrays held at once, and held against peaks that were measured (`tests/rodcone/test_memory.py`).
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
 _DENOISER_BYTES = 1300  # a pixel, of Open Image Denoise
-# What follows a render beside its transport, by band: relit light, its image, both halves' light, an image forming of
-# one of them with its copy for the lens, and what the transport keeps beside its arrays. Pooling the variance takes
-# less.
-_VIEW_ARRAYS = 7.5
-_RUN_BYTES = 2 * 4 * (1 << 24)  # of a light group: what a launch gives of both halves (`render.runs.MOST_FLOATS`)
-_RENDER_BYTES = 200  # for any number of bands: masks of the render, a preview
+_DENOISER_LIBRARY_BYTES = 200e6  # and what its folds' launches leave with Dr.Jit
+# While a render draws: its means, both halves' sums of a launch by group, and two copies of one group's.
+_MEANS_ARRAYS, _SUMS_ARRAYS, _COPIES = 2, 2, 2
+_LAUNCH_BYTES = 4 * (1 << 24)  # all channels of a launch at most (`render.runs.MOST_FLOATS`)
+_CHANNELS_BESIDE = 4  # bands
+_LAUNCHES = 2.5  # launches' channels that Dr.Jit keeps: these, their sums, and one copy
+_OTHER_LAUNCHES = 1.0  # for each group more, whose launches are of other sizes once a render takes many samples
+_MANY_SPP = 32
+_RENDERER_BYTES = 224e6  # libraries and compiled kernels
+_RENDER_BYTES = 120  # a pixel, for any number of bands: its order, its rate
+# What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
+# from, an image forming of one of them with its copy for the lens.
+_VIEW_ARRAYS = 10
+_VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
-PROCESS_BYTES = 350e6  # libraries and compiled kernels
+_WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
+_MAPPED_BYTES = 200e6  # addresses of libraries and threads that a render loads, beyond the memory that they hold
 _FILE_BANDS = 40  # of a picture file
 _FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
 
@@ -51,8 +60,10 @@ class Limit:
     per_process: bool = False
 
 
-def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: bool = False) -> Memory:
-    """Memory that a render of so many light groups needs, and what comes after it.
+def memory(
+    pixels: int, bands: int, groups: int, workers: int = 0, *, spp: float | None = None, denoised: bool = False
+) -> Memory:
+    """Memory that a render of so many light groups needs, or what comes after it where that needs more.
 
     Parameters
     ----------
@@ -60,14 +71,27 @@ def memory(pixels: int, bands: int, groups: int, workers: int = 0, *, denoised: 
         No groups for a picture file, which needs no render.
     workers : int
         Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
+    spp : float, optional
+        Samples per pixel of the render, at most; 0 where the light is there already; left out, many.
     denoised : bool
         Whether the render is denoised.
     """
-    arrays = (_TRANSPORT_ARRAYS + _DENOISED_ARRAYS * denoised) * groups + _VIEW_ARRAYS
-    other = _RENDER_BYTES + _DENOISER_BYTES * denoised
-    rendering = PROCESS_BYTES + pixels * (4.0 * arrays * bands + other) + _RUN_BYTES * groups
-    worker = PROCESS_BYTES + _CELL_BYTES * pixels
-    if workers <= 1:  # the process frees the render before it develops the first cell
+    plane = 4.0 * pixels * bands  # of float32, all bands
+    per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
+    of_denoiser = denoised * (_DENOISER_LIBRARY_BYTES + pixels * per_pixel)
+    # Drawing
+    samples = _MANY_SPP if spp is None else spp
+    channels = 4.0 * (bands + _CHANNELS_BESIDE)  # bytes of a path of a half
+    launch = _LAUNCH_BYTES if spp is None else min(_LAUNCH_BYTES, channels * pixels * max(spp, 2.0) / 2)
+    sums = max(plane, launch * 4.0 * bands / channels)  # of several chunks, where the pixels are few
+    other_sizes = _OTHER_LAUNCHES * max(groups - 1, 0) * min(1.0, samples / _MANY_SPP)
+    drawing = _RENDERER_BYTES + _RENDER_BYTES * pixels + (_LAUNCHES + other_sizes) * launch
+    drawing += (_MEANS_ARRAYS * groups + 1) * plane + (_SUMS_ARRAYS * groups + _COPIES - 1) * sums
+    # Looking at what was drawn, and developing it: the render is let go of before the first cell
+    viewing = _VIEWER_BYTES + (_TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS) * plane
+    rendering = max(drawing * (groups > 0 and spp != 0), viewing) + of_denoiser
+    worker = _WORKER_BYTES + _CELL_BYTES * pixels
+    if workers <= 1:
         peak_bytes = max(rendering, workers * worker)
         return Memory(peak_bytes, peak_bytes)
     return Memory(rendering + workers * worker, max(rendering, worker))
@@ -109,7 +133,8 @@ def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
     yield from _groups(root)
     most = resource.getrlimit(resource.RLIMIT_AS)[0]
     if most != resource.RLIM_INFINITY:
-        yield Limit(f"what the address-space limit of {most / GB:.1f} GB leaves (ulimit -v)", most - _pages(0), True)
+        free = most - _pages(0) - _MAPPED_BYTES
+        yield Limit(f"what the address-space limit of {most / GB:.1f} GB leaves (ulimit -v)", free, True)
 
 
 def _groups(root: Path) -> Iterator[Limit]:

@@ -12,6 +12,7 @@ from cyclopts import App, CycloptsError, Parameter, Token, convert
 
 from rodcone.errors import InputError, is_out_of_memory
 from studies.commands.console import INTERRUPTED, say
+from studies.commands.watched import survive_sudden_end
 
 # Commands are imported when they run: other distributions have packages named render, sensor, ..., and `doctor`, which
 # says which ones Python finds, has to start all the same.
@@ -102,12 +103,10 @@ def main(arguments: list[str] | None = None) -> Any:
             # Warnings look like errors, without the place in the code; each is printed once.
             once = cache(say)
             warnings.showwarning = lambda message, *_: once(str(message))
-            code = app(
-                joined(sys.argv[1:] if arguments is None else arguments),
-                exit_on_error=False,
-                print_error=False,
-                result_action="return_value",
-            )
+            given = joined(sys.argv[1:] if arguments is None else arguments)
+            if arguments is None:
+                survive_sudden_end(given)
+            code = app(given, exit_on_error=False, print_error=False, result_action="return_value")
     except CycloptsError as error:
         fail(" ".join(str(error).split()), BAD_INPUT)
     except InputError as error:

@@ -1,13 +1,9 @@
 """Keep results between changes of a control, and end work for which nobody waits any more."""
 
-import ctypes
-import sys
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, field
 from typing import Any, TypeVar
-
-from rodcone.jit import backend, dr
 
 T = TypeVar("T")
 _KEPT = 8  # results per stage: four light groups of two cameras
@@ -54,11 +50,3 @@ class Memo:
     def kept(self, stage: str, key: Hashable) -> Any:
         """Return the result kept under a key; None where there is none."""
         return self.stages[stage].get(key) if stage in self.stages else None
-
-
-def release_memory() -> None:
-    """Give free memory of Dr.Jit and the C library back; without it, 10 000 changes needed a seventh more than 500."""
-    if backend() != "numpy":
-        dr.flush_malloc_cache()
-    if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's
-        library.malloc_trim(0)

@@ -19,11 +19,12 @@ from typing import Any, TypeAlias
 
 from isp.picture import Picture
 from rodcone.errors import InputError, cut, one_line, require_name
+from rodcone.jit import release_memory
 from rodcone.types import Image
 from studies.explore.answers import Answer, shown, take_sensor, written
 from studies.explore.chain import development_of, expose_scene
 from studies.explore.controls import Controls, controls_from
-from studies.explore.memo import Memo, Overtaken, never_cancel, release_memory
+from studies.explore.memo import Memo, Overtaken, never_cancel
 from studies.explore.messages import KINDS, Header, first_message, is_superseded_by, read_message, read_views, unsent
 from studies.explore.slow import begin, stand_in
 from studies.explore.source import RenderState, Source

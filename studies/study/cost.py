@@ -57,7 +57,8 @@ class PictureCost:
     @property
     def memory(self) -> Memory:
         """Memory at the peak."""
-        return memory(self.pixels, self.bands, self.groups if self.spp != 0 else 1, denoised=self.denoised)
+        groups = self.groups if self.spp != 0 else 1
+        return memory(self.pixels, self.bands, groups, spp=self.spp, denoised=self.denoised)
 
     @property
     def seconds(self) -> float:

@@ -136,7 +136,7 @@ def estimate(
     """Estimate a sweep of opened scenes, `kept` cells of which are there; others as of `estimated`."""
     cells = len(conditions(study)) * len(study.seeds) * len(study_mosaics(study) if frames else study.processors)
     parts = [_part(study, plan, opened) for opened in scenes.values()]
-    needs = [memory(part.pixels, part.bands, part.groups, workers, denoised=part.denoised) for part in parts]
+    needs = [memory(x.pixels, x.bands, x.groups, workers, spp=x.spp, denoised=x.denoised) for x in parts]
     at = partial(_seconds, study, parts, workers, planned, frames)
     return Estimate(
         cells=cells,

@@ -1,0 +1,57 @@
+"""A run that may need more memory than there is, in a process of its own: its sudden end becomes one line.
+
+Where memory runs out while LLVM compiles, or the system ends the process, nothing is raised that Python could catch.
+"""
+
+import ctypes
+import os
+import resource
+import signal
+from collections.abc import Sequence
+from contextlib import suppress
+from pathlib import Path
+
+COMMANDS = ("capture", "demo", "render", "sweep")  # that render
+SUDDEN = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGTRAP, signal.SIGKILL)
+_OUT = "shot.dng", "render.exr"  # of commands that do not name their file
+_END_WITH_PARENT = 1  # Linux's PR_SET_PDEATHSIG
+
+
+def survive_sudden_end(arguments: Sequence[str]) -> None:
+    """Go on in a child process, whose sudden end raises `MemoryError` here; else this process ends as the child did.
+
+    A child is made for a command that renders, where it is forced beyond what memory is free, or where the address
+    space has a limit. Dr.Jit, whose threads a child would lack, must not be imported yet.
+
+    Parameters
+    ----------
+    arguments : sequence of str
+        Of the command line.
+
+    Raises
+    ------
+    MemoryError
+        Where a signal ended the child that no person sends; it names the render that is kept.
+    """
+    limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
+    if not arguments or arguments[0] not in COMMANDS or not (limited or "--force" in arguments):
+        return
+    child = os.fork()
+    if not child:
+        with suppress(OSError, AttributeError):  # not on every system
+            ctypes.CDLL(None).prctl(_END_WITH_PARENT, signal.SIGKILL)
+        return
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to the child too, which says what it keeps
+    signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
+    status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    if status >= 0:
+        os._exit(status)
+    ended_by = signal.Signals(-status)
+    if ended_by not in SUDDEN:
+        os._exit(128 - status)
+    error = MemoryError(f"the system ended the run by {ended_by.name}, as where a compiler gets no more")
+    from render.cache import note_kept  # imports Dr.Jit
+
+    for text in (*_OUT, *arguments[1:]):
+        note_kept(error, Path(text.partition("=")[2] or text))
+    raise error
