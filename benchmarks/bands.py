@@ -2,18 +2,27 @@
 
 Run ``python benchmarks/bands.py``. For each illuminant and bands of 10 and 20 nm it prints the largest relative error
 over 24 patches and R, G, B and W: of means times means, of the weights with the lamp known and unknown
-(`render.band_weights`), the error that `Transport.band_error` would tell (largest channel, RMS over patches), and by
-how much the weights turn up the noise of bands whose relative errors are alike and independent.
+(`render.band_weights`); the error that `Transport.band_error` states beside the one found (largest channel, RMS over
+patches), with the lamp known and for a file of radiance alone; and by how much the weights turn up the noise of bands
+whose relative errors are alike and independent, in even light and of the patch where it is most.
+
+``--render SCENE`` prints how much the weights turn up the noise that a render really has in each channel: its bands
+share their paths.
 """
+
+import argparse
+from collections.abc import Mapping
 
 import numpy as np
 
 from render.bands.error import curve_error
 from render.bands.mixed_light import band_light
+from render.engine import render
 from render.illuminants import illuminant, illuminant_names
 from render.scene import LightGroup
 from render.spectrum import Spectrum, even_bands, photons_per_joule
-from rodcone.types import Floats
+from rodcone.types import Floats, Planes
+from scenes.catalogue import load
 from scenes.reflectances import color_checker_reflectances
 from sensor.presets import low_noise
 from sensor.response import electrons_per_irradiance
@@ -33,7 +42,9 @@ def table(count: int) -> None:
     surface_means = np.array([x.band_average(nm, width) for x in PATCHES])
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
     plain = sensor.responses.band_average(sensor.channels, nm, width) * photons_per_joule(nm) * width * area_m2
-    print(f"\n{width[0]:g} nm        means, %   lamp known   unknown   told (RMS)   found (RMS)   noise")
+    curves_by_name = sensor.responses.curves
+    print(f"\n{width[0]:g} nm: largest error, %; RMS, %, stated and found; noise, times")
+    print("             means      known      unknown    known: stated found   file: stated found   even   patch")
     for name in illuminant_names():
         if name == "sodium_low":
             continue  # lines of 0.1 nm: the fine sum would need more points
@@ -52,13 +63,45 @@ def table(count: int) -> None:
             )
         ]
         planes = surface_means.T.reshape(1, count, 4, 6)
-        lights = {"lamp": LightGroup(("lamp",), lamp)}
-        light = band_light(lights, np.ones(1), nm, width)
-        told = curve_error(lights, light, planes, nm, width, sensor.responses.curves)
+        of_file = averages.T.reshape(1, count, 4, 6)
+        told = [
+            max(stated(spectrum, x, nm, width, curves_by_name).values())
+            for spectrum, x in ((lamp, planes), (illuminant("E"), of_file))
+        ]
         noise = (relative_noise(known * emission) / relative_noise(plain * emission)).max()
+        of_patches = [relative_noise(row * known) / relative_noise(row * plain) for row in surface_means * emission]
         largest = "   ".join(f"{100 * np.abs(error).max():8.2f}" for error in errors)
-        found = np.sqrt(np.mean(errors[1] ** 2, axis=0)).max()
-        print(f"{name:12} {largest}   {100 * max(told.values()):8.3f}   {100 * found:8.3f}   {noise:8.3f}")
+        found = [np.sqrt(np.mean(error**2, axis=0)).max() for error in errors[1:]]
+        pairs = "   ".join(f"{100 * a:7.3f} {100 * b:7.3f}" for a, b in zip(told, found, strict=True))
+        print(f"{name:12} {largest}   {pairs}   {noise:7.3f} {np.max(of_patches):7.3f}")
+
+
+def stated(
+    spectrum: Spectrum, planes: Planes, nm: Floats, width: Floats, curves: Mapping[str, Spectrum]
+) -> dict[str, float]:
+    """Return what `Transport.band_error` says of one light group."""
+    lights = {"lamp": LightGroup((), spectrum)}
+    light = band_light(lights, np.ones(1), nm, width)
+    return curve_error(lights, light, planes, nm, width, curves)
+
+
+def table_of_render(scene: str) -> None:
+    """Print the noise of each channel's electrons by weights over that by products of averages, of one render."""
+    sensor, (nm, width) = low_noise(), even_bands((380.0, 780.0), 20)
+    transport = render(load(scene), 64, spp=32, wavelength_nm=nm, width_nm=width)
+    plain = sensor.responses.band_average(sensor.channels, nm, width) * photons_per_joule(nm) * width
+    print(f"{scene}, 20 nm: {', '.join(sensor.channels)}")
+    for name in illuminant_names():
+        even, odd = transport.relight_halves(name)
+        weights = electrons_per_irradiance(sensor, nm, width, 1.0, even.light)
+        noise = [relative_noise_of(even.values, odd.values, x) for x in (weights, plain)]
+        print(f"{name:12} " + " ".join(f"{ratio:.4f}" for ratio in noise[0] / noise[1]))
+
+
+def relative_noise_of(even: Planes, odd: Planes, weights: Floats) -> Floats:
+    """RMS over pixels of half the difference of two halves' electrons, over their mean, by channel."""
+    differences, means = (even - odd) @ weights.T / 2, (even + odd) @ weights.T / 2
+    return np.asarray(np.sqrt(np.square(differences).mean(axis=(0, 1))) / means.mean(axis=(0, 1)))
 
 
 def relative_noise(weights: Floats) -> Floats:
@@ -67,5 +110,11 @@ def relative_noise(weights: Floats) -> Floats:
 
 
 if __name__ == "__main__":
-    for bands in (20, 40):
-        table(bands)
+    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    options.add_argument("--render", metavar="SCENE")
+    given = options.parse_args()
+    if given.render:
+        table_of_render(given.render)
+    else:
+        for bands in (20, 40):
+            table(bands)

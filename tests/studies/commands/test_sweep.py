@@ -12,6 +12,7 @@ import sweep_sample as SAMPLE
 from any_cpu.configurations import environment
 from command_line import call, check_refusals
 
+from rodcone.memory import memory
 from studies.study.cost import render_seconds
 
 TEXT = """
@@ -99,8 +100,8 @@ def test_dry_run_counts_and_computes_nothing(study: Path, tmp_path: Path) -> Non
     render_s = [render_seconds(256**2, 20, 1, spp) for spp in (64, 512)]
     assert more["seconds"] - facts["seconds"] == pytest.approx(render_s[1] - render_s[0])
     larger = json.loads(call([*command, *still, "--set", "render.size=1024"])[1])
-    fixed = 3 * 350e6 + 2**27  # this process and two workers, and a run of one light; the rest goes with the pixels
-    assert larger["bytes"] - fixed == pytest.approx(16 * (facts["bytes"] - fixed), rel=1e-9)
+    for told, side in ((facts, 256), (larger, 1024)):
+        assert told["bytes"] == memory(side**2, 20, 1, 2, spp=64).total
 
 
 def test_dry_run_counts_cells_of_this_code_alone_as_kept(study, tmp_path, monkeypatch):
