@@ -387,7 +387,9 @@ def test_the_room_of_rendered_scenes_is_counted_by_planes_bands_lamps_and_channe
     )  # fmt: skip
     groups = {"sun": None, "sky": None, "lamp": None}
     opened: Any = SimpleNamespace(choice=choice, size=(30, 50), scene=SimpleNamespace(groups=groups))
-    plan: Any = SimpleNamespace(renders={choice: SimpleNamespace(wavelength_nm=np.arange(7.0))})
+    plan: Any = SimpleNamespace(
+        renders={choice: SimpleNamespace(wavelength_nm=np.arange(7.0))}, samples_a_side=lambda *_: 1
+    )
     order = SetOrder(truth="mosaic_e,channels_e,rgb,depth,normals,ids,shares")
     wanted = 3 * 4 * 1500 * 7 * 3
     for channels in (3, 4):

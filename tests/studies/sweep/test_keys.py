@@ -213,7 +213,7 @@ def test_the_brightest_share_is_asked_for_in_the_brightest_light_over_the_longes
     """Of the sensor of as many frames, over their time together; the largest of the answers is the share."""
     asked: list[tuple[Any, ...]] = []
     monkeypatch.setattr(
-        prepare_module, "render_share", lambda *asks: asked.append(asks) or (3.0, 7.0, 5.0)[len(asked) - 1]
+        prepare_module, "render_share", lambda *asks, samples: asked.append(asks) or (3.0, 7.0, 5.0)[len(asked) - 1]
     )
     levels, exposures = ("1cd/m2", "25cd/m2", "9cd/m2"), ("auto", "20ms", "5ms")
     study = SAMPLE.small_study(
