@@ -40,6 +40,7 @@ BLOCK = 16  # pixels a side, within which errors are pooled: a variance from 256
 FALSE_ALARM = 1e-3  # chance, at most, that an agreeing render is called another
 MOST_PACKED = 32  # times that a file unpacks into; half floats of light come to 2 or 3
 _MULTIPLES = (1, 2, 3, 4, 8)  # of a film's sides, at which a reference is sought to average
+_LARGEST_HALF = np.float32(6e4)  # under the largest half float, 65504
 _LEVELS = ("radiance", "uncovered", "covariance")
 
 
@@ -189,9 +190,13 @@ def save_reference(path: Path, transport: Transport, certificate: Mapping[str, A
 
 
 def _half(planes: Planes) -> tuple[Any, Planes]:
-    """Planes in half floats, each over its largest value, and that value: (group, band, 1, 1)."""
+    """Planes in half floats, and the factor that each is stored over: (group, band, 1, 1).
+
+    A plane's largest value is stored as `_LARGEST_HALF`: light of 1e-9 of it keeps 11 bits, where a lamp in view is a
+    million times brighter than what it lights.
+    """
     largest = planes.max(axis=(2, 3), keepdims=True)
-    scale = np.where(largest > 0, largest, np.float32(1))
+    scale = np.where(largest > 0, largest / _LARGEST_HALF, np.float32(1))
     return (planes / scale).astype(np.float16), scale
 
 

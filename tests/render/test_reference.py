@@ -139,6 +139,18 @@ def test_a_file_gives_light_to_half_floats_and_its_error(small, tmp_path, monkey
     assert read.variance.sum() == pytest.approx(made.variance.sum(), rel=0.1)
 
 
+def test_what_a_lamp_in_view_lights_keeps_its_digits(small, tmp_path, monkeypatch):
+    """A moon of 0.5 degrees in view is 6e5 times as bright as the ground that it lights."""
+    scene, film, made = small
+    monkeypatch.setenv(FOLDER, str(tmp_path))
+    light = made.light.mean / made.light.mean.max(axis=(2, 3), keepdims=True)
+    light = np.maximum(light, np.float32(0.1)) * np.float32(1e-6)
+    light[..., 0, 0] = 1.0  # the lamp
+    save_reference(reference_path(tmp_path, scene, film), replace(made, light=Halves(light, 0 * light)), {})
+    read = find_reference(scene, film).transport
+    np.testing.assert_allclose(read.light.mean, light, rtol=2.0**-11)
+
+
 def test_rounding_is_charged_where_it_is_all_the_error_there_is(small, tmp_path, monkeypatch):
     scene, film, made = small
     monkeypatch.setenv(FOLDER, str(tmp_path))
