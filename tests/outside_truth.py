@@ -34,7 +34,8 @@ ELECTRONS = {  # under D65 in 10 ms, from RGBW: luminance [cd/m^2], f-number, pi
 MOONLIGHT_PHOTONS_PER_UM2_S_CD_M2, MOONLIGHT_CD_M2 = 276.85698, 0.036119732
 
 # Percent flicker over 100, and flicker index, of single lamps at 120 Hz: Lehman, Wilkins, Berman, Poplawski & Miller,
-# "Proposing measures of flicker in the low frequencies for lighting applications" (IEEE ECCE 2011); facts, no licence.
+# "Proposing measures of flicker in the low frequencies for lighting applications" (IEEE ECCE 2011), as commonly quoted:
+# its own table was not at hand; facts, no licence.
 FLICKER_OF_LAMPS = {
     "incandescent": (0.063, 0.02),
     "fluorescent": (0.284, 0.07),

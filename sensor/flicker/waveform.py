@@ -4,7 +4,8 @@ A lamp on the mains brightens twice per cycle, so it flickers at 100 Hz or 120 H
 energy between two peaks: a filament's heat, a phosphor's glow, nothing in a sodium arc. The depths below are the
 percent flicker, (most - least) / (most + least), of Lehman, Wilkins, Berman, Poplawski & Miller, "Proposing measures of
 flicker in the low frequencies for lighting applications" (IEEE ECCE 2011), who list it beside the flicker index of
-single lamps. A cosine of depth d has the index d / pi, which is theirs to 0.01, of the tube to 0.021.
+single lamps. They are entered as commonly quoted: the paper's own table was not at hand. A cosine of depth d has the
+index d / pi, which is theirs to 0.01, of the tube to 0.021.
 """
 
 import re
