@@ -3,18 +3,17 @@
 Where memory runs out while LLVM compiles, or the system ends the process, nothing is raised that Python could catch.
 """
 
-import ctypes
 import os
 import resource
 import signal
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
+
+from rodcone.child_process import end_with_parent
 
 COMMANDS = ("capture", "demo", "render", "sweep")  # that render
 SUDDEN = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGTRAP, signal.SIGKILL)
 _OUT = "shot.dng", "render.exr"  # of commands that do not name their file
-_END_WITH_PARENT = 1  # Linux's PR_SET_PDEATHSIG
 
 
 def survive_sudden_end(arguments: Sequence[str]) -> None:
@@ -38,8 +37,7 @@ def survive_sudden_end(arguments: Sequence[str]) -> None:
         return
     child = os.fork()
     if not child:
-        with suppress(OSError, AttributeError):  # not on every system
-            ctypes.CDLL(None).prctl(_END_WITH_PARENT, signal.SIGKILL)
+        end_with_parent()
         return
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to the child too, which says what it keeps
     signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
@@ -52,6 +50,7 @@ def survive_sudden_end(arguments: Sequence[str]) -> None:
     error = MemoryError(f"the system ended the run by {ended_by.name}, as where a compiler gets no more")
     from render.cache import note_kept  # imports Dr.Jit
 
-    for text in (*_OUT, *arguments[1:]):
+    named = any(text.startswith(("-o", "--out")) for text in arguments)
+    for text in arguments[1:] if named else _OUT:
         note_kept(error, Path(text.partition("=")[2] or text))
     raise error

@@ -1,10 +1,8 @@
 """Cells on any executor, and on a pool of processes that is made anew when one of them dies."""
 
-import ctypes
 import multiprocessing
 import os
 import signal
-import sys
 import threading
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
@@ -16,7 +14,7 @@ from multiprocessing.connection import wait as wait_for
 from multiprocessing.process import BaseProcess
 from typing import Any, Protocol
 
-from rodcone.child_process import SAFE_PATH
+from rodcone.child_process import SAFE_PATH, end_with_parent
 from rodcone.errors import InputError, require_whole
 from rodcone.jit import backend, dr
 from studies.study.cost import cores
@@ -24,7 +22,6 @@ from studies.sweep.run_cell import run_cell
 
 MOST_WORKERS = 1024
 LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
-_PARENT_DEATH_SIGNAL = 1  # PR_SET_PDEATHSIG of prctl(2)
 MOST_DEATHS = 3  # a cell is given up after it was held by so many workers that died; the last two ran it alone
 # What BLAS libraries and OpenMP read at their import: set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
@@ -255,8 +252,7 @@ def _inherited(threads: int) -> Iterator[None]:
 
 def _begin() -> None:
     """Make a new worker end when its parent is killed: at once on Linux, else once native code lets Python run."""
-    if sys.platform == "linux":
-        ctypes.CDLL(None).prctl(_PARENT_DEATH_SIGNAL, signal.SIGKILL)
+    end_with_parent()
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 
 
