@@ -1,4 +1,5 @@
 // The summary's tables and the charts, drawn anew for whatever is compared.
+const LETTER = 6; // width of a tick's letter, in the chart's units
 const WIDTH = 300, HEIGHT = 190, LEFT = 44, RIGHT = 288, TOP = 10, BOTTOM = 154;
 const DRAWING = document.querySelector("svg").namespaceURI;
 
@@ -136,8 +137,12 @@ function frameOf(title, of, place, bounds) {
     chart.append(make("line", { class: "grid", x1: LEFT, x2: RIGHT, y1: up(tick), y2: up(tick) }),
       make("text", { class: "tick", x: LEFT - 6, y: up(tick) + 4, "text-anchor": "end" }, String(tick).replace("-", "−")));
   }
+  let free = -Infinity; // where the label before ends: one that would be written over it is left out
   for (const [x, text] of across) {
+    const half = (LETTER * text.length) / 2;
+    if (x - half < free) { continue; }
     chart.append(make("text", { class: "tick", x, y: BOTTOM + 16, "text-anchor": "middle" }, text));
+    free = x + half + LETTER;
   }
   chart.append(make("text", { class: "tick", x: RIGHT, y: HEIGHT - 5, "text-anchor": "end" }, name));
   return { chart, xs, up };
