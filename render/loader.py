@@ -5,10 +5,11 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cache
+from types import ModuleType
 from typing import Any
 
-from render.integrator.dense import SPECTRUM_SIZE
 from render.integrator.matte import matte_surface, with_matte_surfaces, with_rows
+from render.integrator.variant_types import SPECTRUM_SIZE, MitsubaScene
 from render.scene import Node, Scene, emitter_paths, uniform_node, walk
 from render.spectrum import Spectrum
 from render.user_scene.scene_paths import search_path
@@ -33,7 +34,7 @@ def variant() -> str:
 
 
 @cache
-def mitsuba_module() -> Any:
+def mitsuba_module() -> ModuleType:
     """Mitsuba with its variant set and the dense integrator registered.
 
     Raises
@@ -48,7 +49,7 @@ def mitsuba_module() -> Any:
         )
     import mitsuba  # only now: its import loads Dr.Jit, which must find the LLVM that `rodcone.jit` has chosen
 
-    mi: Any = mitsuba
+    mi: ModuleType = mitsuba
     mi.set_variant(variant())
     mi.set_log_level(mi.LogLevel.Error)
     mi.set_file_resolver(search_path(mi))
@@ -64,7 +65,7 @@ def own_mitsuba_variant() -> Iterator[None]:
     """
     import mitsuba
 
-    mi: Any = mitsuba
+    mi: ModuleType = mitsuba
     variant_before = mi.variant()
     resolver_before = mi.file_resolver()
     mitsuba_module()
@@ -126,7 +127,7 @@ class LoadedScene:
         would be met at few of the table's wavelengths.
     """
 
-    mi_scene: Any
+    mi_scene: MitsubaScene
     groups: tuple[int, ...]
     coloured: bool
     sample_lights: bool
@@ -160,7 +161,7 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
     return loaded
 
 
-def load_unlit(scene: Scene, size: tuple[int, int]) -> Any:
+def load_unlit(scene: Scene, size: tuple[int, int]) -> MitsubaScene:
     """Mitsuba's scene without its lights, each shape by itself, for what is seen whatever the light."""
     description = scene.lit({})
     description["sensor"] = {**description["sensor"], "film": _recorder(size)}
@@ -232,7 +233,7 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
     )
 
 
-def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Any:
+def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> MitsubaScene:
     mi = mitsuba_module()
     config = mi.parser.ParserConfig(variant())
     config.merge_meshes = merge_meshes

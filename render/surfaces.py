@@ -1,6 +1,7 @@
 """What the camera sees at the middle of each pixel: depth, normals, objects and materials, without any light."""
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -90,7 +91,7 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     )
 
 
-def _number(mi: Any, shape: Any) -> Any:
+def _number(mi: ModuleType, shape: Any) -> Any:
     """Number under which Dr.Jit knows a shape; 0 for none."""
     return dr.reinterpret_array(mi.UInt32, shape)
 

@@ -5,14 +5,14 @@ from math import inf
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import DTypeLike, NDArray
 
-from rodcone.jit import arrays, dr
+from rodcone.jit import Double, UInt, arrays, dr
 
 ALIGNMENT = 64  # bytes; for memory that isn't aligned Dr.Jit compiles another, slower kernel without packet loads
 
 
-def aligned(shape: tuple[int, ...], dtype: Any) -> NDArray[Any]:
+def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
     """Empty array whose memory starts at a multiple of `ALIGNMENT`: Dr.Jit takes it without a copy."""
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
@@ -40,8 +40,8 @@ def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
 class Divisor:
     """A whole number to divide by (UInt), and its inverse (Float64): CPUs multiply in vectors."""
 
-    number: Any
-    inverse: Any
+    number: UInt
+    inverse: Double
 
 
 def divisor(number: int) -> Divisor:
@@ -50,13 +50,13 @@ def divisor(number: int) -> Divisor:
     return Divisor(dr.opaque(jit.UInt, number), dr.opaque(jit.Float64, 1 / number))
 
 
-def tile_cell(pixel: Any, width: Divisor, tile: tuple[Divisor, Divisor]) -> Any:
+def tile_cell(pixel: UInt, width: Divisor, tile: tuple[Divisor, Divisor]) -> UInt:
     """Number of each pixel's cell in a tile of (height, width) that is repeated over a picture; row by row, both."""
     row, column = divide(pixel, width)
     return divide(row, tile[0])[1] * tile[1].number + divide(column, tile[1])[1]
 
 
-def divide(number: Any, by: Divisor) -> tuple[Any, Any]:
+def divide(number: UInt, by: Divisor) -> tuple[UInt, UInt]:
     """Quotient and remainder of whole numbers (UInt) under 2^31.
 
     Exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the rounding of its

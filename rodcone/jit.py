@@ -5,7 +5,8 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from functools import cache
-from typing import Any, Literal
+from types import ModuleType
+from typing import Any, Literal, TypeAlias
 
 import drjit as dr  # the package's own import has run `rodcone.llvm` by now, which tells Dr.Jit where its LLVM is
 import drjit.scalar
@@ -13,10 +14,22 @@ import drjit.scalar
 from rodcone.llvm import LIBLLVM
 
 Backend = Literal["cuda", "llvm", "numpy"]
+# Arrays of a kernel, one value a thread. Which classes they are depends on the backend, so that a type checker takes
+# them for anything: the names tell a reader which is meant.
+Float: TypeAlias = Any  # single precision
+Double: TypeAlias = Any
+UInt: TypeAlias = Any
+Int: TypeAlias = Any
+Mask: TypeAlias = Any
 
 __all__ = [
     "Backend",
+    "Double",
+    "Float",
+    "Int",
+    "Mask",
     "Matrix4",
+    "UInt",
     "arrays",
     "at_least_two_threads",
     "backend",
@@ -58,7 +71,7 @@ def compiling() -> Iterator[Callable[[], float]]:
         yield told
 
 
-def arrays() -> Any:
+def arrays() -> ModuleType:
     """Module of Dr.Jit array types (`Float`, `UInt`, ...) of the backend; raises RuntimeError on ``numpy``."""
     name = backend()
     if name == "numpy":

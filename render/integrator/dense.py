@@ -7,15 +7,34 @@ Band wavelengths are jittered by one common offset a path, which makes each band
 Mitsuba is handed in by `render.loader`, which alone imports it.
 """
 
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 
 from render.integrator.matte import TableReader, at_all, band_offsets, reflectance_table
 from render.integrator.points import APERTURE, FILM, WAVELENGTH, Points
+from render.integrator.variant_types import (
+    SPECTRUM_SIZE,
+    Bsdf,
+    BsdfSample,
+    Channels,
+    DirectionSample,
+    Emitter,
+    Float,
+    Interaction,
+    Mask,
+    MitsubaScene,
+    Point2,
+    Ray,
+    Spectra,
+    Spectrum4,
+    Start,
+    UInt,
+    Vector,
+)
+from render.loader import Film, LoadedScene
 from rodcone.jit import dr
 
-SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
 # lobes by wavelength and one path can't serve all bands. Densities count by their size: below the horizon `measured`
 # gives negative ones.
@@ -44,14 +63,14 @@ class Tracer:
         Whether indirect light is also given by itself.
     """
 
-    def __init__(self, mi: Any, loaded: Any, film: Any, seed: int, *, split: bool = False) -> None:
+    def __init__(self, mi: ModuleType, loaded: LoadedScene, film: Film, seed: int, *, split: bool = False) -> None:
         self.mi, self.scene, self.split = mi, loaded.mi_scene, split
         self.size, self.max_depth, self.rr_depth = film.size, film.max_depth, film.rr_depth
         self.coloured, self.sample_lights = loaded.coloured, loaded.sample_lights
         self.environment, self.bands = len(loaded.groups) > 1, film.wavelength_nm.size
         filled = np.minimum(np.arange(-(-self.bands // SPECTRUM_SIZE) * SPECTRUM_SIZE), self.bands - 1)
         self.centres, self.widths = film.wavelength_nm[filled], film.width_nm[filled]
-        self.offsets: Any = None
+        self.offsets: Float | None = None
         self.table: TableReader | None = None
         if loaded.curves:
             offsets = band_offsets(seed)
@@ -59,7 +78,7 @@ class Tracer:
             nm = self.centres + self.widths * offsets[:, None]
             self.table = TableReader(mi, reflectance_table(loaded.curves, nm))
 
-    def camera(self, pixel: Any, points: Points) -> dict[str, list[Any]]:
+    def camera(self, pixel: UInt, points: Points) -> Channels:
         """Trace paths from the camera, one a thread.
 
         Returns
@@ -83,7 +102,7 @@ class Tracer:
             CHOSEN: [self.mi.Float(chosen)],
         }
 
-    def meter(self, _: Any, points: Points) -> dict[str, list[Any]]:
+    def meter(self, _: UInt, points: Points) -> Channels:
         """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as `camera`'s ``scattered``.
 
         The pixel isn't asked for: each path starts anywhere on the shape.
@@ -94,7 +113,7 @@ class Tracer:
         return {"scattered": self._flat(*scattered), CHOSEN: [self.mi.Float(chosen)]}
 
     @dr.syntax
-    def first_surface(self, pixel: Any, points: Points) -> dict[str, list[Any]]:
+    def first_surface(self, pixel: UInt, points: Points) -> Channels:
         """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
 
         Returns
@@ -131,11 +150,11 @@ class Tracer:
         normals = [normal.x, normal.y, normal.z]
         return {"albedo": self._flat(albedo), "normal": normals, CHOSEN: [self.mi.Float(chosen)]}
 
-    def _flat(self, *spectra: list[Any]) -> list[Any]:
+    def _flat(self, *spectra: Spectra) -> list[Float]:
         """Bands one by one, of each spectrum in turn, without those that fill up the last four."""
         return [value for spectrum in spectra for value in _flat(spectrum)[: self.bands]]
 
-    def _camera_ray(self, pixel: Any, points: Points) -> Any:
+    def _camera_ray(self, pixel: UInt, points: Points) -> Ray:
         """Ray through a point of each thread's pixel."""
         mi, size = self.mi, self.size
         row = pixel // size[1]
@@ -144,7 +163,7 @@ class Tracer:
         ray, _ = self.scene.sensors()[0].sample_ray(0.0, 0.5, film, points.pair(APERTURE))
         return ray
 
-    def _wavelengths(self, points: Points) -> tuple[list[Any], Any]:
+    def _wavelengths(self, points: Points) -> tuple[Spectra, UInt]:
         """Wavelengths of a path, and the index of their offset, for which reflectances are tabulated.
 
         The offset from the bands' centres is one of those that the table is made for, if there is one. Centres and
@@ -164,7 +183,7 @@ class Tracer:
         ]
         return [mi.Spectrum(*bands[i : i + SPECTRUM_SIZE]) for i in range(0, len(bands), SPECTRUM_SIZE)], step
 
-    def _start_on_meter(self, points: Points, wavelengths: list[Any]) -> tuple[Any, ...]:
+    def _start_on_meter(self, points: Points, wavelengths: Spectra) -> Start:
         """Start of a path on the irradiance meter: a white matte surface whose lights are sampled as any other's.
 
         Mitsuba's own meter only waits for its rays to meet a light: the sun is met once in 50 000, a point light never.
@@ -194,8 +213,8 @@ class Tracer:
 
     @dr.syntax
     def _trace(
-        self, scene: Any, points: Points, start: tuple[Any, ...], wavelengths: list[Any], step: Any, bounced: int
-    ) -> tuple[list[list[Any]], list[list[Any]], tuple[Any, Any, list[Any]], Any]:
+        self, scene: MitsubaScene, points: Points, start: Start, wavelengths: Spectra, step: UInt, bounced: int
+    ) -> tuple[list[Spectra], list[Spectra], tuple[Mask, Mask, Spectra], Mask]:
         """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
 
         A path that starts on the meter has `bounced` once.
@@ -264,11 +283,13 @@ class Tracer:
         indirects = ([indirect, indirect_sky] if self.environment else [indirect]) if self.split else []
         return scattered, indirects, (lamp_first, sky_first, first), chosen
 
-    def _indirect(self, indirect: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
+    def _indirect(self, indirect: Spectra, throughput: Spectra, light: Spectra, factor: Float) -> Spectra:
         """Add indirect light where it is asked for by itself."""
         return _plus(indirect, throughput, light, factor) if self.split else indirect
 
-    def _mis_weight(self, scene: Any, si: Any, previous: Any, previous_pdf: Any, previous_delta: Any) -> Any:
+    def _mis_weight(
+        self, scene: MitsubaScene, si: Interaction, previous: Interaction, previous_pdf: Float, previous_delta: Mask
+    ) -> Float:
         """Weight of the light that a path meets, against sampling that light from the point before."""
         if not self.sample_lights:
             return self.mi.Float(1.0)
@@ -276,14 +297,16 @@ class Tracer:
         light_pdf = scene.pdf_emitter_direction(previous, direction, ~previous_delta)
         return dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
 
-    def _emitted(self, scene: Any, si: Any, wavelengths: list[Any]) -> list[Any]:
+    def _emitted(self, scene: MitsubaScene, si: Interaction, wavelengths: Spectra) -> Spectra:
         """Emission of the light that a path meets."""
         emitter = si.emitter(scene)
         if self.coloured:
             return list(dr.dispatch(emitter, _emission, si, wavelengths))
         return [emitter.eval(si)[0]] * len(wavelengths)  # unit emission: the same at every wavelength
 
-    def _arriving(self, direction: Any, sampled: Any, interaction: Any, wavelengths: list[Any]) -> list[Any]:
+    def _arriving(
+        self, direction: DirectionSample, sampled: Spectrum4, interaction: Interaction, wavelengths: Spectra
+    ) -> Spectra:
         """Emission towards a point from the sampled position on a light, over the density of the sample."""
         if self.coloured:
             values = dr.dispatch(direction.emitter, _emission_towards, interaction, direction, wavelengths)
@@ -291,8 +314,15 @@ class Tracer:
         return [sampled[0]] * len(wavelengths)
 
     def _bounce(
-        self, scene: Any, drawn: tuple[Any, ...], ray: Any, si: Any, go_on: Any, wavelengths: list[Any], step: Any
-    ) -> tuple[list[Any], Any, list[Any], Any]:
+        self,
+        scene: MitsubaScene,
+        drawn: tuple[Point2, Float, Point2],
+        ray: Ray,
+        si: Interaction,
+        go_on: Mask,
+        wavelengths: Spectra,
+        step: UInt,
+    ) -> tuple[Spectra, BsdfSample, Spectra, Mask]:
         """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
         mi = self.mi
         bsdf = si.bsdf(ray)
@@ -316,8 +346,15 @@ class Tracer:
     # `render.integrator.matte` brings `scatter_bands` and `sample_bands`: its sampling knows no wavelength.
 
     def _eval_and_sample(
-        self, bsdf: Any, si: Any, towards_light: Any, lobe: Any, angle: Any, wavelengths: list[Any], step: Any
-    ) -> tuple[list[Any], Any, Any, list[Any], Any]:
+        self,
+        bsdf: Bsdf,
+        si: Interaction,
+        towards_light: Vector,
+        lobe: Float,
+        angle: Point2,
+        wavelengths: Spectra,
+        step: UInt,
+    ) -> tuple[Spectra, Float, BsdfSample, Spectra, Mask]:
         """Values towards a light, density, sampled direction, its weights, and whether wavelength chose it."""
         if hasattr(bsdf, "scatter_bands"):
             values, pdf, sample, weights = bsdf.scatter_bands(si, towards_light, angle, wavelengths, self.table, step)
@@ -331,8 +368,8 @@ class Tracer:
         return [value for value, *_ in drawn], pdf, sample, [weight for *_, weight in drawn], chosen
 
     def _sampled(
-        self, bsdf: Any, si: Any, lobe: Any, angle: Any, wavelengths: list[Any], step: Any
-    ) -> tuple[Any, list[Any], Any]:
+        self, bsdf: Bsdf, si: Interaction, lobe: Float, angle: Point2, wavelengths: Spectra, step: UInt
+    ) -> tuple[BsdfSample, Spectra, Mask]:
         """Sampled direction, its weights, and whether wavelength chose it: where no light is sampled."""
         if hasattr(bsdf, "sample_bands"):
             sample, weights = bsdf.sample_bands(si, angle, wavelengths, self.table, step)
@@ -342,7 +379,7 @@ class Tracer:
         return sample, [weight for _, weight in drawn], _differs(sample, [other for other, _ in drawn[1:]])
 
 
-def _differs(sample: Any, others: list[Any]) -> Any:
+def _differs(sample: BsdfSample, others: list[BsdfSample]) -> Mask:
     """Whether the BSDF sampled another way at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
@@ -351,40 +388,42 @@ def _differs(sample: Any, others: list[Any]) -> Any:
     return chosen
 
 
-def _emission(emitter: Any, interaction: Any, wavelengths: list[Any]) -> list[Any]:
+def _emission(emitter: Emitter, interaction: Interaction, wavelengths: Spectra) -> Spectra:
     """Evaluate an emitter at all wavelengths within one virtual call."""
     return at_all(wavelengths, interaction, lambda: emitter.eval(interaction))
 
 
-def _emission_towards(emitter: Any, interaction: Any, direction: Any, wavelengths: list[Any]) -> list[Any]:
+def _emission_towards(
+    emitter: Emitter, interaction: Interaction, direction: DirectionSample, wavelengths: Spectra
+) -> Spectra:
     return at_all(wavelengths, interaction, lambda: emitter.eval_direction(interaction, direction))
 
 
-def _flat(groups: list[Any]) -> list[Any]:
+def _flat(groups: Spectra) -> list[Float]:
     """All wavelengths one by one."""
     return [value for group in groups for value in group]
 
 
-def _power_heuristic(a: Any, b: Any) -> Any:
+def _power_heuristic(a: Float, b: Float) -> Float:
     """Weight a^2 / (a^2 + b^2), by the ratio: the squares of densities near a light's rim leave float32's range."""
     weight = dr.rcp(1 + dr.square(b / a))
     return dr.select((a > 0) & dr.isfinite(weight), weight, 0)
 
 
-def _times(first: list[Any], second: list[Any]) -> list[Any]:  # Dr.Jit's syntax knows no pairs in a comprehension
+def _times(first: Spectra, second: Spectra) -> Spectra:  # Dr.Jit's syntax knows no pairs in a comprehension
     return [a * b for a, b in zip(first, second, strict=True)]
 
 
-def _select(mask: Any, if_true: list[Any], if_false: list[Any]) -> list[Any]:
+def _select(mask: Mask, if_true: Spectra, if_false: Spectra) -> Spectra:
     return [dr.select(mask, a, b) for a, b in zip(if_true, if_false, strict=True)]
 
 
-def _plus(result: list[Any], throughput: list[Any], light: list[Any], factor: Any) -> list[Any]:
+def _plus(result: Spectra, throughput: Spectra, light: Spectra, factor: Float) -> Spectra:
     """Add light, times a factor that all wavelengths share, seen through the path's throughput."""
     return [r + t * (x * factor) for r, t, x in zip(result, throughput, light, strict=True)]
 
 
-def _roulette(throughput: list[Any], eta: Any, plays: Any, sample: Any) -> tuple[list[Any], Any]:
+def _roulette(throughput: Spectra, eta: Float, plays: Mask, sample: Float) -> tuple[Spectra, Mask]:
     """Russian roulette by the brightest wavelength, so that one decision serves all; gives the survivors."""
     brightest = dr.max(throughput[0])
     for group in throughput[1:]:

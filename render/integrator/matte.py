@@ -8,16 +8,32 @@ which so few wavelengths would miss or hit for all paths alike: with it there is
 """
 
 from collections.abc import Callable
-from typing import Any
+from types import ModuleType
+from typing import TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.integrator.variant_types import (
+    Bsdf,
+    BsdfContext,
+    BsdfSample,
+    Float,
+    Interaction,
+    Mask,
+    Point2,
+    Properties,
+    Spectra,
+    Spectrum4,
+    UInt,
+    Vector,
+)
 from render.scene import Node, table_of, uniform_node
 from render.spectrum import Spectrum, at_wavelengths
 from rodcone.jit import dr
 from rodcone.types import Floats
 
+T = TypeVar("T")
 STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-4 of the steepest reflectance here
 
 
@@ -40,20 +56,23 @@ def reflectance_table(curves: tuple[Spectrum, ...], wavelength_nm: Floats) -> ND
 class TableReader:
     """The table on the device. A plain object: Dr.Jit takes arrays apart that it finds in a loop's variables."""
 
-    def __init__(self, mi: Any, table: NDArray[np.float32]) -> None:
+    def __init__(self, mi: ModuleType, table: NDArray[np.float32]) -> None:
         self._spectrum = mi.Spectrum
         self._groups = table.shape[2] // dr.size_v(mi.Spectrum)
         # By way of a list, into memory of Dr.Jit's own: an array of NumPy's is used where it lies, and one that happens
         # to lie on a multiple of 64 bytes is read by other code, which is compiled anew.
         self._values = mi.Float(table.ravel().tolist())
 
-    def read(self, row: Any, step: Any, active: Any) -> list[Any]:
+    def read(self, row: UInt, step: UInt, active: Mask) -> Spectra:
         """Reflectance of a path's surface at all its wavelengths, four an entry."""
         first = (row * STEPS + step) * self._groups
         return [dr.gather(self._spectrum, self._values, first + group, active) for group in range(self._groups)]
 
 
-def matte_surface(mi: Any) -> Any:
+Table: TypeAlias = TableReader | None  # none where a scene has no matte surface of one spectrum
+
+
+def matte_surface(mi: ModuleType) -> type[Bsdf]:
     """Build the BSDF class for the variant that is set; register it as ``matte``.
 
     Properties of the plug-in: ``reflectance`` (a texture), ``twosided``; where its reflectance stands in the table also
@@ -61,8 +80,8 @@ def matte_surface(mi: Any) -> Any:
     blend of two holds the second reflectance as ``other``, and the texture of its share as ``weight``.
     """
 
-    class Matte(mi.BSDF):  # type: ignore[misc]
-        def __init__(self, props: Any) -> None:
+    class Matte(mi.BSDF):  # type: ignore[name-defined, misc]
+        def __init__(self, props: Properties) -> None:
             super().__init__(props)
             self.reflectance = props.get_texture("reflectance")
             self.other, self.weight = (props.get_texture(x) if x in props else None for x in ("other", "weight"))
@@ -75,37 +94,43 @@ def matte_surface(mi: Any) -> Any:
             self.m_components = [mi.BSDFFlags.DiffuseReflection | sides]
             self.m_flags = self.m_components[0]
 
+        # What the dense path calls
+
         def scatter_bands(
-            self, si: Any, towards_light: Any, angle: Any, wavelengths: list[Any], table: TableReader | None, step: Any
-        ) -> tuple[list[Any], Any, Any, list[Any]]:
+            self, si: Interaction, wo: Vector, angle: Point2, wavelengths: Spectra, table: Table, step: UInt
+        ) -> tuple[Spectra, Float, BsdfSample, Spectra]:
             """Value and density towards a light; a sampled direction and its weights; at all wavelengths."""
-            density = _density(si.wi, towards_light, self.twosided)
+            density = _density(si.wi, wo, self.twosided)
             sample, weights = self.sample_bands(si, angle, wavelengths, table, step)
             return [weight * density for weight in weights], density, sample, weights
 
         def sample_bands(
-            self, si: Any, angle: Any, wavelengths: list[Any], table: TableReader | None, step: Any
-        ) -> tuple[Any, list[Any]]:
+            self, si: Interaction, angle: Point2, wavelengths: Spectra, table: Table, step: UInt
+        ) -> tuple[BsdfSample, Spectra]:
             """Give a sampled direction and its weights, which are the reflectance."""
             sample = _sampled(mi, si.wi, angle, self.twosided)
             if self.row is not None and table is not None:
                 return sample, _weights_at(self, si, table, step, sample.pdf > 0)
             return sample, at_all(wavelengths, si, lambda: _reflectance_at(self, si) & (sample.pdf > 0))
 
-        def sample(self, ctx: Any, si: Any, sample1: Any, sample2: Any, active: Any = True) -> tuple[Any, Any]:
+        # What Mitsuba calls
+
+        def sample(
+            self, ctx: BsdfContext, si: Interaction, sample1: Float, sample2: Point2, active: Mask = True
+        ) -> tuple[BsdfSample, Spectrum4]:
             sample = _sampled(mi, si.wi, sample2, self.twosided)
             return sample, _reflectance_at(self, si, active) & (active & (sample.pdf > 0))
 
-        def eval(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        def eval(self, ctx: BsdfContext, si: Interaction, wo: Vector, active: Mask = True) -> Spectrum4:
             return _reflectance_at(self, si, active) * _density(si.wi, wo, self.twosided)
 
-        def pdf(self, ctx: Any, si: Any, wo: Any, active: Any = True) -> Any:
+        def pdf(self, ctx: BsdfContext, si: Interaction, wo: Vector, active: Mask = True) -> Float:
             return _density(si.wi, wo, self.twosided)
 
     return Matte
 
 
-def at_all(wavelengths: list[Any], interaction: Any, evaluate: Callable[[], Any]) -> list[Any]:
+def at_all(wavelengths: Spectra, interaction: Interaction, evaluate: Callable[[], T]) -> list[T]:
     """What a call gives at all wavelengths of an interaction, four after four."""
     values = []
     for group in wavelengths:
@@ -114,13 +139,13 @@ def at_all(wavelengths: list[Any], interaction: Any, evaluate: Callable[[], Any]
     return values
 
 
-def _row_at(surface: Any, si: Any) -> Any:
+def _row_at(surface: Bsdf, si: Interaction) -> UInt:
     if surface.which is None:
         return surface.row
     return dr.select(surface.which.eval(si)[0] > 0.5, surface.other_row, surface.row)
 
 
-def _weights_at(surface: Any, si: Any, table: TableReader, step: Any, active: Any) -> list[Any]:
+def _weights_at(surface: Bsdf, si: Interaction, table: TableReader, step: UInt, active: Mask) -> Spectra:
     ones = table.read(_row_at(surface, si), step, active)
     if surface.weight is None:
         return ones
@@ -129,24 +154,24 @@ def _weights_at(surface: Any, si: Any, table: TableReader, step: Any, active: An
     return [dr.lerp(one, other, share) for one, other in zip(ones, others, strict=True)]
 
 
-def _reflectance_at(surface: Any, si: Any, active: Any = True) -> Any:
+def _reflectance_at(surface: Bsdf, si: Interaction, active: Mask = True) -> Spectrum4:
     one = surface.reflectance.eval(si, active)
     if surface.weight is None:
         return one
     return dr.lerp(one, surface.other.eval(si, active), _share_at(surface, si))
 
 
-def _share_at(surface: Any, si: Any) -> Any:
+def _share_at(surface: Bsdf, si: Interaction) -> Float:
     return dr.clip(surface.weight.eval_1(si), 0, 1)
 
 
-def _density(wi: Any, wo: Any, twosided: bool) -> Any:
+def _density(wi: Vector, wo: Vector, twosided: bool) -> Float:
     """Cosine over pi where both directions are on the same, open side: BRDF times cosine for a reflectance of 1."""
     lit = wi.z * wo.z > 0 if twosided else (wi.z > 0) & (wo.z > 0)
     return dr.select(lit, dr.abs(wo.z) * dr.inv_pi, 0.0)
 
 
-def _sampled(mi: Any, wi: Any, angle: Any, twosided: bool) -> Any:
+def _sampled(mi: ModuleType, wi: Vector, angle: Point2, twosided: bool) -> BsdfSample:
     sample = dr.zeros(mi.BSDFSample3f)
     sample.wo = mi.warp.square_to_cosine_hemisphere(angle)
     if twosided:

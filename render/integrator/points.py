@@ -10,11 +10,12 @@ sequence's, at any number of them and best at powers of two, and pixels are inde
 import json
 from functools import cache
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from numpy.typing import NDArray
 
+from render.integrator.variant_types import Float, Point2, UInt
 from rodcone.jit import dr
 
 DIRECTIONS = Path(__file__).parent.parent / "data" / "sobol_directions.json"
@@ -50,7 +51,7 @@ def _reversed_bits() -> NDArray[np.uint32]:
 
 
 @cache
-def _on_device(mi: Any) -> Any:
+def _on_device(mi: ModuleType) -> UInt:
     """The sequence in memory of Dr.Jit's own: a kernel reads NumPy's, which may be aligned or not, by other code."""
     sequence = mi.UInt32(_reversed_bits()) ^ dr.opaque(mi.UInt32, 0)
     dr.eval(sequence)
@@ -71,12 +72,12 @@ class Points:
         Of the pixel: decides the scramble.
     """
 
-    def __init__(self, mi: Any, index: Any, key: Any) -> None:
+    def __init__(self, mi: ModuleType, index: UInt, key: UInt) -> None:
         self.mi, self.index = mi, index & ((1 << LOG2_POINTS) - 1)
         self.key = key + (index >> LOG2_POINTS) * 0x632BE5AB
         self.sequence = _on_device(mi)
 
-    def at(self, dimension: Any) -> Any:
+    def at(self, dimension: UInt) -> Float:
         """Number in [0, 1) of each thread's point in a dimension, 0 or more."""
         mi = self.mi
         dimension = mi.UInt32(dimension)
@@ -92,11 +93,11 @@ class Points:
         number ^= number * 0x53A22864
         return dr.minimum(mi.Float(dr.brev(number)) * 2.0**-32, 1 - 2.0**-24)
 
-    def pair(self, dimension: Any) -> Any:
+    def pair(self, dimension: UInt) -> Point2:
         """Two numbers, in a dimension and the next."""
         return self.mi.Point2f(self.at(dimension), self.at(dimension + 1))
 
-    def bounce(self, depth: Any) -> tuple[Any, Any, Any]:
+    def bounce(self, depth: UInt) -> tuple[Point2, Float, Point2]:
         """Light (2D), lobe and direction (2D) of a bounce, the first at depth 0."""
         mi = self.mi
         further = FURTHER_BOUNCES + (depth - 1) * A_BOUNCE
@@ -106,17 +107,17 @@ class Points:
         lobe = dr.select(first, mi.UInt32(FIRST_LOBE), further + 4)
         return self.pair(base), self.at(lobe), self.pair(base + 2)
 
-    def roulette(self, depth: Any) -> Any:
+    def roulette(self, depth: UInt) -> Float:
         """Number that decides whether a path goes on."""
         return self.at(depth + 0x10000)
 
 
-def pixel_keys(mi: Any, pixel: Any, seed: int) -> Any:
+def pixel_keys(mi: ModuleType, pixel: UInt, seed: int) -> UInt:
     """Key of each pixel, from its number and a seed of 32 bits."""
     return _mixed(pixel * 0x9E3779B1 + dr.opaque(mi.UInt32, seed))
 
 
-def _mixed(number: Any) -> Any:
+def _mixed(number: UInt) -> UInt:
     """Hash of 32 bits (Wellons, "lowbias32", 2018)."""
     number ^= number >> 16
     number *= 0x7FEB352D

@@ -4,20 +4,19 @@ import math
 import re
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.integrator.dense import CHOSEN, Tracer
 from render.integrator.points import Points, pixel_keys
+from render.integrator.variant_types import Channels, UInt
 from render.loader import Film, LoadedScene, mitsuba_module, mitsuba_words
 from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
 
 LANES = 16  # of the widest packet of paths
-Channels = dict[str, list[Any]]  # of a tracer, by name: one Float a channel
 _COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
 
@@ -43,7 +42,7 @@ def tracers(loaded: LoadedScene, film: Film, most_bands: int, seed: int, *, spli
 
 
 def traced(
-    trace: Callable[[Any, Points], Channels], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
+    trace: Callable[[UInt, Points], Channels], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
 ) -> dict[str, Planes]:
     """Means over each chunk of the channels that a tracer gives, by name, each (chunk, channel, h, w).
 
@@ -107,7 +106,7 @@ def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint3
 
 
 def _launched(
-    trace: Callable[[Any, Points], Channels], pixel_of: Any, first_of: Any, chunk: int, seed: int
+    trace: Callable[[UInt, Points], Channels], pixel_of: UInt, first_of: UInt, chunk: int, seed: int
 ) -> Channels:
     """Channels of all points of blocks, each `chunk` points long, evaluated."""
     mi = mitsuba_module()

@@ -7,7 +7,7 @@ this list may be native code. The list is what Mitsuba 3.9 ships, less what the 
 
 import tomllib
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
 from rodcone.errors import InputError, unknown
@@ -45,7 +45,7 @@ def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
         raise InputError(f"{refusal}; or, if you trust the scene, trust=True or --trust-scene")
 
 
-def kind_of(mi: Any, plugin: str) -> str:
+def kind_of(mi: ModuleType, plugin: str) -> str:
     """Kind of a plug-in that has been allowed; Mitsuba itself is asked, and loads it, only where it isn't listed.
 
     Raises

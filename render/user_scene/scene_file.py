@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from dataclasses import replace
 from math import isfinite
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -96,7 +97,7 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
     return replace(opened, scene=replace(opened.scene, extend="hold"), notes=(*opened.notes, note))
 
 
-def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
+def _parse(mi: ModuleType, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     """Mitsuba's parser state. The scene's folders are on the search path only while no plug-in is loaded."""
     resolver = search_path(mi)
     config = mi.parser.ParserConfig(mi.variant())
@@ -116,7 +117,7 @@ def _parse(mi: Any, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
     return state
 
 
-def _from_xml(mi: Any, state: Any, bases: list[Path], folders: list[Path] | None) -> Node:
+def _from_xml(mi: ModuleType, state: Any, bases: list[Path], folders: list[Path] | None) -> Node:
     """Nested dict of a parsed scene: every part is checked before they are put together."""
     nodes = list(state.nodes)
     index_of = state.id_to_index

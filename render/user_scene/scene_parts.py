@@ -4,6 +4,7 @@ light as Mitsuba evaluates it.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -50,7 +51,7 @@ class SceneFile:
     __repr__ = brief
 
 
-def assemble(mi: Any, name: str, description: Node, extend: str | None = None) -> SceneFile:
+def assemble(mi: ModuleType, name: str, description: Node, extend: str | None = None) -> SceneFile:
     """Build the scene: its first camera, light groups by id, a shape with an ``irradiancemeter`` as reference plane.
 
     Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
@@ -128,7 +129,7 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
     return DEEPEST if depth < 0 else min(int(depth), DEEPEST), min(int(rr_depth), DEEPEST)
 
 
-def _check_left_out(mi: Any, name: str, description: Node) -> None:
+def _check_left_out(mi: ModuleType, name: str, description: Node) -> None:
     """Raise for a property that changes the picture, of a part that the engine doesn't take over."""
     for _, node in walk(description):
         kind = _kind(mi, node).replace("reconstructionfilter", "rfilter")
@@ -140,11 +141,11 @@ def _check_left_out(mi: Any, name: str, description: Node) -> None:
                 require_known(f"Mitsuba {kind} property", own)
 
 
-def _kind(mi: Any, part: Any) -> str:
+def _kind(mi: ModuleType, part: Any) -> str:
     return kind_of(mi, type_of(part)) if type_of(part) not in ("", "ref") else ""
 
 
-def _camera(mi: Any, name: str, description: Node, notes: list[str]) -> tuple[Node, tuple[int, int]]:
+def _camera(mi: ModuleType, name: str, description: Node, notes: list[str]) -> tuple[Node, tuple[int, int]]:
     """First camera that can be rendered, without film and sampler, and its film's size."""
     sensors = [part for part in description.values() if _kind(mi, part) == "sensor"]
     # A film or sampler may stand in the scene itself, and be referred to.
@@ -241,7 +242,7 @@ def attach_area_lights(name: str, geometry: Node) -> None:
         shape[key_in_shape] = light
 
 
-def light_groups(mi: Any, name: str, geometry: Node, parts: Mapping[str, Node]) -> dict[str, LightGroup]:
+def light_groups(mi: ModuleType, name: str, geometry: Node, parts: Mapping[str, Node]) -> dict[str, LightGroup]:
     """Light groups of a scene, by the lights' ids.
 
     Parameters
@@ -282,7 +283,7 @@ def _same(a: Spectrum | None, b: Spectrum | None) -> bool:
     return np.array_equal(a.wavelength_nm, b.wavelength_nm) and np.array_equal(a.values, b.values)
 
 
-def _emission(mi: Any, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
+def _emission(mi: ModuleType, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
     """Spectrum of an emitter, as Mitsuba evaluates it; None where its colour varies over position or direction."""
     if emitter["type"] not in EMISSION_PARAMETER or "texture" in emitter:  # a spot's texture varies by direction
         return None
@@ -306,7 +307,7 @@ def _stated(value: Any) -> Spectrum | None:
     return table_of(value) if isinstance(value, dict) else None
 
 
-def _evaluate(mi: Any, emitter: Any) -> Floats:
+def _evaluate(mi: ModuleType, emitter: Any) -> Floats:
     """Emission on `_GRID_NM`, four wavelengths to an evaluation; all at once where the variant holds arrays."""
     fours = _GRID_NM.reshape(-1, 4)
     interaction = dr.zeros(mi.SurfaceInteraction3f, len(fours))

@@ -11,6 +11,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
+from types import ModuleType
 from typing import Any, NoReturn
 from xml.parsers import expat
 
@@ -58,7 +59,7 @@ def find_file(name: str, bases: Sequence[Path], folders: Sequence[Path] | None) 
     return Path(chosen)
 
 
-def search_path(mi: Any, *folders: Path) -> Any:
+def search_path(mi: ModuleType, *folders: Path) -> Any:
     """Mitsuba's search path of the given folders, its own, and the one that holds scikit-image and its pictures.
 
     Not the working directory, which Mitsuba puts first: a ``plugins/diffuse.so`` in it would be loaded as native code.
@@ -68,6 +69,7 @@ def search_path(mi: Any, *folders: Path) -> Any:
     package = find_spec("skimage")
     assert package
     assert package.origin
+    assert mi.__file__
     for folder in (*folders, Path(mi.__file__).parent, Path(package.origin).parents[1]):
         resolver.append(str(folder))
     return resolver

@@ -6,13 +6,12 @@ alone.
 """
 
 from math import pi
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.device_arrays import ALIGNMENT, aligned, divide, divisor, tile_cell, upload
-from rodcone.jit import arrays, dr
+from rodcone.jit import Float, UInt, arrays, dr
 from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
@@ -76,7 +75,7 @@ def expected_electrons_single(
     return np.minimum(result, LARGEST).reshape(height, width)
 
 
-def weighted_sum(planes: list[Any], weights: list[list[Any]], channel: Any) -> Any:
+def weighted_sum(planes: list[Float], weights: list[list[Float]], channel: UInt) -> Float:
     """Sum over bands behind each pixel's own filter.
 
     Parameters
@@ -173,7 +172,7 @@ def read_frame(
     return sensor.pixel_sums(dn.numpy().astype(np.uint16).reshape(expected_e.shape))
 
 
-def philox_single(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, ...]:
+def philox_single(counter: tuple[UInt, ...], key: tuple[UInt, UInt]) -> tuple[UInt, ...]:
     """Philox4x32-10, as `sensor.random.philox`: four random words for each counter."""
     (c0, c1, c2, c3), (k0, k1) = counter, key
     first, second = (arrays().UInt(int(multiplier)) for multiplier in MULTIPLIERS)
@@ -183,7 +182,7 @@ def philox_single(counter: tuple[Any, ...], key: tuple[Any, Any]) -> tuple[Any, 
     return c0, c1, c2, c3
 
 
-def normal_pair(first: Any, second: Any) -> tuple[Any, Any]:
+def normal_pair(first: UInt, second: UInt) -> tuple[Float, Float]:
     """Two independent standard normal draws of two words (Box-Muller); they end at 6.7 standard deviations."""
     jit = arrays()
     radius = dr.sqrt(-2.0 * dr.log(dr.fma(jit.Float(jit.Int(first >> 1)), 2.0**-31, 2.0**-32)))

@@ -10,12 +10,11 @@ range, and falls as 1 / mean^1.5: `LARGEST_ERROR`.
 """
 
 from functools import cache
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from rodcone.jit import arrays, dr
+from rodcone.jit import Double, Float, Mask, UInt, arrays, dr
 
 EXACT_BELOW_E = 30.0
 TABLE_ERROR = 2e-9  # largest error of a distribution function under 30 e-: 128 bins of 25-bit shares
@@ -55,7 +54,7 @@ def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
     return share, other
 
 
-def poisson_single(mean_e: Any, normal: Any, words: tuple[Any, Any], table: Any) -> Any:
+def poisson_single(mean_e: Float, normal: Float, words: tuple[UInt, UInt], table: UInt) -> Float:
     """Poisson draw of each thread, whole numbers in Float.
 
     Parameters
@@ -72,7 +71,7 @@ def poisson_single(mean_e: Any, normal: Any, words: tuple[Any, Any], table: Any)
     return dr.select(mean_e < EXACT_BELOW_E, _by_table(mean_e, words, table), _by_quantile(mean_e, normal))
 
 
-def _by_table(mean_e: Any, words: tuple[Any, Any], table: Any) -> Any:
+def _by_table(mean_e: Float, words: tuple[UInt, UInt], table: UInt) -> Float:
     jit = arrays()
     whole = dr.minimum(dr.floor(mean_e), EXACT_BELOW_E - 1)
     first, second = words
@@ -86,11 +85,11 @@ def _by_table(mean_e: Any, words: tuple[Any, Any], table: Any) -> Any:
     return jit.Float(jit.Int(dr.select(is_first, bin_number, entry & (_BINS - 1)))) + rest
 
 
-def _by_inversion(mean: Any, uniform: Any, active: Any) -> Any:
+def _by_inversion(mean: Double, uniform: Double, active: Mask) -> Float:
     """Poisson draw of a mean under 1: the first number whose chance to be exceeded is not above `uniform`."""
     jit = arrays()
 
-    def next_number(number: Any, chance: Any, exceeded: Any) -> tuple[Any, Any, Any]:
+    def next_number(number: Double, chance: Double, exceeded: Double) -> tuple[Double, Double, Double]:
         number = number + 1.0
         chance = chance * mean / number
         return number, chance, exceeded - chance
@@ -103,7 +102,7 @@ def _by_inversion(mean: Any, uniform: Any, active: Any) -> Any:
     return jit.Float(number)
 
 
-def _by_quantile(mean_e: Any, normal: Any) -> Any:
+def _by_quantile(mean_e: Float, normal: Float) -> Float:
     """Q_N2 of Giles (2016); the mean's whole part stays out of the sum, whose rounding would move large draws."""
     whole = dr.floor(mean_e)
     square = dr.square(normal)

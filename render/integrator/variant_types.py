@@ -1,0 +1,51 @@
+"""Names of the types that Mitsuba's variant has, and that Dr.Jit's kernels compute with: one value a thread.
+
+Which classes they are depends on the variant that is set while the program runs, so that a type checker takes them for
+anything: the names tell a reader which is meant. `mi` is Mitsuba's module with that variant.
+"""
+
+from typing import Any, TypeAlias
+
+from rodcone.jit import Float, Mask, UInt
+
+SPECTRUM_SIZE = 4  # wavelengths of a spectral variant's `Spectrum`
+
+Spectrum4: TypeAlias = Any  # `Spectrum`: four wavelengths of a path
+Spectra: TypeAlias = list[Spectrum4]  # all bands of a path, four an entry
+Point2: TypeAlias = Any
+Vector: TypeAlias = Any
+Ray: TypeAlias = Any
+Interaction: TypeAlias = Any  # `SurfaceInteraction3f`: where a ray meets a surface
+DirectionSample: TypeAlias = Any  # of a position on a lamp, seen from a point
+Bsdf: TypeAlias = Any
+BsdfSample: TypeAlias = Any
+BsdfContext: TypeAlias = Any
+Properties: TypeAlias = Any  # of a plug-in
+Emitter: TypeAlias = Any
+MitsubaScene: TypeAlias = Any
+
+# Start of a path: ray, surface that it leaves, density of its direction, whether no light was sampled, light so far.
+Start: TypeAlias = tuple[Ray, Interaction, Float, Mask, Spectra]
+Channels: TypeAlias = dict[str, list[Float]]  # of a tracer, by name: one number a channel
+
+__all__ = [
+    "SPECTRUM_SIZE",
+    "Bsdf",
+    "BsdfContext",
+    "BsdfSample",
+    "Channels",
+    "DirectionSample",
+    "Emitter",
+    "Float",
+    "Interaction",
+    "Mask",
+    "MitsubaScene",
+    "Point2",
+    "Properties",
+    "Ray",
+    "Spectra",
+    "Spectrum4",
+    "Start",
+    "UInt",
+    "Vector",
+]
