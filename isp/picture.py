@@ -139,7 +139,7 @@ def finish(
 
 
 def require_letters(raw: RawImage, names: tuple[str, ...]) -> tuple[str, ...]:
-    """Return the mosaic's channels, or raise `InputError` where they are others."""
+    """Return the mosaic's channels; raise `InputError` if they aren't `names`."""
     if raw.channels != names:
         raise InputError(
             f"raw: mosaic {raw.cfa} holds {raw.channels}; allowed here: {names}; use ple, which develops any mosaic of "

@@ -19,9 +19,10 @@ SUBSTITUTION_SNR = 4.95  # `table1_output`: 3.59 and 6.82
 SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # `table1_pixel`: 0.476 and 0.951
 OCTAVES = 1.0  # on either side: narrower shows as a step over light, wider leaves W in bright pictures
 
-# How much more error the reconstructed colours hold than noise: each is sampled at one pixel in four, and what W's
-# likeness brings together need not have one colour. Factors on their noise variance, in the luminance that is
-# substituted and in the matrix, and there where noise is the surroundings' (docs/decisions/0015 has the sweep).
+# Factors from the noise variance of the reconstructed colours to their squared error. The error is larger, because each
+# colour is sampled at one pixel in four, and pixels that are alike in W may differ in colour. The first factor counts
+# in the substituted luminance and in the matrix, the second where the colour is the surroundings'
+# (docs/decisions/0015).
 COLOUR_ERROR = 10.0
 SMOOTH_COLOUR_ERROR = 3.0
 

@@ -20,9 +20,9 @@ from rodcone.types import Floats
 INTEGRATOR = "dense path (all bands along each path)"
 METER_PIXELS = 64  # film of the irradiance meter, each side
 
-# Bands traced together. More share the work of tracing, but a kernel's first compilation grows faster than their
-# number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in two parts and 0.69 s in
-# one, and compile in 5 and 12 s.
+# Bands that are traced together. More bands share the work of tracing, but the time of a kernel's first compilation
+# grows faster than their number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in
+# two parts and 0.69 s in one, and compile in 5 and 12 s.
 PART_BANDS = 40
 _search_path: list[Any] = []  # this program's file resolver, between two of its calls
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "none"}
@@ -35,12 +35,12 @@ def variant() -> str:
 
 @cache
 def mitsuba_module() -> ModuleType:
-    """Mitsuba with its variant set and the dense integrator registered.
+    """Import Mitsuba, set its variant and its search path, and register this program's surface `matte`.
 
     Raises
     ------
     InputError
-        Without Dr.Jit, which alone traces paths.
+        Where Dr.Jit has neither LLVM nor CUDA, because nothing else traces paths.
     """
     if backend() == "numpy":
         raise InputError(

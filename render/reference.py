@@ -36,11 +36,11 @@ from rodcone.types import Planes
 
 SHIPPED = Path(__file__).parent / "data" / "references"
 FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
-BLOCK = 16  # pixels a side, within which errors are pooled: a variance from 256 differences is right to 9 %
-FALSE_ALARM = 1e-3  # chance, at most, that an agreeing render is called another
-MOST_PACKED = 32  # times that a file unpacks into; half floats of light come to 2 or 3
-_MULTIPLES = (1, 2, 3, 4, 8)  # of a film's sides, at which a reference is sought to average
-_LARGEST_HALF = np.float32(6e4)  # under the largest half float, 65504
+BLOCK = 16  # side of a block [pixels] over which errors are pooled: 256 differences give a variance within 9 %
+FALSE_ALARM = 1e-3  # largest chance that a render which agrees with the reference is said not to
+MOST_PACKED = 32  # largest ratio of a file's unpacked to its packed size that is read; light in half floats has 2 or 3
+_MULTIPLES = (1, 2, 3, 4, 8)  # a reference may be this many times as large as the film on each side, and is averaged
+_LARGEST_HALF = np.float32(6e4)  # a little below the largest half float, 65504
 _LEVELS = ("radiance", "uncovered", "covariance")
 
 

@@ -286,9 +286,9 @@ class Transport:
         return np.asarray(np.einsum("gab,gb->a", own.maps, self.scene_means.mean_radiance()))
 
     def scattered_luminance(self, *, luminance_cd_m2: float | None = None) -> NDArray[np.float64]:
-        """Luminance [cd m^-2] of each pixel without light that is seen directly, shape (h, w).
+        """Return each pixel's luminance [cd m^-2] without lamps in view, shape (h, w).
 
-        At a level of the scene's own lights; None: at their own powers.
+        `luminance_cd_m2` is the scene's level under its own lights; None leaves them at their own powers.
         """
         emitted = self._emission()
         weights = self._luminance_weights(self._at_level(emitted, luminance_cd_m2)[0])

@@ -218,7 +218,7 @@ def _table(lines: Sequence[_Line], place: str) -> list[_Line]:
 
 
 def _check_decimals(block: Sequence[_Line], place: str) -> None:
-    """Refuse a table with decimal points and commas, of which one separates thousands."""
+    """Refuse a table that has both commas and points within its numbers, because one of them may separate thousands."""
     comma, point = (next((line for line in block if mark in line.text), None) for mark in ",.")
     if comma is not None and point is not None:
         raise InputError(

@@ -1,8 +1,9 @@
-"""What stands before a public function: names become the values they stand for, and each argument's kind is checked.
+"""The checks that run before a public function: of each argument's kind, and of names, which become what they name.
 
 `rodcone.capture` is a function of the packages with these checks before it; the packages themselves trust what they are
-given. A parameter's own annotation says what it may be: a class, or a number within limits. A table holds what no type
-says. Like the table of public names it points up by strings, which are imported when they are needed.
+given. A parameter's own annotation says what it may be: a class, or a number within limits. The table `CHECKS` holds
+the rules that no annotation can state. Both this table and that of public names refer to higher packages by strings,
+which are imported when they are needed, because imports run downwards only.
 """
 
 import sys
@@ -27,7 +28,7 @@ Check = Callable[[str, Any], Any]  # takes the argument's name and value, gives 
 
 
 def at(place: str) -> Any:
-    """Object at ``module:name``."""
+    """Import the object that ``module:name`` names."""
     module, _, name = place.partition(":")
     return getattr(imported(module), name)
 
@@ -288,7 +289,7 @@ _OF_ORIGIN = {"Callable": _CALL, "Mapping": _plain(Mapping, "a dict by light gro
 
 
 def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
-    """A public function with the checks of its arguments before it.
+    """Return a public function that checks its arguments before it runs.
 
     Raises
     ------
@@ -300,7 +301,7 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
     call = signature(function)
     order = f"{name}({', '.join(call.parameters)})"
 
-    @cache  # at the first call, for a method's own class has to be there
+    @cache  # made at the first call, because the class of a method doesn't exist before
     def checks() -> dict[str, Check]:
         hints = get_type_hints(function, include_extras=True)
         return {parameter: check_of(name, parameter, hints.get(parameter, Any)) for parameter in call.parameters}
@@ -316,15 +317,15 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
             try:
                 bound.arguments[key] = checks()[key](key, value)
             except InputError:
-                for other, its in given.items():
-                    if other != "self" and _passes(checks()[key], its) and _passes(checks()[other], value):
+                for other, other_value in given.items():
+                    if other != "self" and _passes(checks()[key], other_value) and _passes(checks()[other], value):
                         raise InputError(
                             f"{name}: {key} and {other} stand in each other's place; write {order}"
                         ) from None
                 raise
         result = function(*bound.args, **bound.kwargs)
-        for place in RESULTS.get(name, ()):
-            at(place)(result)
+        for warning in RESULTS.get(name, ()):
+            at(warning)(result)
         return result
 
     return checked

@@ -151,6 +151,7 @@ def _kinds(owner: Any) -> dict[str, Any]:
 
 
 def _fits(value: Any, kind: Any) -> bool:
+    """Whether a value is of the kind that an annotation states; arrays, and kinds that aren't classes, always are."""
     parts = get_args(kind)
     if isinstance(kind, UnionType):
         return any(_fits(value, part) for part in parts)

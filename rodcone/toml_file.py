@@ -111,7 +111,7 @@ def _is_plain_union(kind: Any) -> bool:
 
 
 def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
-    """Hook that takes a value of these kinds alone; the first that fits is what it becomes."""
+    """Return a hook that accepts a value of one of these kinds, and gives it the first kind that fits."""
     plain = [kind for kind in kinds if kind in _WORDS]
 
     def take(value: Any, _: Any) -> Any:
@@ -126,7 +126,7 @@ def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
 
 
 def _tuple_of(converter: Converter, kind: Any) -> Callable[[Any, Any], Any]:
-    """Hook for a tuple of as many values as its type says, which a list stands for."""
+    """Return a hook that turns a list into a tuple: each value by its own type, as many values as the type states."""
     items = get_args(kind)
 
     def take(value: Any, _: Any) -> Any:

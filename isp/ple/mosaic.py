@@ -54,17 +54,17 @@ class Cells:
 
 
 def pyramid(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> list[Cells]:
-    """Cells of 2x2, 4x4, ... pixels.
+    """Sum the mosaic over cells of 2x2, 4x4, ... pixels; return these levels, the finest first.
 
     Parameters
     ----------
     raw : RawImage
     white_e : (4,) array_like
-        Electrons of R, G, B and W from white, relative to G.
+        Electrons that R, G, B and W collect from a white surface, relative to G.
     electrons : (h, w) float32
         `site_electrons` of the raw image; ``white_e`` is divided by the same factor.
     full : (h, w) bool
-        `full_white` of it.
+        `full_white` of the raw image.
     """
     names = channels(raw.cfa)
     index = tuple(LETTERS.index(name) for name in names)

@@ -34,24 +34,24 @@ class Patches:
 
 
 def border(length: int, size: int) -> tuple[int, int]:
-    """Samples to add before and behind, so that every one lies in as many patches."""
+    """Return how many samples to add before and behind a line, so that all its samples lie in equally many patches."""
     return size - STRIDE, (length - 1) // STRIDE * STRIDE + size - length
 
 
 def padded(samples: NDArray[Any], size: int) -> NDArray[Any]:
-    """Samples (h, w, ...), continued by reflection by their `border`."""
+    """Extend samples (h, w, ...) on each side by their `border`, by reflection."""
     sides = [border(length, size) for length in samples.shape[:2]]
     return np.pad(samples, sides + [(0, 0)] * (samples.ndim - 2), mode="reflect")
 
 
 def overlapped(patches: Patches, shape: tuple[int, int], size: int) -> tuple[Singles, ...]:
-    """Sums over overlapping patches: values and weights by pixel, variances and weights by cells of 2x2 pixels."""
+    """Sum over overlapping patches: values and weights per pixel, then variances and weights per cell of 2x2 pixels."""
     ny, nx = shape
     across = size // STRIDE
     total = np.zeros(((ny - 1) * STRIDE + size, nx - 1 + across, 4 * STRIDE), np.float32)
     values = patches.values.reshape(ny, nx, size, -1)
-    # Some rows of patches at once, so that values are read once. In a row patches that don't overlap, so that a sum
-    # runs over a patch's width.
+    # Several rows of patches are added at once, so that each value is read once from memory. Of a row, every
+    # `across`-th patch is added at once: these lie side by side without overlap.
     together = max(1, 4 * BLOCK // nx)
     for first in range(0, ny, together):
         lines = slice(first, min(first + together, ny))
@@ -61,7 +61,7 @@ def overlapped(patches: Patches, shape: tuple[int, int], size: int) -> tuple[Sin
                 part = values[lines, j::across, i]
                 line = rows[:, j : j + part.shape[1] * across].reshape(part.shape)  # a view: `total` takes the sum
                 line += part
-    # The window is a product of two lines: weights are summed across, then down, and so are the cells.
+    # The window is the product of a row and a column, so weights are summed across first and then down; so are cells.
     inner = np.concatenate([patches.inner, np.ones((ny * nx, 1), np.float32)], axis=1)
     inner = (inner * patches.weight[:, None]).reshape(ny, nx, 5)
     shares = inner[..., 4:]

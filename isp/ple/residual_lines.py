@@ -184,7 +184,7 @@ def _means(values: NDArray[Any]) -> Singles:
 
 
 def _between(values: Singles, site: Phase, phase: Phase) -> Singles:
-    """Return the means of the samples of `site` nearest to the pixels of `phase`; wrong in the outermost lines."""
+    """Return, at each pixel of `phase`, the mean of the nearest samples of `site`; the outermost lines wrap around."""
     for axis in (0, 1):
         if step := phase[axis] - site[axis]:
             values = 0.5 * (values + np.roll(values, -step, axis))

@@ -25,8 +25,8 @@ from sensor.cfa import BAYER, Tile, is_bayer
 from sensor.raw import RawImage
 
 EXTRA = "opponents"
-# Pixels that a value depends on along one axis. Malvar's filters are 5 wide. Menon's take 2 for a green, 2 more for
-# its difference and 2 for the decision, 2 for R and B, and 4 in the refinement that follows.
+# How far away [pixels along an axis] a mosaic's value may still change a result. Malvar's filters are 5 pixels wide.
+# Menon's steps add up: 2 for green, 2 for its difference, 2 for the decision, 2 for R and B, 4 for the refinement.
 MALVAR_REACH, MENON_REACH = 2, 12
 
 

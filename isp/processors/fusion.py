@@ -68,7 +68,8 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
 def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a CMYW raw image as `picture_yamagami`: W's luminance, differences of the complementary colours.
 
-    `colours` takes balanced C, Y, M, in this order, to linear sRGB. A neutral reads the electrons of a yellow pixel.
+    `colours` takes balanced C, Y and M, in this order, to linear sRGB. White balance scales every channel so that a
+    neutral surface has the electrons of a yellow pixel.
     """
     names = raw.channels
     if set(names) != set(_STANDS_FOR):

@@ -1,10 +1,10 @@
 """Several lamps as light of one spectrum within each band: what `render.band_weights` needs of a scene of many lights.
 
-A picture holds the sum of its light groups, and weights of bands follow one lamp. Where groups differ, all are referred
-to their mixture: the light of a group is brought, band by band and into the neighbours, to the values whose integrals
-over all smooth curves are the same under the mixture as its own are under its own spectrum. That is linear in the
-transport, so that it costs a few more additions in relighting, and nothing afterwards. A lamp of few lines goes the
-same way: what surfaces do at a line is told by its dark neighbours, and goes into the line's band.
+A picture holds the sum of its light groups, but weights of bands follow one spectrum. Where groups differ, all are
+referred to the spectrum of their mixture: each group's light is redistributed among neighbouring bands, so that its
+integrals over smooth curves, taken with the mixture's spectrum, equal those with its own spectrum. This is linear in
+the transport, so it costs a few more additions in relighting and nothing afterwards. A lamp of few lines is treated in
+the same way: the dark bands beside a line say how surfaces reflect at the line, and that goes into the line's band.
 """
 
 from collections.abc import Mapping
@@ -19,8 +19,8 @@ from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, observer_weights
 from rodcone.types import Floats
 
 _ALIKE = 1e-9  # of a spectrum's largest value
-_LEAST_SINGULAR = 1e-2  # of the largest: what curves as wide as a band can't tell apart stays as it is
-_LEAST_SHARE = 1e-5  # of a band's light in another
+_LEAST_SINGULAR = 1e-2  # share of the largest singular value; curves as wide as a band don't resolve smaller ones
+_LEAST_SHARE = 1e-5  # share of a band's light, below which moving it into another band is left out
 
 
 @dataclass(frozen=True)
@@ -82,8 +82,10 @@ def band_light(
     powers = [groups[index].power * (transport[index] if shares.any() else 1.0) for index in shining]
     mixture = spectra[0] if alike else _mixture(spectra, powers)
 
-    # Integrals of curves as wide as a band: of light of 1 in a band of the mixture, and of transport of 1 in one. Noise
-    # is bounded where curves as wide as a camera's channels are summed, and where a line is told by its neighbours.
+    # Integrals over bell curves as wide as a band: `of_mixture` of the mixture's light, with 1 in each band in turn,
+    # and `own` of a lamp's light, with a transport of 1 in each band in turn. The noise that this amplifies is bounded
+    # here only for lamps of few lines, whose transport at a line comes from the bands beside it. For others it is
+    # bounded where the wider curves of a camera's channels are summed.
     edges = wavelength_nm[0] - width_nm[0] / 2, wavelength_nm[-1] + width_nm[-1] / 2
     centres = np.linspace(*edges, 2 * wavelength_nm.size + 1)
     wide = float(width_nm.max())

@@ -25,10 +25,10 @@ def relight_denoised(
 ) -> tuple[SpectralRadiance, SpectralRadiance, SpectralRadiance]:
     """Return the denoised picture under given lights (as `Transport.relight`), and its two folds under the same lights.
 
-    The folds are independent of the picture and of each other, and without bias: the mean over the frame of
-    (picture - one)(picture - other) in any linear measure estimates the picture's whole squared error there, bias and
-    noise (`measured_error`). Of single pixels nothing is known. The picture's `relative_mc_error` is
-    the root of that limit for its luminance, over its mean.
+    The folds have no bias, and are independent of the picture and of each other. Therefore the mean over the frame of
+    (picture - one)(picture - other) estimates the picture's whole squared error, bias and noise, in any measure that is
+    linear in light (`measured_error`). It says nothing about single pixels. The picture's `relative_mc_error` is the
+    root of that estimate's upper limit for luminance, over the mean luminance.
 
     Raises
     ------
@@ -49,9 +49,9 @@ def relight_denoised(
     return replace(picture, relative_mc_error=upper**0.5 / mean if mean > 0 else 0.0), first, second
 
 
-BLOCK = 16  # pixels on a side of a block; within one, errors of a denoiser are alike
-LEAST_BLOCKS = 4  # along the shorter side; in a small picture blocks are smaller
-LEVEL = 0.95
+BLOCK = 16  # side of a block [pixels], within which a denoiser's errors are correlated
+LEAST_BLOCKS = 4  # blocks along the picture's shorter side; in a small picture they are smaller than BLOCK
+LEVEL = 0.95  # confidence of the upper limit
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ def measured_error(
 ) -> MeasuredError:
     """Estimate the weighted mean square of a picture's error over the frame; it holds bias and noise.
 
-    The mean product of its differences from two pictures is the mean of its squared error, whatever the noise of the
-    two: that is independent of the picture's and of each other's, and has no mean. Its standard error is that of blocks
-    of pixels, the limit Student's.
+    The picture is compared with two others whose noise has mean 0 and is independent of the picture's and of each
+    other's. The mean product of the two differences is then the picture's mean squared error, however large that noise
+    is. Its standard error comes from the spread between blocks of pixels, and its upper limit from Student's t.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""Names of the types that Mitsuba's variant has, and that Dr.Jit's kernels compute with: one value a thread.
+"""Names for the types of Mitsuba's variant and of Dr.Jit's kernels, which hold one value per thread.
 
-Which classes they are depends on the variant that is set while the program runs, so that a type checker takes them for
-anything: the names tell a reader which is meant. `mi` is Mitsuba's module with that variant.
+Their classes depend on the variant that is set while the program runs. A type checker therefore takes each for `Any`,
+and the names tell a reader which one is meant. `mi` is Mitsuba's module with that variant.
 """
 
 from typing import Any, TypeAlias
@@ -16,11 +16,11 @@ Point2: TypeAlias = Any
 Vector: TypeAlias = Any
 Ray: TypeAlias = Any
 Interaction: TypeAlias = Any  # `SurfaceInteraction3f`: where a ray meets a surface
-DirectionSample: TypeAlias = Any  # of a position on a lamp, seen from a point
+DirectionSample: TypeAlias = Any  # a position that was sampled on a lamp, and its direction from the point it lights
 Bsdf: TypeAlias = Any
 BsdfSample: TypeAlias = Any
 BsdfContext: TypeAlias = Any
-Properties: TypeAlias = Any  # of a plug-in
+Properties: TypeAlias = Any  # a plug-in's parameters
 Emitter: TypeAlias = Any
 MitsubaScene: TypeAlias = Any
 

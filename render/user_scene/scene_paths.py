@@ -17,8 +17,8 @@ from xml.parsers import expat
 
 from rodcone.errors import InputError
 
-# Far above any scene written by hand or by an exporter, far under what ends the process: Mitsuba 3.9 dies at 100 000
-# nested elements.
+# These limits are far above any scene written by hand or by an exporter, and far below what ends the process: Mitsuba
+# 3.9 dies of 100 000 nested elements.
 MOST_NESTED = 64
 MOST_FILES = 200
 MOST_BYTES = 64 << 20

@@ -228,7 +228,7 @@ def dng_tags(raw: RawImage) -> Tags:
 
 
 def _noise_profile(raw: RawImage) -> tuple[float, ...]:
-    """S and O of `dng_tags`, of all channels together or of each plane where some are read apart."""
+    """Return S and O of `dng_tags`: one pair for all channels, or one per channel if some have noise of their own."""
     noise = [raw.noise_of(name) for name in raw.channels[: None if raw.channel_noise else 1]]
     full_e = raw.full_well_e
     return tuple(part for x in noise for part in (x.shot / full_e, (x.dark_noise_e / full_e) ** 2))
@@ -248,7 +248,7 @@ def exif_tags(raw: RawImage) -> Tags:
 
 
 def _moment_tags(written: datetime, frame: int | None) -> Tags:
-    """Tags of the time of an exposure, which is that of writing, and of its number in a burst."""
+    """Return the tags of date and time, for which those of writing stand, and of the exposure's number in a burst."""
     date = written.strftime("%Y:%m:%d %H:%M:%S")
     tags: dict[int, tuple[str, Values]] = {
         36867: text(date),  # DateTimeOriginal

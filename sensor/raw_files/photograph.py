@@ -1,8 +1,8 @@
 """Photographs of real cameras as raw images: any Bayer raw that LibRaw reads (extra `photographs`, library `rawpy`).
 
-A raw image has one black level, one white level and a noise model in electrons; a camera's file has a black level for
-each channel and, but for some digital negatives, says nothing about noise.
-Those say it in NoiseProfile (DNG 1.4 specification, tag 51041).
+A raw image has one black level, one white level and a noise model in electrons. A camera's file has a black level for
+each channel, and says nothing about noise unless it is a digital negative with the tag NoiseProfile (DNG 1.4
+specification, tag 51041).
 """
 
 from pathlib import Path
@@ -26,10 +26,11 @@ NOISE_PROFILE = 51041
 
 
 def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
-    """Gain and dark noise from the profile; None where the file has none, or one that says nothing of use.
+    """Read gain and dark noise from the noise profile; None if the file has none, or one that is out of range.
 
-    N(x)^2 = S x + O for x from black (0) to white (1), so the full scale is 1 / S electrons and a dark pixel's standard
-    deviation sqrt(O) of it. Files with one pair a channel: their mean.
+    The profile states the variance S x + O of a signal x from black (0) to white (1). So the full scale is 1 / S
+    electrons, and the standard deviation of a dark pixel is sqrt(O) of the full scale. If a file states S and O per
+    channel, their means are taken.
 
     Parameters
     ----------
@@ -47,7 +48,7 @@ def read_noise_profile(path: Path, full_dn: float) -> NoiseEstimate | None:
 
 
 def _profile(path: Path) -> Floats:
-    """Numbers of the first profile among the file's pictures; empty where none is found."""
+    """Read the NoiseProfile tag of the first picture in the file that has one; empty if none has."""
     for tags in directories(path, (NOISE_PROFILE,)):
         form, values = tags.get(NOISE_PROFILE, ("", ()))
         if form == "d":

@@ -48,7 +48,10 @@ def write_raw(raw: RawImage, path: str | Path, *, frame: int | None = None) -> t
 
 
 def read_raw(path: str | Path) -> RawImage:
-    """Read a raw file: one that `write_raw` wrote bit for bit, a camera's as `photograph.read_photograph` does.
+    """Read a raw file.
+
+    A file that `write_raw` wrote gives its raw image bit for bit; another camera's is read by
+    `photograph.read_photograph`.
 
     Raises
     ------

@@ -62,7 +62,10 @@ def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floa
 
 
 def clipped(light_e: Floats, reading: PlainReading) -> Moments:
-    """Return the moments of one reading's samples of `light_e` expected photo-electrons [the raw image's electrons]."""
+    """Return the moments of one reading's samples, clipped, where light gives `light_e` expected photo-electrons.
+
+    All electrons are those of the raw image: the whole pixel's over the whole exposure.
+    """
     shape = np.shape(light_e)
     light = np.ravel(np.asarray(light_e, dtype=np.float64))
     sensor, share = reading.sensor, reading.share

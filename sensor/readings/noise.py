@@ -18,10 +18,11 @@ from numpy.typing import NDArray
 from rodcone.types import Floats
 from sensor.readings.resolve import PlainReading
 
-# A reading, or a frame of a burst, counts where the merged light fills it to no more than 6 standard deviations under
-# its well: its own noise then clips once in 1e9 pixels.
+# A reading, or a frame of a burst, counts where the merged light stays 6 standard deviations below its full well: noise
+# then clips it in one of 1e9 pixels.
 CLEAR_SIGMAS = 6.0
-_LEVELS = 8192  # of light, 0.3 % apart; a large frame's variance is interpolated between them
+# A large frame's variance is computed at this many levels of light, 0.3 % apart, and interpolated between them.
+_LEVELS = 8192
 
 
 @dataclass(frozen=True)

@@ -127,7 +127,7 @@ def _condition(row: Row) -> tuple[str, str]:
 
 
 def expected(samples: Lines, study: str) -> list[Score]:
-    """PSNR that `rodcone expect` computes of each condition: of presets, and of the frozen list's sensor files."""
+    """Compute by `rodcone expect` the PSNR of each condition whose sensor is a preset or a file of the frozen list."""
     known = {name: name for name in preset_names()}
     if study == FROZEN_LIST:  # another study's file of the same name is another sensor
         known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
@@ -137,7 +137,7 @@ def expected(samples: Lines, study: str) -> list[Score]:
     for (camera, level), line in conditions.items():
         light = line["luminance_cd_m2"]
         exposure = parse_exposure(line["exposure"]) or line["exposure"]
-        sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # with its filters, of which a tile doesn't tell
+        sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # brings the mosaic's filters too
         error = expect(sensor, [light], EXPECTED_UNDER, exposure)[0]
         means = nothing | {"psnr_db": error.psnr_db}
         result.append(Score(camera, level, f"expect, {EXPECTED_UNDER}", light, 0, means, nothing))

@@ -1,9 +1,9 @@
-"""What the page asks and what it is answered: messages in, pictures and figures out, on one thread of its own.
+"""The explorer's answers to its page: messages come in, pictures and figures go out, on a thread of its own.
 
-A page has one request of each kind under way. Of several that wait, only the newest is answered. A new request ends an
-older one of its kind between two stages. Kinds earlier in `KINDS` are answered first: other requests wait for them, and
-a render waits between two runs. When the page is closed, all work ends. Every answer holds the number of its request,
-the controls with which it was made, and the Python that makes it again.
+A page has one request of each kind under way. Of several requests of a kind that wait, only the newest is answered. A
+new request ends an older one of its kind between two stages. Kinds earlier in `KINDS` are answered first: other
+requests wait for them, and a render waits between two runs. When the page is closed, all work ends. Every answer holds
+the number of its request, the controls with which it was made, and the Python that makes it again.
 """
 
 import sys
@@ -45,7 +45,7 @@ class Session:
     ----------
     source : Source
     scenes : mapping of str to callable
-        What the page may choose in its place.
+        Other scenes that the page may choose, each as a function that opens its source.
     """
 
     def __init__(self, source: Source, scenes: Mapping[str, Callable[[], Source]] = MappingProxyType({})) -> None:
@@ -179,12 +179,15 @@ class Session:
         return kind if self._rendered is not None or not self._rendering or kind in SOON else None
 
     def _check(self) -> None:
-        """Raise `Overtaken` where nobody waits for the work under way any more, or another message goes first."""
+        """Raise `Overtaken` if nobody waits for the work under way any more, or if another message has to go first.
+
+        A message that has to give way to another kind is kept, and answered again after it.
+        """
         with self._changed:
             message = self._message
             pending = self._first_pending()
-            left = self._closed or self._alone or (message and message.get("page", "") != self._page)
-            if left or (pending and not message):
+            abandoned = self._closed or self._alone or (message and message.get("page", "") != self._page)
+            if abandoned or (pending and not message):
                 raise Overtaken
             if message and pending and is_superseded_by(message, self._pending[pending]):
                 if pending != message["kind"]:

@@ -133,10 +133,10 @@ def _where(levels: Sequence[str], first: int, last: int) -> str:
 
 
 def in_light(pair: Pair) -> str:
-    """Say how much less light the better one needs for the other's PSNR, and in which light nobody sees a difference.
+    """Say with how much less light the better of a pair has the other's PSNR, and where nobody sees a difference.
 
-    It says nothing if no difference is visible at any level, or if the sweep can't tell: because its levels don't rise,
-    or one of them isn't known.
+    The text is empty if no difference is visible at any level, or if light can't be compared, because the study's
+    levels don't rise or one of them isn't known.
     """
     lights = [light for light in pair.light_cd_m2 if light]
     if len(lights) < max(2, len(pair.levels)) or lights != sorted(set(lights)):
@@ -166,7 +166,7 @@ def in_light(pair: Pair) -> str:
 
 
 _SHARES = {1 / 2: "half", 1 / 3: "a third", 1 / 4: "a quarter"}
-_ROUND = 0.05  # of a share, within which its word is said; the interval stands beside it
+_ROUND = 0.05  # largest relative difference at which a share is named by its word; the interval stands beside it
 
 
 # Words of pairs in their places
@@ -174,9 +174,9 @@ _ROUND = 0.05  # of a share, within which its word is said; the interval stands 
 
 @dataclass(frozen=True)
 class Group:
-    """A pair in one place of the study: scene, light, sensor, ... but for what is compared and the light level.
+    """A pair under one combination of a study's other axes: scene, lamp, sensor and so on, over all light levels.
 
-    `title` names what varies besides.
+    `title` names the values of those axes that vary in the study.
     """
 
     title: str
@@ -186,7 +186,7 @@ class Group:
 
 
 def pair_words(group: Group) -> str:
-    """Say what the two have in common and what not: method, exposure times, the paper's reference."""
+    """Say in what the two cameras of a pair are alike and in what they differ: method, exposure times."""
     differ = []
     for ours, theirs in zip(group.ours, group.theirs, strict=True):
         times = [cell.first.exposure_s for cell in (ours, theirs) if cell.first]
@@ -208,14 +208,14 @@ def _balances(*cells: ReportCell) -> set[str]:
 
 
 def best_words(group: Group, cells: Sequence[ReportCell]) -> str:
-    """Say which Bayer camera has the best PSNR at each level, and RGBW's lead over it; empty where one has no rival.
+    """Say which Bayer camera has the best PSNR at each level, and RGBW's lead over it; empty if there is only one.
 
     Parameters
     ----------
     group : Group
-        Of the same method on both mosaics; nothing is said of others.
+        A pair of one method on both mosaics; the text is empty for any other pair.
     cells : sequence of ReportCell
-        Of all cameras in its place. Those with electrons in R, G and B alone are Bayer's.
+        Those of all cameras under the same conditions. A camera with electrons in R, G and B alone is a Bayer one.
     """
     if not group.ours or (group.ours[0].camera, group.theirs[0].camera) != WHITE_PIXEL:
         return ""
@@ -233,9 +233,9 @@ def best_words(group: Group, cells: Sequence[ReportCell]) -> str:
 
 
 def balance_words(group: Group) -> str:
-    """Say where a white balance found in the picture misses the light visibly, and by more than the lead; else empty.
+    """Say where Gray World misses the light's colour visibly and by more than the lead; empty if it does so nowhere.
 
-    Both are of colour, CIEDE2000: the miss of the worse of the two cameras, and the lead in the pictures' median.
+    Both are CIEDE2000: the miss is that of the worse of the two cameras, the lead is that of the pictures' medians.
     """
     lead = group.pair.leads[DELTA_E.key].mean
     cases = []

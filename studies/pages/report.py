@@ -270,9 +270,9 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
 
 
 def _snr_address(report: ReportData) -> str:
-    """Address of the plot of the sensors' SNR over light under D65 in 33 ms; empty without a sensor.
+    """Plot the sensors' SNR over the level of D65 in 33 ms; return a ``data:`` address, or an empty text for no sensor.
 
-    Sensors with a window beyond 380-780 nm are left out: the light of the plot ends there.
+    Sensors whose window reaches beyond 380-780 nm are left out, because the plot's light ends there.
     """
     sensors = {
         sensor.name: sensor.config

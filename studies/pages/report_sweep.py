@@ -192,7 +192,7 @@ def _value(value: Any, axis: str, at: int | None) -> str:
 
 
 def _ways(study: Mapping[str, Any]) -> list[tuple[str, int, str]]:
-    """Return each exposure with each number of frames and each gain; the report's exposures are these."""
+    """Return all combinations of exposure, number of frames and gain; the report lists each as one exposure."""
     gains = [gain_text(gain, None) for gain in study["gains"]] + [gain_text(None, iso) for iso in study["isos"]]
     return list(product(study["exposures"], study["frames"], gains or [OWN]))
 
@@ -204,7 +204,7 @@ def _exposure_rules(study: Mapping[str, Any]) -> str:
 
 
 def _size(truth: NDArray[np.uint8] | None) -> tuple[int, int]:
-    """Height and width of a picture; of one not made yet 1 each."""
+    """Return the height and width of a picture, or 1 and 1 if it isn't made yet."""
     return (1, 1) if truth is None else (truth.shape[0], truth.shape[1])
 
 
@@ -212,7 +212,7 @@ NAMED = {level.name: ReportLevel(level.name, with_signs(level.source)) for level
 
 
 def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
-    """Return how a scene was rendered; unknown where no cell of it is made yet."""
+    """Return how a scene was rendered; all facts are unknown until a cell of it is made."""
     first = next((row for row in rows if row.scene == scene), None)
     if first is None:
         return ReportRender(scene)
@@ -221,7 +221,7 @@ def render_of(rows: Sequence[Row], scene: str) -> ReportRender:
 
 
 def _further(row: Row) -> dict[str, Any]:
-    """Facts of the render beside those with columns of their own."""
+    """Return those facts of the render that have no column of their own."""
     facts: dict[str, Any] = json.loads(row.render)
     return facts
 

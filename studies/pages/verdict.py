@@ -1,4 +1,4 @@
-"""Who is ahead: a lead over seeds beside the size that a person sees; the one place where pages decide it."""
+"""Who is ahead, decided here for all pages: by a lead's interval over seeds, and by whether a person sees the lead."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -37,7 +37,7 @@ class Leads:
 
 
 def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
-    """Compare figures (..., seed) of pairs of pictures; NaN in one of a pair's seeds leaves its outcome unknown."""
+    """Compare the figures (..., seed) of two pictures; where one seed's figure is NaN, the outcome is unknown."""
     difference = (1.0 if metric.higher else -1.0) * (ours - theirs)
     mean = difference.mean(axis=-1)
     half = half_width(difference)
@@ -50,9 +50,9 @@ def leads(metric: Metric, ours: Floats, theirs: Floats) -> Leads:
 
 
 def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
-    """Part neighbouring light levels into runs in which neither side's picture changes by what a person sees.
+    """Group neighbouring light levels into runs within which a person sees no change in either side's picture.
 
-    Of the metrics `DECIDING`, each level is compared with the first of its run.
+    Each level is compared with the first of its run, by the metrics `DECIDING`.
     """
     runs: list[list[int]] = []
     sides = [side[metric.key].mean(axis=-1) / metric.threshold for metric in DECIDING for side in (ours, theirs)]
@@ -67,7 +67,7 @@ def same_light(ours: Figures, theirs: Figures) -> list[list[int]]:
 
 
 def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
-    """Count light levels by metric and outcome; levels that give one picture count once, by the mean of their leads."""
+    """Count light levels by metric and outcome; a run of levels of `same_light` counts once, by its mean figures."""
     runs = same_light(ours, theirs)
     counted = {}
     for metric in METRICS:

@@ -35,14 +35,14 @@ from studies.paper.setup import (
 from studies.photograph.snr import channel_e, snr
 
 LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had
-DARK_GAIN = LIT_CD_M2 / DARK_CD_M2  # that shows the dark half as bright as the lit one
+DARK_GAIN = LIT_CD_M2 / DARK_CD_M2  # the factor that shows the dark half as bright as the lit one
 # Figure 1(b)
 LUMINANCE_CD_M2, EXPOSURE_S = 100.0, 0.010
 LARGE_UM, SMALL_UM = 6, 2
 
 
 def half_snr_db(subject: View, reading: str, dark: bool) -> float:
-    """Median SNR of a green pixel in the dark (left) or the lit half [dB]."""
+    """Return the median SNR of a green pixel in the dark (left) or the lit half [dB]."""
     sensor = table1_sensor(reading, "bayer")
     half = subject.radiance.shape[1] // 2
     columns = slice(0, half) if dark else slice(half, None)
@@ -53,13 +53,19 @@ def half_snr_db(subject: View, reading: str, dark: bool) -> float:
 
 
 def claims_1a(dark_db: Mapping[str, float], lit_db: Mapping[str, float]) -> tuple[Claim, ...]:
-    """Noise in the dark half, none to be seen in the lit one: SNR of a green pixel by reading [dB]."""
+    """Judge the paper's claims on Figure 1(a): the dark half shows noise, the lit half none.
+
+    Parameters
+    ----------
+    dark_db, lit_db : mapping of str to float
+        SNR of a green pixel in each half [dB], by preset.
+    """
     light = {"dark": DARK_CD_M2, "lit": LIT_CD_M2, "ms": LONGEST_S * 1e3}
     return judge_claim(6, dark_db, **light), judge_claim(7, lit_db)
 
 
 def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """The photograph under both readings, as it is and with its dark half made as bright as the other."""
+    """Draw the photograph by both readings of Table 1, as taken and with its dark half made as bright as the other."""
     subject = replace(view(setup, "lit_and_shadowed", None, "lamp"), level=f"{LIT_CD_M2:g}cd/m2")
     rows = []
     half = subject.radiance.shape[1] // 2
@@ -81,7 +87,7 @@ def figure_1a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 
 
 def gain_db(reading: str, *, shot_alone: bool = False) -> float:
-    """SNR of a green pixel of 6 um over that of one of 2 um on a uniform field [dB]."""
+    """Return the SNR of a green pixel of 6 um over that of a green pixel of 2 um, on a uniform field [dB]."""
     values = []
     for pitch_um in (LARGE_UM, SMALL_UM):
         sensor = table1_sensor(reading, "bayer", pitch_um)

@@ -95,7 +95,7 @@ class View:
         As a study names them.
     radiance : SpectralRadiance
     light : Light
-        That the cameras' colours are set to.
+        The light that the cameras' colours are balanced for.
     white_cd_m2 : float
         Luminance shown as white.
     """
@@ -149,12 +149,14 @@ class Camera:
 
 
 def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | None = None) -> View:
-    """A scene at a mean luminance, None for its lights' own powers; rendered once, then read from the folder.
+    """Return a scene at a mean luminance, or for None with its lights' own powers.
+
+    The scene is rendered once; later calls read that render from the folder.
 
     Parameters
     ----------
     white : str, optional
-        Light group whose colour the cameras are set to; the scene's first where left out.
+        Light group whose colour the cameras are balanced for; left out, the scene's first.
     """
     spp = max(1, round(setup.spp * _SPP_SHARE.get(scene, 1.0)))
     study = Study((SceneChoice(scene),), ("1cd/m2",), render=RenderLimits(setup.size, setup.band_nm, spp))

@@ -1,12 +1,13 @@
-"""Contrast transfer accuracy (IEEE 2020-2024): how surely a pair of pixels tells the contrast of what it sees.
+"""Contrast transfer accuracy (IEEE 2020-2024): how surely a pair of pixels measures the contrast of what it sees.
 
-Two pixels see luminances of Michelson contrast K. The one that they tell, (x - y) / (x + y), counts as right within
-K (1 - d) and K (1 + d); the figure is the probability of that, the sum over all pairs of readings. A reading has
+Two pixels see luminances of Michelson contrast K and read x and y. The contrast that they measure, (x - y) / (x + y),
+counts as right between K (1 - d) and K (1 + d). The figure is the probability of that, summed over all pairs of
+readings. The probability of a reading is
 
     P(DN) = sum_n Poisson(n; e + m) P(DN | n),
 
-e photo-electrons and m electrons of dark current, P(DN | n) a normal distribution of what else is noise, rounded and
-clipped by the converter. From 1000 electrons on all of it is taken as one normal distribution.
+where e are the expected photo-electrons and m those of dark current. P(DN | n) is the normal distribution of all other
+noise, rounded and clipped by the converter. From 1000 electrons on, one normal distribution stands for all noise.
 """
 
 from collections.abc import Iterator
@@ -25,9 +26,9 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit
 
 CONTRAST, TOLERANCE = 0.2, 0.5  # K and d
-EQUAL = 1e-5  # by which a contrast may be beyond a limit: readings are whole numbers, and many lie on it
-COUNTED_E = 1000.0  # electrons, under which their distribution is Poisson's
-TAIL = 1e-12  # of Poisson's distribution, that is left out
+EQUAL = 1e-5  # a contrast this far beyond a limit counts as on it: readings are whole numbers, and many lie on it
+COUNTED_E = 1000.0  # below this many electrons their distribution is Poisson's, from here on a normal one
+TAIL = 1e-12  # share of Poisson's distribution that is left out
 LUX = (0.1, 1.0, 10.0, 100.0)  # on an 18 % grey card that has the pair's mean luminance
 
 
@@ -53,19 +54,19 @@ def _measure(field: EvenField, mean_cd_m2: float, rng: np.random.Generator) -> l
 
 
 def accuracy(field: EvenField, mean_cd_m2: float) -> float:
-    """Return the closed form at a pair's mean luminance; nan of a camera that merges readings."""
+    """Compute the accuracy in closed form at a pair's mean luminance; NaN for a camera that merges readings."""
     sides = [reading_distribution(field, mean_cd_m2 * side) for side in (1 + CONTRAST, 1 - CONTRAST)]
     if not all(len(side[0]) for side in sides):
         return float("nan")
     (bright_e, bright), (dark_e, dark) = sides
     total = bright_e[:, None] + dark_e
-    told = np.divide(bright_e[:, None] - dark_e, total, out=np.full_like(total, np.inf), where=total > 0)
-    right = np.abs(told - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL
+    contrast = np.divide(bright_e[:, None] - dark_e, total, out=np.full_like(total, np.inf), where=total > 0)
+    right = np.abs(contrast - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL
     return float(bright @ right @ dark)
 
 
 def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floats, Floats]:
-    """Return electrons of the readings that a pixel may give, and their probabilities."""
+    """Return the readings that a pixel may give [e-], and the probability of each."""
     sensor, expected_e = field.sensor, luminance_cd_m2 * field.electrons_per_cd_m2
     readings = at_channel(resolve(sensor, np.array([expected_e]), field.exposure_s, field.channel), field.channel)
     if several(readings):
@@ -92,11 +93,14 @@ def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floa
 
 
 def accuracy_on_frames(field: EvenField, mean_cd_m2: float, rng: np.random.Generator) -> float:
-    """Return the share of pairs whose contrast is told right: the pixels of two fields on two chips."""
+    """Measure the accuracy on simulated frames: the share of pixel pairs that measure the contrast right.
+
+    A pair is a pixel of a brighter field on one chip, and the same pixel of a darker field on another.
+    """
     bright, dark = (
         field.samples_e(field.shoot(mean_cd_m2 * side, field.draw_chip(rng), rng))
         for side in (1 + CONTRAST, 1 - CONTRAST)
     )
     total = bright + dark
-    told = np.divide(bright - dark, total, out=np.full_like(total, np.inf), where=total > 0)
-    return float(np.mean(np.abs(told - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL))
+    contrast = np.divide(bright - dark, total, out=np.full_like(total, np.inf), where=total > 0)
+    return float(np.mean(np.abs(contrast - CONTRAST) <= CONTRAST * TOLERANCE + EQUAL))

@@ -5,9 +5,10 @@ n per pixel, f in cycles per pixel:
 
     noise equivalent quanta   q(f) = ((b + d) / 2)^2 M(f)^2 / n
     ideal observer's ratio    s^2 = (b - d)^2 integral |G|^2 M^2 / n    over both axes up to Nyquist,
-    capacity                  c = integral from 0 to 1/2 of 2 pi f log2(1 + (b - d)^2 M(f)^2 / (12 n)),
+    capacity                  c = integral from 0 to 1/2 of 2 pi f log2(1 + (b - d)^2 M(f)^2 / (12 n)).
 
-G the transform of a square object, and 12 from levels that lie evenly between d and b.
+G is the Fourier transform of a square object. The 12 comes from signals that are spread evenly between d and b, whose
+variance is (b - d)^2 / 12.
 """
 
 from math import log10
@@ -17,9 +18,9 @@ import numpy as np
 from rodcone.types import Floats
 from studies.score.figure import Merit
 
-OBJECT_PX = 3.0  # side of the observer's square
+OBJECT_PX = 3.0  # side of the square object that the ideal observer looks for
 KOREN = "Koren 2024, image information metrics from slanted edges"
-STEPS = 400  # of an integral, up to Nyquist
+STEPS = 400  # steps of each integral from 0 to Nyquist
 
 
 def information(frequency: Floats, mtf: Floats, bright_e: float, dark_e: float, noise_e2: float) -> list[float]:

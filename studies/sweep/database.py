@@ -45,8 +45,8 @@ _CREATE = (
     "CREATE TABLE cells ("
     + ", ".join(f"{name} {_TYPES[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS)
     + ", digest TEXT NOT NULL) STRICT",
-    # What the last run asks for, in the study's order; of a scene that isn't rendered yet the keys aren't known. The
-    # cells of earlier runs stay in `cells`.
+    # The cells that the last run asks for, in the study's order. The key of a cell is NULL until its scene is rendered.
+    # Cells of earlier runs stay in `cells`.
     "CREATE TABLE wanted (place INTEGER PRIMARY KEY, key TEXT) STRICT",
     "CREATE TABLE renders (request TEXT PRIMARY KEY, record TEXT NOT NULL, digest TEXT NOT NULL) STRICT",
     "CREATE TABLE runs (started TEXT NOT NULL, host TEXT NOT NULL, study TEXT NOT NULL, stages TEXT NOT NULL, "
@@ -56,7 +56,7 @@ _CREATE = (
 
 @dataclass(frozen=True)
 class LastRun:
-    """What a folder holds of the last run: its study, its seconds by stage, how many cells it wants, the rows made."""
+    """The last run in a folder: its study, its seconds per stage, how many cells it asks for, and the rows made."""
 
     study: dict[str, Any]
     stages: dict[str, float]
@@ -201,7 +201,7 @@ def row_count(folder: Path) -> int:
 
 
 def last_run(folder: Path) -> LastRun:
-    """Study and rows of a folder's last run, and the seconds by stage of all runs of this study.
+    """Read study and rows of a folder's last run, and the seconds per stage, summed over all runs of this study.
 
     Raises
     ------
@@ -224,7 +224,7 @@ def last_run(folder: Path) -> LastRun:
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
-    """Note which cells this run asks for, in place of the last run's; None where a key is not known yet."""
+    """Store the keys of the cells that this run asks for, in place of the last run's; None for a key not yet known."""
     base.execute("BEGIN IMMEDIATE")
     base.execute("DELETE FROM wanted")
     base.executemany("INSERT INTO wanted VALUES (?, ?)", enumerate(keys))
@@ -232,7 +232,7 @@ def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:
 
 
 def note_keys(base: sqlite3.Connection, first: int, keys: Iterable[str]) -> None:
-    """Note the keys of a scene's cells, known now that it is rendered, from the place of its first cell on."""
+    """Store the keys of a scene's cells, which its render has made known; `first` is the place of the first of them."""
     base.execute("BEGIN IMMEDIATE")
     base.executemany("UPDATE wanted SET key = ? WHERE place = ?", ((key, at) for at, key in enumerate(keys, first)))
     base.execute("COMMIT")

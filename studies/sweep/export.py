@@ -98,9 +98,11 @@ def _harmless(value: Any) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
-SAME = 1e-6  # below it a mean is none, and a half width, as a share of its mean, only sums in another order
-ELECTRONS = "electrons_"  # and a channel: mean electrons of its pixels
-MOST_ROWS = 10_000  # in results.json: 2.5 kB each; a larger sweep's go into CSV
+# A mean smaller than this is 0. So is an interval's half width smaller than this share of its mean: the seeds' figures
+# then differ by rounding alone.
+SAME = 1e-6
+ELECTRONS = "electrons_"  # prefix of a channel's name: mean electrons of its pixels
+MOST_ROWS = 10_000  # rows in results.json, 2.5 kB each; a larger sweep is exported as CSV
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
 TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
 FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")
@@ -121,28 +123,28 @@ class TableLine:
 def lines(
     rows: Sequence[Row], folder: Path, by: Sequence[str], show: Sequence[str], where: Mapping[str, str]
 ) -> list[TableLine]:
-    """Lines of a table, in the study's order.
+    """Average a sweep's figures over its seeds, one line per combination of the axes' values, in the study's order.
 
     Parameters
     ----------
     rows : sequence of Row
     folder : Path
-        Of the sweep, for figures that are measured in pictures.
+        The sweep's folder, because some figures are measured in its pictures.
     by : sequence of str
         Axes, some of `AXES`.
     show : sequence of str
-        Columns of the ledger that are numbers; ``electrons_W`` and the other channels; ``pair_delta_e``, the mean
-        CIEDE2000 within the pairs of scene metamers; ``daylight_delta_e``, the mean between the ColorChecker's patches
-        and their colours under D65; both are measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE
-        observer sees of the pairs.
+        Figures: numeric columns of `Row`, or one of these. ``electrons_W``, and so for the other channels, is the mean
+        number of electrons in the channel's pixels. ``pair_delta_e`` is the mean CIEDE2000 within the pairs of the
+        scene `metamers`, and ``daylight_delta_e`` the mean between the ColorChecker's patches and their colours under
+        D65, both measured in the 8-bit pictures. ``true_pair_delta_e`` is what the CIE observer sees within the pairs.
     where : mapping of str to str
-        Axes and the one value that counts.
+        Value that an axis must have for a row to count, by axis.
 
     Raises
     ------
     InputError
-        For an unknown axis or figure, a figure that the scene doesn't have, or lines whose cells differ in more than
-        their seeds: a mean over lights, cameras or versions says nothing.
+        For an unknown axis or figure, for a figure that the scene doesn't have, or if cells of one line differ in more
+        than their seeds, because a mean over lights, cameras or versions says nothing.
     """
     require_keys("axis", (*by, *where), AXES)
     for name in show:

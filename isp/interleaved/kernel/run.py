@@ -1,7 +1,7 @@
 """The reconstruction of a frame, strip by strip.
 
-Kernels run beside Python. So a strip is finished when the next one has been started: what NumPy does to prepare it is
-hidden behind the kernels of the one before.
+Kernels run beside Python. Therefore each strip is started before the one above it is finished: NumPy prepares it while
+the kernels of that other strip still run.
 """
 
 from dataclasses import dataclass, replace
@@ -40,9 +40,10 @@ class StartedStrip:
 
 
 def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | None) -> list[NDArray[np.float32]]:
-    """f_i(x) of eq. (1) [e-] and sum w^2 / (sum w)^2; each (h, w, channel).
+    """Return f_i(x) of eq. (1) [e-] and its noise gain, sum w^2 / (sum w)^2; each has the shape (h, w, channel).
 
-    With a `guide` (h, w), one plane guides all channels; else each has its own, which W's stands for as eq. (6) has it.
+    A `guide` (h, w) is the plane whose similarity weighs the samples of all channels. Without one, W's plane does that,
+    and where W is saturated each channel's own plane, mixed by eq. (6).
     """
     jit = arrays()
     pattern = make_pattern(raw.cfa)
