@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
@@ -44,10 +45,24 @@ def test_csv_holds_every_value_and_numbers_as_they_are(tmp_path: Path) -> None:
     assert (found["illuminance_lux"], found["psnr_db"]) == ("", "inf")
 
 
+def test_the_page_makes_a_labelled_array_of_rows(tmp_path: Path) -> None:
+    pandas = pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    page = (ROOT / "docs" / "formats.md").read_text("utf-8")
+    lines_of_code = re.findall(r"^(axes = .*|psnr_db = .*)$", page, re.MULTILINE)
+    names = {"table": pandas.DataFrame(map(vars, ROWS))}
+    exec("\n".join(lines_of_code), names)
+    psnr_db = names["psnr_db"]
+    assert psnr_db.dims == ("scene", "sensor", "level", "processor", "seed")
+    assert psnr_db.sel(processor="interleaved").mean().item() == 21.0
+    assert psnr_db.sel(processor="bayer", seed=1).item() == 12.0
+
+
 # Tables of a sweep's figures: means and intervals by hand, electrons by channel, and what is refused.
 
 
 HERE = Path()
+ROOT = Path(__file__).parents[3]
 
 
 def cell(processor: str, seed: int, psnr_db: float, **more: object) -> Row:
