@@ -20,6 +20,7 @@ help:
 	@echo "make test-any-cpu  the same as other processors add up; CPU=NAME one of them, CPU=by-date today's"
 	@echo "make verify  slow tests, hard cases, planted faults, damaged files, soak: hours; goes on where it was ended"
 	@echo "             with SCENES=folder: all Mitsuba scenes of a folder beside stock Mitsuba; DEFINE=spp=16 its \$$parameters"
+	@echo "             with FRAMES=folder: the frames of real cameras that others published, EMVA1288/datasets of GitHub"
 	@echo "make hard-cases  a hundred hard cases with the margin by which each invariant is kept, as docs/hard_cases.md"
 	@echo "make results  every figure and table that README and the pages quote: hours, goes on where it was ended; PART=NAME one"
 	@echo "make faults  plant the faults of tests/faults one by one and show that a test notices each (resumable)"
@@ -57,6 +58,9 @@ SLOW = $(shell grep -rl --include="test_*.py" "pytest.mark.slow" tests)
 ifdef SCENES
 verify: $(VENV)/installed
 	@$(BIN)/python benchmarks/stock_scenes.py "$(SCENES)" --out out/verify/scenes.csv $(DEFINE:%=--define %)
+else ifdef FRAMES
+verify: $(VENV)/installed-dev
+	@FRAMES="$(abspath $(FRAMES))" $(BIN)/python -m pytest -q -m slow -n0 tests/crosscheck/test_public_frames.py
 else
 verify: $(addprefix out/verify/,$(SLOW) any-cpu faults fuzz soak)
 endif

@@ -1,15 +1,26 @@
 """Raw files of flat and dark frames: read together, checked to belong together, and the pixel that they tell."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from math import isnan
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
+from sensor.cameras.frame_sets import FrameSet, LightFrames, open_set, read_pixels, white_of
 from sensor.cameras.numbers import PixelNumbers, SourcedValue, bits_of
-from sensor.emva1288.from_frames import FrameFigures, Interval, figures_of_frames
-from sensor.raw import RawImage
+from sensor.cfa import Tile
+from sensor.emva1288.from_frames import (
+    LEAST_SIDE,
+    FrameFigures,
+    Interval,
+    LightStack,
+    figures_of_frames,
+    figures_of_stacks,
+    stack_of,
+)
 from sensor.raw_files.raw_file import read_raw
 
 MOST_FILES = 1000
@@ -47,7 +58,7 @@ def measure_files(flats: Sequence[Path], darks: Sequence[Path], window: int | No
                 raise InputError(
                     f"{path}: {name} is {its!r}, that of {first} is {ours!r}; allowed: one; take one camera"
                 )
-    cut = {path: _middle(raw, window) for path, raw in raws.items()}
+    cut = {path: _middle(raw.dn, raw.cfa, window) for path, raw in raws.items()}
     try:
         return figures_of_frames(
             [cut[path] for path in flats], [cut[path] for path in darks], raws[first].cfa, raws[first].white_dn
@@ -55,6 +66,57 @@ def measure_files(flats: Sequence[Path], darks: Sequence[Path], window: int | No
     except InputError as error:
         names = ", ".join(path.name for path in flats)
         raise InputError(f"{error} (flat frames: {names})") from error
+
+
+def measure_place(path: Path, window: int | None) -> FrameFigures:
+    """Measure a camera from a set of frames: a folder, a zip file, a descriptor or a list (`frame_sets.open_set`)."""
+    with open_set(path) as frames:
+        return measure_set(frames, window)
+
+
+def measure_set(frames: FrameSet, window: int | None = None) -> FrameFigures:
+    """Measure a camera from frames by light, which are read one light after the other.
+
+    A light with one frame is left out and named in the notes, as is one without any signal above the dark.
+
+    Raises
+    ------
+    InputError
+        For frames that can't be read, differ in size or mosaic, or that `figures_of_stacks` refuses.
+    """
+    pairs = [light for light in frames.lights if len(light.frames) > 1]
+    flats, darks = ([light for light in pairs if light.lit is lit] for lit in (True, False))
+    for name, lights in (("flat", flats), ("dark", darks)):
+        if not lights:
+            raise InputError(f"{name} frames: none has two or more of one light; allowed: two or more; take others")
+    # What all have in common
+    ends = [read_pixels(lights[-1].frames[0], frames) for lights in (darks, flats)]
+    notes = list(frames.notes)
+    white_dn = ends[1].white_dn
+    if isnan(white_dn):
+        white_dn, note = white_of([read_pixels(light.frames[0], frames) for light in flats])
+        notes.append(note)
+    if len(pairs) < len(frames.lights):
+        notes.append(f"{len(frames.lights) - len(pairs)} lights with a single frame are left out")
+    shape, tile = ends[0].dn.shape, ends[0].cfa
+    if min(shape[0] // len(tile), shape[1] // len(tile[0])) < LEAST_SIDE:
+        raise InputError(f"frames: {shape[0]} x {shape[1]} pixels are too few; allowed: {LEAST_SIDE} tiles a side")
+
+    def stacks(lights: Sequence[LightFrames]) -> Iterator[LightStack]:
+        for light in lights:
+            read = [read_pixels(frame, frames) for frame in light.frames]
+            for frame, one in zip(light.frames, read, strict=True):
+                if one.dn.shape != shape or one.cfa != tile:
+                    name = frame if isinstance(frame, Path) else "array"
+                    raise InputError(
+                        f"{name}: {one.dn.shape} of {one.cfa}, where the first frame is {shape} of {tile}; allowed: "
+                        "one size and mosaic; take frames of one camera"
+                    )
+            cut = [_middle(one.dn, tile, window) for one in read]
+            yield stack_of(cut, tile, white_dn, light.exposure_s, light.photons)
+
+    found = figures_of_stacks(stacks(flats), list(stacks(darks)), tile, white_dn)
+    return replace(found, notes=(*notes, *found.notes))
 
 
 def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
@@ -86,15 +148,15 @@ def _interval_text(interval: Interval) -> str:
     return f"{interval.value:.4g} ({interval.low:.4g} to {interval.high:.4g}, 95 %)"
 
 
-def _middle(raw: RawImage, window: int | None) -> NDArray[np.uint16]:
+def _middle(dn: NDArray[Any], tile: Tile, window: int | None) -> NDArray[Any]:
     """Square in the middle of a frame, beginning with the tile's first position."""
     if window is None:
-        return raw.dn
-    height, width = raw.dn.shape
-    rows, columns = len(raw.cfa), len(raw.cfa[0])
+        return dn
+    height, width = dn.shape
+    rows, columns = len(tile), len(tile[0])
     if not max(rows, columns) <= window <= min(height, width):
         raise InputError(
             f"window: {window} pixels don't fit a frame of {height} x {width}; allowed: up to its side; give fewer"
         )
     top, left = (height - window) // 2 // rows * rows, (width - window) // 2 // columns * columns
-    return raw.dn[top : top + window, left : left + window]
+    return dn[top : top + window, left : left + window]

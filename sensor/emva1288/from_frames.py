@@ -4,9 +4,9 @@ Each position of the mosaic's tile is a chip of its own, under the light that it
 gives four points of the line of variance over mean for a Bayer camera. Equations of EMVA 1288, release 4.0 Linear.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from math import hypot, sqrt
+from math import hypot, nan, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +21,11 @@ MOST_UNEVEN = 0.03  # of the mean, from the darkest block to the brightest, beyo
 SAME_LIGHT = 0.02  # two frames whose means are nearer than this share of them were lit alike
 MOST_CLIPPED = 1e-3  # of a frame's pixels, at white or at 0
 LEAST_SIDE = 8  # pixels of each position, so that blocks and columns can be told apart
+LEAST_LIGHTS = 3  # from which a change of K over the range can be told
+SPREAD = (0.4, 0.6)  # of the range: one light is dimmer and one brighter, or the change would be extrapolated
+UNKNOWN_CHANGE = 0.05  # of K over the range, which is allowed for where the lights don't tell it
 _BLOCKS = 4  # a side, for the evenness
+_SURFACE_TERMS = 6  # of second order: 1, x, y, x^2, y^2, xy
 
 
 @dataclass(frozen=True)
@@ -34,12 +38,58 @@ class Interval:
 
 
 @dataclass(frozen=True)
+class LightPoint:
+    """One light's point of the photon transfer, by position in the tile.
+
+    Attributes
+    ----------
+    exposure_s, photons : float
+        Exposure time [s] and photons per pixel; NaN where they aren't known.
+    frames : int
+    mean_dn, variance_dn2, error_dn2 : (position,) float64
+        Mean, temporal variance, and the variance's standard error.
+    dark_dn, dark_variance_dn2, dark_error_dn2 : (position,) float64
+        The same of the dark frames that belong to it.
+    clipped : float
+        Share of the pixels that read white.
+    drift : float
+        From the darkest frame to the brightest, over the mean.
+    """
+
+    exposure_s: float
+    photons: float
+    frames: int
+    mean_dn: Floats
+    variance_dn2: Floats
+    error_dn2: Floats
+    dark_dn: Floats
+    dark_variance_dn2: Floats
+    dark_error_dn2: Floats
+    clipped: float
+    drift: float
+
+    @property
+    def signal_dn(self) -> Floats:
+        """Mean above the dark."""
+        return self.mean_dn - self.dark_dn
+
+    @property
+    def gain(self) -> Floats:
+        """Variance that light adds, over the signal [DN/e-]: K at this light."""
+        return (self.variance_dn2 - self.dark_variance_dn2) / self.signal_dn
+
+
+@dataclass(frozen=True)
 class FrameFigures:
     """What flat and dark frames tell of a camera.
 
     Attributes
     ----------
     gain_dn_per_e, read_noise_e, dsnu_e, prnu : Interval
+    gain_error : (float, float)
+        Standard errors of K over itself: by frames and the scatter of the lights, and by K's change over the range.
+    gain_change : float
+        Change of K over the standard's range, relative to K; NaN where the lights don't tell it.
     black_dn, white_dn : float
         Mean of the dark frames, and the reading of a full pixel.
     levels_dn : (level, position) float64
@@ -48,21 +98,40 @@ class FrameFigures:
         Flat frames of each stack, then dark frames.
     cfa : tuple of str
         Their mosaic.
+    points : tuple of LightPoint
+        The photon transfer, from dim to bright.
+    notes : tuple of str
+        What was assumed, and what a reader has to know of these frames.
     """
 
     gain_dn_per_e: Interval
     read_noise_e: Interval
     dsnu_e: Interval
     prnu: Interval
+    gain_error: tuple[float, float]
+    gain_change: float
     black_dn: float
     white_dn: float
     levels_dn: Floats
     frames: tuple[int, ...]
     cfa: Tile
+    points: tuple[LightPoint, ...]
+    notes: tuple[str, ...]
 
 
 @dataclass(frozen=True)
-class _Site:
+class LightStack:
+    """Frames of one light, reduced: exposure time, photons and share of white pixels, and sites by position."""
+
+    exposure_s: float
+    photons: float
+    clipped: float
+    drift: float
+    sites: tuple["Site", ...]
+
+
+@dataclass(frozen=True)
+class Site:
     """Frames of one light at one position of the tile: their mean, and their temporal variance with its error."""
 
     mean_dn: NDArray[np.float64]
@@ -74,6 +143,21 @@ class _Site:
     def temporal_dn2(self) -> float:
         """Temporal variance that is left in the mean over frames."""
         return self.variance_dn2 / self.frames
+
+
+@dataclass(frozen=True)
+class SystemGain:
+    """K with its two standard errors, and its change over the range, all in DN per electron but the last."""
+
+    value: float
+    scatter: float
+    model: float
+    change: float
+
+    @property
+    def estimate(self) -> Estimate:
+        """Value and whole standard error."""
+        return self.value, hypot(self.scatter, self.model)
 
 
 def figures_of_frames(
@@ -93,34 +177,124 @@ def figures_of_frames(
     InputError
         For frames that are too few, too small, uneven, clipped, no pair, or that show no shot noise.
     """
-    # Frames
     _require_frames(flats, darks, tile)
-    dark = _sites(darks, tile)
-    black_dn = float(np.mean([site.mean_dn.mean() for site in dark]))
-    stacks = [_sites(stack, tile) for stack in _stacks(flats)]
+    stacks = [stack_of(frames, tile, white_dn) for frames in _stacks(flats)]
     _require_exposed(flats, darks, white_dn)
-    levels = np.array([[site.mean_dn.mean() for site in stack] for stack in stacks])
-    levels -= [site.mean_dn.mean() for site in dark]
-    for number, (stack, level) in enumerate(zip(stacks, levels, strict=True), 1):
-        _require_even(stack, level, number)
+    return figures_of_stacks(stacks, [stack_of(darks, tile, white_dn)], tile, white_dn)
+
+
+def stack_of(
+    frames: Sequence[NDArray[np.uint16]], tile: Tile, white_dn: float, exposure_s: float = nan, photons: float = nan
+) -> LightStack:
+    """Reduce the frames of one light."""
+    means = [float(frame.mean()) for frame in frames]
+    clipped = float(np.mean([np.mean(frame >= white_dn) for frame in frames]))
+    drift = (max(means) - min(means)) / max(float(np.mean(means)), 1e-12)
+    return LightStack(exposure_s, photons, clipped, drift, tuple(_sites(frames, tile)))
+
+
+def figures_of_stacks(
+    flats: Iterable[LightStack], darks: Sequence[LightStack], tile: Tile, white_dn: float
+) -> FrameFigures:
+    """Measure a camera from reduced frames.
+
+    Each light is held against the dark frames of its exposure time, where there are some, else against the stack with
+    the most. Flat stacks may come one by one: the image is kept of one alone, that with the most frames, and the
+    brightest of those, up to 70 % of white.
+
+    Raises
+    ------
+    InputError
+        For frames that are uneven, too bright, or that show no shot noise.
+    """
+    # Points of the photon transfer
+    common = max(darks, key=lambda stack: stack.sites[0].frames)
+    black_dn = float(np.mean([site.mean_dn.mean() for site in common.sites]))
+    points: list[LightPoint] = []
+    kept: tuple[tuple[int, float], LightStack, LightPoint] | None = None
+    for stack in flats:
+        own = [dark for dark in darks if dark.exposure_s == stack.exposure_s]
+        point = _point(stack, max(own, key=lambda dark: dark.sites[0].frames) if own else common)
+        points.append(point)
+        rank = (stack.sites[0].frames, float(point.signal_dn.mean()))
+        dim = 0 < point.signal_dn.mean() <= FIT_SHARE * (white_dn - black_dn)
+        if dim and point.clipped <= MOST_CLIPPED and (kept is None or rank > kept[0]):
+            kept = rank, stack, point
+    points.sort(key=lambda point: float(point.mean_dn.mean()))
+    if kept is None:
+        raise InputError(
+            f"flat frames: each is over {FIT_SHARE:.0%} of white; allowed: two or more below that; expose them less"
+        )
+    _, bright, bright_point = kept
+    notes = _evenness(bright, bright_point.signal_dn)
 
     # Figures
-    gain = _gain(stacks, dark, levels, FIT_SHARE * (white_dn - black_dn))
-    pixels = sum(site.mean_dn.size for site in dark)
-    variance = sum(site.variance_dn2 * site.mean_dn.size for site in dark) / pixels
-    error = sqrt(sum((site.error_dn2 * site.mean_dn.size) ** 2 for site in dark)) / pixels
-    used = int(np.argmax(np.where(levels.mean(axis=1) <= FIT_SHARE * (white_dn - black_dn), levels.mean(axis=1), -1)))
+    gain = _gain(points, FIT_SHARE * _saturation_dn(points, white_dn - black_dn))
+    pixels = sum(site.mean_dn.size for site in common.sites)
+    variance = sum(site.variance_dn2 * site.mean_dn.size for site in common.sites) / pixels
+    error = sqrt(sum((site.error_dn2 * site.mean_dn.size) ** 2 for site in common.sites)) / pixels
     return FrameFigures(
-        gain_dn_per_e=_interval(gain),
-        read_noise_e=_electrons(variance - QUANTISATION_DN2, error, gain),
-        dsnu_e=_electrons(*_spread([(site.mean_dn, site.temporal_dn2) for site in dark]), gain),
-        prnu=_root(*_spread(_relative(stacks[used], dark, levels[used]))),
+        gain_dn_per_e=_interval(gain.estimate),
+        read_noise_e=_electrons(variance - QUANTISATION_DN2, error, gain.estimate),
+        dsnu_e=_electrons(*_spread([(site.mean_dn, site.temporal_dn2) for site in common.sites]), gain.estimate),
+        prnu=_root(*_spread(_relative(bright.sites, common.sites, bright_point.signal_dn))),
+        gain_error=(gain.scatter / gain.value, gain.model / gain.value),
+        gain_change=gain.change,
         black_dn=black_dn,
         white_dn=white_dn,
-        levels_dn=levels,
-        frames=(*(stack[0].frames for stack in stacks), len(darks)),
+        levels_dn=np.array([point.signal_dn for point in points]),
+        frames=(*(point.frames for point in points), common.sites[0].frames),
         cfa=tile,
+        points=tuple(points),
+        notes=(*notes, *_notes(points, darks, gain)),
     )
+
+
+def _point(stack: LightStack, dark: LightStack) -> LightPoint:
+    def by_site(values: Iterable[float]) -> Floats:
+        return np.array(list(values), dtype=np.float64)
+
+    return LightPoint(
+        exposure_s=stack.exposure_s,
+        photons=stack.photons,
+        frames=stack.sites[0].frames,
+        mean_dn=by_site(site.mean_dn.mean() for site in stack.sites),
+        variance_dn2=by_site(site.variance_dn2 for site in stack.sites),
+        error_dn2=by_site(site.error_dn2 for site in stack.sites),
+        dark_dn=by_site(site.mean_dn.mean() for site in dark.sites),
+        dark_variance_dn2=by_site(site.variance_dn2 for site in dark.sites),
+        dark_error_dn2=by_site(site.error_dn2 for site in dark.sites),
+        clipped=stack.clipped,
+        drift=stack.drift,
+    )
+
+
+def _saturation_dn(points: Sequence[LightPoint], white_dn: float) -> float:
+    """Signal of the light behind the one whose variance is greatest; white above black where no brighter one is."""
+    peak = max(range(len(points)), key=lambda index: float(points[index].variance_dn2.mean()))
+    return min(float(points[peak + 1].signal_dn.max()), white_dn) if peak + 1 < len(points) else white_dn
+
+
+def _notes(points: Sequence[LightPoint], darks: Sequence[LightStack], gain: SystemGain) -> list[str]:
+    """Say what was assumed, with the figure that these frames show of it."""
+    used = [point for point in points if point.clipped <= MOST_CLIPPED]
+    notes = [
+        "frames are single exposures: frames that a camera averaged (stacked) or denoised would show less noise",
+        f"light that changes from frame to frame is taken out; it changed by {max(x.drift for x in used):.2%} at most",
+    ]
+    at_0 = max(float(np.mean(site.mean_dn <= 0)) for dark in darks for site in dark.sites)
+    notes.append(f"the dark isn't cut off at 0: {at_0:.2%} of its pixels read 0 in all frames")
+    if np.isnan(gain.change):
+        notes.append(
+            f"fewer than {LEAST_LIGHTS} lights, or lights that leave a part of the range out, don't tell whether K "
+            f"changes with light: {UNKNOWN_CHANGE:.0%} over the range is allowed for"
+        )
+    elif gain.model:
+        notes.append(
+            f"K changes by {gain.change:+.1%} from the dark to {FIT_SHARE:.0%} of saturation: the camera isn't linear, "
+            "and the interval holds that change"
+        )
+    return notes
 
 
 def _stacks(flats: Sequence[NDArray[np.uint16]]) -> list[list[NDArray[np.uint16]]]:
@@ -141,7 +315,7 @@ def _stacks(flats: Sequence[NDArray[np.uint16]]) -> list[list[NDArray[np.uint16]
     return [[flats[index] for index in stack] for stack in stacks]
 
 
-def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
+def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[Site]:
     """Mean and temporal variance by position, each frame's own brightness taken off: lamps flicker (eqs. 18, 44)."""
     height, width = len(tile), len(tile[0])
     sites = []
@@ -154,49 +328,73 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[_Site]:
             freedom = (len(frames) - 1) * (mean.size - 1)
             variance = float(np.sum(rest**2)) / freedom
             error = max(variance, QUANTISATION_DN2) * sqrt(2 / freedom)  # the same file twice varies in nothing
-            sites.append(_Site(mean, variance, error, len(frames)))
+            sites.append(Site(mean, variance, error, len(frames)))
     return sites
 
 
-def _gain(stacks: list[list[_Site]], dark: list[_Site], levels: Floats, most_dn: float) -> Estimate:
-    """Slope of the variance that light adds over the signal (eq. 50), in DN per electron; least squares by error."""
-    power, slope, of_flats = 0.0, 0.0, 0.0
-    of_darks = np.zeros(len(dark))
-    for stack, level in zip(stacks, levels, strict=True):
-        for index, (site, signal) in enumerate(zip(stack, level, strict=True)):
-            if signal <= most_dn and signal > 0:
-                weight = signal / site.error_dn2**2
-                slope += weight * (site.variance_dn2 - dark[index].variance_dn2)
-                power += weight * signal
-                of_flats += (weight * site.error_dn2) ** 2
-                of_darks[index] += weight * dark[index].error_dn2
-    if not power:
+def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
+    """Slope of the variance that light adds over the signal (eq. 50), in DN per electron, through the dark point.
+
+    Its errors are those of the frames, widened by the scatter of K by light where that is more than frames explain
+    (Birge's ratio), and the spread of K over the range where a second term of the line is told from 0.
+    """
+    used = [point for point in points if point.clipped <= MOST_CLIPPED]
+    signal = np.array([point.signal_dn for point in used]).reshape(-1)
+    flats = np.array([point.error_dn2 for point in used]).reshape(-1)
+    darks = np.array([point.dark_error_dn2 for point in used]).reshape(-1)
+    excess = np.array([point.variance_dn2 - point.dark_variance_dn2 for point in used]).reshape(-1)
+    keep = (signal > 0) & (signal <= most_dn)
+    if not np.any(keep):
         raise InputError(
             f"flat frames: each is over {FIT_SHARE:.0%} of white; allowed: two or more below that; expose them less"
         )
-    error = sqrt(of_flats + float(np.sum(of_darks**2))) / power
-    slope /= power
+    position = np.tile(np.arange(len(used[0].mean_dn)), len(used))[keep]
+    signal, flats, darks, excess = signal[keep], flats[keep], darks[keep], excess[keep]
+    power = float(np.sum(signal**2))
+    slope = float(np.sum(signal * excess)) / power
+    # A dark stack may serve several lights: its error counts once for all of one position.
+    of_darks = sum(float(np.sum(signal[position == site] * darks[position == site])) ** 2 for site in set(position))
+    error = sqrt(float(np.sum((signal * flats) ** 2)) + of_darks) / power
     if not slope > 4 * error:  # 4 standard errors: no slope at all would be taken for one once in 3e4 cameras
         raise InputError(
             f"flat frames: their variance grows by {slope:.3g} +- {error:.3g} DN/e-, which can't be told from 0; "
             "allowed: frames that show shot noise; take brighter or more frames, unprocessed"
         )
-    return slope, error
+    lights = sum(bool(np.any((point.signal_dn > 0) & (point.signal_dn <= most_dn))) for point in used)
+    if lights < LEAST_LIGHTS or signal.min() > SPREAD[0] * most_dn or signal.max() < SPREAD[1] * most_dn:
+        return SystemGain(slope, error, slope * UNKNOWN_CHANGE / sqrt(12), nan)
+    # The second term: excess = K0 s + k1 s^2, weighted by the errors.
+    sigma = np.hypot(flats, darks)
+    terms = np.stack([signal, signal**2], axis=1) / sigma[:, None]
+    inverse = np.linalg.inv(terms.T @ terms)
+    bend = inverse @ terms.T @ (excess / sigma)
+    freedom = signal.size - 2
+    birge = sqrt(max(float(np.sum((excess / sigma - terms @ bend) ** 2)) / freedom, 1.0))
+    change, change_error = float(bend[1]) * most_dn / slope, sqrt(float(inverse[1, 1])) * birge * most_dn / slope
+    # K is anywhere in its range: the standard deviation of an even distribution.
+    model = abs(change) / sqrt(12) if abs(change) > 2 * change_error else 0.0
+    return SystemGain(slope, error * birge, slope * model, change)
 
 
-def _relative(stack: list[_Site], dark: list[_Site], level: Floats) -> list[tuple[NDArray[np.float64], float]]:
+def _relative(stack: Sequence[Site], dark: Sequence[Site], level: Floats) -> list[tuple[NDArray[np.float64], float]]:
     """Response of each pixel over the mean, less a smooth surface of second order, with its temporal variance."""
     responses = []
     for site, shade, signal in zip(stack, dark, level, strict=True):
         added = (site.mean_dn - shade.mean_dn) / signal
-        y, x = (np.linspace(-1, 1, size) for size in added.shape)
-        terms = [np.ones_like(added), *np.meshgrid(x, y), *np.meshgrid(x**2, y**2), np.outer(y, x)]
-        surface = np.stack([term.ravel() for term in terms], axis=1)
-        smooth = surface @ np.linalg.lstsq(surface, added.ravel(), rcond=None)[0]
-        rest = added.ravel() - smooth
-        freedom = sqrt(rest.size / (rest.size - len(terms)))
+        rest = without_surface(added).ravel()
+        freedom = sqrt(rest.size / (rest.size - _SURFACE_TERMS))
         responses.append(((rest * freedom).reshape(added.shape), (site.temporal_dn2 + shade.temporal_dn2) / signal**2))
     return responses
+
+
+def without_surface(image: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Image less a smooth surface of second order: a lens's shading, and a lamp at one side."""
+    y, x = (np.linspace(-1, 1, size) for size in image.shape)
+    terms = [np.ones_like(image), *np.meshgrid(x, y), *np.meshgrid(x**2, y**2), np.outer(y, x)]
+    surface = np.stack([term.ravel() for term in terms], axis=1)
+    # The normal equations: six terms over a whole frame are well apart, and lstsq would copy them.
+    weights = np.linalg.solve(surface.T @ surface, surface.T @ image.ravel())
+    return image - (surface @ weights).reshape(image.shape)
 
 
 def _spread(images: list[tuple[NDArray[np.float64], float]]) -> Estimate:
@@ -259,18 +457,31 @@ def _require_exposed(flats: Sequence[NDArray[np.uint16]], darks: Sequence[NDArra
                 )
 
 
-def _require_even(stack: list[_Site], level: Floats, number: int) -> None:
-    """Refuse light or a surface that isn't even: its structure would pass for PRNU."""
-    for site, signal in zip(stack, level, strict=True):
-        rows = np.array_split(site.mean_dn, _BLOCKS)
-        blocks = [block for row in rows for block in np.array_split(row, _BLOCKS, axis=1)]
-        means = np.array([block.mean() for block in blocks])
-        # 4 standard errors of a block to each side: 16 blocks of noise alone are refused once in a thousand frames
-        noise = 8 * float(np.mean([block.std() / sqrt(block.size) for block in blocks]))
-        uneven = (float(np.ptp(means)) - noise) / signal
-        if uneven > MOST_UNEVEN:
-            raise InputError(
-                f"flat frames of light {number}: they are not flat, {uneven:.1%} from the darkest part to the "
-                f"brightest; allowed: {MOST_UNEVEN:.0%}; light an even surface, out of focus, or measure the middle "
-                "alone (--window)"
-            )
+def _evenness(stack: LightStack, level: Floats) -> list[str]:
+    """Say how even the light was; refuse a surface with structure beyond a smooth one, which would pass for PRNU."""
+    uneven = max(_unevenness(site.mean_dn, signal) for site, signal in zip(stack.sites, level, strict=True))
+    if uneven <= MOST_UNEVEN:
+        return [f"the flat frames are even within {max(uneven, 0.0):.1%} from the darkest part to the brightest"]
+    rest = max(
+        _unevenness(without_surface(site.mean_dn), signal) for site, signal in zip(stack.sites, level, strict=True)
+    )
+    if rest > MOST_UNEVEN:
+        raise InputError(
+            f"flat frames of {level.mean():.4g} DN: they are not flat, {uneven:.1%} from the darkest part to the "
+            f"brightest, {rest:.1%} without a smooth surface; allowed: {MOST_UNEVEN:.0%}; light an even surface, out "
+            "of focus, or measure the middle alone (--window)"
+        )
+    return [
+        f"warning: the flat frames aren't even, {uneven:.1%} from the darkest part to the brightest: a surface of "
+        f"second order is taken out of PRNU, which leaves {max(rest, 0.0):.1%}"
+    ]
+
+
+def _unevenness(image: NDArray[np.float64], signal: float) -> float:
+    """Difference of the darkest part of an image and the brightest, beyond noise, over the signal."""
+    rows = np.array_split(image, _BLOCKS)
+    blocks = [block for row in rows for block in np.array_split(row, _BLOCKS, axis=1)]
+    means = np.array([block.mean() for block in blocks])
+    # 4 standard errors of a block to each side: 16 blocks of noise alone are refused once in a thousand frames
+    noise = 8 * float(np.mean([block.std() / sqrt(block.size) for block in blocks]))
+    return (float(np.ptp(means)) - noise) / signal

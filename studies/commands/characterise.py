@@ -5,11 +5,13 @@ from math import isinf
 from pathlib import Path
 from typing import Annotated, Any
 
+import numpy as np
 from cyclopts import Parameter
 
 from rodcone.errors import InputError, require_absent, require_name, require_range, require_whole
 from rodcone.files import check_place, write_files
-from sensor.cameras.frames import frame_numbers, measure_files
+from sensor.cameras.frame_sets import is_set
+from sensor.cameras.frames import frame_numbers, measure_files, measure_place
 from sensor.cameras.numbers import preset_text
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import Characterisation
@@ -33,9 +35,10 @@ class Frames:
     Attributes
     ----------
     flats : tuple of Path
-        Raw files of a real camera instead: an evenly lit surface, two or more at each light.
+        Raw files of a real camera instead: an evenly lit surface, two or more at each light. Or one set of frames by
+        light: a folder, a zip file, a descriptor of EMVA 1288 (.txt), a list of files by exposure (.csv).
     dark : tuple of Path
-        Raw files with the cap on, two or more, at the same exposure index and time.
+        Raw files with the cap on, two or more, at the same exposure index and time; a set has its own.
     reading : int, optional
         Reading to measure, of a sensor that has several: 1 for the first.
     channel : str, optional
@@ -138,7 +141,13 @@ def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
     if out is not None:
         require_new(out, ".toml")
         check_place(out)
-    camera = measure_files(frames.flats, frames.dark, frames.window)
+    sets = [path for path in frames.flats if is_set(path)]
+    if sets:
+        if len(frames.flats) > 1 or frames.dark:
+            raise InputError(f"from: {sets[0]} is a set of frames; allowed: alone, as it has its dark frames; give it")
+        camera = measure_place(sets[0], frames.window)
+    else:
+        camera = measure_files(frames.flats, frames.dark, frames.window)
     rows = (
         ("gain", "DN/e-", camera.gain_dn_per_e),
         ("read noise", "e-", camera.read_noise_e),
@@ -149,15 +158,27 @@ def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
         title = f"A camera measured from {frames.flats[0].name} and others."
         write_files({out: preset_text(title, frame_numbers(camera, frames.flats), None, "")})
     if json:
-        print_json({**asdict(camera), "levels_dn": camera.levels_dn.tolist()})
+        print_json(_plain(asdict(camera)))
         return
     print_table(
         FRAMES_HEAD,
         [(name, unit, *(f"{value:.5g}" for value in (x.value, x.low, x.high))) for name, unit, x in rows],
         words=2,
     )
+    scatter, model = camera.gain_error
+    print(f"standard error of K: {scatter:.2%} by frames and lights, {model:.2%} by its change with light")
+    print("\n".join(["", *(f"- {note}" for note in camera.notes)]))
     if out is not None:
         say(f"{out}: add pitch_um and fill_factor, which frames don't show")
+
+
+def _plain(value: Any) -> Any:
+    """Give a value with lists in place of arrays, as JSON holds it."""
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    if isinstance(value, dict):
+        return {name: _plain(item) for name, item in value.items()}
+    return [_plain(item) for item in value] if isinstance(value, list | tuple) else value
 
 
 def _facts(chip: Characterisation) -> dict[str, Any]:

@@ -32,7 +32,8 @@ def bench(sensor, seed, shape=(96, 96)):
 
 
 def measure(sensor, frames, *, bright=4):
-    flats = [*frames(8000.0, bright), *frames(2000.0, 2)]
+    # Three lights: of fewer, the interval allows for a change of K that they can't show.
+    flats = [*frames(8000.0, bright), *frames(5000.0, 2), *frames(2000.0, 2)]
     return figures_of_frames(flats, frames(0.0, 4), sensor.cfa, sensor.white_dn)
 
 

@@ -107,8 +107,10 @@ def test_it_prints_intervals_and_writes_a_preset(frames, tmp_path):
     out = tmp_path / "mine.toml"
     code, printed, err = call(["characterise", "--from", *flats, "--dark", *darks, "-o", out])
     assert code == 0
-    assert [line.split()[0] for line in printed.splitlines()] == ["figure", "gain", "read", "DSNU", "PRNU"]
-    for line in printed.splitlines()[1:]:
+    table = printed.splitlines()[:5]
+    assert [line.split()[0] for line in table] == ["figure", "gain", "read", "DSNU", "PRNU"]
+    assert "fewer than 3 lights, or lights that leave" in printed
+    for line in table[1:]:
         measured, low, high = map(float, line.split()[-3:])
         assert low < measured < high
     assert "add pitch_um and fill_factor, which" in err
@@ -133,6 +135,8 @@ def test_what_is_not_allowed_is_told_in_one_line(frames, tmp_path):
         (f"--from {flat} --dark {darks[0]} {tmp_path / 'absent.dng'}", "there is no such file"),
         (f"--from {flat} --dark {darks[0]} {tmp_path / 'broken.dng'}", "broken.dng"),
         (f"--from {flat} --dark {dark} --window 0", "window: 0 pixels"),
+        (f"--from {tmp_path}", "no descriptor"),
+        (f"--from {tmp_path} --dark {dark}", "is a set of frames; allowed: alone"),
         ("low_noise --window 20", "window: 20"),
     )
     check_refusals("characterise", rows, tmp_path)
