@@ -73,6 +73,7 @@ app.command("studies.commands.sweep:sweep", name="sweep", help="Make every pictu
 app.command("studies.commands.export:export", name="export", help="Write a sweep's results as CSV.")
 app.command("studies.commands.export:table", name="table", help="Print a sweep's figures as a Markdown table.")
 app.command("studies.commands.train:train", name="train", help="Train the prior of ple, ple_rgbw and ple_bayer.")
+app.command("studies.commands.twin:twin", name="twin", help="Set a real camera beside its simulated twin.")
 app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 
 

@@ -1,0 +1,272 @@
+"""A camera's twin: its preset measured from frames, and the same lights photographed with it, each figure tested."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import erfc, hypot, isnan, sqrt
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from rodcone.types import Floats
+from sensor.cameras.frame_sets import FrameSet, LightFrames, read_pixels
+from sensor.cameras.frames import frame_numbers, measure_set
+from sensor.cameras.numbers import PixelNumbers, SourcedValue
+from sensor.capture import expose
+from sensor.config import LensConfig, SensorConfig
+from sensor.device import Device, draw_device
+from sensor.emva1288.estimators import FIT_SHARE
+from sensor.emva1288.from_frames import MOST_CLIPPED, NORMAL_95, FrameFigures, LightStack, stack_of, without_surface
+from sensor.pixel import PixelConfig
+
+APART = 0.01  # probability under which two samples are told apart, over all tests of one kind
+SIMULATED_UM = 5.0  # pitch of the simulated pixel, which light given in electrons doesn't ask for
+
+
+@dataclass(frozen=True)
+class TwinFigure:
+    """One figure of the camera and of its twin.
+
+    Attributes
+    ----------
+    name, place : str
+        Which figure, and of which frames.
+    camera, twin : float
+    low, high : float
+        Ends of the 95 % interval of twin over camera.
+    alike : bool
+        Whether a two-sample test at 1 %, shared by all tests of this figure, doesn't tell them apart.
+    """
+
+    name: str
+    place: str
+    camera: float
+    twin: float
+    low: float
+    high: float
+    alike: bool
+
+    @property
+    def ratio(self) -> float:
+        """Twin over camera."""
+        return self.twin / self.camera
+
+    @property
+    def verdict(self) -> str:
+        """A sentence that says what was found."""
+        told = "not told apart" if self.alike else "told apart"
+        return (
+            f"{self.name}: {self.ratio:.3f} of the camera's {self.place}, interval {self.low:.3f} to {self.high:.3f}: "
+            f"{told} at {APART:.0%}"
+        )
+
+
+@dataclass(frozen=True)
+class FramePair:
+    """Mean image and one frame of the camera and of its twin, under one light."""
+
+    camera_mean: Floats
+    twin_mean: Floats
+    camera_frame: NDArray[Any]
+    twin_frame: NDArray[Any]
+
+
+@dataclass(frozen=True)
+class Twin:
+    """A camera and its twin.
+
+    Attributes
+    ----------
+    figures : FrameFigures
+        What the camera's frames tell.
+    numbers : PixelNumbers
+        The preset's numbers, each with its source.
+    sensor : SensorConfig
+        The simulated camera.
+    camera_dn2, twin_dn2 : (light,) float64
+        Temporal variance under each light that isn't clipped.
+    signal_dn : (light,) float64
+        The camera's mean above the dark.
+    dark, bright : FramePair
+    comparisons : tuple of TwinFigure
+    """
+
+    figures: FrameFigures
+    numbers: PixelNumbers
+    sensor: SensorConfig
+    signal_dn: Floats
+    camera_dn2: Floats
+    twin_dn2: Floats
+    dark: FramePair
+    bright: FramePair
+    comparisons: tuple[TwinFigure, ...]
+
+
+def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
+    """Measure a camera and photograph its lights with a simulated one.
+
+    The simulated light has the camera's own mean at each light, and the smooth surface of its flat frames.
+
+    Raises
+    ------
+    InputError
+        For frames that `sensor.cameras.frames.measure_set` refuses.
+    """
+    figures = measure_set(frames)
+    dark = _largest(frames, lit=False)
+    room_dn = FIT_SHARE * (figures.white_dn - figures.black_dn)
+    bright = _largest(frames, lit=True, most_dn=figures.black_dn + room_dn)
+    dark_dn, bright_dn = (_pixels(light, frames) for light in (dark, bright))
+    mean = {False: _mean_image(dark_dn), True: _mean_image(bright_dn)}
+    numbers = _with_columns(frame_numbers(figures, [Path(name)]), figures, dark_dn, bright_dn)
+    sensor = _sensor(numbers, figures)
+
+    # The same lights with the twin
+    rng = np.random.default_rng([seed, 1])
+    device = draw_device(sensor, mean[True].shape, np.random.default_rng([seed, 0]))
+    gain = figures.gain_dn_per_e.value
+    signal = mean[True] - figures.black_dn
+    surface = (signal - without_surface(signal)) / signal.mean()
+    points = [point for point in figures.points if point.clipped <= MOST_CLIPPED and np.all(point.signal_dn > 0)]
+    stacks = []
+    for point in points:
+        light_e = surface / surface.mean() * _site_light(point.signal_dn / gain, figures, mean[True].shape)
+        stacks.append(stack_of(_taken(light_e, sensor, device, rng, point.frames), figures.cfa, figures.white_dn))
+    twin_dark = _taken(np.zeros(mean[False].shape), sensor, device, rng, len(dark_dn))
+    light_e = surface / surface.mean() * signal.mean() / gain
+    twin_bright = _taken(light_e, sensor, device, rng, len(bright_dn))
+
+    # Figures of both
+    camera_dn2 = np.array([point.variance_dn2.mean() for point in points])
+    twin_dn2 = np.array([np.mean([site.variance_dn2 for site in stack.sites]) for stack in stacks])
+    both = list(zip(points, stacks, strict=True))
+    errors = [_relative_error(point.error_dn2, point.variance_dn2, stack) for point, stack in both]
+    compared = [
+        _compared("temporal noise", f"at {point.mean_dn.mean():.0f} DN", sqrt(a), sqrt(b), error, len(points))
+        for point, a, b, error in zip(points, camera_dn2, twin_dn2, errors, strict=True)
+    ]
+    compared += _of_pair("dark", dark_dn, twin_dark) + _of_pair("flat", bright_dn, twin_bright)
+    return Twin(
+        figures=figures,
+        numbers=numbers,
+        sensor=sensor,
+        signal_dn=np.array([point.signal_dn.mean() for point in points]),
+        camera_dn2=camera_dn2,
+        twin_dn2=twin_dn2,
+        dark=FramePair(mean[False], _mean_image(twin_dark), dark_dn[0], twin_dark[0]),
+        bright=FramePair(mean[True], _mean_image(twin_bright), bright_dn[0], twin_bright[0]),
+        comparisons=tuple(compared),
+    )
+
+
+def _mean_image(frames: Sequence[NDArray[Any]]) -> Floats:
+    return np.asarray(np.mean(frames, axis=0, dtype=np.float64), dtype=np.float64)
+
+
+def _pixels(light: LightFrames, frames: FrameSet) -> list[NDArray[Any]]:
+    return [read_pixels(frame, frames).dn for frame in light.frames]
+
+
+def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFrames:
+    """Light with the most frames, and of those the brightest under a level."""
+    ranked = []
+    for light in frames.lights:
+        if light.lit is lit and len(light.frames) > 1:
+            mean = float(read_pixels(light.frames[0], frames).dn.mean())
+            if mean <= most_dn:
+                ranked.append((len(light.frames), mean, light))
+    return max(ranked, key=lambda one: one[:2])[2]
+
+
+def _with_columns(
+    numbers: PixelNumbers, figures: FrameFigures, dark: Sequence[NDArray[Any]], bright: Sequence[NDArray[Any]]
+) -> PixelNumbers:
+    """Numbers with the columns' share taken out of DSNU and PRNU, and the well for a whole black level."""
+    gain = figures.gain_dn_per_e.value
+    black = round(figures.black_dn)
+    dark_dn2 = _column_variance(dark)
+    signal = float(np.mean(bright) - np.mean(dark))
+    bright_dn2 = max(_column_variance(bright) - dark_dn2, 0.0)
+    offset_e, spread = sqrt(dark_dn2) / gain, sqrt(bright_dn2) / signal
+    pixel = dict(numbers.pixel)
+    rest = {"dsnu_e": offset_e, "prnu": spread}
+    for key, columns in rest.items():
+        whole = pixel[key].value
+        pixel[key] = SourcedValue(sqrt(max(whole**2 - columns**2, 0.0)), f"{pixel[key].source}, less the columns'")
+    pixel["column_offset_e"] = SourcedValue(offset_e, f"column means of {len(dark)} dark frames")
+    pixel["column_gain_spread"] = SourcedValue(spread, f"column means of {len(bright)} flat frames, surface taken out")
+    pixel["full_well_e"] = replace(pixel["full_well_e"], value=(figures.white_dn - black) / gain)
+    return replace(numbers, pixel=pixel)
+
+
+def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
+    """Variance of the columns' means over what the pixels of a column leave in them [DN^2].
+
+    It goes by the difference of neighbours, because a decay along the rows isn't white as a preset's columns are.
+    """
+    image = without_surface(_mean_image(frames))
+    of_pixels = float(np.mean(np.var(image, axis=0, ddof=1))) / int(image.shape[0])
+    of_columns = float(np.mean(np.diff(image.mean(axis=0)) ** 2)) / 2
+    return max(of_columns - of_pixels, 0.0)
+
+
+def _sensor(numbers: PixelNumbers, figures: FrameFigures) -> SensorConfig:
+    pixel = {key: number.value for key, number in numbers.pixel.items()}
+    return SensorConfig(
+        pixel=PixelConfig(pitch_um=SIMULATED_UM, fill_factor=1.0, **pixel),
+        lens=LensConfig(f_number=2.8),
+        cfa=figures.cfa,
+        bits=int(numbers.settings["bits"].value),
+        black_level_dn=round(figures.black_dn),
+        white_level_dn=int(figures.white_dn),
+    )
+
+
+def _site_light(electrons: Floats, figures: FrameFigures, shape: tuple[int, ...]) -> Floats:
+    """Electrons by position of the tile, as an image."""
+    tile = electrons.reshape(len(figures.cfa), len(figures.cfa[0]))
+    rows, columns = np.arange(shape[0]) % tile.shape[0], np.arange(shape[1]) % tile.shape[1]
+    return np.asarray(tile[rows[:, None], columns[None, :]])
+
+
+def _taken(
+    light_e: Floats, sensor: SensorConfig, device: Device, rng: np.random.Generator, count: int
+) -> list[NDArray[Any]]:
+    return [expose(light_e, sensor, 0.0, device, rng).dn for _ in range(count)]
+
+
+def _relative_error(error_dn2: Floats, variance_dn2: Floats, stack: LightStack) -> float:
+    """Standard error of the ratio of two standard deviations, each the root of a mean over positions."""
+    camera = sqrt(float(np.sum(error_dn2**2))) / float(np.sum(variance_dn2))
+    sites = stack.sites
+    errors = [site.error_dn2 for site in sites]
+    twin = hypot(*errors) / max(sum(site.variance_dn2 for site in sites), 1e-12)
+    return 0.5 * float(hypot(camera, twin))
+
+
+def _compared(name: str, place: str, camera: float, twin: float, error: float, tests: int) -> TwinFigure:
+    """Compare two positive figures by their ratio, whose standard error is relative."""
+    ratio = twin / camera if camera > 0 else np.inf
+    share = erfc(abs(ratio - 1) / error / sqrt(2)) if error > 0 and not isnan(ratio) else 0.0
+    width = NORMAL_95 * error
+    return TwinFigure(name, place, camera, twin, ratio * (1 - width), ratio * (1 + width), share > APART / tests)
+
+
+def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> list[TwinFigure]:
+    """Fixed pattern by rows, columns and pixels, noise of whole rows, and the histogram of one frame."""
+    found = []
+    images = [without_surface(_mean_image(frames)) for frames in (camera, twin)]
+    height, width = images[0].shape
+    flickers = [np.subtract(frames[0], frames[1], dtype=np.float64) for frames in (camera, twin)]
+    parts = (
+        ("row means", [float(np.std(image.mean(axis=1), ddof=1)) for image in images], height),
+        ("column means", [float(np.std(image.mean(axis=0), ddof=1)) for image in images], width),
+        ("neighbouring columns", [float(np.std(np.diff(image.mean(axis=0)))) for image in images], 2 * width // 3),
+        ("spread of pixels", [float(np.std(image)) for image in images], height * width),
+        ("row noise", [float(np.std(flicker.mean(axis=1), ddof=1)) for flicker in flickers], height),
+    )
+    for name, (of_camera, of_twin), samples in parts:
+        # Two standard deviations of `samples` draws each: sqrt(2 / (2 samples)) of their ratio.
+        found.append(_compared(name, f"in {kind} frames", of_camera, of_twin, sqrt(1 / samples), 2))
+    return found
