@@ -23,6 +23,7 @@ MOST_CLIPPED = 1e-3  # of a frame's pixels, at white or at 0
 LEAST_SIDE = 8  # pixels of each position, so that blocks and columns can be told apart
 LEAST_LIGHTS = 3  # from which a change of K over the range can be told
 SPREAD = (0.4, 0.6)  # of the range: one light is dimmer and one brighter, or the change would be extrapolated
+TOLD = 2.0  # standard errors from which a change of K is told from 0
 UNKNOWN_CHANGE = 0.05  # of K over the range, which is allowed for where the lights don't tell it
 _BLOCKS = 4  # a side, for the evenness
 _SURFACE_TERMS = 6  # of second order: 1, x, y, x^2, y^2, xy
@@ -88,8 +89,9 @@ class FrameFigures:
     gain_dn_per_e, read_noise_e, dsnu_e, prnu : Interval
     gain_error : (float, float)
         Standard errors of K over itself: by frames and the scatter of the lights, and by K's change over the range.
-    gain_change : float
-        Change of K over the standard's range, relative to K; NaN where the lights don't tell it.
+    gain_change, gain_change_error : float
+        Change of K over the standard's range, relative to K, and its standard error; NaN where the lights don't
+        tell it.
     black_dn, white_dn : float
         Mean of the dark frames, and the reading of a full pixel.
     levels_dn : (level, position) float64
@@ -110,6 +112,7 @@ class FrameFigures:
     prnu: Interval
     gain_error: tuple[float, float]
     gain_change: float
+    gain_change_error: float
     black_dn: float
     white_dn: float
     levels_dn: Floats
@@ -147,12 +150,17 @@ class Site:
 
 @dataclass(frozen=True)
 class SystemGain:
-    """K with its two standard errors, and its change over the range, all in DN per electron but the last."""
+    """K with its two standard errors [DN/e-]: by frames and lights, and by its change over the range.
+
+    `change` is K's change over the range, relative to K, and `change_error` its standard error; NaN where the lights
+    don't tell it.
+    """
 
     value: float
     scatter: float
     model: float
     change: float
+    change_error: float
 
     @property
     def estimate(self) -> Estimate:
@@ -240,6 +248,7 @@ def figures_of_stacks(
         prnu=_root(*_spread(_relative(bright.sites, common.sites, bright_point.signal_dn))),
         gain_error=(gain.scatter / gain.value, gain.model / gain.value),
         gain_change=gain.change,
+        gain_change_error=gain.change_error,
         black_dn=black_dn,
         white_dn=white_dn,
         levels_dn=np.array([point.signal_dn for point in points]),
@@ -289,10 +298,12 @@ def _notes(points: Sequence[LightPoint], darks: Sequence[LightStack], gain: Syst
             f"fewer than {LEAST_LIGHTS} lights, or lights that leave a part of the range out, don't tell whether K "
             f"changes with light: {UNKNOWN_CHANGE:.0%} over the range is allowed for"
         )
-    elif gain.model:
+    else:
+        told = abs(gain.change) > TOLD * gain.change_error
+        verdict = "the camera is not linear" if told else "this is not told from 0"
         notes.append(
-            f"K changes by {gain.change:+.1%} from the dark to {FIT_SHARE:.0%} of saturation: the camera isn't linear, "
-            "and the interval holds that change"
+            f"K changes by {gain.change:+.1%} +- {gain.change_error:.1%} from the dark to {FIT_SHARE:.0%} of "
+            f"saturation: {verdict}; the interval of K holds both"
         )
     return notes
 
@@ -336,7 +347,8 @@ def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
     """Slope of the variance that light adds over the signal (eq. 50), in DN per electron, through the dark point.
 
     Its errors are those of the frames, widened by the scatter of K by light where that is more than frames explain
-    (Birge's ratio), and the spread of K over the range where a second term of the line is told from 0.
+    (Birge's ratio), and the spread of K over the range by a second term of the line, together with the error of that
+    term: lights that don't tell a small change from 0 don't tell either that there is none.
     """
     used = [point for point in points if point.clipped <= MOST_CLIPPED]
     signal = np.array([point.signal_dn for point in used]).reshape(-1)
@@ -362,7 +374,7 @@ def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
         )
     lights = sum(bool(np.any((point.signal_dn > 0) & (point.signal_dn <= most_dn))) for point in used)
     if lights < LEAST_LIGHTS or signal.min() > SPREAD[0] * most_dn or signal.max() < SPREAD[1] * most_dn:
-        return SystemGain(slope, error, slope * UNKNOWN_CHANGE / sqrt(12), nan)
+        return SystemGain(slope, error, slope * UNKNOWN_CHANGE / sqrt(12), nan, nan)
     # The second term: excess = K0 s + k1 s^2, weighted by the errors.
     sigma = np.hypot(flats, darks)
     terms = np.stack([signal, signal**2], axis=1) / sigma[:, None]
@@ -372,8 +384,8 @@ def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
     birge = sqrt(max(float(np.sum((excess / sigma - terms @ bend) ** 2)) / freedom, 1.0))
     change, change_error = float(bend[1]) * most_dn / slope, sqrt(float(inverse[1, 1])) * birge * most_dn / slope
     # K is anywhere in its range: the standard deviation of an even distribution.
-    model = abs(change) / sqrt(12) if abs(change) > 2 * change_error else 0.0
-    return SystemGain(slope, error * birge, slope * model, change)
+    model = hypot(change, change_error) / sqrt(12)
+    return SystemGain(slope, error * birge, slope * model, change, change_error)
 
 
 def _relative(stack: Sequence[Site], dark: Sequence[Site], level: Floats) -> list[tuple[NDArray[np.float64], float]]:

@@ -51,4 +51,4 @@ def test_the_ccd_and_the_cmos_are_measured_whole_and_the_uneven_one_with_a_word(
     assert ccd.gain_change < -0.02
     assert cmos.gain_change < -0.1
     for found in (ccd, cmos):
-        assert any("the camera isn't linear" in note for note in found.notes)
+        assert any("the camera is not linear" in note for note in found.notes)

@@ -2,7 +2,7 @@
 
 import csv
 import zipfile
-from math import nan, sqrt
+from math import hypot, nan, sqrt
 
 import numpy as np
 import pytest
@@ -122,22 +122,29 @@ def test_a_change_of_gain_is_told_and_its_spread_is_in_the_interval():
     found = measure_set(as_set(*series(4, bend=bend)))
     most = 0.7 * (found.white_dn - found.black_dn)
     assert found.gain_change == pytest.approx(3 * bend * most / 4095, abs=0.03)
-    assert found.gain_error[1] == pytest.approx(abs(found.gain_change) / sqrt(12))
-    assert any("the camera isn't linear" in note for note in found.notes)
+    assert found.gain_change + 2 * found.gain_change_error < 0
+    assert found.gain_error[1] == pytest.approx(hypot(found.gain_change, found.gain_change_error) / sqrt(12))
+    assert any("the camera is not linear" in note for note in found.notes)
 
 
 @pytest.mark.thorough
-def test_half_of_the_lights_holds_the_gain_of_the_others_and_of_all_of_a_bent_response():
-    """Of 25 draws 23 or more, as for a real camera; frames alone would hold the other half in 83 of 100."""
-    flats, darks = series(5, lights_e=np.linspace(400, 14_000, 40), bend=-0.05)
-    rng, whole = np.random.default_rng(6), measure_set(as_set(flats, darks)).gain_dn_per_e.value
-    inside = {"whole": 0, "other": 0}
-    for _ in range(25):
-        order = rng.permutation(len(flats))
-        half, other = (measure_set(as_set([flats[k] for k in part], darks)) for part in (order[:20], order[20:]))
-        for name, value in (("whole", whole), ("other", other.gain_dn_per_e.value)):
-            inside[name] += half.gain_dn_per_e.low <= value <= half.gain_dn_per_e.high
-    assert min(inside.values()) >= 23, inside
+@loop("bend, least", ((0.0, 0.87), (-0.023, 0.92)))
+def test_half_of_the_lights_holds_the_gain_of_the_others_and_of_all(bend, least):
+    """In 23 of 25 draws for a response bent as the public CCD's, in 87 % for a linear one.
+
+    Frames alone would hold the gain of other lights, which has the same error again, in 83 of 100 draws at most.
+    """
+    inside, draws = {"whole": 0, "other": 0}, 0
+    for seed in range(6):
+        flats, darks = series([5, seed], lights_e=np.linspace(400, 14_000, 40), bend=bend)
+        rng, whole = np.random.default_rng(6), measure_set(as_set(flats, darks)).gain_dn_per_e.value
+        for _ in range(25):
+            order = rng.permutation(len(flats))
+            half, other = (measure_set(as_set([flats[k] for k in part], darks)) for part in (order[:20], order[20:]))
+            draws += 1
+            for name, value in (("whole", whole), ("other", other.gain_dn_per_e.value)):
+                inside[name] += half.gain_dn_per_e.low <= value <= half.gain_dn_per_e.high
+    assert min(inside.values()) >= least * draws, inside
 
 
 @pytest.mark.thorough

@@ -11,7 +11,7 @@ from refusal import refusal
 from sensor.capture import expose
 from sensor.cfa import BAYER
 from sensor.device import draw_device
-from sensor.emva1288.from_frames import figures_of_frames
+from sensor.emva1288.from_frames import NORMAL_95, figures_of_frames
 from sensor.presets import low_noise
 
 RUNS = 200
@@ -39,17 +39,24 @@ def measure(sensor, frames, *, bright=4):
 
 @pytest.mark.thorough
 def test_the_intervals_hold_what_was_configured_in_95_of_100_runs_give_or_take_3():
-    """A binomial of 200 runs at 0.95 has a standard deviation of 1.5 %: outside 92-98 % with probability 5 %."""
+    """A binomial of 200 runs at 0.95 has a standard deviation of 1.5 %: outside 92-98 % with probability 5 %.
+
+    Of K that is the interval by frames and lights: the whole one, which read noise and DSNU in electrons take on,
+    allows for a change of K with light too, which this chip hasn't, and holds more.
+    """
     sensor = chip()
     truth = {"gain_dn_per_e": 1 / sensor.gain_e_per_dn, "read_noise_e": 3.0, "prnu": 0.01, "dsnu_e": 2.0}
-    held, values = dict.fromkeys(truth, 0), {name: [] for name in truth}
+    held, values = dict.fromkeys((*truth, "by frames"), 0), {name: [] for name in truth}
     for seed in range(RUNS):
         found = measure(sensor, bench(sensor, seed, (80, 80)))
         for name, true in truth.items():
             each = getattr(found, name)
             held[name] += each.low <= true <= each.high
             values[name].append(each.value / true)
-    assert all(0.92 <= count / RUNS <= 0.98 for count in held.values()), held
+        error = NORMAL_95 * found.gain_error[0] * found.gain_dn_per_e.value
+        held["by frames"] += abs(found.gain_dn_per_e.value - truth["gain_dn_per_e"]) <= error
+    assert all(0.92 <= held[name] / RUNS <= 0.98 for name in ("by frames", "prnu")), held
+    assert all(held[name] / RUNS >= 0.95 for name in ("gain_dn_per_e", "read_noise_e", "dsnu_e")), held
     for name, each in values.items():  # four standard errors of the mean: once in 15 000 runs
         assert abs(np.mean(each) - 1) < 4 * np.std(each) / np.sqrt(RUNS), name
 
