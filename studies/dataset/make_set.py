@@ -210,7 +210,7 @@ def card(lines: Lines) -> str:
         "SNR, dB": _histogram([line["snr_db"] for line in samples], _SNR_DB),
         "render's variance over the sensor's, in 95 % of the pixels": _histogram(noise["of_95_percent"], _NOISE),
     }
-    texts = {"planes": TRUTH, "manifest": MANIFEST, "note": noise_note(max(noise["mean"], default=0.0), 0)}
+    texts = {"planes": TRUTH, "manifest": MANIFEST, "note": noise_note(max(noise["mean"]), 0)}
     return write_out("card.md.j2", head=lines[0], **by_kind, **texts, counts=counts)
 
 

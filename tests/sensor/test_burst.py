@@ -98,6 +98,24 @@ def test_frames_of_a_noisy_camera_that_are_full_are_left_out_although_many_read_
     assert not merged.saturated.any()
 
 
+@loop("dark_e", [0.0, 3000.0])
+def test_a_frame_counts_up_to_six_standard_deviations_below_its_well(dark_e):
+    """By hand: shot noise, dark noise, and columns' gains of 3 % on light and dark current together."""
+    well_e, spread = 10_000.0 - dark_e, 0.03
+    told = {"white_dn": 100 + well_e, "dark_current_e": dark_e, "column_gain_spread": spread, "read_noise_e": 5.0}
+    told |= {"dsnu_e": np.hypot(7.0, spread * dark_e)}
+    variance_e2 = well_e + 5.0**2 + 1 / 12 + 7.0**2 + (spread * (well_e + dark_e)) ** 2
+    wanted_e = well_e - 6 * np.sqrt(variance_e2)
+    electrons = np.arange(4000, 7000 + 3000 * (dark_e == 0)).reshape(-1, 100)
+    long = raw_image(electrons + 100, exposure_s=0.1, **told)
+    short = raw_image(np.full(electrons.shape, 100), exposure_s=1e-5, **told)  # reads nothing, and hardly weighs
+    alone = electrons / 0.1
+    merged = merge_frames([long, short]).rate_e_per_s
+    counted = electrons[merged > alone / 2]
+    assert counted.max() == pytest.approx(wanted_e, abs=3)
+    assert counted.size == counted.max() - 4000 + 1
+
+
 def test_fixed_patterns_have_the_stated_variance_over_a_chip():
     sensor = camera(read_noise_e=5.0, dsnu_e=10.0, prnu=0.02)
     device = draw_device(sensor, SHAPE, np.random.default_rng(2))

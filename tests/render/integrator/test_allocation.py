@@ -1,13 +1,16 @@
 """Samples where they are needed: rates of the pixels by closed forms, and no bias against uniform samples."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from scipy.stats import t
 
-from render import engine
+from render import engine, runs
 from render.combine import combine, emission
 from render.engine import render
 from render.integrator.allocation import LEAST_SHARE, POOL, rates_of
+from render.runs import PILOT
 from scenes.catalogue import load
 
 NM = np.arange(450.0, 700.0, 60.0)
@@ -96,6 +99,33 @@ def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
     assert np.array_equal(one.mean(axis=0)[~lit], other.mean(axis=0)[~lit])
     z = (one.mean(axis=0) - other.mean(axis=0))[lit] / error[lit]
     assert np.abs(z).max() < t.isf(1e-3 / 2 / z.size, 2 * repeats - 2)
+
+
+def test_a_pilot_weighs_each_bands_light_by_its_lamp_and_width(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two lights, bands of 10 and 30 nm; of the second what is seen directly is the same in both bands."""
+    widths, lights, size = np.array([10.0, 30.0]), np.array([[1.0, 2.0], [3.0, 0.5]]), (2, 3)
+    rng, chunks = np.random.default_rng(1), PILOT.chunks
+    halves = [
+        SimpleNamespace(
+            radiance=rng.uniform(1, 2, (chunks, 2, 2, *size)).astype(np.float32),
+            seen=[rng.uniform(0, 1, (chunks, bands, *size)).astype(np.float32) for bands in (2, 1)],
+        )
+        for _ in range(2)
+    ]
+    asked: list[np.ndarray] = []
+    monkeypatch.setattr(runs, "_drawn", lambda *_: halves)
+    monkeypatch.setattr(runs, "rates_of", lambda *planes: asked.extend(planes))
+    film = SimpleNamespace(size=size, width_nm=widths, wavelength_nm=np.array([450.0, 470.0]))
+    loaded = SimpleNamespace(groups=(1, 0), channels=lambda *_, **__: 8)
+    runs.pilot_rates([loaded], film, lights, 0)  # type: ignore[list-item, arg-type]
+    scattered, seen = asked
+    for slot, group in enumerate(loaded.groups):
+        energy = lights[group] * widths
+        sets = [(half.radiance[n, slot], half.seen[slot][n]) for half in halves for n in range(chunks)]
+        direct = [energy[0] * lamp[0] + energy[1] * lamp[-1] for _, lamp in sets]
+        whole = [energy[0] * light[0] + energy[1] * light[1] for light, _ in sets]
+        np.testing.assert_allclose(scattered[group], np.subtract(whole, direct), rtol=1e-4, atol=1e-4)
+        np.testing.assert_allclose(seen[group], np.mean(direct, axis=0), rtol=1e-5)
 
 
 def test_a_short_render_without_a_pilot_is_made_anew_where_more_is_asked_for():

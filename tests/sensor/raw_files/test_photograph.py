@@ -239,6 +239,25 @@ def test_opcodes_that_are_not_applied_are_told(tmp_path: Path) -> None:
         read_photograph(path)
 
 
+# DNG 1.6, chapter 7, by number from 1 on.
+OPCODES = (
+    *("WarpRectilinear", "WarpFisheye", "FixVignetteRadial", "FixBadPixelsConstant", "FixBadPixelsList", "TrimBounds"),
+    *("MapTable", "MapPolynomial", "GainMap", "DeltaPerRow", "DeltaPerColumn", "ScalePerRow", "ScalePerColumn"),
+    "WarpRectilinear2",
+)
+
+
+@loop("number", range(1, 16))
+def test_each_opcode_is_told_by_its_name_and_list(number: int, tmp_path: Path) -> None:
+    """Flag 1 makes it optional; one that no version of DNG has goes by its number."""
+    name = OPCODES[number - 1] if number <= len(OPCODES) else str(number)
+    code = (51008, 51009, 51022)[number % 3]
+    operation = struct.pack(">5I", 1, number, 0x01030000, 1, 4) + bytes(4)
+    path = other_camera(tmp_path / "shot.dng", over_black(np.full(SHAPE, 3000.0)), more={code: ("U", operation)})
+    with pytest.warns(UserWarning, match=rf"\b{name} of OpcodeList{number % 3 + 1} is not applied"):
+        read_photograph(path)
+
+
 def test_a_mosaic_below_a_preview_has_its_own_levels(tmp_path: Path) -> None:
     dn = (repeated(COLOURS + LEVELS, (0, 0, 0, 0), SHAPE)).astype(np.uint16)
     camera = [(50706, "B", 4, bytes((1, 4, 0, 0))), (271, "s", 6, b"Other\0"), (272, "s", 2, b"X\0")]

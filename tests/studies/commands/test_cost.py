@@ -4,7 +4,9 @@ import json
 import sys
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 import sweep_sample as SAMPLE
 from command_line import COST, call
@@ -16,8 +18,9 @@ from studies.commands import cli, develop
 from studies.photograph import shot
 from studies.study import cost
 from studies.study.cost import START_S, PictureCost, render_seconds
+from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
-from studies.sweep.cost import estimated
+from studies.sweep.cost import Estimate, estimate, estimated
 
 PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
@@ -137,3 +140,52 @@ def test_each_mosaic_has_an_image_of_its_own(tmp_path: Path) -> None:
     )
     pixels, bands, _ = extent_of(tmp_path / "scene.exr")
     assert two - one == pytest.approx(7e-7 * pixels * bands, rel=1e-6)
+
+
+def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
+    """By hand: two scenes, three cells each, two images that cells share; nothing is read of a picture file."""
+    choices = [SceneChoice("still_life"), SceneChoice("night_street")]
+    study = Study(
+        tuple(choices), ("1cd/m2",), processors=("bayer", "interleaved", "ple_rgbw"), render=RenderLimits(size=40)
+    )
+    sizes, bands, groups, spp = [(30, 40), (20, 40)], [20, 30], [1, 3], [64, 256]
+    scenes = {
+        choice: SimpleNamespace(
+            choice=choice, size=size, scene=SimpleNamespace(groups=dict.fromkeys(range(count)), max_depth=8, rr_depth=5)
+        )
+        for choice, size, count in zip(choices, sizes, groups, strict=True)
+    }
+    models = {
+        choice: SimpleNamespace(wavelength_nm=np.arange(n), width_nm=np.ones(n), spp=count, denoise=False)
+        for choice, n, count in zip(choices, bands, spp, strict=True)
+    }
+    plan = SimpleNamespace(renders=models, samples_a_side=lambda choice: 1 + (choice is choices[1]))
+
+    def told(workers: int, **options: bool) -> Estimate:
+        return estimate(study, plan, scenes, workers, 5, **options)  # type: ignore[arg-type]
+
+    pixels = [1200, 4 * 800]  # the second takes four samples of light a pixel
+    light = [
+        render_seconds(1, n, count, of) * area for n, count, of, area in zip(bands, groups, spp, pixels, strict=True)
+    ]
+    shared = [2 * 7e-7 * area * n for area, n in zip(pixels, bands, strict=True)]
+    first = 0.7 + 0.3 + 0.4 + 2.2  # a process's own, and that of three processors
+    cell = [0.03 + area * (5e-6 + (1e-6 + 1.2e-6 + 5e-6) / 3) for area in pixels]
+    whole = START_S + first + 2.5 + sum(light) + sum(shared) + 3 * sum(cell) + 6 * 0.05
+    estimates = told(1)
+    assert (estimates.cells, estimates.kept, estimates.renders) == (6, 5, 2)
+    assert estimates.seconds == pytest.approx(whole, rel=1e-9)
+    assert told(1, planned=True).seconds == pytest.approx(whole + 2 * 6.0, rel=1e-9)
+    halved = START_S + first + 2.5 + sum(light) + sum(shared) + 3 * sum(cell) / 2 + 3 * 0.05
+    assert estimates.half_cells_seconds == pytest.approx(halved, rel=1e-9)
+    least = 6 * 0.03 + START_S + first + 2.5 + 6 * 0.05
+    assert estimates.half_size_seconds == pytest.approx(least + (whole - least) / 4, rel=1e-9)
+    # of two workers on two cores each cell takes half, and each imports for itself
+    two = whole + START_S - 3 * sum(cell) / 2
+    assert told(2).seconds == pytest.approx(two, rel=1e-9)
+    limited = replace(study, render=replace(study.render, max_seconds=min(light) / 2))
+    shorter = estimate(limited, plan, scenes, 1, 0)  # type: ignore[arg-type]
+    assert shorter.seconds == pytest.approx(whole - sum(light) + min(light), rel=1e-9)
+    needs = [memory(area, n, count, 1, spp=of) for area, n, count, of in zip(pixels, bands, groups, spp, strict=True)]
+    assert estimates.bytes == max(need.total for need in needs)
+    assert estimates.largest_bytes == max(need.largest for need in needs)

@@ -167,6 +167,32 @@ def test_the_closed_form_is_asked_for_each_conditions_own_camera_light_and_time(
     assert digest_inputs(asked[0][0]) == digest_inputs(preset(str(judge_module.SENSORS / "low_noise_rgbw.toml")))
 
 
+def test_the_chart_has_each_developers_means_intervals_and_a_dotted_line_of_what_is_expected() -> None:
+    def score(developer: str, light: float, psnr_db: float, half_db: float, scenes: int = 4) -> Score:
+        return Score("a", f"{light:g}cd/m2", developer, light, scenes, {"psnr_db": psnr_db}, {"psnr_db": half_db})
+
+    told = [score("mine", 0.05, 18.0, 1.5), score("expect, D65", 0.05, 17.0, np.nan, 0), score("mine", 25.0, 31.0, 0.5),
+            score("expect, D65", 25.0, 33.0, np.nan, 0), score("bayer", 25.0, 29.0, 2.0)]  # fmt: skip
+    (axes,) = judge_module.psnr_chart(told).axes
+    wanted = {
+        "mine": ([0.05, 25.0], [18.0, 31.0], [1.5, 0.5], "-"),
+        "expect, D65": ([0.05, 25.0], [17.0, 33.0], [0.0, 0.0], ":"),
+        "bayer": ([25.0], [29.0], [2.0], "-"),
+    }
+    assert len(axes.containers) == len(wanted)
+    colours = []
+    for drawn, (developer, (light, values, halves, style)) in zip(axes.containers, wanted.items(), strict=True):
+        line, _, (bars,) = drawn.lines
+        assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (light, values), developer
+        assert [np.ptp(bar[:, 1]) / 2 for bar in bars.get_segments()] == pytest.approx(halves)
+        assert line.get_linestyle() == style
+        colours.append(line.get_color())
+        (name,) = [text for text in axes.texts if text.get_text() == developer]
+        assert name.get_color() == line.get_color()
+    assert len(set(colours)) == 3
+    assert (axes.get_xscale(), axes.get_xlabel()) == ("log", "cd/m²")
+
+
 @pytest.mark.thorough
 def test_the_closed_form_stands_beside_sensors_of_this_package(tmp_path: Path) -> None:
     out = made(tmp_path, "low_noise")

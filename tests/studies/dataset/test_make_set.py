@@ -307,6 +307,27 @@ def test_the_room_asked_for_is_the_sum_of_its_parts(tmp_path: Path) -> None:
     assert needed == sum(parts), "a file's light is there already"
 
 
+def test_a_set_of_one_frame_is_the_frame_of_the_study(tmp_path: Path) -> None:
+    study = SAMPLE.small_study(tmp_path, levels=("25cd/m2",), seeds=(4,))
+    told = make_set(study, tmp_path / "out", SetOrder(truth="rgb"), "rodcone dataset", HERE)
+    assert (told["samples"], told["shards"], told["made"]) == (1, 1, 1)
+    ((arrays, facts),) = [x for path in Path(told["folder"]).glob("*.tar") for x in read_shard(path)]
+    assert (arrays["raw"].shape, facts["window"], facts["seed"], facts["level"]) == (
+        *(SAMPLE.SIZE, [0, 0, *SAMPLE.SIZE]),
+        *(4, "25cd/m2"),
+    )
+    (line,) = [x for x in read_manifest(Path(told["folder"])) if x["kind"] == "sample"]
+    assert {name: facts[name] for name in line if name != "kind"} == {k: v for k, v in line.items() if k != "kind"}
+    assert "1 raw frames" in (Path(told["folder"]) / CARD).read_text("utf-8")
+
+
+def test_planes_are_by_the_names_of_the_page() -> None:
+    """All eight without an order, in the order in which they are cut; one alone where it is asked for."""
+    names = ("mosaic_e", "channels_e", "rgb", "xyz", "depth", "normals", "ids", "shares")
+    assert SetOrder().planes == names
+    assert [SetOrder(truth=name).planes for name in names] == [(name,) for name in names]
+
+
 def test_a_value_at_a_bound_of_the_cards_histograms_is_counted_above_it(stored: Path) -> None:
     lines = [dict(line) for line in read_manifest(stored)]
     for line, snr_db, share in zip((x for x in lines if x["kind"] == "sample"), (0, 10, 10, 20, 30, 29, -1, 5),

@@ -199,6 +199,19 @@ def test_every_fact_of_a_sample_is_counted_another_way(tmp_path: Path) -> None:
     assert 0.1 < full[0] <= told["saturated"] <= full[1] < 0.9
 
 
+def test_a_part_without_light_is_told_as_minus_120_db(tmp_path: Path) -> None:
+    """Its ratio of powers is 0, whose logarithm JSON can't hold."""
+    sample = sample_of(tmp_path, with_pixel(), 1.0)
+    for name, value in (("electrons", 0.0), ("errors", 0.0)):
+        path = getattr(sample.cell.frame, name)
+        np.save(tmp_path / f"dark_{name}.npy", np.full_like(np.load(path), value))
+    frame = replace(sample.cell.frame, **{x: tmp_path / f"dark_{x}.npy" for x in ("electrons", "errors")})
+    _, facts = make_sample(replace(sample, cell=replace(sample.cell, frame=frame), files={}))
+    assert facts["snr_db"] == pytest.approx(-120.0, abs=1e-9)
+    assert set(facts["mean_e"].values()) == {0.0}
+    assert facts["render_noise"] == {"mean": 0.0, "of_95_percent": 0.0}
+
+
 def test_parts_of_a_frame_have_noise_of_their_own_and_one_chip(tmp_path: Path) -> None:
     sample = sample_of(tmp_path, with_pixel(prnu=0.2), 20.0)
 

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from command_line import check_refusals
 from explore_sample import BANDS, ran, small_transport
+from refusal import refusal
 from scipy.io import savemat
 
 import rodcone as public
@@ -27,7 +28,7 @@ from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import expose_scene, photograph
 from studies.explore.controls import LENS, PIXEL, SETTINGS, Controls, Lamp
 from studies.explore.memo import Memo, never_cancel
-from studies.explore.messages import first_message
+from studies.explore.messages import first_message, read_views
 from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
@@ -495,6 +496,16 @@ def test_reflectances_take_other_lamps_and_the_copied_python_opens_them(tmp_path
     shot, own = (photograph(state.transport, Controls(lamps=lamps)) for lamps in ({"light": Lamp("A")}, {}))
     assert np.array_equal(ran(python_of(state.code, Controls()))["picture"], own.picture)
     assert not np.array_equal(own.exposed.light.spectrum, shot.exposed.light.spectrum)
+
+
+def test_up_to_four_views_are_read_each_of_a_camera_that_is_there() -> None:
+    views = [[0, "truth"], [1, "picture"], [0, "picture"], [1, "truth"]]
+    for count in range(1, 5):
+        assert read_views(views[:count], 2) == [tuple(pair) for pair in views[:count]]
+    wrong = ([], [*views, [0, "truth"]], [[2, "truth"]], [[-1, "truth"]], [[True, "truth"]], [[0, "holiday"]], [0, 1])
+    for value in (*wrong, [[0, "truth", 1]], {"0": "truth"}, "truth", None):
+        refusal(read_views, value, 2, match=r"give up to four of \[camera, view\], cameras from 0")
+    refusal(read_views, [[1, "truth"]], 1, match=r"views: \[1, 'truth'\] is not allowed")
 
 
 def test_bad_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -273,6 +273,76 @@ def test_ratios_of_early_designs_are_of_each_light_and_way(monkeypatch: pytest.M
     }
 
 
+def test_figure_b_draws_the_three_cameras_that_its_claims_compare(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each camera with times and qualities of its own; a tile of RGBW holds a quarter of each channel."""
+    asked: list[Any] = []
+    firsts = {"bayer": 0.04, "interleaved_paper": 0.02, "interleaved": 0.01}
+
+    def measure(setup: Setup, subject: View, camera: Camera) -> dict[float, best_exposure.Best]:
+        asked.append((setup, subject, camera))
+        first = firsts[camera.processor]
+        return {
+            level: best_exposure.Best(np.array([first, 3 * first]) / level, np.array([20.0, 24.0]) - 100 * first, first)
+            for level in best_exposure.LEVELS_CD_M2
+        }
+
+    drawn: list[Any] = []
+    monkeypatch.setattr(best_exposure, "view", lambda setup, scene, level: (setup, scene, level))
+    monkeypatch.setattr(best_exposure, "close_up", lambda subject: ("close up", *subject))
+    monkeypatch.setattr(best_exposure, "measure_best", measure)
+    monkeypatch.setattr(best_exposure, "light_charts", lambda *asks: drawn.append(asks) or Figure((1, 1)))
+    setup = Setup(Path("unused"), seeds=2)
+    figure, (times, qualities) = best_exposure.figure_b(setup)
+    assert {x[:2] for x in asked} == {(setup, ("close up", setup, "still_life", 1.0))}
+    assert [(x.processor, x.reading, x.shake) for *_, x in asked] == [
+        (name, best_exposure.READING, "hand") for name in ("bayer", "interleaved_paper", "interleaved")
+    ]
+    ((levels, charts),) = drawn
+    assert levels == best_exposure.LEVELS_CD_M2
+    names = {"Bayer": 0.04, "interleaved": 0.02, "the default": 0.01}
+    for name, first in names.items():
+        means = [charts[chart][name] for chart in ("Best time by hand, ms", "PSNR at the best time, dB")]
+        assert means[0] == pytest.approx([2e3 * first / level for level in levels])
+        assert means[1] == pytest.approx([22.0 - 100 * first] * len(levels))
+    assert [list(chart) for chart in charts.values()] == [list(names)] * 2
+    assert figure.name == "B"
+    # an octave, and 2 dB; of the default two octaves, and 3 dB
+    assert {(round(x.value, 9), round(x.default or 0.0, 9)) for x in times.checks} == {(1.0, 2.0)}
+    assert {(round(x.value, 9), round(x.default or 0.0, 9)) for x in qualities.checks} == {(2.0, 3.0)}
+    light = [channel_e(asked[n][2].sensor, named_light("D65"), 1.0, 1.0) for n in (1, 0)]
+    more = (light[0].sum() / 4) / ((light[1][0] + 2 * light[1][1] + light[1][2]) / 4)
+    assert f"gathers {more:.2f} times" in times.note
+
+
+def test_section_2_is_counted_from_each_designs_own_developed_picture(monkeypatch: pytest.MonkeyPatch) -> None:
+    def developed(camera: Camera, raw: Any, subject: Any) -> tuple[Any, Any]:
+        return ("picture of", camera, raw, subject), "no picture"
+
+    told: list[Any] = []
+    number = {camera: 0.01 * n for n, camera in enumerate((x, y) for x in early.DESIGNS for y in READINGS)}
+
+    def measured(raw: Any, picture: Any, subject: Any) -> SimpleNamespace:
+        words, camera, of_raw, of_subject = picture
+        assert (words, of_raw, of_subject) == ("picture of", raw, subject)
+        assert raw == ("first of", camera, subject, "66ms")
+        return SimpleNamespace(result_correlation=number[camera.processor, camera.reading])
+
+    monkeypatch.setattr(early, "view", lambda setup, scene, level: (scene, level))
+    monkeypatch.setattr(early, "exposures", lambda *asks: [("first of", *asks), "second"])
+    monkeypatch.setattr(early, "develop_view", developed)
+    monkeypatch.setattr(early, "measure_bright", measured)
+    monkeypatch.setattr(early, "ranges_lost_db", lambda reading: {f"{reading}, lost": 1.0})
+    monkeypatch.setattr(early, "colour_noise_ratios", lambda reading: {f"{reading}, noise": 2.0})
+    monkeypatch.setattr(early, "gathered", lambda tile: {"R": (float(len(tile)), 0.0)})
+    monkeypatch.setattr(early, "claims_early", lambda *asks: told.append(asks) or ())
+    early.section_2(Setup(Path("unused"), seeds=2))
+    ((bright, lost_db, noise, lights),) = told
+    assert {(x, y): value for x, of in bright.items() for y, value in of.items()} == number
+    assert lost_db == {f"{reading}, lost": 1.0 for reading in READINGS}
+    assert noise == {f"{reading}, noise": 2.0 for reading in READINGS}
+    assert lights == {"rgbw": {"R": (2.0, 0.0)}, "rgbw_4x4": {"R": (4.0, 0.0)}}
+
+
 def test_the_default_stands_beside_a_check_where_it_differs() -> None:
     told = with_default(
         lambda factor: [Claim("a", "b", tuple(within({"one": 2.0 * factor, "two": 5.0})))],
