@@ -13,18 +13,21 @@ import numpy as np
 import pytest
 import scipy
 import sweep_sample as SAMPLE
+import tifffile
 from command_line import call
+from PIL import Image
 from refusal import refusal
 
 from rodcone.colour_spaces import decode_srgb, encode_srgb
 from rodcone.digests import digest_inputs
 from sensor.presets import low_noise, preset, preset_file, vary
 from studies.dataset import judge as judge_module
-from studies.dataset.judge import MEASURED, Score, expected, judge, scores, scores_of_sweep
+from studies.dataset.judge import MEASURED, Score, expected, judge, read_picture, scores, scores_of_sweep
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
 from studies.dataset.shards import read_shard
 from studies.design.expect import expect
+from studies.pages import report_text as text
 from studies.photograph.picture_file import write_picture
 from studies.study.study import SceneChoice, Study
 from studies.sweep.export import read_rows
@@ -165,6 +168,67 @@ def test_the_closed_form_is_asked_for_each_conditions_own_camera_light_and_time(
     own = line | {"luminance_cd_m2": 5.0, "sensor": "low_noise_rgbw.toml", "mosaic": "own"}
     assert [len(expected([own], study)) for study in ("mine", "benchmark")] == [0, 1]
     assert digest_inputs(asked[0][0]) == digest_inputs(preset(str(judge_module.SENSORS / "low_noise_rgbw.toml")))
+
+
+def test_pictures_of_every_format_are_read_as_what_they_hold(tmp_path: Path) -> None:
+    """Eight bits, sixteen, floats that overshoot by a hundredth; upper case and both spellings of TIFF."""
+    rng = np.random.default_rng(2)
+    whole = rng.integers(0, 256, (4, 5, 3)).astype(np.uint8)
+    deep = rng.integers(0, 65_536, (4, 5, 3)).astype(np.uint16)
+    Image.fromarray(whole).save(tmp_path / "a.PNG", format="PNG")
+    for name in ("a.tif", "a.tiff"):
+        tifffile.imwrite(tmp_path / name, deep, photometric="rgb")
+        np.testing.assert_array_equal(read_picture(tmp_path / name, (4, 5)), deep / 65_535)
+    np.testing.assert_array_equal(read_picture(tmp_path / "a.PNG", (4, 5)), whole / 255)
+    assert {".png", ".tif", ".tiff", ".npy"} == set(judge_module.ENDINGS)
+    for value, shown in ((-0.0099, 0.0), (1.0099, 1.0), (-0.0101, None), (1.0101, None)):
+        np.save(tmp_path / "a.npy", np.where(np.arange(60).reshape(4, 5, 3) == 7, value, 0.5))
+        if shown is None:
+            refusal(read_picture, tmp_path / "a.npy", (4, 5), match="values from .*; allowed: 0 to 1, 1 is white")
+        else:
+            assert read_picture(tmp_path / "a.npy", (4, 5))[0, 2, 1] == shown
+
+
+def test_a_mistake_is_told_from_three_decibels_on() -> None:
+    """By the mean over the pictures; the mistake that would undo most is named."""
+    mistakes = list(judge_module._MISTAKES)
+    for index, words in enumerate(mistakes):
+        gains = [0.5 * (number == (index + 1) % 5) + 3.0 * (number == index) for number in range(5)]
+        for more, told in ((-0.1, False), (0.1, True)):
+            rows = [
+                {"psnr_db": psnr, "mistakes": {x: psnr + gain + more for x, gain in zip(mistakes, gains, strict=True)}}
+                for psnr in (10.0, 30.0)
+            ]
+            if told:
+                shown = f"they look {words} \\(PSNR 23.1 dB after that, 20.0 dB as they are\\)"
+                refusal(judge_module._check_encoding, rows, match=shown)
+            else:
+                judge_module._check_encoding(rows)
+
+
+def test_the_page_has_a_table_of_every_metric_for_each_camera() -> None:
+    keys = [metric.key for metric in MEASURED]
+    means = {key: 3.0 + index / 8 for index, key in enumerate(keys)}
+    halves = {key: 0.5 + index / 8 for index, key in enumerate(keys)}
+    own = Score("low_noise, bayer", "25cd/m2", "mine", 25.0, 4, means, halves)
+    nothing = dict.fromkeys(keys, np.nan)
+    told = Score("table1, rgbw", "1cd/m2", "expect, D65", 1.0, 0, nothing | {"psnr_db": 21.5}, nothing)
+    page = judge_module.judge_page({"name": "a set", "rodcone": "9.8", "identity": "00ff"}, [own, told])
+    assert "Pictures of a set" in page
+    assert "rodcone 9.8" in page
+    assert "set 00ff" in page
+    assert page.count('<img class="chart" src="data:image/svg+xml') == 2
+    first, second = page.split("<section")[1:]
+    for part, score in ((first, own), (second, told)):
+        assert f">{score.camera}</h2>" in part
+        assert f"<td>{score.developer}</td>" in part
+        for metric in MEASURED:
+            assert f">{metric.name}</th>" in part
+    for metric in MEASURED:
+        mean, half = (text.fixed(of[metric.key], metric.digits) for of in (means, halves))
+        assert f">{mean} ± {half}</td>" in first
+    assert second.count(">—</td>") == len(keys)  # all but PSNR, and the number of scenes
+    assert "21.5</td>" in second
 
 
 def test_the_chart_has_each_developers_means_intervals_and_a_dotted_line_of_what_is_expected() -> None:

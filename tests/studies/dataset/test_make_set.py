@@ -6,9 +6,12 @@ import shutil
 import signal
 import subprocess
 import sys
+import tarfile
 import time
 from collections.abc import Generator, Sequence
+from dataclasses import replace
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -28,6 +31,7 @@ from studies.dataset import sample as sample_module
 from studies.dataset import shards as shards_module
 from studies.dataset.make_set import CARD, make_set
 from studies.dataset.order import SetOrder
+from studies.dataset.sample import Sample
 from studies.dataset.shards import MANIFEST, Shard, read_manifest, read_shard, split_of
 from studies.study.lit_scene import open_all
 from studies.study.study import RenderLimits, SceneChoice
@@ -38,6 +42,7 @@ from studies.sweep.run_sweep import sweep
 from studies.sweep.workers import InThisProcess, run, run_in_processes
 
 ORDER = SetOrder(shards=3, crop=16)
+LISTED = "key scene scene_hash spectrum level luminance_cd_m2 exposure sensor mosaic tile snr_db saturated render_noise"
 HERE = partial(run, executor=InThisProcess())
 STUDY = """
 scenes = [{{ source = "scene.exr", light = "E" }}]
@@ -386,17 +391,170 @@ def test_a_samples_snr_is_counted_from_what_its_shard_holds(stored: Path) -> Non
 def test_a_manifest_that_lacks_what_is_read_is_refused(stored: Path, tmp_path: Path) -> None:
     lines = read_manifest(stored)
     for kind, names in (
-        ("set", "kind name identity samples planes"),
+        ("set", "kind name rodcone command identity samples planes"),
         ("scene", "kind split licence"),
         ("shard", "kind name split samples bytes digest made_from"),
-        ("sample", "kind key scene level sensor luminance_cd_m2"),
+        ("sample", f"kind {LISTED}"),
     ):
         index, line = next((index, line) for index, line in enumerate(lines) if line["kind"] == kind)
         for name in names.split():
             short = {key: value for key, value in line.items() if key != name}
             text = "".join(f"{json.dumps(x)}\n" for x in (*lines[:index], short, *lines[index + 1 :]))
             (tmp_path / MANIFEST).write_text(text)
-            refusal(read_manifest, tmp_path, match="no manifest of a set")
+            words = "no manifest of a set" + ("" if name == "kind" else f".*line {index + 1} has no '{name}'")
+            refusal(read_manifest, tmp_path, match=words)
+
+
+def test_what_is_no_manifest_is_refused(tmp_path: Path) -> None:
+    """Nothing, no lines, no JSON, a number for a line, a line of another kind, and one that begins with a scene."""
+    whole = {"kind": "set", "name": "a", "rodcone": "1", "command": "c", "identity": "i", "samples": 0, "planes": []}
+    refusal(read_manifest, tmp_path, match=f"{MANIFEST}: it is no manifest of a set")
+    for text in ("", "kind", "17\n", '{"kind": "scene"}\n', f'{json.dumps(whole)}\n{{"kind": "holiday"}}\n'):
+        (tmp_path / MANIFEST).write_text(text)
+        refusal(read_manifest, tmp_path, match=f"{MANIFEST}: it is no manifest of a set.*run that again")
+    (tmp_path / MANIFEST).write_text(json.dumps(whole))
+    assert read_manifest(tmp_path) == [whole]
+
+
+def test_what_is_no_shard_is_refused(tmp_path: Path) -> None:
+    """No tar file, an array without a byte, one that is cut, facts that are no JSON, a member without an ending."""
+    path = tmp_path / "train-000000.tar"
+    cut = BytesIO()
+    np.save(cut, np.arange(9))
+    for name, content in (
+        *(("a.raw.npy", b""), ("a.raw.npy", cut.getvalue()[:-4])),
+        *(("a.json", b"{"), ("json", b"{}")),
+    ):
+        with tarfile.open(path, "w") as tar:
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            tar.addfile(member, BytesIO(content))
+        refusal(list, read_shard(path), match=f"{path.name}: it is no whole shard")
+    path.write_bytes(b"mine")
+    refusal(list, read_shard(path), match=f"{path.name}: it is no whole shard")
+
+
+def test_a_shards_key_has_all_that_decides_it(stored: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each field of a sample that its bytes follow is changed alone; the folder of its files doesn't matter."""
+    cells = SAMPLE.made_cells(tmp_path)
+    files = {"rgb": Path("a/one.npy"), "xyz": Path("a/two.npy")}
+    sample = Sample("k", cells[0], "bayer", "0" * 32, "train", files, {}, None, (0, 0, 16, 20))
+    changes: list[dict[str, Any]] = [
+        {"key": "l"},
+        {"cell": cells[1]},
+        {"part": 0},
+        *({"window": window} for window in ((1, 0, 16, 20), (0, 1, 16, 20), (0, 0, 15, 20), (0, 0, 16, 19))),
+        {"files": files | {"xyz": Path("a/three.npy")}},
+        {"files": {"rgb": files["rgb"]}},
+    ]
+    keys = [shards_module.shard_key([replace(sample, **change)]) for change in ({}, *changes)]
+    keys += [shards_module.shard_key([]), shards_module.shard_key([sample, sample])]
+    assert len(set(keys)) == len(keys)
+    elsewhere = {name: Path("b") / path.name for name, path in files.items()}
+    assert shards_module.shard_key([replace(sample, files=elsewhere)]) == keys[0]
+    for name in ("versions", "code_digests"):
+        with monkeypatch.context() as other:
+            other.setattr(shards_module, name, lambda: ["another"])
+            assert shards_module.shard_key([sample]) != keys[0]
+
+
+def test_shards_are_as_many_as_a_splits_samples_are_in_proportion(tmp_path: Path) -> None:
+    """Of ten shards for 31, 6 and 3 samples: 7.75, 1.5 and 0.75, rounded to even; the parts differ by one at most."""
+    cell = SAMPLE.made_cells(tmp_path)[0]
+    splits = ["train"] * 31 + ["validation"] * 6 + ["test"] * 3
+    samples = [
+        Sample(f"k{n}", cell, "bayer", "0" * 32, split, {}, {}, None, (0, 0, 16, 20)) for n, split in enumerate(splits)
+    ]
+    shards = shards_module.into_shards(samples, 10, tmp_path)
+    counts = {split: [len(x.samples) for x in shards if x.path.name.startswith(split)] for split in set(splits)}
+    assert {split: len(of) for split, of in counts.items()} == {"train": 8, "validation": 2, "test": 1}
+    assert {split: sum(of) for split, of in counts.items()} == {"train": 31, "validation": 6, "test": 3}
+    assert all(max(of) - min(of) <= 1 for of in counts.values())
+    assert [x.path for x in shards[:2]] == [tmp_path / "train-000000.tar", tmp_path / "train-000001.tar"]
+    assert all({x.split for x in shard.samples} == {shard.path.name.split("-")[0]} for shard in shards)
+    assert all(shard.key == shards_module.shard_key(shard.samples) for shard in shards)
+    first = [int(x.key[1:]) for x in shards[0].samples]
+    assert max(np.diff(sorted(first))) > 1, "a shard mixes scenes"
+    # one sample of a split has a file even where its share is small, and none has more files than samples
+    assert [len(shards_module.into_shards(samples, n, tmp_path)) for n in (1, 1000)] == [3, 40]
+
+
+def test_a_sets_progress_is_that_of_its_renders_then_of_its_shards(tmp_path: Path) -> None:
+    """Renders are 0.9 of it, scene by scene; then a tenth by shards."""
+    told: list[tuple[str, float]] = []
+    study = SAMPLE.small_study(tmp_path, processors=("bayer", "interleaved"))
+    make_set(study, tmp_path / "out", ORDER, "rodcone dataset", HERE, lambda *asks: told.append(asks))
+    shards = [(words, share) for words, share in told if words.startswith("shard")]
+    assert [words for words, _ in shards] == [f"shard {n} of 3" for n in (1, 2, 3)]
+    assert [share for _, share in shards] == pytest.approx([0.9 + 0.1 * n / 3 for n in (1, 2, 3)])
+    told.clear()
+    for index, share in ((0, 0.0), (0, 0.5), (2, 0.25), (3, 1.0)):
+        make_set_module._show_render(lambda *asks: told.append(asks), index, 4, share, 0.01)
+    assert [share for _, share in told] == pytest.approx([0.0, 0.1125, 0.50625, 0.9])
+    assert [words.split(": ")[0] for words, _ in told] == [f"scene {n} of 4" for n in (1, 1, 3, 4)]
+
+
+def test_white_balances_of_a_frame_make_no_other_set(stored: Path, tmp_path: Path) -> None:
+    other = made(tmp_path, white_balances=("gray-world", "as-shot"))
+    lines, own = read_manifest(other), read_manifest(stored)
+    assert lines[0]["identity"] == own[0]["identity"]
+    assert lines[0]["samples"] == own[0]["samples"] == 8
+
+
+def test_the_manifests_head_and_the_card_tell_the_study(stored: Path) -> None:
+    head, scene = read_manifest(stored)[:2]
+    text = (stored / CARD).read_text("utf-8")
+    assert head["axes"] == {
+        "levels": ["1cd/m2", "25cd/m2"], "spectra": ["own"], "exposures": ["auto:information"],
+        "sensors": ["low_noise"], "processors": ["bayer", "interleaved"], "seeds": ["0", "1"],
+    }  # fmt: skip
+    assert (head["command"], head["planes"]) == ("rodcone dataset", list(SetOrder().planes))
+    assert (scene["name"], scene["licence"]) == ("scene.exr", "its owner's")
+    assert scene["split"] == split_of(scene["hash"])
+    for name, meaning in sample_module.TRUTH.items():
+        assert f"| `KEY.{name}.npy` | {meaning} |" in text
+    assert f"`{MANIFEST}` lists scenes" in text
+    assert "| 1 | its owner's |" in text
+    samples = [line for line in read_manifest(stored) if line["kind"] == "sample"]
+    assert [" ".join(line) for line in samples] == [f"kind {LISTED}"] * 8
+
+
+def test_a_card_says_where_the_renders_noise_shows_and_a_scenes_licence(stored: Path) -> None:
+    lines = [dict(line) for line in read_manifest(stored)]
+    assert "the render's noise has" not in make_set_module.card(lines)
+    (last,) = [x for x in lines if x["kind"] == "sample"][-1:]
+    last["render_noise"] = {"mean": 2.5, "of_95_percent": 0.0}
+    assert "the render's noise has 2.5 times the sensor's variance" in make_set_module.card(lines)
+    for source, words in (
+        ("still_life", "MIT, as rodcone; no texture of others"),
+        ("diorama-5", f"MIT, as rodcone; {make_set_module.PICTURES_LICENCE}"),
+        ("own/street.exr", "its owner's"),
+    ):
+        opened: Any = SimpleNamespace(choice=SimpleNamespace(source=source, label="a label"))
+        facts = {"hash": "f" * 32, "objects": ["ball"], "materials": ["red"], "files": {}}
+        assert make_set_module._scene_line(opened, facts) == {
+            "kind": "scene", "name": "a label", "hash": "f" * 32, "split": "test", "licence": words,
+            "objects": ["ball"], "materials": ["red"],
+        }  # fmt: skip
+
+
+def test_an_orders_numbers_have_their_limits() -> None:
+    limits = {"generated": (0, 100_000), "diorama": (0, 100_000), "shards": (1, 100_000), "crop": (16, 8192)}
+    for name, (least, most) in limits.items():
+        for value in (least, most):
+            assert getattr(SetOrder(**{name: value}), name) == value
+        for value in (least - 1, most + 1):
+            refusal(SetOrder, **{name: value}, match=f"{name}: {value} is outside {least} to {most:g}")
+
+
+def test_a_disk_holds_a_set_to_the_byte_less_what_is_there(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    usage = type(shutil.disk_usage(tmp_path))
+    monkeypatch.setattr(order_module.shutil, "disk_usage", lambda _: usage(9 * 10**9, 0, 2_500_000_000))
+    (tmp_path / "below").mkdir()
+    (tmp_path / "below" / "a.npy").write_bytes(bytes(1000))
+    order_module.require_room(2_500_001_000, tmp_path)
+    refusal(order_module.require_room, 2_500_001_001, tmp_path, match=r"needs about 2\.5 GB more; allowed: 2\.5 GB")
+    refusal(order_module.require_room, 7_250_001_000, tmp_path, match=r"needs about 7\.25 GB more; allowed: 2\.5 GB")
 
 
 def test_the_room_of_rendered_scenes_is_counted_by_planes_bands_lamps_and_channels(tmp_path: Path) -> None:

@@ -199,6 +199,20 @@ def test_every_fact_of_a_sample_is_counted_another_way(tmp_path: Path) -> None:
     assert 0.1 < full[0] <= told["saturated"] <= full[1] < 0.9
 
 
+def test_the_renders_share_in_95_per_cent_is_pooled_over_3x3_pixels(tmp_path: Path) -> None:
+    """Two errors that are drawn apart for each pixel: their product over the sensor's variance, its mean of nine."""
+    sensor = with_pixel(read_noise_e=3.0, dsnu_e=0.0, prnu=0.0)
+    sample = sample_of(tmp_path, sensor, 1.0)
+    time_s = sample.cell.exposure_s
+    errors = np.random.default_rng(4).gamma(2.0, 3.0, (2, *SIZE))
+    np.save(sample.cell.frame.errors, errors / time_s)
+    arrays, facts = make_sample(sample)
+    share = errors[0] * errors[1] / (arrays["mosaic_e"] + 9.0 + facts["gain_e_per_dn"] ** 2 / 12)
+    padded = np.pad(share, 1, mode="symmetric")
+    pooled = np.mean([padded[i : i + SIZE[0], j : j + SIZE[1]] for i in range(3) for j in range(3)], axis=0)
+    assert facts["render_noise"]["of_95_percent"] == pytest.approx(np.quantile(pooled, 0.95), rel=1e-3)
+
+
 def test_a_part_without_light_is_told_as_minus_120_db(tmp_path: Path) -> None:
     """Its ratio of powers is 0, whose logarithm JSON can't hold."""
     sample = sample_of(tmp_path, with_pixel(), 1.0)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from loop import loop
 from PIL import Image
 from refusal import refusal
 
@@ -237,3 +238,19 @@ def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the
 def test_a_plan_of_sensors_of_one_size_is_refused() -> None:
     asked = Study(scenes=(SceneChoice("flat_field"),), levels=("1cd/m2",), sensors=("low_noise",), sensor_side_um=220.0)
     refusal(plan, asked, match="sensor_side_um: 220 can't be planned")
+
+
+@loop(
+    ("picture", "pitch_um", "block", "shape"),
+    [
+        ((30, 40), 10.0, 1, (60, 80)),  # 800 um by 600 um
+        ((40, 30), 10.0, 1, (80, 60)),
+        ((30, 40), 33.0, 1, (18, 24)),  # 18.2 and 24.2
+        ((30, 40), 10.0, 4, (60, 80)),
+        ((30, 40), 10.0, 7, (63, 77)),  # 8.6 and 11.4 blocks
+        ((1, 400), 10.0, 1, (1, 80)),  # 0.2 of a pixel, which stays one
+        ((400, 1), 10.0, 3, (81, 3)),  # 26.7 blocks, and one
+    ],
+)
+def test_a_sensor_of_a_side_has_whole_blocks_in_the_pictures_proportions(picture, pitch_um, block, shape):
+    assert EqualArea(side_um=800.0, coarsest_um=33.0).shape(picture, pitch_um, block) == shape

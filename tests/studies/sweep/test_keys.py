@@ -1,5 +1,6 @@
 """Whatever a frame, a picture or a stream of noise depends on is in its key: each input changed alone changes it."""
 
+import json
 from dataclasses import fields, replace
 from pathlib import Path
 from types import SimpleNamespace
@@ -20,10 +21,11 @@ from studies.dataset import sample as sample_module
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2
 from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import open_all, under
+from studies.study.render_facts import RenderFacts, render_facts
 from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
 from studies.sweep import prepare as prepare_module
-from studies.sweep.cells import cell_key, device_stream, exposure_stream, shake_stream
+from studies.sweep.cells import RenderRecord, cell_key, device_stream, exposure_stream, render_text, shake_stream
 from studies.sweep.database import open_results
 from studies.sweep.frames import frame_key
 from studies.sweep.prepare import Job, scene_cells
@@ -168,6 +170,28 @@ def test_the_files_of_a_data_sets_scene_are_made_anew_for_each_input_alone(
             monkeypatch.setattr(sample_module, name, lambda: "another")
             facts()
         assert len(made) == len(changes) + 3
+
+
+def test_a_row_tells_of_its_render_what_no_column_of_its_own_does() -> None:
+    """Eleven facts of a render, of which four stand in columns; each told under its name with its own value."""
+    facts = RenderFacts(
+        integrator="path", variant="llvm", seconds=1.5, spp=64.0, stopped_by="samples", relative_mc_error=0.25,
+        relative_level_error=None, bands=7, first_nm=400.0, last_nm=700.0, width_nm=50.0,
+    )  # fmt: skip
+    told = json.loads(render_text(RenderRecord("content", facts, 0.125, ("a note", "another"))))
+    assert told == {
+        "integrator": "path", "stopped_by": "samples", "relative_mc_error": 0.25, "relative_level_error": None,
+        "first_nm": 400.0, "last_nm": 700.0, "width_nm": 50.0, "brightest_share": 0.125,
+        "notes": ["a note", "another"],
+    }  # fmt: skip
+    nm, widths = np.array([410.0, 440.0, 500.0]), np.array([20.0, 40.0, 80.0])
+    transport: Any = SimpleNamespace(
+        integrator="path", variant="llvm", seconds=2.0, spp=8.0, stopped_by="time", wavelength_nm=nm, width_nm=widths
+    )
+    radiance: Any = SimpleNamespace(relative_mc_error=0.5, relative_level_error=0.0625)
+    assert render_facts(transport, radiance) == RenderFacts(
+        "path", "llvm", 2.0, 8.0, "time", 0.5, 0.0625, bands=3, first_nm=410.0, last_nm=500.0, width_nm=20.0
+    )
 
 
 def test_a_frame_that_is_read_back_is_the_frame_that_was_made(tmp_path: Path) -> None:
