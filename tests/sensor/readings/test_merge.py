@@ -486,6 +486,14 @@ def test_a_metered_channels_time_counts_what_its_density_lets_through(light_shar
     assert 0.8 * 15_000 * 2 ** (-1 / 16) < held <= 0.8 * 15_000 * (1 + 1e-9)
 
 
+def test_a_metered_channel_is_open_for_a_millionth_of_the_time_at_least():
+    """White of 12 000 e- in 2e-5, 1e-6 and 1e-8 of the time, down to a sixteenth of an octave."""
+    sensor = with_channel_readings(low_noise(), [ChannelReading("W", metered=True)])
+    for share, wanted in ((2e-5, 2 ** (np.floor(16 * np.log2(2e-5)) / 16)), (1e-6, 1e-6), (1e-8, 1e-6)):
+        (reading,) = resolve(sensor, np.full((8, 8), 12_000.0 / share), 1.0, "W")
+        assert reading.time_share == pytest.approx(wanted, rel=1e-9)
+
+
 @pytest.mark.parametrize("gain", [1.0, 2.0])
 def test_a_metered_channel_fills_the_converters_range_at_the_cameras_gain(gain):
     sensor = with_channel_readings(replace(low_noise(), gain=gain), [ChannelReading("W", metered=True)])

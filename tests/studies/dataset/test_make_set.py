@@ -494,6 +494,30 @@ def test_a_sets_progress_is_that_of_its_renders_then_of_its_shards(tmp_path: Pat
     assert [words.split(": ")[0] for words, _ in told] == [f"scene {n} of 4" for n in (1, 1, 3, 4)]
 
 
+def test_parts_are_numbered_where_there_are_several(tmp_path: Path) -> None:
+    """A frame of 16 by 20 pixels is one part of 16, and a whole; one of 40 by 36 holds four of 16 without its rest."""
+    asked: list[Sample] = []
+
+    def asking(shards: Sequence[Shard], make: Any) -> Generator[Shard, None, None]:
+        asked.extend(x for shard in shards for x in shard.samples)
+        yield from map(make, shards)
+
+    windows = [(row, column, 16, 16) for row in (0, 16) for column in (0, 16)]
+    for crop, size, wanted in (
+        *((None, (16, 20), {None: (0, 0, 16, 20)}), (16, (16, 20), {None: (0, 0, 16, 16)})),
+        (16, (40, 36), dict(enumerate(windows))),
+    ):
+        asked.clear()
+        out, order = f"{crop} {size[0]}", SetOrder(shards=1, crop=crop, truth="rgb")
+        SAMPLE.picture(tmp_path / "scene.exr", size)
+        study = SAMPLE.small_study(tmp_path, levels=("1cd/m2",), seeds=(0,))
+        make_set(study, tmp_path / out, order, "rodcone dataset", asking)
+        assert {x.part: x.window for x in asked} == wanted
+        for x in asked:
+            place = "" if crop is None else f"_{x.window[0]}-{x.window[1]}"
+            assert x.key == f"scenepexr_own_1cd-m2_auto-information_low_noise_bayer_s0{place}"
+
+
 def test_white_balances_of_a_frame_make_no_other_set(stored: Path, tmp_path: Path) -> None:
     other = made(tmp_path, white_balances=("gray-world", "as-shot"))
     lines, own = read_manifest(other), read_manifest(stored)

@@ -1,10 +1,12 @@
 """The explorer's door: host, origin, token, paths, methods, and messages that no page of ours sends."""
 
+import asyncio
 import json
 import socket
 import time
 from collections.abc import Iterator
 from http.client import HTTPConnection
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -17,6 +19,7 @@ from explore_browser import served as explorer
 from refusal import refusal
 
 from rodcone.errors import MOST_TOLD
+from studies.explore import server
 from studies.explore.controls import Controls, controls_from, to_json
 from studies.explore.messages import read_message
 from studies.explore.server import BURST_S, MOST_A_SECOND, MOST_CHARACTERS_A_SECOND, listen
@@ -178,6 +181,32 @@ def test_a_page_that_floods_is_read_at_its_pace(served, text, most):
         for _ in range(count):
             received(connection)
         assert time.monotonic() - start > 0.9  # 1 s by the loop's clock, which began with the connection
+
+
+def test_a_message_waits_for_what_came_before_it(served, monkeypatch):
+    """By a clock that stands still: each message costs its own time and that of its characters, after a burst free."""
+    port, token = served
+    waited, texts = [], ["{" * 150_000] * 12
+
+    async def sleep(seconds):
+        waited.append(seconds)
+
+    class Loop:
+        def __getattr__(self, name):
+            return getattr(asyncio.get_running_loop(), name)
+
+        def time(self):
+            return 100.0
+
+    still = SimpleNamespace(**vars(asyncio) | {"sleep": sleep, "get_running_loop": Loop})
+    each_s = 1 / MOST_A_SECOND + 150_000 / MOST_CHARACTERS_A_SECOND
+    monkeypatch.setattr(server, "asyncio", still)
+    monkeypatch.setattr(server, "BURST_S", 4.5 * each_s)
+    with connected(port, f"/{token}/live", origin=f"http://127.0.0.1:{port}", max_size=None) as connection:
+        for text in texts:
+            connection.send(text)
+            received(connection)
+    assert waited == pytest.approx([max(0.0, (n - 4.5) * each_s) for n in range(1, 13)])
 
 
 NOT_ALLOWED: list[Any] = [

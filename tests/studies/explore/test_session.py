@@ -26,9 +26,19 @@ from sensor.readout import noise_variance
 from studies.explore import chain
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import expose_scene, photograph
-from studies.explore.controls import LENS, PIXEL, SETTINGS, Controls, Lamp
+from studies.explore.controls import (
+    LENS,
+    MOST_POINTS,
+    PIXEL,
+    SETTINGS,
+    WIDEST,
+    Controls,
+    Lamp,
+    controls_from,
+    options_of,
+)
 from studies.explore.memo import Memo, never_cancel
-from studies.explore.messages import first_message, read_views
+from studies.explore.messages import KINDS, first_message, is_superseded_by, read_message, read_views, write_dropped
 from studies.explore.session import Session
 from studies.explore.slow import stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
@@ -506,6 +516,85 @@ def test_up_to_four_views_are_read_each_of_a_camera_that_is_there() -> None:
     for value in (*wrong, [[0, "truth", 1]], {"0": "truth"}, "truth", None):
         refusal(read_views, value, 2, match=r"give up to four of \[camera, view\], cameras from 0")
     refusal(read_views, [[1, "truth"]], 1, match=r"views: \[1, 'truth'\] is not allowed")
+
+
+def test_a_messages_limits_are_kept_to_the_unit() -> None:
+    """200 000 characters, a page's name of 40, numbers up to 2^53 - all of them whole in JSON -, two cameras."""
+    text = '{"kind": "hello", "number": 1}'
+    assert read_message(text.ljust(200_000)) == {"kind": "hello", "number": 1}
+    refusal(read_message, text.ljust(200_001), match="message: 200001 characters; allowed: 200000")
+    assert read_message(json.dumps({"kind": "hello", "number": 1, "page": "p" * 40}))["page"] == "p" * 40
+    refusal(read_message, json.dumps({"kind": "hello", "number": 1, "page": "p" * 41}), match="allowed: 40 characters")
+    for number in (0, 2**53):
+        assert read_message(json.dumps({"kind": "hello", "number": number}))["number"] == number
+    for number in (-1, 2**53 + 2):  # floats tell no odd number there
+        refusal(read_message, json.dumps({"kind": "hello", "number": number}), match="number: ")
+    for count in (1, 2):
+        asked = {"kind": "histogram", "number": 1, "cameras": [{}] * count}
+        assert read_message(json.dumps(asked)) == asked
+    for count in (0, 3):
+        asked = {"kind": "histogram", "number": 1, "cameras": [{}] * count}
+        refusal(read_message, json.dumps(asked), match="send one or two")
+
+
+def test_each_kind_of_message_has_its_own_keys_and_all_of_them() -> None:
+    keys = {
+        "hello": (), "cancel": (), "scene": ("name",), "sensor": ("files",), "show": ("cameras", "views"),
+        "pixel": ("cameras", "row", "column"), "histogram": ("cameras",), "dng": ("cameras",),
+    }  # fmt: skip
+    assert {kind: tuple(of) for kind, of in KINDS.items()} == keys
+    for kind, of in keys.items():
+        whole = {"kind": kind, "number": 3} | {key: [{}] if key == "cameras" else 0 for key in of}
+        assert read_message(json.dumps(whole)) == whole
+        for key in of:
+            short = {name: value for name, value in whole.items() if name != key}
+            refusal(read_message, json.dumps(short), match=f"message: '{key}' is missing")
+        refusal(read_message, json.dumps(whole | {"more": 1}), match="more")
+
+
+def test_a_newer_message_of_its_kind_and_any_of_a_kind_before_goes_first() -> None:
+    kinds = list(KINDS)
+    for own, mine in enumerate(kinds):
+        for other, theirs in enumerate(kinds):
+            for number in (4, 5, 6):
+                pending = {"kind": theirs, "number": number}
+                first = number > 5 if own == other else other < own
+                assert is_superseded_by({"kind": mine, "number": 5}, pending) is first, (mine, pending)
+
+
+def test_as_many_files_and_sensors_are_taken_as_are_allowed(tmp_path: Path) -> None:
+    """Eight files of one sensor; a hundred sensors, each in a folder of the next number."""
+    toml = preset_file("low_noise").read_text("utf-8")
+    tables = {f"table {n}.csv": "wavelength_nm,value\n400,1\n" for n in range(8)}
+    for number in range(98):
+        (tmp_path / str(number)).mkdir()
+    path, sensor = write_dropped({"mine.toml": toml, **dict(list(tables.items())[:7])}, tmp_path)
+    assert path == tmp_path / "98" / "mine.toml"
+    assert sensor == preset(path)
+    assert len(list(path.parent.iterdir())) == 8
+    refusal(write_dropped, {"mine.toml": toml, **tables}, tmp_path, match="that it names, 8")
+    assert write_dropped({"mine.toml": toml}, tmp_path)[0] == tmp_path / "99" / "mine.toml"
+    refusal(write_dropped, {"mine.toml": toml}, tmp_path, match="sensor: 100 were dropped; allowed: 100")
+
+
+def test_settings_stand_in_from_half_a_second_of_sums_on() -> None:
+    """Pixels times 21 x 21 neighbours times a patch of 3: 65 536 pixels times 4 000 are the limit."""
+    wide = Controls(processor="interleaved", settings={"neighbourhood": 21, "patch": 3})
+    most = 65_536 * 4_000 // (21**2 * 3)
+    assert stand_in(wide, most) == wide
+    assert stand_in(wide, most + 1) == replace(wide, settings={})
+
+
+def test_settings_and_tables_have_their_limits() -> None:
+    for name, values, beyond in (("neighbourhood", (3, WIDEST), WIDEST + 2), ("patch", (1, 9), 11)):
+        for value in values:
+            own = Controls(processor="interleaved", settings={name: value})
+            assert getattr(options_of(own)["settings"], name) == value
+        refusal(lambda: Controls(processor="interleaved", settings={name: beyond}), match=f"settings.{name}: {beyond}")  # noqa: B023
+    points = [[380.0 + n / 10, 1.0] for n in range(MOST_POINTS + 1)]
+    lamps = [{"lamps": {"sun": {"table": points[:count]}}} for count in (MOST_POINTS, MOST_POINTS + 1)]
+    assert len(controls_from(lamps[0]).lamps["sun"].table) == MOST_POINTS
+    refusal(controls_from, lamps[1], match=f"{MOST_POINTS + 1} points; allowed: {MOST_POINTS}")
 
 
 def test_bad_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

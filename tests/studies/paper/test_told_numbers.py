@@ -26,6 +26,7 @@ from sensor.response import expected_electrons
 from studies.metrics.flip import flip
 from studies.metrics.truth import light_in_bands, named_light
 from studies.paper import best_exposure, early, light_levels, patches
+from studies.paper import paper as paper_module
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, with_default, within
 from studies.paper.figure2 import bright_cd_m2, signal_ratios, snr_gains
 from studies.paper.numbers import measured_snr_db, number_claims, range_spans
@@ -271,6 +272,40 @@ def test_ratios_of_early_designs_are_of_each_light_and_way(monkeypatch: pytest.M
     assert set(early.ranges_lost_db("table1_pixel")) == {
         f"table1_pixel, {mosaic}, {how}" for mosaic in ("rgbw_nd", "cmyw") for how in ("closed form", "read out")
     }
+
+
+def test_a_paper_has_its_figures_claims_after_those_of_its_text(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two figures that tell their progress; where one is asked for alone, the text's claims are left out."""
+    steps: list[tuple[str, float]] = []
+
+    def maker(name: str) -> Any:
+        def make(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
+            setup.step("renders", 0.5)
+            return PaperFigure(name, name, Figure((1, 1))), (Claim(name, "a", CHECKS[:1]), Claim(name, "b", CHECKS[:1]))
+
+        return make
+
+    def claim_of(*what: Any) -> tuple[Claim, ...]:
+        return (Claim(str(what), "", CHECKS[:1]),)
+
+    monkeypatch.setattr(paper_module, "_MAKERS", {"1": maker("1"), "2": maker("2")})
+    monkeypatch.setattr(paper_module, "view", lambda setup, scene, level: (setup.size, scene, level))
+    monkeypatch.setattr(paper_module, "number_claims", claim_of)
+    monkeypatch.setattr(paper_module, "section_2", lambda setup: claim_of("2", setup.size))
+    monkeypatch.setattr(paper_module, "section_3_1", lambda: claim_of("3.1"))
+    setup = Setup(tmp_path / "new" / "folder", size=24, spp=5, seeds=3, step=lambda *asks: steps.append(asks))
+    whole = paper_module.make(setup)
+    assert [figure.name for figure in whole.figures] == ["1", "2"]
+    text = [str(((24, "still_life", 1.0),)), str(("2", 24)), str(("3.1",))]
+    assert [claim.where for claim in whole.claims] == [text[0], "1", "1", "2", "2", *text[1:]]
+    words = [f"Figure {name}: {what}" for name in "12" for what in ("begins", "renders")]
+    assert steps == list(zip(words, (0.0, 0.25, 0.5, 0.75), strict=True))
+    assert {name: whole.facts[name] for name in ("size", "spp", "seeds")} == {"size": 24, "spp": 5, "seeds": 3}
+    assert set(whole.facts) == {"size", "spp", "seeds", "rodcone", "environment"}
+    alone = paper_module.make(setup, ["2"])
+    assert ([x.name for x in alone.figures], [x.where for x in alone.claims]) == (["2"], ["2", "2"])
 
 
 def test_figure_b_draws_the_three_cameras_that_its_claims_compare(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -153,6 +153,16 @@ def test_a_merge_s_seam_does_not_move_the_light_that_a_ratio_takes() -> None:
     assert np.std(found, ddof=1) / sqrt(24) < 0.003
 
 
+def test_the_light_for_a_figure_is_where_a_power_of_light_crosses_it_within_the_ladder() -> None:
+    """Figures 3 x^p about 7 cd/m2; beyond 6 % the ladder's end; one that falls with light counts as its end too."""
+    for power in (0.5, 1.0, 2.0):
+        for goal, wanted in ((1.0, 1.0), (1.02, 1.02 ** (1 / power)), (2.0, 1.06), (0.5, 0.94)):
+            found = light_for(lambda x, p=power: 3.0 * (x / 7.0) ** p, 3.0 * goal, 7.0)
+            assert found == pytest.approx(7.0 * wanted, rel=1e-9)
+    for goal, wanted in ((2.0, 0.94), (4.0, 1.06)):  # 3 at the middle: too much, too little
+        assert light_for(lambda x: 3.0 * (7.0 / x), goal, 7.0) == pytest.approx(7.0 * wanted)
+
+
 def test_a_wider_aperture_and_a_longer_exposure_need_less_light() -> None:
     sensor = shot_noise_camera()
     wide = replace(sensor, lens=replace(sensor.lens, f_number=sensor.lens.f_number / 2))
