@@ -20,7 +20,12 @@ from studies.explore.source import RenderOptions, open_source
 from studies.photograph import shot
 from studies.photograph.ready_light import BANDS, find_ready
 
-SHIPPED_AT = {"color_checker": (340, 512), "siemens_star": (512, 512), "still_life": (512, 512)}
+SHIPPED_AT = {
+    "color_checker": (340, 512),
+    "night_street": (256, 256),
+    "siemens_star": (512, 512),
+    "still_life": (512, 512),
+}
 
 
 def film(size: tuple[int, int]) -> Film:
