@@ -28,6 +28,8 @@ WRITTEN = {
     },
     text.exposure_name: {
         text.way_name("auto"): "automatic",
+        text.way_name("auto:W"): "automatic for W",
+        text.way_name("auto:information", 3): "automatic by information, 3 frames",
         text.way_name("2ms", 4): "2 ms, 4 frames",
         text.way_name("auto", 2): "automatic, 2 frames",
     },

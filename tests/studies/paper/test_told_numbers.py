@@ -25,7 +25,16 @@ from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.metrics.flip import flip
 from studies.metrics.truth import light_in_bands, named_light
-from studies.paper import best_exposure, early, light_levels, patches
+from studies.paper import (
+    best_exposure,
+    early,
+    light_levels,
+    patches,
+    pixel_size,
+    white_beside_bayer,
+    white_in_low_light,
+    white_partly_full,
+)
 from studies.paper import paper as paper_module
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, with_default, within
 from studies.paper.figure2 import bright_cd_m2, signal_ratios, snr_gains
@@ -306,6 +315,283 @@ def test_a_paper_has_its_figures_claims_after_those_of_its_text(
     assert set(whole.facts) == {"size", "spp", "seeds", "rodcone", "environment"}
     alone = paper_module.make(setup, ["2"])
     assert ([x.name for x in alone.figures], [x.where for x in alone.claims]) == (["2"], ["2", "2"])
+
+
+Called = dict[str, list[tuple[Any, ...]]]
+
+
+def recorded(monkeypatch: pytest.MonkeyPatch, module: Any, **functions: Any) -> Called:
+    """Take functions of a module in place of its own, and note what each is called with."""
+    called: Called = {name: [] for name in functions}
+
+    def noting(name: str, function: Any) -> Any:
+        return lambda *asks, **more: called[name].append((*asks, *more.values())) or function(*asks, **more)
+
+    for name, function in functions.items():
+        monkeypatch.setattr(module, name, noting(name, function))
+    return called
+
+
+def pictured(scene: str, level: float | None, *light: str) -> View:
+    return view_of(np.full((8, 12), level or 1.0))
+
+
+def drawn(rows: Any) -> dict[str, Image]:
+    return {words: picture for row in rows for words, picture in row}
+
+
+def test_figure_1a_shows_each_reading_and_its_dark_half_made_as_bright(monkeypatch: pytest.MonkeyPatch) -> None:
+    shade = {"table1_pixel": 0.001, "table1_output": 0.002}
+    called = recorded(
+        monkeypatch,
+        pixel_size,
+        view=lambda setup, *asks: pictured(*asks),
+        exposures=lambda camera, subject, time: [("first", camera.reading), "second"],
+        develop_view=lambda camera, raw, subject: (np.full((8, 12, 3), shade[raw[1]]), None),
+        half_snr_db=lambda subject, name, dark: len(name) + 100 * dark,
+        picture_rows=lambda rows: Figure((1, 1)),
+        claims_1a=lambda dark, lit: (),
+    )
+    figure, _ = pixel_size.figure_1a(Setup(Path("unused"), size=24))
+    assert called["view"][0][1:] == ("lit_and_shadowed", None, "lamp")
+    names = (*READINGS, pixel_size.TODAY, pixel_size.LARGE)
+    ((dark, lit),) = called["claims_1a"]
+    assert (dark, lit) == ({name: len(name) + 100 for name in names}, {name: len(name) for name in names})
+    assert {(camera.processor, time) for camera, _, time in called["exposures"]} == {("bayer", "66ms")}
+    assert f"the left half at {pixel_size.DARK_CD_M2:g} cd/m², the right one at 25." in figure.caption
+    rows = called["picture_rows"][0][0]
+    assert [row[0][0] for row in rows] == list(READINGS)
+    for (reading, taken), (words, raised) in rows:
+        np.testing.assert_allclose(taken, encode_srgb(np.full((8, 12, 3), shade[reading])))
+        np.testing.assert_allclose(
+            raised[:, :6], encode_srgb(np.full((8, 6, 3), pixel_size.DARK_GAIN * shade[reading]))
+        )
+        np.testing.assert_array_equal(raised[:, 6:], taken[:, 6:])
+        assert words.startswith("left half ")
+    (level,) = {subject.level for _, subject, _ in called["exposures"]}
+    assert level == f"{pixel_size.LIT_CD_M2:g}cd/m2"
+
+
+def test_figure_1b_gains_what_the_pictures_of_large_pixels_do(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = recorded(
+        monkeypatch,
+        pixel_size,
+        view=lambda setup, *asks: pictured(*asks),
+        exposures=lambda camera, subject, time, seeds: [(camera.pitch_um, n) for n in range(seeds)],
+        develop_view=lambda camera, raw, subject: (np.full((2, 2, 3), raw[0] / 10 + raw[1] / 100), None),
+        quality_db=lambda developed, truth: np.array([20 + 10 * x.mean() for x in developed]),
+        gain_db=lambda reading, shot_alone=False: len(reading) + 0.5 * shot_alone,
+        picture_rows=lambda rows: Figure((1, 1)),
+        claims_1b=lambda *asks: (),
+    )
+    pixel_size.figure_1b(Setup(Path("unused"), size=24, seeds=3))
+    ((shot_db, all_db, gained_db),) = called["claims_1b"]
+    assert (shot_db, all_db) == (len("table1_output") + 0.5, {name: len(name) for name in READINGS})
+    np.testing.assert_allclose(gained_db, [4.0] * 3)  # 6 um over 2 um
+    assert called["view"][0][1:] == ("still_life", pixel_size.LUMINANCE_CD_M2)
+    assert {time for _, _, time, _ in called["exposures"]} == {"10ms"}
+    shown = drawn(called["picture_rows"][0][0])
+    assert list(shown) == ["6 µm, PSNR 26.1 dB", "2 µm, PSNR 22.1 dB"]
+    np.testing.assert_allclose(next(iter(shown.values())), encode_srgb(np.full((2, 2, 3), 0.6)))
+
+
+def test_figure_3_measures_colour_white_and_both_results(monkeypatch: pytest.MonkeyPatch) -> None:
+    of = {"interleaved_paper": 0.5, "interleaved": 0.7}
+    called = recorded(
+        monkeypatch,
+        white_in_low_light,
+        view=lambda setup, *asks: pictured(*asks),
+        exposures=lambda camera, subject, time, seeds: [(camera.reading, n) for n in range(seeds)],
+        colour_and_white=lambda raw, subject, camera: (np.full((2, 2, 3), 0.1), np.full((2, 2, 3), 0.2)),
+        develop_view=lambda camera, raw, subject: (np.full((2, 2, 3), of[camera.processor]), None),
+        noise=lambda pictures: float(pictures[0].mean()),
+        quality_db=lambda pictures, truth: np.array([10 * x.mean() for x in pictures]),
+        picture_rows=lambda rows: Figure((1, 1)),
+        claims_3=lambda stages: (),
+    )
+    figure, _ = white_in_low_light.figure_3(Setup(Path("unused"), size=24, seeds=2))
+    stages = {name: shot for (one,) in called["claims_3"] for name, shot in one.items()}
+    assert len(called["claims_3"]) == 2  # the paper's way, and the default's
+    for (one,), gained_db in zip(called["claims_3"], (4.0, 6.0), strict=True):
+        assert list(one) == list(READINGS)
+        for shot in one.values():
+            assert (shot.colour_noise, shot.white_noise) == pytest.approx((0.1, 0.2))
+            np.testing.assert_allclose(shot.gain_db, [gained_db] * 2)
+    assert called["view"][0][1:] == ("still_life", 2.5)
+    assert {time for _, _, time, _ in called["exposures"]} == {"20ms"}
+    rows = called["picture_rows"][0][0]
+    assert [[words for words, _ in row] for row in rows] == [
+        [f"{name}: colour", "W", "result", "by the default"] for name in stages
+    ]
+    for row in rows:
+        levels = [0.1, 0.2, 0.5, 0.7]
+        np.testing.assert_allclose([picture.mean() for _, picture in row], encode_srgb(np.array(levels)), rtol=1e-6)
+    assert "2.5" in figure.caption
+    assert "20" in figure.caption
+
+
+def test_figure_6_has_an_outcome_for_each_reading_camera_and_exposure(monkeypatch: pytest.MonkeyPatch) -> None:
+    cameras = ("bayer", "interleaved_paper", "interleaved")
+
+    def photographed(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Any, Image]:
+        substituted = None if camera.processor == "bayer" else float(exposure == "5ms")
+        return white_beside_bayer.Outcome(0.1, np.array([1.0]), substituted), np.full((2, 2, 3), 0.1)
+
+    called = recorded(
+        monkeypatch,
+        white_beside_bayer,
+        view=lambda setup, *asks: pictured(*asks),
+        _photograph=photographed,
+        swap=lambda setup, subject, camera: (camera.reading, camera.processor),
+        picture_rows=lambda rows: Figure((1, 1)),
+        claims_6=lambda *asks: (),
+    )
+    white_beside_bayer.figure_6(Setup(Path("unused"), size=24))
+    exposures = list(white_beside_bayer.SUBSTITUTED)
+    wanted = [(reading, name, exposure) for reading in READINGS for name in cameras for exposure in exposures]
+    assert [(x.reading, x.processor, exposure) for *_, x, exposure in called["_photograph"]] == wanted
+    (bayer, paper, swaps), (_, default, other) = called["claims_6"]
+    keys = [f"{reading}, {exposure}" for reading in READINGS for exposure in exposures]
+    assert list(bayer) == list(paper) == list(default) == keys
+    assert (swaps, other) == tuple({x: (x, name) for x in READINGS} for name in cameras[1:])
+    assert called["view"][0][1:] == ("still_life", white_beside_bayer.LUMINANCE_CD_M2)
+    words = [[text for text, _ in row] for row in called["picture_rows"][0][0]]
+    names = ("Bayer", "interleaved", "the default")
+    told = iter(words)
+    for reading in READINGS:
+        for name in names:
+            row = [
+                f"{name}{', W' + chr(39) + 's luminance' if exposure == '5ms' and name != 'Bayer' else ''}, {exposure}"
+                for exposure in exposures
+            ]
+            assert next(told) == [f"{reading}: {row[0]}", *row[1:]]
+
+
+def test_figure_5_measures_each_reading_by_both_cameras(monkeypatch: pytest.MonkeyPatch) -> None:
+    planes = np.broadcast_to([3000.0, 0.0, 0.0, 6000.0], (2, 2, 4))
+    of = {"interleaved_paper": 0.5, "interleaved": 0.7}
+    called = recorded(
+        monkeypatch,
+        white_partly_full,
+        view=lambda setup, *asks: pictured(*asks),
+        exposures=lambda camera, subject, time: [("first", camera.reading, camera.processor), "second"],
+        develop_view=lambda camera, raw, subject: (np.full((2, 2, 3), of[camera.processor]), None),
+        bilinear=lambda raw: planes,
+        measure_bright=lambda raw, result, subject: (*raw, float(result.mean())),
+        picture_rows=lambda rows: Figure((1, 1)),
+        claims_5=lambda bright: (),
+    )
+    white_partly_full.figure_5(Setup(Path("unused"), size=24))
+    assert called["view"][0][1:] == ("still_life", 200.0)
+    assert {(camera.pitch_um, time) for camera, _, time in called["exposures"]} == {(3, "66ms")}
+    for (told,), (name, level) in zip(called["claims_5"], of.items(), strict=True):
+        assert told == {reading: ("first", reading, name, pytest.approx(level)) for reading in READINGS}
+    for reading, row in zip(READINGS, called["picture_rows"][0][0], strict=True):
+        words = [f"{reading}: R, white is full", "W, white is full", "result", "by the default"]
+        assert [text for text, _ in row] == words
+        full_e = Camera(reading, pitch_um=3).sensor.pixel.full_well_e
+        levels = [min(3000 / full_e, 1.0), min(6000 / full_e, 1.0), 0.5, 0.7]
+        means = [picture.mean() for _, picture in row]
+        np.testing.assert_allclose(means, encode_srgb(np.array(levels)), rtol=1e-6)
+
+
+def test_where_w_alone_is_full_is_told_by_the_correlation_of_luminance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Half of the pixels near a full W, of which a quarter are near a full colour; each has a slope of its own."""
+    rng = np.random.default_rng(6)
+    near = {"W": np.arange(64).reshape(8, 8) < 32, "RGB": np.arange(64).reshape(8, 8) < 8}
+    truth = rng.uniform(0, 1, (8, 8))
+    both, alone = near["W"] & near["RGB"], near["W"] & ~near["RGB"]
+    grey = np.where(both, -truth, np.where(alone, 2 * truth + 1, rng.uniform(0, 1, (8, 8))))
+    white = np.where(alone, 5 - truth, 9.0)
+    planes = np.stack([np.zeros((8, 8))] * 3 + [white], axis=-1)
+    monkeypatch.setattr(white_partly_full, "saturated_nearby", lambda raw, channels: near[channels])
+    monkeypatch.setattr(white_partly_full, "bilinear", lambda raw: planes)
+    is_white = (np.indices((8, 8)) % 2).prod(axis=0) == 1
+    full = np.where(is_white, near["W"], near["RGB"])
+    raw: Any = SimpleNamespace(cfa=("RG", "BW"), shape=(8, 8), saturated=full, channels=("R", "G", "B", "W"))
+    subject: Any = SimpleNamespace(truth=np.repeat(truth[..., None], 3, axis=-1))
+    found = white_partly_full.measure_bright(raw, np.repeat(grey[..., None], 3, axis=-1), subject)
+    assert (found.white_full, found.colours_full) == pytest.approx((0.5, 8 / 48))
+    assert found.result_correlation == pytest.approx(1.0)
+    assert found.white_correlation == pytest.approx(-1.0)
+    assert found.full_correlation == pytest.approx(-1.0)
+    none, one, two = (np.arange(64).reshape(8, 8) < count for count in range(3))
+    for first, second, where in ((truth, grey, none), (truth, grey, one)):
+        assert white_partly_full.correlation(first, second, where) == 0.0
+    for first, second in ((np.ones((8, 8)), truth), (truth, np.ones((8, 8)))):
+        assert white_partly_full.correlation(first, second, alone) == 0.0
+    assert abs(white_partly_full.correlation(truth, grey, two)) == pytest.approx(1.0)
+
+
+def test_figure_4_compares_patches_at_both_levels_and_draws_the_first(monkeypatch: pytest.MonkeyPatch) -> None:
+    called = recorded(
+        monkeypatch,
+        patches,
+        view=lambda setup, *asks: pictured(*asks),
+        exposures=lambda camera, subject, time: [(camera.reading, subject.radiance.luminance().mean()), "second"],
+        edge_columns=lambda luminance: luminance.shape,
+        triplets=lambda raw, columns: SimpleNamespace(share=raw[1] * (1 + (raw[0] == "table1_output")), raw=raw),
+        white_plane=lambda raw: ("plane", raw),
+        _drawing=lambda parts: Figure((1, 1)),
+        claims_4=lambda shares: (),
+    )
+    figure, _ = patches.figure_4(Setup(Path("unused"), size=24))
+    ((shares,),) = called["claims_4"]
+    light = {name: pictured("", level).radiance.luminance().mean() for name, level in patches.LEVELS.items()}
+    wanted = {
+        f"{reading}, {name}": light[name] * factor
+        for name in patches.LEVELS
+        for reading, factor in zip(READINGS, (1, 2), strict=True)
+    }
+    assert shares == pytest.approx(wanted)
+    assert list(patches.LEVELS) == ["25 cd/m²", "moonlight"]
+    ((parts,),) = called["_drawing"]
+    assert [(reading, plane, edge.raw[0]) for reading, plane, edge in parts] == [
+        (reading, ("plane", (reading, light["25 cd/m²"])), reading) for reading in READINGS
+    ]
+    assert "25 cd/m²" in figure.caption
+    assert [asks[1:] for asks in called["view"]] == [("slanted_edge", level) for level in patches.LEVELS.values()]
+    assert {time for _, _, time in called["exposures"]} == {"20ms"}
+
+
+def test_an_edge_is_at_the_middle_of_dark_and_bright() -> None:
+    truth = np.full((3, 10), 1.0)
+    for row, column in enumerate((2, 5, 9)):
+        truth[row, column:] = 9.0
+        truth[row, column - 1] = 4.9  # the middle is 5
+    assert patches.edge_columns(truth).tolist() == [2, 5, 9]
+    truth[truth == 4.9] = 5.1
+    assert patches.edge_columns(truth).tolist() == [1, 4, 8]
+
+
+def test_the_bilateral_filter_is_its_sum_by_hand() -> None:
+    """Of a frame of 3 x 3 with a spot, by patches of one pixel; with three, of a frame of one value but the spot."""
+    values = np.zeros((3, 3))
+    values[1, 1] = 60.0
+    near, far, value = np.exp(-1 / 18), np.exp(-2 / 18), np.exp(-0.5)
+    middle = 60 / (1 + value * (4 * near + 4 * far))
+    assert patches.filtered(values, 1)[1, 1] == pytest.approx(middle, rel=1e-12)
+    others = 1 + 2 * near + 2 * np.exp(-4 / 18) + 2 * np.exp(-5 / 18) + np.exp(-8 / 18)
+    assert patches.filtered(values, 1)[0, 0] == pytest.approx(60 * value * far / (others + value * far), rel=1e-12)
+    assert np.abs(patches.filtered(np.full((5, 7), 3.0), 3) - 3.0).max() < 1e-12
+
+
+def test_what_always_against_never_substituting_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Grey 0.2 without W and 0.3 with it; the noise of 4 is a quarter's."""
+    called = recorded(
+        monkeypatch,
+        white_beside_bayer,
+        exposures=lambda camera, subject, time, seeds: list(range(seeds)),
+        develop_view=lambda camera, raw, subject, snr: (np.full((2, 2, 3), 0.3 if snr else 0.2), None),
+        noise=lambda pictures: 1.0 if pictures[0][0, 0, 0] > 0.25 else 4.0,
+    )
+    setup, subject = Setup(Path("unused"), size=24, seeds=2), view_of(np.ones((2, 2)))
+    found = white_beside_bayer.swap(setup, subject, Camera("table1_output"))
+    assert found.noise_ratio == 4.0
+    lab = [rgb2lab(np.full((1, 1, 3), encode_srgb(np.array(x)))) for x in (0.2, 0.3)]
+    assert found.delta_e == pytest.approx(float(deltaE_ciede2000(*lab)[0, 0]), rel=1e-6)
+    assert [snr for *_, snr in called["develop_view"]] == [0.0, 0.0, np.inf, np.inf]
+    assert called["exposures"][0][2:] == (white_beside_bayer.DARKEST, 2)
 
 
 def test_figure_b_draws_the_three_cameras_that_its_claims_compare(monkeypatch: pytest.MonkeyPatch) -> None:
