@@ -46,6 +46,14 @@ def test_what_covers_over_a_hundredth_of_the_frame_is_white() -> None:
         assert stops_to_white(grey("bayer", share)) == pytest.approx(np.log2(0.9 / white), abs=1e-6)
 
 
+def test_a_spot_over_a_hundredth_of_the_frame_is_white_wherever_it_lies() -> None:
+    for size, white in (((8, 8), 0.64), ((2, 40), 0.64), ((2, 20), 0.01)):  # 64, 80 and 40 of 5120 pixels
+        for row, column in ((0, 0), (20, 38), (64 - size[0], 80 - size[1])):
+            share = np.full(SHAPE, 0.01)
+            share[row : row + size[0], column : column + size[1]] = 0.64
+            assert stops_to_white(grey("bayer", share)) == pytest.approx(np.log2(0.9 / white), abs=1e-6)
+
+
 @loop("cfa", ["bayer", "rgbw"])
 def test_noise_raises_the_percentile_of_a_flat_frame_by_half_a_stop_at_most(cfa: str) -> None:
     # The 99th percentile of a normal variable lies 2.33 standard deviations over its mean, and these are at most

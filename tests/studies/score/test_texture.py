@@ -15,9 +15,10 @@ from rodcone.colour_spaces import SRGB_TO_XYZ
 from studies.metrics.s_cielab import eye_xyz
 from studies.photograph.snr import snr
 from studies.score.dead_leaves import autocovariance, draw_leaves, texture_response
+from studies.score.developed import developed_figures
 from studies.score.figure import measured
 from studies.score.information import information
-from studies.score.score import score
+from studies.score.score import definitions, score
 from studies.score.visual_noise import raw_visual_noise, visual_noise
 
 
@@ -96,6 +97,42 @@ import numpy as np
 def develop(raw, matrix, *, balance):
     return np.repeat(raw.electrons[..., None], 3, axis=2)
 """
+
+
+def test_one_measurement_of_a_developed_picture_is_near_the_pixels_own_closed_form(tmp_path: Path) -> None:
+    """Samples passed on as they are: 6400 of them spread a ratio by 0.08 dB; texture and edge by a hundredth."""
+    path = tmp_path / "mine.py"
+    path.write_text(AS_READ, "utf-8")
+    sensor, rng = public.low_noise("mono"), np.random.default_rng(3)
+    found = {}
+    for definition in developed_figures(sensor, "D65", 0.01, f"{path}:develop", trust_code=True):
+        names = [merit.name.removeprefix("developed.") for merit in definition.merits]
+        found |= dict(zip(names, definition.measure(rng), strict=True)) if names != ["delta_e"] else {}
+    ratio_db = 20 * np.log10(snr(np.array([0.18 * 0.7 * sensor.pixel.full_well_e]), sensor, 0.01)[0])
+    assert found["snr_18"] == pytest.approx(ratio_db, abs=0.4)
+    noise = np.random.default_rng(4).normal(0, 0.18 / 10 ** (ratio_db / 20), (80, 80, 1))
+    assert found["visual_noise"] == pytest.approx(visual_noise(np.repeat(0.18 + noise, 3, axis=2)), rel=0.15)
+    closed = list(definitions(sensor, "D65", 0.01, ["iso_12233", "iso_19567"]))
+    computed = {merit.name.split(".")[1]: merit.computed for one in closed for merit in one.merits}
+    for name in (
+        "mtf50",
+        "mtf_half_nyquist",
+        "acutance",
+        *(f"texture_{x}" for x in ("mtf50", "half_nyquist", "acutance")),
+    ):
+        assert found[name] == pytest.approx(computed[name], abs=0.02), name
+    (texture,) = (one for one in closed if one.merits[0].name == "iso_19567.texture_mtf50")
+    for merit, value in zip(texture.merits, texture.measure(rng), strict=True):
+        assert value == pytest.approx(merit.computed, abs=0.02), merit.name
+
+
+def test_one_measurement_of_a_developed_chart_is_near_the_cameras_closed_form() -> None:
+    """A linear processor takes the matrix that the closed form takes: 1.4, and noise adds a tenth."""
+    sensor = public.low_noise("bayer")
+    *_, chart = developed_figures(sensor, "D65", 0.01, "bayer")
+    computed = {x.name: x.computed for one in definitions(sensor, "D65", 0.01, ["color_checker"]) for x in one.merits}
+    (value,) = chart.measure(np.random.default_rng(3))
+    assert value == pytest.approx(computed["color_checker.delta_e"] + 0.1, abs=0.15)
 
 
 @pytest.mark.thorough
