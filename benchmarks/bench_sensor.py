@@ -3,8 +3,8 @@
 Run ``python benchmarks/bench_sensor.py``. It prints the environment, the first capture of a fresh process with an empty
 kernel cache (compilation included), then for each size and light the medians of rounds in turn: a capture; reading
 the bands' memory once, which nothing can undercut; and NumPy's `Generator.poisson` alone on the same means, which the
-whole is measured against. Before that, the largest memory of a fresh process (``--memory`` runs it alone) that images a
-picture behind a lens that diffracts, beside the size of its bands. NumPy's
+whole is measured against. Before that, processor time and largest memory of fresh processes (``--memory`` runs them
+alone) that image a picture behind a lens that diffracts, beside the size of its bands. NumPy's
 sampler runs on one thread, and the capture's two or more get less of a CPU that others use too: trust the ratios of
 processor time. `rodcone bench` measures the exact readout and the lens.
 """
@@ -16,7 +16,6 @@ import sys
 import tempfile
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import replace
 
 import numpy as np
 from environment import beside, in_turn, print_environment, seconds_of
@@ -27,7 +26,7 @@ from sensor.capture import photograph_radiance
 from sensor.device import draw_device
 from sensor.optics import form_image
 from sensor.presets import preset
-from sensor.response import expected_electrons
+from sensor.response import channel_electrons, expected_electrons, imaged_electrons
 
 NM = np.arange(385.0, 780.0, 10.0)
 EXPOSURE_S = 0.02
@@ -78,20 +77,25 @@ def peak_gb() -> float:
     return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * unit / 1e9
 
 
-def lens_memory() -> None:
-    """Memory of an image behind a lens that diffracts, over that of the bands it is made from."""
-    sensor, radiance = preset("low_noise"), scene(1024, LIGHTS["a lit room"])
-    lens = replace(sensor.lens, diffraction=1.0, veiling_glare=0.02)
+def behind_lens(way: str, side: int) -> None:
+    """Time and memory of the channels' electrons behind a lens that diffracts, beside the bands that they come from."""
+    sensor, radiance = preset("low_noise"), scene(side, LIGHTS["a lit room"])
     before, cube = peak_gb(), radiance.values.nbytes / 1e9
-    form_image(radiance, replace(sensor, lens=lens))
-    print(
-        f"1024x1024 behind a lens that diffracts: bands {cube:.2f} GB, image and all that its making takes "
-        f"{(peak_gb() - before) / cube:.2f} x that on top"
-    )
+    ways: dict[str, Callable[[], object]] = {
+        "each band there and back": lambda: channel_electrons(form_image(radiance, sensor), sensor, EXPOSURE_S),
+        "bands summed on the way": lambda: imaged_electrons(radiance, sensor, EXPOSURE_S),
+    }
+    cpu = min(seconds_of(ways[way])[1] for _ in range(3))
+    taken = (peak_gb() - before) / cube
+    print(f"  {way}: processor {cpu:.2f} s, {cpu / side**2 * 1e6:.1f} s/Mpx; {taken:.2f} x {cube:.2f} GB on top")
 
 
 def memory() -> None:
-    subprocess.run([sys.executable, __file__, "--lens"], check=True)
+    """Time and memory behind a lens, each way in a process of its own."""
+    for side in (512, 1024, 2048):
+        print(f"{side}x{side}, {NM.size} bands, behind a lens that diffracts", flush=True)
+        for way in ("each band there and back", "bands summed on the way"):
+            subprocess.run([sys.executable, __file__, "--lens", way, str(side)], check=True)
 
 
 def main() -> None:
@@ -109,7 +113,10 @@ def main() -> None:
             print("\n".join("  " + beside(name, times, NUMPY) for name in times), flush=True)
 
 
-PARTS = {"--first-call": first_call, "--lens": lens_memory, "--memory": memory}
+PARTS: dict[str, Callable[[], None]] = {"--first-call": first_call, "--memory": memory}
 
 if __name__ == "__main__":
-    PARTS.get(" ".join(sys.argv[1:]), main)()
+    if sys.argv[1:2] == ["--lens"]:
+        behind_lens(sys.argv[2], int(sys.argv[3]))
+    else:
+        PARTS.get(" ".join(sys.argv[1:]), main)()

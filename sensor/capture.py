@@ -7,12 +7,12 @@ from render.radiance import SpectralRadiance
 from rodcone.jit import backend
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
-from sensor.exposure import auto_exposure_s
+from sensor.exposure import AUTO, auto_exposure_s, exposure_of_electrons_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
 from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
 from sensor.raw import RawImage
 from sensor.readout import read_out
-from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, expected_electrons
+from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, imaged_electrons
 from sensor.shake import shaken
 
 
@@ -67,29 +67,47 @@ def photograph_radiance(
     numpy_runs = exact or backend() == "numpy"
     formed = isinstance(radiance, SpectralIrradiance)
     scaled = samples_per_pixel == 1 and not spreads(sensor.lens) and not formed
-    light = radiance
-    if isinstance(light, SpectralRadiance) and (numpy_runs or not scaled or sensor.lens.shake_um):
-        light = form_image(light, sensor, samples_per_pixel)
-    height, width = light.values.shape[:2]
+    metered_s, channels_e = exposure_s or 1.0, None
+    if isinstance(radiance, SpectralRadiance) and (numpy_runs or not scaled or sensor.lens.shake_um):
+        channels_e = imaged_electrons(radiance, sensor, metered_s, samples_per_pixel)
+    elif isinstance(radiance, SpectralIrradiance) and (numpy_runs or sensor.lens.shake_um):
+        channels_e = channel_electrons(radiance, sensor, metered_s)
+    (height, width, _) = radiance.values.shape if channels_e is None else channels_e.shape
     device = device or draw_device(sensor, (height, width), np.random.default_rng([0, 0]))
     rng = rng or np.random.default_rng([0, 1])
-    if exposure_s is None:
-        image = light if isinstance(light, SpectralIrradiance) else form_image(light, sensor)
+    if exposure_s is None and channels_e is not None:
+        exposure_s = exposure_of_electrons_s(AUTO, channels_e, sensor)
+    elif exposure_s is None:
+        image = radiance if isinstance(radiance, SpectralIrradiance) else form_image(radiance, sensor)
         exposure_s = auto_exposure_s(image, sensor)
-    expected_e: NDArray[np.floating]
-    if isinstance(light, SpectralIrradiance) and sensor.lens.shake_um:
-        moved = shaken(channel_electrons(light, sensor, exposure_s), sensor, exposure_s, rng)
-        expected_e = behind_filters(moved, sensor)
-    elif isinstance(light, SpectralIrradiance) and numpy_runs:
-        expected_e = expected_electrons(light, sensor, exposure_s)
-    else:
-        # A lens that only scales light forms no image: its factors go to the weights and to the electrons.
-        weights = electrons_per_irradiance(sensor, light.wavelength_nm, light.widths_nm, exposure_s, light.light)
-        weights = weights * camera_equation(sensor.lens) if scaled else weights
-        expected_e = expected_electrons_single(light.values, weights, sensor)
-        if scaled and sensor.lens.horizontal_view_deg:
-            expected_e *= falloff(sensor.lens, (expected_e.shape[0], expected_e.shape[1])).astype(expected_e.dtype)
+    if channels_e is not None:
+        scale = exposure_s / metered_s
+        return expose_channels(channels_e * scale if scale != 1 else channels_e, sensor, exposure_s, device, rng, exact)
+    # A lens that only scales light forms no image: its factors go to the weights and to the electrons.
+    weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, exposure_s, radiance.light)
+    weights = weights * camera_equation(sensor.lens) if scaled else weights
+    expected_e = expected_electrons_single(radiance.values, weights, sensor)
+    if scaled and sensor.lens.horizontal_view_deg:
+        expected_e *= falloff(sensor.lens, (height, width)).astype(expected_e.dtype)
     return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
+
+
+def expose_channels(
+    channels_e: NDArray[np.float64],
+    sensor: SensorConfig,
+    exposure_s: float,
+    device: Device,
+    rng: np.random.Generator,
+    exact: bool = False,
+) -> RawImage:
+    """Expose and read the chip once, from the electrons behind every filter, (h, w, channel): shake, mosaic, `expose`.
+
+    The electrons are those of a still camera in `exposure_s`, of `sensor.response.imaged_electrons`; the rest is as
+    `photograph_radiance` takes it.
+    """
+    if sensor.lens.shake_um:
+        channels_e = shaken(channels_e, sensor, exposure_s, rng)
+    return expose(behind_filters(channels_e, sensor), sensor, exposure_s, device, rng, exact=exact)
 
 
 def expose(

@@ -1,14 +1,17 @@
 """From scene radiance to irradiance on the sensor, and what this leaves out of a lens.
 
 Where a lens spreads light the picture is transformed by cosines (DCT-II), which continue it as its own mirror image: no
-border darkens, and the sum of the light is kept to rounding. Bands are transformed in double precision, several at once
-on threads.
+border darkens, and the sum of the light is kept to rounding. `form_image` transforms each band there and back in double
+precision. A camera collects sums over bands, one for each filter. A lens is linear, so that `image_sums` adds the
+transformed bands and transforms the few sums back, in single precision where no lamp in view asks for more.
 """
 
 import os
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from math import ceil, inf, isnan, pi, radians, tan
+from typing import Any
 
 import numpy as np
 import scipy
@@ -30,7 +33,8 @@ VIEW_DEG = 40.0  # angle of view for the falloff
 DIAGONAL = 1.25  # over the width of a picture of 4:3
 APERTURE_AT_NYQUIST = 2 / pi  # transfer of a square pixel there, sin(pi / 2) / (pi / 2)
 AIRY_DIAMETER = 2.44  # of the first dark ring, in wavelengths x f-number
-_BANDS_A_THREAD = 16  # a band at work takes as much memory as a dozen bands of float32
+MOST_OVER_MEAN = 10.0  # of the brightest light over the mean, for single precision: its error grows with the brightest
+_AT_ONCE = 2**17  # frequencies at work on a thread: few enough for its cache
 _LEAST_LOSS = 5e-4  # of the MTF: a smaller one isn't stated
 
 
@@ -134,17 +138,18 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     >>> image.values.shape
     (8, 8, 4)
     """
-    require_whole("samples_per_pixel", samples_per_pixel, 1, 64, "give samples a side")
-    lens, samples = sensor.lens, int(samples_per_pixel)
-    if any(size % samples for size in radiance.shape):
-        raise InputError(f"samples_per_pixel: {samples} don't divide the picture's {radiance.shape}; give whole pixels")
-    factor = radiance.values.dtype.type(camera_equation(lens))
+    shape, samples, lens = pixel_shape(radiance, samples_per_pixel), int(samples_per_pixel), sensor.lens
+    values_type = radiance.values.dtype.type
     if samples == 1 and not spreads(lens):
-        values = radiance.values * factor
+        values = radiance.values * values_type(camera_equation(lens))
         if lens.horizontal_view_deg:
             values *= falloff(lens, radiance.shape)[..., None].astype(values.dtype)
     else:
-        values = spread_light(radiance, sensor, samples)
+        imaged = _imager(radiance, sensor, samples, np.float64)
+        planes = np.empty((radiance.wavelength_nm.size, *shape), values_type)
+        for plane, of_one_band in zip(planes, np.eye(len(planes)), strict=True):
+            plane[:] = imaged(of_one_band[None])[0]
+        values = np.moveaxis(planes, 0, -1)
     return SpectralIrradiance(
         values=values,
         wavelength_nm=radiance.wavelength_nm,
@@ -155,35 +160,105 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     )
 
 
-def spread_light(radiance: SpectralRadiance, sensor: SensorConfig, samples: int) -> NDArray[np.floating]:
-    """Irradiance behind a lens that spreads light, shape (h / samples, w / samples, band), band-planar."""
-    lens = sensor.lens
-    per_radiance = camera_equation(lens) * falloff(lens, radiance.shape)
-    height, width = (size // samples for size in radiance.shape)
-    planes = np.empty((radiance.wavelength_nm.size, height, width), dtype=radiance.values.dtype)
-    scattered = scatterer(lens, (height, width), radiance.horizontal_view_deg) if scatters(lens) else None
-    blurs = bool(lens.diffraction or lens.defocus_um)
-    otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1) if blurs else None
+def image_sums(
+    radiance: SpectralRadiance, weights: Floats, sensor: SensorConfig, samples_per_pixel: int = 1
+) -> NDArray[np.float64]:
+    """Weighted sums over bands of what `form_image` gives, shape (h, w, sum): as many inverse transforms as sums.
 
-    def one_band(band: int) -> None:
-        light = radiance.values[..., band] * per_radiance
+    Where the brightest light is at most `MOST_OVER_MEAN` times the mean in each band they are of single precision, off
+    by up to 1e-6 of the pixel's own light and the mean together. Beside a lamp in view that would be much for the dark,
+    and they are of double precision. Undershoot becomes 0 in each sum; `form_image` does so in each band.
+
+    Parameters
+    ----------
+    radiance, sensor, samples_per_pixel
+        As `form_image` takes them.
+    weights : (sum, band) float64
+        Of irradiance, such as `sensor.response.electrons_per_irradiance`.
+
+    Raises
+    ------
+    InputError
+        As of `form_image`.
+    """
+    imaged = _imager(radiance, sensor, samples_per_pixel, _enough(radiance))
+    largest = float(np.abs(weights).max(initial=0.0)) or 1.0
+    # Electrons for each watt would leave the range of single precision.
+    return np.moveaxis(largest * imaged(weights / largest), 0, -1)
+
+
+def pixel_shape(radiance: SpectralRadiance, samples_per_pixel: int) -> tuple[int, int]:
+    """Rows and columns of the pixels that the samples make.
+
+    Raises
+    ------
+    InputError
+        Where the samples don't make whole pixels.
+    """
+    require_whole("samples_per_pixel", samples_per_pixel, 1, 64, "give samples a side")
+    samples = int(samples_per_pixel)
+    if any(size % samples for size in radiance.shape):
+        raise InputError(f"samples_per_pixel: {samples} don't divide the picture's {radiance.shape}; give whole pixels")
+    return radiance.shape[0] // samples, radiance.shape[1] // samples
+
+
+def _enough(radiance: SpectralRadiance) -> type[np.floating]:
+    """Precision that a picture's light asks for."""
+    if radiance.values.dtype != np.float32:
+        return np.float64
+    planes = (np.abs(plane) for plane in np.moveaxis(radiance.values, -1, 0))
+    even = all(plane.max() <= MOST_OVER_MEAN * plane.mean(dtype=np.float64) for plane in planes)
+    return np.float32 if even else np.float64
+
+
+def _imager(
+    radiance: SpectralRadiance, sensor: SensorConfig, samples: int, real: type[np.floating]
+) -> Callable[[Floats], NDArray[np.float64]]:
+    """Function of weights (sum, band) that gives these sums behind a lens, (sum, h, w); bands without weight are free.
+
+    A sum's value doesn't depend on the number of threads.
+    """
+    pixels, lens, (height, width) = pixel_shape(radiance, samples), sensor.lens, radiance.shape
+    threads = os.cpu_count() or 1
+    per_radiance: NDArray[Any] = (camera_equation(lens) * falloff(lens, radiance.shape)).astype(real)
+    otf = None
+    if lens.diffraction or lens.defocus_um:
+        otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1, real=real)
+    scattered = scatterer(lens, pixels, radiance.horizontal_view_deg) if scatters(lens) else None
+    step = max(_AT_ONCE // width, 1)
+    strips = [slice(first, first + step) for first in range(0, height, step)]
+
+    def add(rows: slice, sums: NDArray[Any], weights: NDArray[Any], light: NDArray[Any], nm: float) -> None:
+        part = light[rows] if otf is None else light[rows] * otf(nm, rows)
+        for plane, weight in zip(sums, weights, strict=True):
+            plane[rows] += weight * part
+
+    def behind_lens(plane: NDArray[Any]) -> NDArray[np.float64]:
         if otf is not None:
-            spectrum = scipy.fft.dctn(light, type=2, overwrite_x=True)
-            spectrum *= otf(float(radiance.wavelength_nm[band]))
-            light = scipy.fft.idctn(spectrum, type=2, overwrite_x=True)
-            if light.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
-                total, kept = light.sum(), np.maximum(light, 0.0)
-                light = kept * (total / kept.sum() if total > 0 else 0.0)
+            plane = scipy.fft.idctn(plane, type=2, overwrite_x=True, workers=threads)
+            if plane.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
+                total, plane = plane.sum(dtype=np.float64), np.maximum(plane, 0)
+                plane *= real(total / plane.sum(dtype=np.float64) if total > 0 else 0.0)
+        light = plane.astype(np.float64)
         if samples > 1:
-            light = light.reshape(height, samples, width, samples).mean(axis=(1, 3))
+            light = light.reshape(pixels[0], samples, pixels[1], samples).mean(axis=(1, 3))
         if scattered is not None:
             light = scattered(light)
             light = light if radiance.signed else np.maximum(light, 0.0)  # rounding beside a lamp
-        planes[band] = (1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean()
+        return np.asarray((1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean())
 
-    with ThreadPoolExecutor(min(os.cpu_count() or 1, 1 + len(planes) // _BANDS_A_THREAD)) as threads:
-        list(threads.map(one_band, range(len(planes))))
-    return np.moveaxis(planes, 0, -1)
+    def imaged(weights: Floats) -> NDArray[np.float64]:
+        sums = np.zeros((len(weights), height, width), real)
+        with ThreadPoolExecutor(threads) as pool:
+            for band in np.flatnonzero(weights.any(axis=0)):
+                light = radiance.values[..., band] * per_radiance
+                if otf is not None:
+                    light = scipy.fft.dctn(light, type=2, overwrite_x=True, workers=threads)
+                of_band = weights[:, band].astype(real), light, float(radiance.wavelength_nm[band])
+                list(pool.map(lambda rows, of_band=of_band: add(rows, sums, *of_band), strips))
+        return np.stack([behind_lens(plane) for plane in sums])
+
+    return imaged
 
 
 def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:

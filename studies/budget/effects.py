@@ -15,8 +15,7 @@ from render.radiance import SpectralRadiance
 from render.transport import Transport
 from sensor.config import LensConfig, SensorConfig
 from sensor.kernel.poisson import LARGEST_ERROR
-from sensor.optics import form_image
-from sensor.response import behind_filters, channel_electrons, expected_electrons
+from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import shaken
 from studies.budget.bands import merge_radiance, merge_transport
 
@@ -123,7 +122,7 @@ def shake_effect(
     """Return what a still camera changes, as `Effects.lens`, for the path among `PATHS` that costs most."""
     halves = transport.relight_halves(luminance_cd_m2=1.0)
     held = replace(sensor, lens=lens)
-    still = [channel_electrons(form_image(half, held), held, 1.0) for half in halves]
+    still = [imaged_electrons(half, held, 1.0) for half in halves]
     effects = []
     for key in rng.integers(0, 2**63, PATHS):
         moved = [shaken(half, held, exposure_s, np.random.default_rng(key)) for half in still]
@@ -152,7 +151,7 @@ def _noise(transport: Transport, sensor: SensorConfig, rng: np.random.Generator)
 
 
 def _electrons(halves: Sequence[SpectralRadiance], sensor: SensorConfig) -> Pair:
-    return np.stack([expected_electrons(form_image(half, sensor), sensor, 1.0) for half in halves])
+    return np.stack([behind_filters(imaged_electrons(half, sensor, 1.0), sensor) for half in halves])
 
 
 def _band_errors(

@@ -23,11 +23,10 @@ from rodcone.digests import digest, digest_file, digest_inputs
 from rodcone.types import Progress
 from sensor.cfa import mask
 from sensor.device import draw_device
-from sensor.optics import form_image
 from sensor.raw import RawImage
 from sensor.readings.resolve import PlainReading, at_channel, resolve
 from sensor.readout import frame_variance, light_variance, read, sources_of
-from sensor.response import channel_electrons
+from sensor.response import imaged_electrons
 from studies.study.equal_area import area_average, in_pixels
 from studies.study.lit_scene import OpenedScene, photographed, under
 from studies.study.render_noise import OF_PIXELS, monte_carlo_bound
@@ -256,7 +255,7 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
         facts["illuminants"][spectrum] = _illuminants(lit)
         for name, cell in frames.items():
             if cell.condition.spectrum == spectrum:
-                electrons = channel_electrons(form_image(view, cell.frame.sensor, samples), cell.frame.sensor, 1.0)
+                electrons = imaged_electrons(view, cell.frame.sensor, 1.0, samples)
                 facts["files"][name] = surfaces | of_light | kept(channels_e=electrons.astype(np.float32))
     return facts
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from render.illuminants import illuminant
 from rodcone.errors import InputError
-from sensor.optics import form_image
 from sensor.raw_files.raw_file import write_raw
-from sensor.response import behind_filters, channel_electrons
+from sensor.response import behind_filters, imaged_electrons
 from studies.explore.chain import Exposure, Shot, development_of, expose_scene, photograph, true_picture_of
 from studies.explore.controls import Controls, Lamp, only_group, to_json
 from studies.explore.memo import Memo
@@ -168,7 +167,6 @@ def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
 def _error_e(exposed: Exposure, name: str) -> NDArray[np.float64]:
     """Return the Monte Carlo error of one light group at power 1 in 1 s, behind the filters, (h, w, channel) [e-]."""
     even, odd = (
-        channel_electrons(form_image(half, exposed.sensor), exposed.sensor, 1.0)
-        for half in only_group(exposed.transport, name).relight_halves()
+        imaged_electrons(half, exposed.sensor, 1.0) for half in only_group(exposed.transport, name).relight_halves()
     )
     return (even - odd) / 2

@@ -22,6 +22,7 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from scenes.reflectances import color_checker_reflectances, held
 from sensor.calibration import ColourCalibration
+from sensor.capture import expose_channels
 from sensor.capture import photograph_radiance as frame_of
 from sensor.cfa import mask
 from sensor.config import SensorConfig
@@ -30,12 +31,12 @@ from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
-from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
+from sensor.optics import camera_equation, falloff, form_image, pixel_shape
 from sensor.photodiodes import Gain
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.readout import spread_charge
-from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, mixing_of
+from sensor.response import behind_filters, electrons_per_irradiance, imaged_electrons, mixing_of
 from sensor.shake import held_lens
 from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
 from studies.study.gain import at_gain, gain_text, iso_speed
@@ -327,22 +328,22 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     """
     sensor = preset("low_noise") if sensor is None else sensor
     sensor = at_gain(replace(sensor, lens=held_lens(sensor.lens, shake)), gain_text(gain, iso))
-    subject: SpectralRadiance | SpectralIrradiance = radiance
+    shape, per_second_e = pixel_shape(radiance, samples_per_pixel), None
     if exposure_s is None:
-        image = form_image(radiance, sensor, samples_per_pixel)
-        exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, channel_electrons(image, sensor, 1.0), sensor)
-        subject = image if spreads(sensor.lens) else radiance  # else its factors cost nothing
+        per_second_e = imaged_electrons(radiance, sensor, 1.0, samples_per_pixel)
+        exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, per_second_e, sensor)
         exposure_s = exposure_s if flicker is None else steady_exposure_s([flicker], exposure_s)
-    if flicker is None:
-        raw = frame_of(subject, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
-    else:
+    device = device or draw_device(sensor, shape, np.random.default_rng([0, 0]))
+    rng = rng or np.random.default_rng([0, 1])
+    if flicker is not None:
         check_flicker(sensor)
         image = form_image(radiance, sensor, samples_per_pixel)
-        shape = (image.values.shape[0], image.values.shape[1])
-        device = device or draw_device(sensor, shape, np.random.default_rng([0, 0]))
-        rng = rng or np.random.default_rng([0, 1])
         starts_s = frame_starts_s(sensor, shape, exposure_s, rng)
         (raw,) = photograph_flickering(image, [(flicker, image)], sensor, exposure_s, device, rng, starts_s, exact)
+    elif per_second_e is not None:
+        raw = expose_channels(per_second_e * exposure_s, sensor, exposure_s, device, rng, exact)
+    else:
+        raw = frame_of(radiance, sensor, exposure_s, device, rng, exact=exact, samples_per_pixel=samples_per_pixel)
     try:
         colour = calibrate(sensor, light or radiance.light or illuminant("D65"))
     except InputError:

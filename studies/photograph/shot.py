@@ -24,18 +24,18 @@ from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
 from rodcone.time_text import parse_time
 from rodcone.types import Floats
-from sensor.capture import photograph_radiance
+from sensor.capture import expose_channels
 from sensor.config import SensorConfig, check_frame
 from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
-from sensor.optics import SpectralIrradiance, form_image, left_out, spreads
+from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import check_ending
-from sensor.response import channel_electrons, expected_electrons
+from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.lamps import flicker_of, lamp_parts
@@ -287,12 +287,11 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
             f"{luminance_cd_m2:.3g} cd/m2"
         ]
     samples = checked.samples
-    image = form_image(radiance, sensor, samples)
-    exposure_s, sensor = _exposure(checked, image)
-    subject = image if spreads(sensor.lens) or samples > 1 else radiance  # else its factors cost nothing
-    device = draw_device(sensor, image.values.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
+    per_second_e = imaged_electrons(radiance, sensor, 1.0, samples)
+    exposure_s, sensor = _exposure(checked, per_second_e)
+    device = draw_device(sensor, per_second_e.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
     lamps = lamp_parts(transport, spectra, level, checked.flicker)
-    taken = _frames(checked, subject, image, lamps, sensor, exposure_s, device)
+    taken = _frames(checked, radiance, per_second_e * exposure_s, lamps, sensor, exposure_s, device)
     notes += [_ALL_ROWS] * bool(lamps and sensor.row_time_us == 0)
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
@@ -335,31 +334,31 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
 
 def _frames(
     checked: Checked,
-    subject: SpectralRadiance | SpectralIrradiance,
-    image: SpectralIrradiance,
+    radiance: SpectralRadiance,
+    channels_e: NDArray[np.float64],
     parts: Sequence[tuple[Waveform, SpectralRadiance | None]],
     sensor: SensorConfig,
     exposure_s: float,
     device: Device,
 ) -> list[RawImage]:
-    """Exposures of the order; `parts` are of `lamp_parts`."""
+    """Exposures of the order; `channels_e` are of `radiance` in the exposure time, and `parts` of `lamp_parts`."""
     seed, frames = checked.order.seed, checked.order.frames
     rng = np.random.default_rng([seed, _FRAME])
     if not parts:
-        return [photograph_radiance(subject, sensor, exposure_s, device, rng) for _ in range(frames)]
+        return [expose_channels(channels_e, sensor, exposure_s, device, rng) for _ in range(frames)]
+    image = form_image(radiance, sensor, checked.samples)
     imaged = [(lamp, image if lit is None else form_image(lit, sensor, checked.samples)) for lamp, lit in parts]
     starts_s = frame_starts_s(sensor, device.shape, exposure_s, np.random.default_rng([seed, _START]), frames)
     return photograph_flickering(image, imaged, sensor, exposure_s, device, rng, starts_s)
 
 
-def _exposure(checked: Checked, image: SpectralIrradiance) -> tuple[float, SensorConfig]:
+def _exposure(checked: Checked, per_second_e: NDArray[np.float64]) -> tuple[float, SensorConfig]:
     """Exposure time [s], asked for or by a rule, and the camera at the gain that it takes.
 
     A rule meters the lamps' mean, and cuts its time to whole periods of lamps that flicker.
     """
     if checked.exposure_s is not None:
         return checked.exposure_s, checked.sensor
-    per_second_e = channel_electrons(image, checked.sensor, 1.0)
     exposure_s, sensor = exposed_by_rule(checked.order.exposure, per_second_e, checked.sensor)
     return steady_exposure_s(checked.flicker.values(), exposure_s), sensor
 
@@ -401,7 +400,7 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
 
 def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float, samples: int) -> NDArray[np.float64]:
     """Expected electrons of the raw image's pixels, shape (h, w)."""
-    return sensor.pixel_sums(expected_electrons(form_image(radiance, sensor, samples), sensor, exposure_s))
+    return sensor.pixel_sums(behind_filters(imaged_electrons(radiance, sensor, exposure_s, samples), sensor))
 
 
 def check(order: Order) -> Checked:

@@ -22,8 +22,7 @@ from rodcone.digests import digest_inputs
 from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.exposure import AUTO, AUTO_W, amplified, at_level_s, best_exposure
-from sensor.optics import form_image
-from sensor.response import behind_filters, channel_electrons
+from sensor.response import behind_filters, imaged_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.equal_area import in_pixels, site_grid
@@ -143,7 +142,7 @@ def make_frames(
             pitch_um, block = site_grid(sensor)
             radiances = tuple(area.view(view, pitch_um / samples, block * samples) for view in views)
         of_pixels = in_pixels(radiances[0], samples)
-        unmoved, *halves = (channel_electrons(form_image(view, sensor, samples), sensor, 1.0) for view in radiances)
+        unmoved, *halves = (imaged_electrons(view, sensor, 1.0, samples) for view in radiances)
         whole, first, second = (behind_filters(electrons, sensor) for electrons in (unmoved, *halves))
         errors = [(first - second) / 2] if transport.denoised is None else [whole - first, whole - second]
         facts = scene | {

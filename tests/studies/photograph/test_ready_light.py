@@ -178,7 +178,7 @@ def test_memory_that_runs_out_is_one_line(monkeypatch: pytest.MonkeyPatch, tmp_p
         raise MemoryError("Unable to allocate 3.00 GiB")
 
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(shot, "form_image", full)
+    monkeypatch.setattr(shot, "imaged_electrons", full)
     code, _, err = call(["capture", "color_checker", "-o", "shot.tif", "--size", "256"])
     assert code == cli.BAD_INPUT
     assert err.splitlines()[-1].startswith("rodcone: memory: it ran out (Unable to allocate 3.00 GiB); take a smaller")
