@@ -180,6 +180,8 @@ def test_pictures_of_every_format_are_read_as_what_they_hold(tmp_path: Path) -> 
         tifffile.imwrite(tmp_path / name, deep, photometric="rgb")
         np.testing.assert_array_equal(read_picture(tmp_path / name, (4, 5)), deep / 65_535)
     np.testing.assert_array_equal(read_picture(tmp_path / "a.PNG", (4, 5)), whole / 255)
+    Image.fromarray(whole).save(tmp_path / "b.png", format="GIF")
+    refusal(read_picture, tmp_path / "b.png", (4, 5), match="b.png: it is no picture of this set")
     assert {".png", ".tif", ".tiff", ".npy"} == set(judge_module.ENDINGS)
     for value, shown in ((-0.0099, 0.0), (1.0099, 1.0), (-0.0101, None), (1.0101, None)):
         np.save(tmp_path / "a.npy", np.where(np.arange(60).reshape(4, 5, 3) == 7, value, 0.5))
@@ -250,11 +252,25 @@ def test_the_chart_has_each_developers_means_intervals_and_a_dotted_line_of_what
         assert (line.get_xdata().tolist(), line.get_ydata().tolist()) == (light, values), developer
         assert [np.ptp(bar[:, 1]) / 2 for bar in bars.get_segments()] == pytest.approx(halves)
         assert line.get_linestyle() == style
+        assert {cap.get_markersize() for cap in drawn.lines[1]} == {6.0}  # 3 points on either side
         colours.append(line.get_color())
         (name,) = [text for text in axes.texts if text.get_text() == developer]
         assert name.get_color() == line.get_color()
     assert len(set(colours)) == 3
-    assert (axes.get_xscale(), axes.get_xlabel()) == ("log", "cd/m²")
+    words = "PSNR, dB, mean over scenes and its 95 % interval"
+    assert (axes.get_xscale(), axes.get_xlabel(), axes.get_title(loc="left") or axes.get_title()) == (
+        *("log", "cd/m²"),
+        words,
+    )
+
+
+def test_the_truth_itself_has_an_infinite_score() -> None:
+    """Two scenes of it: their mean is infinite, and no interval is told; nothing is warned of."""
+    row = dict.fromkeys((metric.key for metric in MEASURED), 1.0) | dict.fromkeys(judge_module._PLACE, "a")
+    rows = [row | {"scene": scene, "luminance_cd_m2": 4.0, "psnr_db": np.inf} for scene in "ab"]
+    (score,) = scores(rows, "mine")
+    assert score.means["psnr_db"] == np.inf
+    assert not np.isfinite(score.halves["psnr_db"])
 
 
 @pytest.mark.thorough

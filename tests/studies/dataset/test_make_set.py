@@ -34,9 +34,12 @@ from studies.dataset.order import SetOrder
 from studies.dataset.sample import Sample
 from studies.dataset.shards import MANIFEST, Shard, read_manifest, read_shard, split_of
 from studies.study.lit_scene import open_all
+from studies.study.model import LensTerms
 from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
+from studies.sweep.database import open_results
+from studies.sweep.prepare import Job, scene_cells, scene_transport
 from studies.sweep.provenance import versions
 from studies.sweep.run_sweep import sweep
 from studies.sweep.workers import InThisProcess, run, run_in_processes
@@ -80,6 +83,7 @@ def test_two_readers_give_the_same_arrays(stored: Path, tmp_path: Path) -> None:
     for arrays, facts in samples:
         assert arrays["raw"].shape == (16, 16)
         assert arrays["raw"].dtype == np.uint16
+        assert {array.dtype for name, array in arrays.items() if name != "raw"} == {np.dtype(np.float32)}
         assert set(arrays) == {"raw", "mosaic_e", "channels_e", "rgb", "xyz", "shares"}
         for name, array in arrays.items():
             other = np.load(tmp_path / f"{facts['key']}.{name}.npy")
@@ -224,6 +228,8 @@ def test_the_whole_frame_is_that_of_the_sweep(tmp_path: Path) -> None:
         ({"sensors": ("dual_gain",)}, "'dual_gain' bins or merges readings"),
         ({"frames": (2,)}, r"frames: \[2\] in a data set"),
         ({"sensor_side_um": 100.0}, "sensor-side-um: 100.0 in a data set"),
+        ({"lens": LensTerms(shake="hand")}, "shake: 'hand' in a data set"),
+        ({"flicker": "pwm@1000Hz:0.25"}, "flicker: .* in a data set"),
     ],
 )
 def test_what_no_set_can_hold_is_told_in_a_line(changes: dict[str, Any], words: str, tmp_path: Path) -> None:
@@ -506,6 +512,7 @@ def test_parts_are_numbered_where_there_are_several(tmp_path: Path) -> None:
     for crop, size, wanted in (
         *((None, (16, 20), {None: (0, 0, 16, 20)}), (16, (16, 20), {None: (0, 0, 16, 16)})),
         (16, (40, 36), dict(enumerate(windows))),
+        (16, (31, 47), {0: (0, 0, 16, 16), 1: (0, 16, 16, 16)}),
     ):
         asked.clear()
         out, order = f"{crop} {size[0]}", SetOrder(shards=1, crop=crop, truth="rgb")
@@ -532,6 +539,7 @@ def test_the_manifests_head_and_the_card_tell_the_study(stored: Path) -> None:
         "levels": ["1cd/m2", "25cd/m2"], "spectra": ["own"], "exposures": ["auto:information"],
         "sensors": ["low_noise"], "processors": ["bayer", "interleaved"], "seeds": ["0", "1"],
     }  # fmt: skip
+    assert set(head) == {*("kind", "name", "rodcone", "versions", "command", "identity", "samples", "planes", "axes")}
     assert (head["command"], head["planes"]) == ("rodcone dataset", list(SetOrder().planes))
     assert (scene["name"], scene["licence"]) == ("scene.exr", "its owner's")
     assert scene["split"] == split_of(scene["hash"])
@@ -548,7 +556,8 @@ def test_a_card_says_where_the_renders_noise_shows_and_a_scenes_licence(stored: 
     assert "the render's noise has" not in make_set_module.card(lines)
     (last,) = [x for x in lines if x["kind"] == "sample"][-1:]
     last["render_noise"] = {"mean": 2.5, "of_95_percent": 0.0}
-    assert "the render's noise has 2.5 times the sensor's variance" in make_set_module.card(lines)
+    (note,) = [x for x in make_set_module.card(lines).splitlines() if x.startswith("the render's noise has")]
+    assert note == "the render's noise has 2.5 times the sensor's variance: it shows in pictures and reference"
     for source, words in (
         ("still_life", "MIT, as rodcone; no texture of others"),
         ("diorama-5", f"MIT, as rodcone; {make_set_module.PICTURES_LICENCE}"),
@@ -560,6 +569,42 @@ def test_a_card_says_where_the_renders_noise_shows_and_a_scenes_licence(stored: 
             "kind": "scene", "name": "a label", "hash": "f" * 32, "split": "test", "licence": words,
             "objects": ["ball"], "materials": ["red"],
         }  # fmt: skip
+
+
+def test_an_order_that_says_nothing_draws_no_scene_and_fills_64_files() -> None:
+    order = SetOrder()
+    assert (order.drawn_scenes, order.shards, order.crop) == ((), 64, None)
+    assert SetOrder(generated=2).drawn_scenes == SetOrder(generated=2, seed=0, diorama=0).drawn_scenes
+
+
+def test_what_a_scenes_surfaces_are_is_kept_by_plane(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Depth, normals and numbers of object and material of each pixel, beside the light of its file."""
+    rng, size = np.random.default_rng(8), SAMPLE.SIZE
+    seen = SimpleNamespace(
+        object_id=rng.integers(0, 9, size).astype(np.uint16), material_id=rng.integers(0, 9, size).astype(np.uint16),
+        depth_m=rng.uniform(1, 2, size).astype(np.float32), normal=rng.uniform(-1, 1, (*size, 3)).astype(np.float32),
+        objects=("ball", "floor"), materials=("red",),
+    )  # fmt: skip
+    study = SAMPLE.small_study(tmp_path, seeds=(0,), levels=("1cd/m2",))
+    with open_results(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        (opened,) = open_all(study).values()
+        cells = scene_cells(job, opened, lambda *_: None)
+        transport = scene_transport(job, opened, lambda *_: None)[0]
+        monkeypatch.setattr(sample_module, "see_surfaces", lambda scene, size: seen)
+        monkeypatch.setattr(sample_module, "scene_hash", lambda opened: "a hash")
+        scene: Any = SimpleNamespace()
+        frames = {sample_module._frame_key(cell): cell for cell in cells}
+        facts = sample_module._make_files(job, replace(opened, scene=scene, size=size), frames, transport)
+        assert (facts["hash"], facts["objects"], facts["materials"]) == ("a hash", seen.objects, seen.materials)
+        files = sample_module.plane_files(job, facts, cells[0], tuple(sample_module.TRUTH))
+    assert set(files) == set(sample_module.TRUTH)
+    ids = np.stack([seen.object_id, seen.material_id], axis=2)
+    for name, plane in (("depth", seen.depth_m), ("normals", seen.normal), ("ids", ids)):
+        np.testing.assert_array_equal(np.load(files[name]), plane, strict=True)
+    assert np.load(files["xyz"])[..., 1].mean() == pytest.approx(1.0, rel=1e-5)
+    electrons, behind = np.load(files["mosaic_e"]), np.load(files["channels_e"])
+    np.testing.assert_allclose(behind[::2, ::2, 0], electrons[::2, ::2], rtol=1e-5)
 
 
 def test_an_orders_numbers_have_their_limits() -> None:

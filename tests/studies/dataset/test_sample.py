@@ -283,6 +283,20 @@ def test_shares_follow_each_lamps_own_spectrum_within_the_bands() -> None:
     assert shares[bright].mean(axis=0).min() > 0.05
 
 
+def test_shares_are_those_of_any_power_and_0_in_pixels_without_light() -> None:
+    transport = small_transport()
+    shape = transport.radiance.shape[2:]
+    wanted = group_shares(transport, shape)
+    for factor in (1e-9, 1e6):
+        scaled = {name: replace(group, power=factor * group.power) for name, group in transport.groups.items()}
+        np.testing.assert_allclose(group_shares(replace(transport, groups=scaled), shape), wanted, rtol=1e-6, atol=1e-9)
+    dark = transport.radiance.copy()
+    dark[..., :2, :] = 0.0
+    shares = group_shares(replace(transport, light=replace(transport.light, mean=dark)), shape)
+    assert not shares[:2].any()
+    np.testing.assert_allclose(shares[2:], wanted[2:], rtol=1e-6)
+
+
 def test_shares_of_a_lamp_of_lines_beside_a_sky_are_those_of_surfaces_at_its_lines() -> None:
     """Low-pressure sodium in bands of 20 nm: the band of the line holds what surfaces do 7 nm beside it, too."""
     nm, width_nm = even_bands((380.0, 780.0), 20)
