@@ -28,6 +28,7 @@ QUALITY = 80  # of the pictures, as WebP counts it
 SHOWN = {
     "color_checker": "--level 500lux",
     "cornell_box": "--level 300lux",
+    "dead_leaves": "--level 200cd/m2",
     "diorama": "--level 200cd/m2",
     "flat_field": "--level 25cd/m2",
     "furnace": "--level 25cd/m2",
@@ -35,6 +36,7 @@ SHOWN = {
     "lit_and_shadowed": "",
     "metamers": "--level 500lux",
     "night_street": "--exposure 50ms",
+    "oecf": "--level 200cd/m2",
     "siemens_star": "--level 200cd/m2",
     "slanted_edge": "--level 200cd/m2",
     "still_life": "--level 500lux",

@@ -8,6 +8,8 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
+import numpy as np
+
 from render.integrator.matte import matte_surface, with_matte_surfaces, with_rows
 from render.integrator.variant_types import SPECTRUM_SIZE, MitsubaScene
 from render.scene import Node, Scene, emitter_paths, uniform_node, walk
@@ -238,13 +240,22 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Mit
     config = mi.parser.ParserConfig(variant())
     config.merge_meshes = merge_meshes
     try:
-        state = mi.parser.parse_dict(config, description)
+        state = mi.parser.parse_dict(config, _with_textures(description))
         mi.parser.transform_all(config, state)
         with at_least_two_threads():
             return mi.parser.instantiate(config, state)
     except RuntimeError as error:
         words = mitsuba_words(error)
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
+
+
+def _with_textures(node: Node) -> Node:
+    """Copy of a scene's dict in which bitmaps of plain bytes are Mitsuba's tensors of 0 to 1."""
+    made = {key: _with_textures(value) if isinstance(value, dict) else value for key, value in node.items()}
+    data = made.get("data")
+    if isinstance(data, np.ndarray):
+        made["data"] = mitsuba_module().TensorXf(np.asarray(data[..., None] / 255, np.float32))
+    return made
 
 
 def _recorder(size: tuple[int, int]) -> Node:

@@ -12,6 +12,7 @@ from rodcone.errors import require_keys, unknown
 _NAMES = (
     "color_checker",
     "cornell_box",
+    "dead_leaves",
     "diorama",
     "flat_field",
     "furnace",
@@ -19,6 +20,7 @@ _NAMES = (
     "lit_and_shadowed",
     "metamers",
     "night_street",
+    "oecf",
     "siemens_star",
     "slanted_edge",
     "still_life",

@@ -4,6 +4,8 @@ from collections.abc import Mapping
 from math import radians, tan
 from typing import Annotated, TypeAlias
 
+import numpy as np
+
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.illuminants import illuminant
 from render.scene import LightGroup, Node, Scene, spectrum_node
@@ -12,6 +14,7 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from scenes.reflectances import grey, resampled
 
+Greys: TypeAlias = np.ndarray[tuple[int, int], np.dtype[np.uint8]]  # 0 to 255
 Metres: TypeAlias = Annotated[float, (1e-9, 1e9, "give metres")]
 SKY_LUMINANCE_CD_M2 = 100.0
 
@@ -79,6 +82,17 @@ def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn
     }
     dark_side, bright_side = ({"type": "diffuse", "reflectance": spectrum_node(x)} for x in (dark, bright))
     return {"type": "twosided", "bsdf": {"type": "blendbsdf", "weight": share, "a": dark_side, "b": bright_side}}
+
+
+def mixed(share: Greys, dark: Spectrum, bright: Spectrum) -> Node:
+    """Matte surface of squares, each a mixture of two reflectances: `share` / 255 of `bright`.
+
+    The first row is the upper one, as a camera sees the front of a panel that `look_at` turns to it.
+    """
+    rows = share[::-1]  # Mitsuba counts them from below
+    squares = {"type": "bitmap", "data": rows, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
+    dark_side, bright_side = ({"type": "diffuse", "reflectance": spectrum_node(x)} for x in (dark, bright))
+    return {"type": "twosided", "bsdf": {"type": "blendbsdf", "weight": squares, "a": dark_side, "b": bright_side}}
 
 
 def panel(pose: Floats, width_m: Metres, height_m: Metres, bsdf: Node, **more: Node) -> Node:

@@ -17,6 +17,7 @@ from isp.processors.catalogue import require_libraries
 from isp.processors.own import processor_of, require_consent
 from rodcone.colour_spaces import SRGB_TO_XYZ, luminance_of_srgb
 from rodcone.types import Floats, Plane
+from scenes.dead_leaves import draw_leaves
 from scenes.reflectances import color_checker_reflectances, held
 from sensor.capture import expose
 from sensor.cfa import OWN
@@ -29,11 +30,11 @@ from studies.metrics.mtf import edge_response
 from studies.metrics.truth import GREY, neutral_electrons
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.score.colour import true_lab
-from studies.score.dead_leaves import draw_leaves, texture_response
 from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit
 from studies.score.sharpness import acutance, bands_of, edge_reflectance, grey_radiance
 from studies.score.texture import LEAST_SAMPLES, SIDE_PX, figures_of, texture_merits
+from studies.score.texture_response import texture_response
 from studies.score.visual_noise import STANDARD, WHITE_SHARE, visual_noise
 
 EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and what is left off around

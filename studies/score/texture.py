@@ -6,6 +6,7 @@ from math import isfinite
 import numpy as np
 
 from rodcone.types import Floats
+from scenes.dead_leaves import draw_leaves
 from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import draw_device
@@ -13,9 +14,9 @@ from sensor.diffraction import half_frequency
 from sensor.optics import form_image, least_samples
 from sensor.response import expected_electrons
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
-from studies.score.dead_leaves import TextureResponse, draw_leaves, expected_response, texture_response
 from studies.score.figure import Definition, Merit
 from studies.score.sharpness import acutance, bands_of, every_pixel, grey_radiance, transfer_at
+from studies.score.texture_response import TextureResponse, expected_response, texture_response
 
 SIDE_PX = 96
 LEAST_SAMPLES = 4  # of a chart along a side of a pixel

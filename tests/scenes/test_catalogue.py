@@ -17,7 +17,10 @@ from scenes.reflectances import color_checker_reflectances
 BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
 
-LIT_BY_NAME = ("color_checker", "cornell_box", "flat_field", "metamers", "siemens_star", "slanted_edge", "still_life")
+LIT_BY_NAME = (
+    *("color_checker", "cornell_box", "dead_leaves", "flat_field", "metamers", "oecf", "siemens_star"),
+    *("slanted_edge", "still_life"),
+)
 
 
 def test_names_are_the_scenes_in_order():
@@ -110,6 +113,9 @@ def test_a_reflectance_outside_zero_to_one_is_refused_with_its_value(name, optio
     [
         ("slanted_edge", {"contrast": 0.5}, "contrast: 0.5 is outside 1 to 1e+06"),
         ("slanted_edge", {"angle_deg": 60.0}, "angle_deg: 60.0 is outside -45 to 45"),
+        ("oecf", {"patches": 3}, "patches: 3 is outside 4 to 36"),
+        ("oecf", {"contrast": 0.5}, "contrast: 0.5 is outside 1 to 1e+06"),
+        ("dead_leaves", {"seed": -1}, "seed: -1 is outside 0 to"),
         ("siemens_star", {"spokes": 1}, "spokes: 1 is outside 2 to 720"),
         ("siemens_star", {"spokes": 7.5}, "spokes: 7.5 is not a whole number"),
         ("lit_and_shadowed", {"dark_cd_m2": -1.0}, "dark_cd_m2: -1.0 is outside 0 to 1e+09"),

@@ -18,6 +18,8 @@ from render.spectrum import Spectrum, luminance
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalogue import load
 from scenes.cornell_box import paint
+from scenes.dead_leaves import chart
+from scenes.oecf import grey_scale
 from scenes.siemens_star import RADIUS_M
 
 FALSE_ALARM = 1e-5
@@ -59,6 +61,32 @@ def test_the_edge_has_its_contrast_and_leans_by_its_angle(contrast, angle_deg):
     assert slope == pytest.approx(np.tan(np.radians(angle_deg)), abs=bound * row_error / np.sqrt((rows**2).sum()))
     assert middle == pytest.approx(20.0, abs=bound * row_error / np.sqrt(40))
     assert bound * row_error / np.sqrt((rows**2).sum()) < np.tan(np.radians(0.5))  # sees half a degree
+
+
+def test_the_grey_scale_s_patches_have_the_cube_root_steps_of_the_standard():
+    """12 patches clockwise from the top; the reflectance of a middle one by hand: ((0.9^1/3 + 0.009^1/3) / 2)^3."""
+    scene = load("oecf", patches=13)
+    assert grey_scale(13, 100.0)[6] == pytest.approx(((0.9 ** (1 / 3) + 0.009 ** (1 / 3)) / 2) ** 3)
+    made = render(scene, (50, 50), wavelength_nm=BANDS_NM, spp=16, seed=5)
+    picture, error = made.radiance[0].mean(axis=0, dtype=np.float64), np.sqrt(made.variance[0, 0].max())
+    bound = norm.isf(FALSE_ALARM / 2 / 14) * max(error, 1e-6)
+    for index, reflectance in enumerate(grey_scale(13, 100.0)):
+        turn = 2 * np.pi * index / 13
+        row, column = 25 - 17 * np.cos(turn), 25 + 17 * np.sin(turn)  # 1 cm a pixel
+        assert picture[int(row), int(column)] == pytest.approx(reflectance, abs=bound)
+    assert picture[24, 24] == pytest.approx(0.18, abs=bound)
+    assert grey_scale(12, 1000.0)[0] / grey_scale(12, 1000.0)[-1] == pytest.approx(1000.0)
+
+
+def test_dead_leaves_are_the_chart_that_their_seed_draws():
+    """Pixels are means of 32 x 32 squares, within the error of their paths; another seed draws another chart."""
+    made = render(load("dead_leaves", seed=4), (32, 32), wavelength_nm=BANDS_NM, spp=256, seed=6)
+    picture, error = (np.asarray(x, np.float64) for x in (made.radiance[0, 0], np.sqrt(made.variance[0, 0])))
+    expected = chart(4).reshape(32, 32, 32, 32).mean(axis=(1, 3))
+    assert np.abs(picture - expected).max() < 0.03  # 256 paths in strata; 0.6 at a chart turned over
+    assert abs(picture.mean() - expected.mean()) < norm.isf(FALSE_ALARM / 2) * np.sqrt((error**2).sum()) / error.size
+    assert np.abs(chart(4) - chart(5)).mean() > 0.2
+    assert np.unique(chart(4)).size > 200
 
 
 @loop("spokes", [9, 24])

@@ -12,13 +12,14 @@ from scipy.integrate import quad
 
 import rodcone as public
 from rodcone.colour_spaces import SRGB_TO_XYZ
+from scenes.dead_leaves import autocovariance, draw_leaves
 from studies.metrics.s_cielab import eye_xyz
 from studies.photograph.snr import snr
-from studies.score.dead_leaves import autocovariance, draw_leaves, texture_response
 from studies.score.developed import developed_figures
 from studies.score.figure import measured
 from studies.score.information import information
 from studies.score.score import definitions, score
+from studies.score.texture_response import texture_response
 from studies.score.visual_noise import raw_visual_noise, visual_noise
 
 

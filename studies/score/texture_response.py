@@ -1,12 +1,4 @@
-"""Dead leaves: a chart of overlapping disks whose spectrum is known, and what a camera transfers of it.
-
-Disks of radii with a density in proportion to r^-3, between two limits, fall on one another, each of a grey of its own.
-Two points at a distance d see the same disk with the probability
-
-    g(d) / (2 g(0) - g(d)),    g(d) the mean area in which a disk and itself moved by d overlap
-
-(Matheron 1968), which times the variance of the greys is the chart's autocovariance.
-"""
+"""What a camera transfers of a chart of dead leaves (`scenes.dead_leaves`), by frequency."""
 
 from dataclasses import dataclass
 
@@ -14,9 +6,6 @@ import numpy as np
 
 from rodcone.types import Floats, Plane
 
-LEAST_PX, MOST_PX = 1.0, 24.0  # radii, in pixels of the picture
-DARKEST, BRIGHTEST = 0.05, 0.95  # reflectances, evenly spread
-LAYERS = 5.0  # of disks: exp(-5) of the chart shows the ground, which has the mean grey
 ANNULUS = 0.02  # width of a step of frequency [cycles per pixel]
 
 
@@ -26,36 +15,6 @@ class TextureResponse:
 
     frequency_cycles_per_px: Floats
     mtf: Floats
-
-
-def draw_leaves(side_px: int, samples: int, rng: np.random.Generator) -> Plane:
-    """Draw the reflectances of a chart of side_px x side_px pixels, `samples` squares along a side of each pixel."""
-    side, least, most = (value * samples for value in (side_px, LEAST_PX, MOST_PX))
-    around = side + 2 * most
-    mean_area = 2 * np.pi * np.log(most / least) / (least**-2 - most**-2)
-    count = int(rng.poisson(LAYERS * around**2 / mean_area))
-    radii = (least**-2 - rng.random(count) * (least**-2 - most**-2)) ** -0.5
-    rows, columns = rng.uniform(-most, side + most, (2, count))
-    greys = rng.uniform(DARKEST, BRIGHTEST, count)
-    chart: Plane = np.full((int(side), int(side)), (DARKEST + BRIGHTEST) / 2)
-    middles = np.arange(int(side)) + 0.5
-    for radius, row, column, grey in zip(radii.tolist(), rows.tolist(), columns.tolist(), greys.tolist(), strict=True):
-        down = slice(max(int(row - radius), 0), max(int(row + radius) + 1, 0))
-        across = slice(max(int(column - radius), 0), max(int(column + radius) + 1, 0))
-        inside = (middles[down, None] - row) ** 2 + (middles[across] - column) ** 2 <= radius**2
-        chart[down, across][inside] = grey
-    return chart
-
-
-def autocovariance(distance_px: Floats) -> Floats:
-    """Return the chart's autocovariance at distances in pixels."""
-    radii = np.geomspace(LEAST_PX, MOST_PX, 4001)
-    half = np.minimum(np.asarray(distance_px)[..., None] / (2 * radii), 1.0)
-    overlap = 2 * radii**2 * (np.arccos(half) - half * np.sqrt(1 - half**2))
-    shared = np.trapezoid(overlap * radii**-3, radii)
-    whole = np.trapezoid(np.pi / radii, radii)
-    variance = (BRIGHTEST - DARKEST) ** 2 / 12
-    return np.asarray(variance * shared / (2 * whole - shared))
 
 
 def texture_response(picture: Plane, chart: Plane) -> TextureResponse:
