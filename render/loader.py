@@ -240,7 +240,7 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Mit
     config = mi.parser.ParserConfig(variant())
     config.merge_meshes = merge_meshes
     try:
-        state = mi.parser.parse_dict(config, _with_textures(description))
+        state = mi.parser.parse_dict(config, with_textures(description))
         mi.parser.transform_all(config, state)
         with at_least_two_threads():
             return mi.parser.instantiate(config, state)
@@ -249,12 +249,12 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Mit
         raise InputError(f"scene {scene.name}: Mitsuba can't load it: {words}; correct the description") from error
 
 
-def _with_textures(node: Node) -> Node:
-    """Copy of a scene's dict in which bitmaps of plain bytes are Mitsuba's tensors of 0 to 1."""
-    made = {key: _with_textures(value) if isinstance(value, dict) else value for key, value in node.items()}
-    data = made.get("data")
-    if isinstance(data, np.ndarray):
-        made["data"] = mitsuba_module().TensorXf(np.asarray(data[..., None] / 255, np.float32))
+def with_textures(node: Node) -> Node:
+    """Copy of a scene's dict in which bitmaps whose ``data`` are rows of bytes in hexadecimal are tensors of 0 to 1."""
+    made = {key: with_textures(value) if isinstance(value, dict) else value for key, value in node.items()}
+    if made.get("type") == "bitmap" and isinstance(made.get("data"), list):
+        rows = np.array([list(bytes.fromhex(row)) for row in made["data"]], np.float32)
+        made["data"] = mitsuba_module().TensorXf(rows[..., None] / 255)
     return made
 
 

@@ -147,7 +147,8 @@ class Scene:
     def description(self) -> Node:
         """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power.
 
-        Coloured emitters are left as they are: Mitsuba has no parameter for a factor on them.
+        Coloured emitters are left as they are: Mitsuba has no parameter for a factor on them. Bitmaps whose ``data``
+        are rows of bytes, as in `dead_leaves`, are for `render.loader.with_textures` to turn into Mitsuba's tensors.
         """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 

@@ -89,7 +89,7 @@ def mixed(share: Greys, dark: Spectrum, bright: Spectrum) -> Node:
 
     The first row is the upper one, as a camera sees the front of a panel that `look_at` turns to it.
     """
-    rows = share[::-1]  # Mitsuba counts them from below
+    rows = [row.tobytes().hex() for row in share[::-1]]  # Mitsuba counts them from below
     squares = {"type": "bitmap", "data": rows, "raw": True, "filter_type": "nearest", "wrap_mode": "clamp"}
     dark_side, bright_side = ({"type": "diffuse", "reflectance": spectrum_node(x)} for x in (dark, bright))
     return {"type": "twosided", "bsdf": {"type": "blendbsdf", "weight": squares, "a": dark_side, "b": bright_side}}

@@ -1,15 +1,17 @@
-"""Flare: how much of a bright surround's light a lens scatters onto a black patch."""
+"""What a lens does to even light: flare onto a black patch in a bright surround, and falloff in the corners."""
 
 from dataclasses import replace
-from math import nan
+from math import nan, radians, tan
 
 import numpy as np
 
 from render.radiance import SpectralRadiance
+from rodcone.types import Plane
 from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.lens.scatter import scatters
 from sensor.optics import form_image
 from sensor.response import expected_electrons
 from studies.score.even_field import SIDE_PX
@@ -20,22 +22,31 @@ PATCH_PX, BORDER_PX = 32, 2  # the black square's side, and the pixels of its bo
 WHITE_SHARE = 0.8  # of the converter's top
 
 
+VIEW_PX = 96, 128  # height and width of the picture whose corners are measured
+CORNER_PX = 16  # side of a corner, and half of the middle's
+
+
 def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the veiling glare index of a lens that states a share g of evenly scattered light.
 
-    A black square takes the share a of a white picture. It reads g (1 - a), and the white 1 - g + g (1 - a).
+    A black square takes the share a of a white picture. It reads g (1 - a), and the white 1 - g + g (1 - a). Wings, by
+    the angle from each light, have no closed form on a chart, and are measured alone.
     """
     glare = sensor.lens.veiling_glare
     lit = glare * (1 - (PATCH_PX / SIDE_PX) ** 2)
+    wings = scatters(sensor.lens)
+    missing = "" if lit or wings else "the lens states no glare; state veiling_glare or scatter in [lens]"
+    if wings and not sensor.lens.horizontal_view_deg:
+        missing = "wings need an angle of view; state horizontal_view_deg in [lens]"
     merit = Merit(
         "iso_9358.veiling_glare_index",
         "veiling glare index",
         "%",
         "ISO 9358, black patch in a white surround (flare)",
         f"{channel}, raw, black square of {100 * (PATCH_PX / SIDE_PX) ** 2:.1f} % of the picture, {light}, share of "
-        f"scattered light {glare:g}",
-        100 * lit / (1 - glare + lit) if lit else nan,
-        missing="" if lit else "the lens states no glare; state veiling_glare in [lens]",
+        f"evenly scattered light {glare:g}{', and wings by angle' if wings else ''}",
+        nan if missing or wings else 100 * lit / (1 - glare + lit),
+        missing=missing,
     )
     if merit.missing:
         return Definition((merit,), not_measured)
@@ -47,7 +58,11 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
     reflectance = np.ones((side, side))
     reflectance[start:stop, start:stop] = 0.0
     radiance = SpectralRadiance(
-        reflectance[..., None] * bands.spectrum, bands.wavelength_nm, width_nm=bands.width_nm, light=bands.lamp
+        reflectance[..., None] * bands.spectrum,
+        bands.wavelength_nm,
+        width_nm=bands.width_nm,
+        light=bands.lamp,
+        horizontal_view_deg=sensor.lens.horizontal_view_deg or None,
     )
     chart_e = expected_electrons(form_image(radiance, plain), plain, exposure_s)
     chart_e = chart_e * WHITE_SHARE * plain.top_e / plain.sites**2 / chart_e.max()
@@ -62,3 +77,51 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
         return [100 * float(raw.electrons[black & seen].mean() / raw.electrons[white].mean())]
 
     return Definition((merit,), measure)
+
+
+def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
+    """Define the light in the corners over that in the middle, of a lens that states its angle of view.
+
+    At the tangent t of the angle off the axis it is cos^4 = 1 / (1 + t^2)^2.
+    """
+    lens, (height, width) = sensor.lens, VIEW_PX
+    across = tan(radians(lens.horizontal_view_deg / 2))
+    tangents = ((np.arange(side) - (side - 1) / 2) * 2 * across / width for side in VIEW_PX)
+    cos4 = (1 + np.add.outer(*(tangent**2 for tangent in tangents))) ** -2
+    merit = Merit(
+        "lens.corner_illumination",
+        "relative illumination of the corners",
+        "1",
+        "like ISO 17957 (shading): corners over the middle",
+        f"{channel}, raw, an even field of 4:3, {lens.horizontal_view_deg:g} degrees wide, {light}, corners of "
+        f"{100 * CORNER_PX / width:.1f} % of the width; natural falloff, no mechanical vignetting",
+        _corners_over_middle(cos4),
+    )
+    if not lens.horizontal_view_deg:
+        missing = "the lens states no angle of view; state horizontal_view_deg in [lens]"
+        return Definition((replace(merit, computed=nan, missing=missing),), not_measured)
+    plain = replace(
+        sensor, lens=replace(lens, shake_um=0.0, diffraction=0.0, defocus_um=0.0, veiling_glare=0.0, scatter=0.0)
+    )
+    plain = replace(plain, lens=replace(plain.lens, eye_age_years=0.0))
+    bands = bands_of(light)
+    even = np.ones((height * sensor.sites, width * sensor.sites, 1)) * bands.spectrum
+    radiance = SpectralRadiance(even, bands.wavelength_nm, width_nm=bands.width_nm, light=bands.lamp)
+    field_e = expected_electrons(form_image(radiance, plain), plain, exposure_s)
+    field_e = field_e * WHITE_SHARE * plain.top_e / plain.sites**2 / field_e.max()
+
+    def measure(rng: np.random.Generator) -> list[float]:
+        chip = draw_device(plain, field_e.shape, rng)
+        lit, dark = (expose(light_e, plain, exposure_s, chip, rng) for light_e in (field_e, np.zeros_like(field_e)))
+        seen_e = np.where(mask(lit.cfa, channel, lit.shape), lit.electrons - dark.electrons, np.nan)
+        return [_corners_over_middle(seen_e)]
+
+    return Definition((merit,), measure)
+
+
+def _corners_over_middle(plane: Plane) -> float:
+    """Divide the mean of four corners by that of the middle, which is as large; nan where nothing was measured."""
+    ends = slice(None, CORNER_PX), slice(-CORNER_PX, None)
+    corners = [plane[rows, columns] for rows in ends for columns in ends]
+    rows, columns = (slice(side // 2 - CORNER_PX, side // 2 + CORNER_PX) for side in plane.shape)
+    return float(np.nanmean(corners) / np.nanmean(plane[rows, columns]))

@@ -13,7 +13,8 @@ from studies.score.contrast import contrast_figures
 from studies.score.developed import developed_figures
 from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit, measured
-from studies.score.flare import flare
+from studies.score.flare import corner_illumination, flare
+from studies.score.flicker import flicker
 from studies.score.noise_figures import field_words, noise_figures
 from studies.score.output_speeds import output_speeds
 from studies.score.print_figures import print_figures
@@ -30,11 +31,13 @@ GROUPS = (
     "iso_15739",
     "print",
     "iso_9358",
+    "lens",
     "iso_12233",
     "iso_19567",
     "ieee_1858",
     "information",
     "ieee_2020",
+    "flicker",
     "iso_17321",
     "color_checker",
     "emva_1288",
@@ -125,6 +128,8 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield from print_figures(field, field_words(field, light))
     if _group_wanted("iso_9358", only):
         yield flare(sensor, light, exposure_s, channel)
+    if _group_wanted("lens", only):
+        yield corner_illumination(sensor, light, exposure_s, channel)
     if _group_wanted("iso_15739", only):
         yield raw_visual_noise(sensor, light, exposure_s)
     if any(_group_wanted(group, only) for group in ("iso_12233", "ieee_1858", "information")):
@@ -133,6 +138,8 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield texture(sensor, light, exposure_s, channel)
     if _group_wanted("ieee_2020", only):
         yield from contrast_figures(sensor, light, exposure_s, channel)
+    if _group_wanted("flicker", only):
+        yield flicker(field, light)
     if any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
         yield colour_figures(sensor, light, exposure_s)
 

@@ -13,7 +13,7 @@ from refusal import refusal
 from render.engine import render
 from render.geometry import look_at, rotate, scale, to_world, translate
 from render.integrator.matte import STEPS, TableReader
-from render.loader import Film, load_groups, mitsuba_module, variant
+from render.loader import Film, load_groups, mitsuba_module, variant, with_textures
 from render.scene import LightGroup, Scene, spectrum_node, uniform_node
 from render.spectrum import Spectrum, flat
 from render.user_scene.scene_paths import search_path
@@ -65,7 +65,7 @@ def test_mitsuba_loads_a_description_in_the_scalar_and_the_active_variant(name):
     try:
         for kind in ("scalar_spectral", variant()):
             mi.set_variant(kind)
-            loaded = mi.load_dict(copy.copy(description))
+            loaded = mi.load_dict(with_textures(copy.copy(description)))
             assert len(loaded.sensors()) == 1
             assert loaded.emitters()
     finally:

@@ -131,6 +131,41 @@ def test_flare_is_the_share_that_scatters_by_hand() -> None:
     assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)  # 12 standard errors of the mean
 
 
+def test_the_corners_of_a_wide_lens_have_cos4_and_frames_show_it() -> None:
+    """60 degrees across 4:3: 0.536 over blocks of an eighth; by hand at the blocks' middles 0.521 over 0.973."""
+    sensor = public.low_noise()
+    wide = replace(sensor, lens=replace(sensor.lens, horizontal_view_deg=60.0))
+    (merit,) = score(wide, only=["lens"])
+    at = np.tan(np.radians(30.0))
+    corner = (1 + (at * 112 / 128) ** 2 + (at * 80 / 128) ** 2) ** -2
+    middle = (1 + 2 * (at * 16 / 64) ** 2 / 3) ** -2
+    assert merit.computed == pytest.approx(corner / middle, rel=5e-3)
+    assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)  # 12 standard errors of the mean
+    assert "states no angle of view" in score(sensor, only=["lens"])[0].missing
+
+
+def test_wings_are_measured_without_a_closed_form() -> None:
+    """2 % scattered by angle veil a black patch; without an angle of view they have no size."""
+    sensor = public.low_noise()
+    hazy = replace(sensor, lens=replace(sensor.lens, scatter=0.02))
+    assert "need an angle of view" in score(hazy, only=["iso_9358"])[0].missing
+    (merit,) = score(replace(hazy, lens=replace(hazy.lens, horizontal_view_deg=60.0)), only=["iso_9358"])
+    assert np.isnan(merit.computed)
+    assert 0.1 < merit.measured < 2.0
+
+
+def test_flicker_is_the_sinc_s_and_frames_show_it() -> None:
+    """A depth of 0.52 at 100 Hz in 2 ms: 0.52 sin(0.2 pi) / (0.2 pi); within 0.1 of 1 for 2 / pi asin(0.1 / that)."""
+    swing = 0.52 * np.sin(0.2 * pi) / (0.2 * pi)
+    index, share = score(public.low_noise(), only=["flicker"])
+    assert index.computed == pytest.approx(swing)
+    assert share.computed == pytest.approx(2 / pi * np.arcsin(0.1 / swing))
+    for merit in (index, share):
+        assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
+    assert index.high - index.low < 1e-3
+    assert "other parts of the lamp's period" in score(public.preset("staggered"), only=["flicker"])[0].missing
+
+
 def test_what_a_camera_does_not_have_is_left_out_with_its_reason() -> None:
     rows = {
         row.name: row for row in score(public.low_noise("mono"), only=["iso_9358", "color_checker", "print.portrait"])

@@ -1,0 +1,68 @@
+"""Flicker figures of IEEE 2020: how much a lamp's flicker shows in frames that start at any time of its period."""
+
+from dataclasses import replace
+from math import nan
+
+import numpy as np
+
+from rodcone.errors import InputError
+from sensor.flicker.figures import TOLERANCE, flicker_figures
+from sensor.flicker.rows import check_flicker, row_weights
+from sensor.flicker.waveform import waveform
+from studies.score.even_field import EvenField, even_field
+from studies.score.figure import Definition, Merit, not_measured
+
+LAMP, EXPOSURE_S = "metal_halide@100Hz", 0.002  # a lamp on the mains, and a fifth of its period
+FRAMES = 40  # of a measurement, that start evenly over the lamp's period
+WHITE_SHARE = 0.4  # of what the largest reading holds, for the lamp's mean light
+
+
+def flicker(plain: EvenField, light: str) -> Definition:
+    """Define the modulation index and the mitigation probability of an even field's camera.
+
+    In closed form they are those of the exposure and the lamp alone; frames show what the camera makes of them.
+    """
+    lamp = waveform(LAMP)
+    known = flicker_figures(lamp, EXPOSURE_S)
+    words = (
+        f"{plain.channel}, raw means of {FRAMES} frames that start evenly over the period, {light} from a lamp that "
+        f"swings by {100 * lamp.depth:.0f} % at {lamp.frequency_hz:g} Hz ({LAMP}), {EXPOSURE_S * 1e3:g} ms"
+    )
+    merits = (
+        Merit(
+            "flicker.modulation_index",
+            "flicker modulation index",
+            "1",
+            "IEEE 2020-2024: (most - least) / (most + least) of a frame's light",
+            f"{words}; of the cosine that fits the frames",
+            known.modulation_index,
+        ),
+        Merit(
+            "flicker.mitigation_probability",
+            "modulation mitigation probability",
+            "1",
+            f"IEEE 2020-2024: share of frames within {100 * TOLERANCE:.0f} % of the mean",
+            words,
+            known.mitigation_probability,
+        ),
+    )
+    try:
+        check_flicker(plain.sensor)
+    except InputError:
+        reason = "readings of a part of the exposure see other parts of the lamp's period"
+        return Definition(tuple(replace(x, computed=nan, missing=reason) for x in merits), not_measured)
+    field = even_field(plain.sensor, plain.light, EXPOSURE_S, plain.channel)
+    mean_cd_m2 = WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2
+
+    def measure(rng: np.random.Generator) -> list[float]:
+        chip = field.draw_chip(rng)
+        dark = field.samples_e(field.shoot(0.0, chip, rng)).mean()
+        phases = (np.arange(FRAMES) + rng.random()) / FRAMES
+        light_of = [float(row_weights(lamp, field.sensor, 1, EXPOSURE_S, phase * lamp.period_s)[0]) for phase in phases]
+        seen = np.array([field.samples_e(field.shoot(mean_cd_m2 * x, chip, rng)).mean() - dark for x in light_of])
+        turns = 2 * np.pi * phases
+        swing = 2 * float(np.hypot(seen @ np.cos(turns), seen @ np.sin(turns))) / FRAMES
+        mean = float(seen.mean())
+        return [swing / mean, float(np.mean(np.abs(seen / mean - 1) <= TOLERANCE))]
+
+    return Definition(merits, measure)
