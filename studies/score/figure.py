@@ -1,5 +1,6 @@
 """A figure of merit: what a closed form says, and what repeated measurements on simulated frames say."""
 
+import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite, nan
@@ -74,9 +75,7 @@ def measured(definition: Definition, seed: int) -> list[Merit]:
     """
     if all(merit.missing for merit in definition.merits):
         return list(definition.merits)
-    # A stream per name, so that a figure doesn't depend on which others are asked for.
-    key = int.from_bytes(definition.merits[0].name.encode(), "little") % 2**63
-    seeds = [np.random.SeedSequence((seed, key, repeat)) for repeat in range(REPEATS)]
+    seeds = [np.random.SeedSequence((seed, stream(definition.merits[0].name), repeat)) for repeat in range(REPEATS)]
     values = np.array([definition.measure(np.random.default_rng(one)) for one in seeds])
     means, spreads = values.mean(axis=0), values.std(axis=0, ddof=1)
     halves = scipy.stats.t.ppf((1 + CONFIDENCE) / 2, REPEATS - 1) * spreads / REPEATS**0.5
@@ -84,6 +83,14 @@ def measured(definition: Definition, seed: int) -> list[Merit]:
         merit if merit.missing else replace(merit, measured=mean, low=mean - half, high=mean + half)
         for merit, mean, half in zip(definition.merits, means.tolist(), halves.tolist(), strict=True)
     ]
+
+
+def stream(name: str) -> int:
+    """Return the number of a figure's own random stream, so that a figure doesn't depend on which others are asked for.
+
+    It is of the whole name: with a stream in common figures miss their intervals together.
+    """
+    return zlib.crc32(name.encode())
 
 
 def not_measured(rng: np.random.Generator) -> list[float]:

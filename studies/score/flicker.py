@@ -13,7 +13,7 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit, not_measured
 
 LAMP, EXPOSURE_S = "metal_halide@100Hz", 0.002  # a lamp on the mains, and a fifth of its period
-FRAMES = 40  # of a measurement, that start evenly over the lamp's period
+FRAMES = 40  # of a measurement, that start at random
 WHITE_SHARE = 0.4  # of what the largest reading holds, for the lamp's mean light
 
 
@@ -25,7 +25,7 @@ def flicker(plain: EvenField, light: str) -> Definition:
     lamp = waveform(LAMP)
     known = flicker_figures(lamp, EXPOSURE_S)
     words = (
-        f"{plain.channel}, raw means of {FRAMES} frames that start evenly over the period, {light} from a lamp that "
+        f"{plain.channel}, raw means of {FRAMES} frames that start at random, {light} from a lamp that "
         f"swings by {100 * lamp.depth:.0f} % at {lamp.frequency_hz:g} Hz ({LAMP}), {EXPOSURE_S * 1e3:g} ms"
     )
     merits = (
@@ -57,12 +57,13 @@ def flicker(plain: EvenField, light: str) -> Definition:
     def measure(rng: np.random.Generator) -> list[float]:
         chip = field.draw_chip(rng)
         dark = field.samples_e(field.shoot(0.0, chip, rng)).mean()
-        phases = (np.arange(FRAMES) + rng.random()) / FRAMES
-        light_of = [float(row_weights(lamp, field.sensor, 1, EXPOSURE_S, phase * lamp.period_s)[0]) for phase in phases]
-        seen = np.array([field.samples_e(field.shoot(mean_cd_m2 * x, chip, rng)).mean() - dark for x in light_of])
+        phases = rng.random(FRAMES)
+        light_of = [row_weights(lamp, field.sensor, 1, EXPOSURE_S, x * lamp.period_s)[0] for x in phases.tolist()]
+        frames = (field.shoot(mean_cd_m2 * float(x), chip, rng) for x in light_of)
+        seen = np.array([field.samples_e(raw).mean() - dark for raw in frames])
         turns = 2 * np.pi * phases
-        swing = 2 * float(np.hypot(seen @ np.cos(turns), seen @ np.sin(turns))) / FRAMES
-        mean = float(seen.mean())
-        return [swing / mean, float(np.mean(np.abs(seen / mean - 1) <= TOLERANCE))]
+        waves = np.stack([np.ones(FRAMES), np.cos(turns), np.sin(turns)], axis=1)
+        mean, *swing = np.linalg.lstsq(waves, seen)[0].tolist()
+        return [float(np.hypot(*swing)) / mean, float(np.mean(np.abs(seen / mean - 1) <= TOLERANCE))]
 
     return Definition(merits, measure)

@@ -20,6 +20,8 @@ from studies.study.gain import ISO_SATURATION_LUX_S
 ISO_NOISE_LUX_S = 10.0  # the noise-based speed is 10 over the exposure that has the signal-to-noise ratio
 REFERENCE_SHARE = 0.13  # of the saturation luminance, at which ISO 15739 takes the signal-to-noise ratio
 RAMP = (0.1, 0.2, 0.35, 0.5, 0.65)  # of saturation: light at which the response is measured
+# Of an overexposed field's samples, which reads the converter's top: half of them are less, by what noise took off.
+SATURATED_PERCENT = 95.0
 LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # of the light that the closed form gives, around which a figure is searched
 SNR1S = ("3200 K", 1 / 60, 1.4)  # of SNR1s: colour temperature, exposure time, f-number
 
@@ -129,7 +131,8 @@ def _measured_range(field: EvenField, rng: np.random.Generator) -> float:
     chip = field.draw_chip(rng)
     dark = [field.samples_e(field.shoot(0.0, chip, rng)) for _ in range(2)]
     bright = field.samples_e(field.shoot(1.3 * field.headroom_e / field.electrons_per_cd_m2, chip, rng))
-    return float((bright.mean() - np.mean(dark)) / (np.std(dark[0] - dark[1], ddof=1) / 2**0.5))
+    top_e = np.percentile(bright, SATURATED_PERCENT)
+    return float((top_e - np.mean(dark)) / (np.std(dark[0] - dark[1], ddof=1) / 2**0.5))
 
 
 def _light_for_ratio(field: EvenField, ratio: float, figures: Sequence[Named]) -> Definition:

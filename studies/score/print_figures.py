@@ -18,7 +18,7 @@ from sensor.readings.resolve import several
 from studies.photograph.snr import electrons_at_snr, snr
 from studies.score.even_field import EvenField
 from studies.score.figure import Definition, Merit, not_measured
-from studies.score.noise_figures import light_for, ratio_at
+from studies.score.noise_figures import SATURATED_PERCENT, light_for, ratio_at
 from studies.study.gain import ISO_SATURATION_LUX_S
 
 GREY_SHARE = 0.18  # of saturation, at which the low-light speed takes its ratio
@@ -147,7 +147,8 @@ def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) ->
     about = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
     found = light_for(lambda x: ratio_at(field, x, rng), ratio, about)
     bright = field.shoot(1.3 * field.headroom_e / field.electrons_per_cd_m2, field.draw_chip(rng), rng)
-    return log2(float(field.samples_e(bright).mean()) / (found * field.electrons_per_cd_m2))
+    top_e = float(np.percentile(field.samples_e(bright), SATURATED_PERCENT))
+    return log2(top_e / (found * field.electrons_per_cd_m2))
 
 
 def _colours(field: EvenField) -> Sequence[str]:
