@@ -50,7 +50,7 @@ def main() -> None:
         rest = seconds_of_command(*sweep)
         seconds_of_command("export", str(out), "-o", str(table))
         rows = list(csv.DictReader(table.open()))
-    bare_s = sum(float(row["capture_s"]) + float(row["develop_s"]) for row in rows)
+    bare_s = sum(float(row[step] or 0.0) for row in rows for step in ("capture_s", "develop_s"))
     cells = len(rows) - 1
     print(f"{cells + 1} cells, {given.size}x{given.size}, {given.spp} samples, {given.workers} workers")
     samples = given.size**2 * given.spp * 20  # bands

@@ -61,7 +61,8 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
     # The table: conditions ahead, level and behind; then those in which `OURS` is no worse than all of a kind.
     columns = [(metric, balance) for metric in METRICS for balance in balances]
     seconds = {
-        name: np.median([row.develop_s for of in places.values() for row in of[name]]) for name in (OURS, *names)
+        name: np.median([row.develop_s for of in places.values() for row in of[name] if row.develop_s is not None])
+        for name in (OURS, *names)
     }
     lines = []
     for name in names:

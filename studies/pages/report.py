@@ -197,14 +197,25 @@ def budget_share(report: ReportData) -> float | None:
 
 
 def speed_rows(report: ReportData) -> list[tuple[str, str, float, float]]:
-    """Return camera and sensor, and the mean seconds of capture and of development; NaN where a picture isn't made."""
+    """Return camera and sensor, and the mean seconds of capture and of development, those of first calls left out.
+
+    NaN where a picture isn't made, or where first calls alone are.
+    """
     cells = grid(report)
     rows = []
     for sensor, camera in product(range(len(report.sensors)), range(len(report.cameras))):
         firsts = [cell.first for cell in cells[:, :, sensor, ..., camera].ravel()]
-        seconds = [[first.capture_s, first.develop_s] if first else [np.nan, np.nan] for first in firsts]
-        names = text.camera_name(report.cameras[camera]), text.plain_name(report.sensors[sensor].name)
-        rows.append((*names, *np.mean(seconds, axis=0).tolist()))
+        steps = [(first.capture_s, first.develop_s) if first else (np.nan, np.nan) for first in firsts]
+        known = ([step for step in of if step is not None] for of in zip(*steps, strict=True))
+        capture_s, develop_s = (float(np.mean(of)) if of else np.nan for of in known)
+        rows.append(
+            (
+                text.camera_name(report.cameras[camera]),
+                text.plain_name(report.sensors[sensor].name),
+                capture_s,
+                develop_s,
+            )
+        )
     return rows
 
 

@@ -43,20 +43,19 @@ class Clock:
 _CALLED = set[Hashable]()  # kinds of calls that this process has made
 
 
-def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float, float]:
-    """Make a call; the first of its kind in a process compiles kernels and loads libraries, so it is made again.
+def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | None, float]:
+    """Make a call; the first of its kind in a process compiles kernels and loads libraries, so it is told apart.
 
     Parameters
     ----------
     call : callable
-        Gives the same each time.
     *kind
         All that a kernel is compiled for.
 
     Returns
     -------
     result, seconds, first_s
-        Seconds of the call, and of the first one before it, 0 where there was none.
+        Seconds of the call, None of a first one; and those of a first one, else 0.
     """
     start = time.perf_counter()
     result = call()
@@ -64,9 +63,7 @@ def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float, f
     if kind in _CALLED:
         return result, seconds, 0.0
     _CALLED.add(kind)
-    start = time.perf_counter()
-    result = call()
-    return result, time.perf_counter() - start, seconds
+    return result, None, seconds
 
 
 def processor_name() -> str:

@@ -24,7 +24,7 @@ from studies.sweep.cells import RenderRecord
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import is_whole
 
-VERSION = 7  # of the tables; raise it with any change to them
+VERSION = 8  # of the tables; raise it with any change to them
 APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
 FILE = "ledger.sqlite"
 _DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)

@@ -156,6 +156,7 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
     """Make what is missing of the files that the scene's cells share."""
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
+    samples = job.plan.samples_a_side(opened.choice)
     for spectrum in job.study.spectra:
         keyed = {
             frame_key(record.content, opened, spectrum, job.study, *sensors): sensors
@@ -165,7 +166,6 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
         absent = {key: sensors for key, sensors in keyed.items() if load_frame(folder, key, sensors[1]) is None}
         if absent:
             light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            samples = job.plan.samples_a_side(opened.choice)
             make_frames(folder, under(transport, spectrum), light, absent, job.study, samples)
 
 

@@ -52,11 +52,12 @@ class Row:
         Of `studies.sweep.provenance.Provenance`; the engines as raw image and picture tell them.
     picture, truth : str
         Files of the developed and the noise-free picture below the folder of pictures.
-    render_s, capture_s, develop_s, measure_s : float
-        Of the render that the cell shares with others, and of its own steps.
+    render_s : float
+        Of the render that the cell shares with others.
+    capture_s, develop_s, measure_s : float or None
+        Of the cell's own steps; None of a step that was the first of its kind in the process.
     first_s : float
-        Of the steps' first calls of their kind in the process, which compile and load: made again, and not in the three
-        above.
+        Of those first steps, which compile and load.
     threads : int
         Of Dr.Jit's kernels in the process.
     finished : str
@@ -113,9 +114,9 @@ class Row:
     picture: str
     truth: str
     render_s: float
-    capture_s: float
-    develop_s: float
-    measure_s: float
+    capture_s: float | None
+    develop_s: float | None
+    measure_s: float | None
     first_s: float
     threads: int
     finished: str

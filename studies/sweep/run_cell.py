@@ -69,7 +69,7 @@ def run_cell(cell: Cell) -> Row:
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
 
-    def burst() -> RawImage:  # `timed` may call it twice: with the same noise
+    def burst() -> RawImage:
         stream = exposure_stream(cell.condition, processor.mosaic, cell.seed)
         hand = shake_stream(cell.seed)
         raws = []

@@ -206,9 +206,9 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
         for count, row in enumerate(coming, start=1):
             add(job.base, row)
             workers.add((row.host, row.worker))
-            seconds["captures"] += row.capture_s
-            seconds[f"develop {row.processor}"] += row.develop_s
-            seconds["metrics"] += row.measure_s
+            seconds["captures"] += row.capture_s or 0.0
+            seconds[f"develop {row.processor}"] += row.develop_s or 0.0
+            seconds["metrics"] += row.measure_s or 0.0
             seconds[FIRST] += row.first_s
             # as wall time: the workers work at the same time
             on_the_clock = {name: value / len(workers) for name, value in seconds.items()}
