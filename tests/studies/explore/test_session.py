@@ -22,6 +22,7 @@ from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
 from sensor.photodiodes import with_gain
 from sensor.presets import low_noise, preset, preset_file, vary
+from sensor.raw_files.raw_file import read_raw
 from sensor.readout import noise_variance
 from studies.explore import chain
 from studies.explore.answers import noise_share, python_of
@@ -184,6 +185,21 @@ def test_what_is_told_of_two_cameras_is_each_ones_own(session):
     assert ["0.02" in python for python in told["python"]] == [True, False]
     transport = small_transport()
     assert (told["spp"], told["render_error"]) == (transport.spp, transport.relative_mc_error)
+
+
+def test_a_negative_holds_the_exposure_that_is_shown_and_a_burst_is_refused(session: Session, tmp_path: Path) -> None:
+    camera = {"exposure": "time", "exposure_s": 0.004, "level_cd_m2": 40.0, "seed": 3} | QUICK
+    exposed = expose_scene(small_transport(), Controls(**camera), Memo())  # type: ignore[arg-type]
+    page = connected(session)
+    assert page.ask(session, "dng", 1, cameras=[camera | {"frames": 1}])["name"] == "explored.dng"
+    (content,) = page.buffers[-1]
+    (tmp_path / "explored.dng").write_bytes(content)
+    raw = read_raw(tmp_path / "explored.dng")
+    np.testing.assert_array_equal(raw.dn, exposed.raw.dn)
+    assert (raw.exposure_s, raw.black_dn, raw.cfa) == (0.004, exposed.raw.black_dn, exposed.raw.cfa)
+    for number in (2, 3):
+        session.take(message("dng", number, cameras=[camera | {"frames": number}]), page.send)
+        assert "dng: a merged burst is no raw file; allowed: 1 frame" in page.wait("error", number)["message"]
 
 
 def test_a_pixels_figures_and_a_histogram_are_those_of_the_frame_that_is_asked_for(session: Session) -> None:
