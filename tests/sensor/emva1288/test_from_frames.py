@@ -89,6 +89,18 @@ def test_a_chip_without_fixed_patterns_has_intervals_that_begin_at_0():
     assert all(each.prnu.high < 0.003 for each in found)
 
 
+def test_an_interval_reaches_as_far_up_as_down_and_roots_do_by_their_squares():
+    """Of K 1.96 of its whole standard error, which is told in parts; of a root the ends of its variance's interval."""
+    sensor = chip()
+    found = measure(sensor, bench(sensor, 4))
+    gain, parts = found.gain_dn_per_e, np.hypot(*found.gain_error)
+    assert gain.high / gain.value - 1 == pytest.approx(1.959964 * parts, rel=1e-6)
+    assert gain.value - gain.low == pytest.approx(gain.high - gain.value, rel=1e-9)
+    for each in (found.read_noise_e, found.dsnu_e, found.prnu):
+        assert 0 < each.low < each.value < each.high
+        assert each.value**2 - each.low**2 == pytest.approx(each.high**2 - each.value**2, rel=1e-9)
+
+
 @cache
 def bad_frames():
     sensor = chip()
