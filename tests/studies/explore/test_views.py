@@ -91,6 +91,12 @@ def test_the_histogram_counts_every_sample_once():
     assert sum(counts[-1] for counts in told["counts"].values()) == full
     assert told["well_e"] == pytest.approx(15000.0, rel=1e-9)
     assert told["floor_e"] == raw.dark_noise_e
+    # eighty bins of one ratio, and each channel's samples in them counted one by one
+    assert np.diff(np.log(edges)) == pytest.approx(np.full(80, np.log(1.05 * 15_000.0 / 0.5) / 80), rel=1e-6)
+    for row, column in np.ndindex(2, 2):
+        samples = np.clip(raw.electrons[row::2, column::2], edges[0], edges[-1]).ravel()
+        places = np.minimum((samples[:, None] >= edges).sum(axis=1), 80) - 1
+        assert told["counts"][raw.cfa[row][column]] == np.bincount(places, minlength=80).tolist()
 
 
 def test_terms_that_belong_to_readings_are_refused_in_one_line():
