@@ -9,7 +9,7 @@ from studies.commands.console import say
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison, markdown
 from studies.pages.report_sweep import sweep_report
-from studies.sweep.database import row_count
+from studies.sweep.database import last_run
 from studies.sweep.export import MOST_ROWS, axis_values, results_json
 
 FILE, RESULTS = "report.html", "results.json"
@@ -77,14 +77,14 @@ def write_results(folder: Path) -> Path:
     InputError, OSError
         As `write_report`.
     """
-    page = render_report(*sweep_report(folder))
-    count = row_count(folder)
+    run = last_run(folder)
+    page, count = render_report(*sweep_report(folder, run=run)), len(run.rows)
     if count > MOST_ROWS:  # none stays that says less than the sweep
         write_files({folder / FILE: page})
         (folder / RESULTS).unlink(missing_ok=True)
         say(f"{count} rows are too many for {RESULTS}: rodcone export {folder} -o rows.csv writes them")
     else:
-        write_files({folder / FILE: page, folder / RESULTS: results_json(folder)})
+        write_files({folder / FILE: page, folder / RESULTS: results_json(run)})
     return folder / FILE
 
 

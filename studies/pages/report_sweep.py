@@ -28,7 +28,7 @@ from studies.photograph.clock import machine
 from studies.study.gain import gain_text
 from studies.study.model import samples_a_side
 from studies.study.study import OWN, label
-from studies.sweep.database import last_run
+from studies.sweep.database import LastRun, last_run
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import in_words, made_by, require_alike, threads, versions
 from studies.sweep.row import AXES, Row
@@ -38,7 +38,7 @@ MOST_CELLS = 1000  # pictures of a first seed on one page: its words compare any
 
 
 def sweep_report(
-    folder: Path, most_pictures: int | None = None, where: Mapping[str, str] | None = None
+    folder: Path, most_pictures: int | None = None, where: Mapping[str, str] | None = None, run: LastRun | None = None
 ) -> tuple[ReportData, ReportPictures]:
     """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
@@ -51,6 +51,8 @@ def sweep_report(
     where : mapping of str to str, optional
         Axes, and the one value of each that is shown. Of a study of more than `MOST_CELLS` pictures a part is shown,
         and a note says which.
+    run : LastRun, optional
+        Of the folder; left out, it is read.
 
     Raises
     ------
@@ -58,7 +60,7 @@ def sweep_report(
         For an unknown axis or value, where there is no results database, one of another version, none of the last
         run's cells is made yet, they were made by different versions, variants or engines, or a picture is gone.
     """
-    run = last_run(folder)
+    run = run or last_run(folder)
     rows, brightness = run.rows, {row.level: row.luminance_cd_m2 for row in reversed(run.rows)}
     require_alike(rows)
     levels = sorted(run.study["levels"], key=lambda level: brightness.get(level, np.inf))

@@ -194,12 +194,6 @@ def rows(base: sqlite3.Connection, everything: bool = False) -> Iterator[Row]:
         yield Row(*_require_sound(values, f"row {values[0]!r}"))
 
 
-def row_count(folder: Path) -> int:
-    """Count the cells of the last run that are made."""
-    with read_results(folder) as base:
-        return int(base.execute("SELECT count(*) FROM wanted JOIN cells USING (key)").fetchone()[0])
-
-
 def last_run(folder: Path) -> LastRun:
     """Read study and rows of a folder's last run, and the seconds per stage, summed over all runs of this study.
 

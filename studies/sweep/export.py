@@ -25,7 +25,7 @@ from scenes.metamers import TWINS_UNDER
 from studies.metrics.confidence import half_width
 from studies.metrics.target_figures import daylight_delta_e, pair_delta_e, patch_masks, true_pair_delta_e
 from studies.study.study import OWN
-from studies.sweep.database import COLUMNS, last_run, read_results, rows
+from studies.sweep.database import COLUMNS, LastRun, read_results, rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.provenance import require_alike
 from studies.sweep.row import AXES, Row
@@ -80,12 +80,11 @@ def write_csv(table: Iterable[Row], path: Path) -> None:
         write_table(file, COLUMNS, ([_harmless(value) for value in vars(row).values()] for row in table))
 
 
-def results_json(folder: Path) -> bytes:
+def results_json(run: LastRun) -> bytes:
     """Study, seconds by stage and rows of a sweep's last run, as a JSON file.
 
     A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
-    run = last_run(folder)
     cells = []
     for row in run.rows:
         values = finite(vars(row))

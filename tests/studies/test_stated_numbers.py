@@ -14,6 +14,7 @@ from rodcone.jit import backend
 from sensor.presets import low_noise
 from studies.study import render_noise
 from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.sweep.database import last_run
 from studies.sweep.export import read_rows, results_json
 
 
@@ -56,7 +57,7 @@ def test_the_results_state_the_render_that_was_made(monkeypatch: pytest.MonkeyPa
     limits = RenderLimits(size=size, spp=33, noise_share=1e-6)
     study = Study((SceneChoice("slanted_edge"),), ("0.001cd/m2", "1000cd/m2"), render=limits)
     swept(study, tmp_path)
-    found = json.loads(results_json(tmp_path))["rows"]
+    found = json.loads(results_json(last_run(tmp_path)))["rows"]
     (transport,), told = made, found[0]["render"]
     assert found[0]["spp"] == paths["camera"] / (2 * size) ** 2 / len(transport.groups)
     assert told["stopped_by"] == "samples"

@@ -305,3 +305,12 @@ def test_a_renders_facts_are_those_of_its_rows() -> None:
     other = replace(row, scene="table", spp=1.0, bands=2, render_s=3.0)
     assert render_of([other, row], "desk") == ReportRender("desk", 64.0, 20, 1.5, "file", "samples", 0.01)
     assert render_of([row], "street") == ReportRender("street")
+
+
+def test_results_are_written_from_one_reading_of_the_database(tmp_path, monkeypatch):
+    SAMPLE.swept(SAMPLE.small_study(tmp_path), tmp_path / "out")
+    opened, connect = [], sqlite3.connect
+    monkeypatch.setattr("sqlite3.connect", lambda *given, **named: opened.append(given) or connect(*given, **named))
+    write_results(tmp_path / "out")
+    assert len(opened) == 1
+    assert len(json.loads((tmp_path / "out" / "results.json").read_bytes())["rows"]) == 4
