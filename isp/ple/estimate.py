@@ -253,7 +253,15 @@ def _solve_by_light(
 def _solve_one_light(
     components: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
-    """Estimate the patches `index`, whose samples are y, from the prior's components at one light."""
+    """Estimate the patches `index`, whose samples are y, from the prior's components at one light.
+
+    With i_d the pilot's innovation in direction d (`Whitening.reads`), s_d its variance without the pilot's own noise
+    n, and c_d its covariance with the patch's values,
+
+        x = t + C_xy C_yy^-1 (y - t_y) + sum_d c_d i_d / (n + s_d),   v = v_y - sum_d c_d^2 / (n + s_d),
+
+    where v_y is the posterior variance given the samples alone.
+    """
     noise = None
     # Patches whose linear estimate falls under black: `on_the_curve` estimates them again.
     below = [np.empty(0, np.intp)]
@@ -280,7 +288,7 @@ def _solve_one_light(
                     estimator.variance - precision @ estimator.pilot_variance,
                     estimator.inner - precision @ estimator.pilot_inner,
                 )
-                # The pilot's means give way to their innovation times its precision.
+                # The pilot's means p give way to i_d / (n + s_d), the precision times the innovation.
                 rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
             # A patch that no component explains has a larger posterior variance, by `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT

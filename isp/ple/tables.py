@@ -188,8 +188,13 @@ class Table:
     def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
         """Return the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
 
-        The other directions count by their summed squares alone. The likelihood of all components is then one matrix
-        times the products of pairs of coordinates, the coordinates, that sum, and 1.
+        With z a patch's coordinates, of mean m and covariance C in a component of weight w, and q the summed squares in
+        the n other directions, which count by their mean variance o alone, twice the log likelihood is
+
+            2 log w - (z - m)^T C^-1 (z - m) - log |C| - q / o - n log o.
+
+        That of all components is one matrix times the products of pairs of z, z, q and 1: C^-1, C^-1 m, 1 / o and the
+        rest.
         """
         at = self.rows
         own = len(self.rows)
@@ -238,6 +243,7 @@ class Table:
         ks = [k for k in components if k not in self._whitenings]
         if not ks:
             return
+        # C_yy = S A S + d d^T + N: A of the roots, S their slopes, d what an error of the light brings, N noise.
         at = self.rows
         own = len(self.rows)
         slopes, drift = self.slopes[ks][:, at], self.drift[ks][:, at]
@@ -246,8 +252,10 @@ class Table:
         scatter *= slopes[:, None]
         scatter += drift[:, :, None] * drift[:, None]
         scatter[:, np.arange(own), np.arange(own)] += self.noise[ks]
+        # F of F C_yy F^T = 1, so that F (y - t_y) are independent numbers of variance 1.
         factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(scatter)])
-        # The pilot is turned so that its directions are independent given the samples.
+        # H = C_py F^T. The pilot's innovation p - t_p - H F (y - t_y), in units of its errors, is turned so that its
+        # four directions are independent given the samples: by the eigenvectors of its covariance C_pp - H H^T.
         half = self.pilot_samples[ks] @ factors.swapaxes(1, 2)
         left = self.white @ (self.pilot_pilot[ks] - half @ half.swapaxes(1, 2)) @ self.white.T
         spread, turns = np.linalg.eigh(left)
@@ -283,17 +291,19 @@ class Table:
         return self._estimators[k]
 
     def _make_estimator(self, k: int) -> Estimator:
+        # With F of `make_whitenings`: the estimate's matrix C_xy C_yy^-1 = H F, where H = C_xy F^T.
         at = self.rows
         whitening = self.whitening(k)
         factor = whitening.reads[: len(at), : len(at)].T.astype(np.float64)
         covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
         half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
         linear = half @ factor
-        # Posterior covariances given the samples: of every pixel, of the pilot's means and of the middle's.
+        # C_xx - H H^T, the posterior covariance given the samples: its diagonal for every pixel, its rows for the
+        # pilot's means and the middle's.
         variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
         means = np.concatenate([self.average, self.inner])
         left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T
-        pilot = whitening.turn @ left[:4]
+        pilot = whitening.turn @ left[:4]  # covariance of the pilot's four innovations with every value
         inner = (left[4:] * self.inner).sum(axis=1)
         offset = self.over_black[k] - linear @ self.values[k, at]
         return Estimator(
