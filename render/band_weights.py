@@ -1,11 +1,11 @@
 """Integrals of a curve and light that is known by its band means: the weight of each band, and the error that is left.
 
 Light within a band is a transport T (what surfaces and paths make of a lamp) times the lamp's own spectrum S. T is
-smooth, and S is known to the last line, so that the integral of a curve Q over the light is that of S Q times T, and T
-is interpolated from its band means. As interpolation T is taken as a Gaussian process of wavelength: its covariance
-gives the weights of the least expected squared error (Rasmussen & Williams, "Gaussian Processes for Machine Learning",
-2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature") and that error itself. Weights are at least 0,
-and where they would turn a render's noise up by more than 5 %, the ones of least error within that are taken.
+smooth, and S is known to the last line. The integral of a curve Q over the light is therefore the integral of S Q T, in
+which T is interpolated from its band means. For the interpolation, T is taken as a Gaussian process over wavelength:
+its covariance gives the weights of least expected squared error, and that error (Rasmussen & Williams, "Gaussian
+Processes for Machine Learning", 2.25; integrals as O'Hagan 1991, "Bayes-Hermite quadrature"). Weights are at least 0.
+If the best ones would raise a render's noise by more than 5 %, the weights of least error within that limit are taken.
 """
 
 from collections.abc import Callable
@@ -24,20 +24,19 @@ Curves = Callable[[Floats], Floats]  # wavelengths (n,) [nm] to values (curve, n
 # Covariance of T: Matern's of order 5/2, variance 1, on a mean that may be anything. With this length the expected
 # error of chart patches is 0.7 to 2.4 times what it is (benchmarks/bands.py), and the weights hardly depend on it.
 LENGTH_NM = 100.0
-_MEAN_VARIANCE = 100.0  # holds the sum of weights while they are brought to 0 or more
-_ROUNDING = 1e-9  # variance of what a band's mean is known to: keeps bands of 1 nm apart
-_STEP_NM = 2.5  # longest piece that a quadratic rule takes
-NARROW_NM = 2.0  # within a band up to so wide T is as good as constant
+_MEAN_VARIANCE = 100.0  # variance of T's mean, which keeps the sum of weights while they are brought to 0 or more
+_ROUNDING = 1e-9  # variance of a band mean's own error, without which bands of 1 nm can't be told apart
+_STEP_NM = 2.5  # longest piece that the quadrature takes at once
+NARROW_NM = 2.0  # T is as good as constant within a band of at most this width
 _NODES = np.array([-1.0, 1.0]) / 3**0.5  # Gauss-Legendre, exact for cubics
 _IN_BAND, _IN_BAND_SHARES = np.polynomial.legendre.leggauss(4)
-_LEAST_BESIDE_DARK = 1e-2  # of a lamp's light
-LEAST_LIGHT = 1e-6  # of the brightest band's: darker ones tell nothing of T
-_TOUCH, _AS_WIDE = 0.02, 1.5  # gap over width, ratio of widths
-_LEAST_NEGATIVE = 1e-9  # of the largest weight: rounding
-MOST_NOISE = 1.05  # of weights: times that of products of averages
-# of T's variance: found within 0.5 %
-_RIDGES = (1e-8, 10.0)
-_HALVINGS = 12
+_LEAST_BESIDE_DARK = 1e-2  # share of its light in bands beside dark ones, above which a lamp is one of few lines
+LEAST_LIGHT = 1e-6  # share of the brightest band's light, below which a band is dark and says nothing about T
+_TOUCH, _AS_WIDE = 0.02, 1.5  # neighbouring bands: largest gap over their width, and largest ratio of their widths
+_LEAST_NEGATIVE = 1e-9  # share of the largest weight that a negative weight may have by rounding
+MOST_NOISE = 1.05  # largest noise of weights, over that of products of averages
+_RIDGES = (1e-8, 10.0)  # smallest and largest ridge tried, in units of T's variance
+_HALVINGS = 12  # steps of the search between them, which finds a ridge within 0.5 %
 
 
 class LampSpectrum(Protocol):
@@ -59,17 +58,19 @@ class BandPoints:
     Attributes
     ----------
     nm : (n,) float64
+        Wavelength of each point.
     step_nm : (n,) float64
-        Share of the integral.
+        Weight of each point in an integral over wavelength.
     band : (n,) int
-        Whose band each lies in.
+        Index of the band in which each point lies.
     light : (n,) float64
         The light over its mean in the band; 0 in dark bands.
     mean : (band,) float64
         Mean of the light in each band.
     run : (band,) int
-        Bands of one number tell of each other. Of a lamp that is known all do; of light that isn't, neighbours that
-        touch and are about as wide: a narrow band may hold a line, that its neighbours know nothing of.
+        Number of the run that a band belongs to: T is interpolated within a run. Under a known lamp all bands are one
+        run. Under unknown light only neighbours that touch and are about equally wide are, because a narrow band may
+        hold a line, which its neighbours don't show.
     """
 
     nm: Floats
@@ -86,23 +87,28 @@ class BandPoints:
 
 
 def of_few_lines(energy: Floats) -> bool:
-    """Whether dark bands lie beside much of a lamp's light: they tell what surfaces do at its lines.
+    """Whether bands beside dark ones hold more than a hundredth of a lamp's light, as those of a lamp of few lines do.
+
+    The transport in such dark bands says how surfaces reflect at the line.
 
     Parameters
     ----------
     energy : (band,) float64
+        The lamp's light in each band.
     """
     dark = np.concatenate([[False], energy <= LEAST_LIGHT * energy.max(initial=0.0), [False]])
     return bool(energy[dark[:-2] | dark[2:]].sum() > _LEAST_BESIDE_DARK * energy.sum())
 
 
 def points_of(knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: LampSpectrum | None) -> BandPoints:
-    """Points on which bands are summed, two in each piece between knots; no light: the same at all wavelengths.
+    """Place the points at which integrals over bands are summed: two in each piece between knots.
 
     Parameters
     ----------
     knots_nm : (n,) float64
-        Where the curves have corners or steps; the light's own are added.
+        Wavelengths at which the curves have corners or steps; the light's own are added.
+    light : LampSpectrum, optional
+        Left out, it is the same at all wavelengths.
     """
     knots = knots_nm if light is None else np.concatenate([knots_nm, light.wavelength_nm])
     knots = np.unique(knots)
@@ -255,11 +261,14 @@ class Interpolation:
         return result
 
     def _of_ridge(self, values: Floats, ridge: float) -> Floats:
-        """Weights of the least expected error plus `ridge` times their squares, of any sign, shape (curve, known)."""
+        """Return the weights that minimise the expected error plus `ridge` times their squares, shape (curve, known).
+
+        They may be negative.
+        """
         of_light = self._of_light(values)
         factor = scipy.linalg.cho_factor(self.among + ridge * np.eye(self.known.size))
         result = scipy.linalg.cho_solve(factor, (of_light @ self.towards).T).T
-        # Universal kriging: whatever is the same all over a run is found exactly.
+        # Universal kriging: a T that is constant over a run is integrated exactly.
         run = self.points.run[self.known]
         each = run[:, None] == np.unique(run)
         even = scipy.linalg.cho_solve(factor, each.astype(np.float64))
@@ -302,12 +311,12 @@ def band_covariance(wavelength_nm: Floats, width_nm: Floats) -> Floats:
 
 
 def _nodes(wavelength_nm: Floats, width_nm: Floats) -> Floats:
-    """Where means over bands are summed, shape (band x node,)."""
+    """Return the wavelengths of the nodes by which means over bands are computed, shape (band x node,)."""
     return np.asarray((wavelength_nm[:, None] + width_nm[:, None] / 2 * _IN_BAND).ravel())
 
 
 def _means(covariance: Floats) -> Floats:
-    """Means over each band, along the last axis, of what is known at `_nodes`."""
+    """Average over each band, along the last axis, values that are given at `_nodes`."""
     return np.asarray(covariance.reshape(len(covariance), -1, _IN_BAND.size) @ (_IN_BAND_SHARES / 2))
 
 
@@ -321,7 +330,7 @@ def _least(root: Floats, target: Floats, ridge: float) -> Floats:
 
 
 def _within_noise(best: Floats, of_ridge: Callable[[float], Floats], most: float) -> Floats:
-    """Return `best`, or weights of the least ridge whose noise is at most `most`."""
+    """Return `best` if its noise is at most `most`; else the weights of the smallest ridge that keeps to it."""
     if _noise(best) <= most:
         return best
     low, high = _RIDGES

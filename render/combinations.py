@@ -16,10 +16,12 @@ from render.scene import Node, Scene, emitter_paths, walk
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
-# Of rounded numbers in a file: a tenth of what a float32 of Mitsuba's resolves over a picture of 10 000 pixels.
+# Largest difference of two transforms that counts as rounding of a file's numbers: a tenth of what Mitsuba's single
+# precision resolves over a picture of 10 000 pixels.
 _SLACK = 1e-5
 _MESHES = ("obj", "ply", "serialized")
-# Shapes on which a map of normals or heights comes out turned where they are mirrored, beside meshes with normals.
+# Shapes on which Mitsuba turns a map of normals or heights the wrong way when they are mirrored, as it does on meshes
+# with normals.
 _MAPS_TURN = {"normalmap": ("rectangle", "disk", "cube", "cylinder"), "bumpmap": ("rectangle", "cube")}
 
 
@@ -40,7 +42,7 @@ def check_combinations(scene: Scene) -> None:
 
 
 def _wrong_pairs(geometry: Node) -> Iterator[tuple[str, str, str]]:
-    """Each wrong pair: the shape and what it has, what Mitsuba does with it, and what is right in its place."""
+    """Give for each wrong pair the shape and its features, what Mitsuba does wrong, and what may stand in its place."""
     parts = _parts_by_name(geometry)
     yield from _lamps_in_groups(parts)
     for instance in _instances(geometry, parts):
@@ -107,7 +109,7 @@ def _wrong_by_its_transform(name: str, shape: Node, parts: Mapping[str, Node]) -
 
 
 def _parts_by_name(geometry: Node) -> dict[str, Node]:
-    """All parts that a reference can name: by key or by id."""
+    """Return all parts that a reference can name, by key and by id."""
     named: dict[str, Node] = {}
     for path, part in walk(geometry):
         if part.get("type") != "ref":
@@ -117,6 +119,7 @@ def _parts_by_name(geometry: Node) -> dict[str, Node]:
 
 
 def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]:
+    """Give all instances of shape groups, which may hold their group or refer to it."""
     for path, node in walk(geometry):
         if node.get("type") != "instance":
             continue
@@ -130,7 +133,7 @@ def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]
 
 
 def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
-    """All parts under a node, those that it refers to among them, each once."""
+    """Give a node and all parts under it, and those that they refer to, each once."""
     pending = [node]
     met = set()
     while pending:
@@ -144,7 +147,7 @@ def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
 
 
 def _matrix(transform: Any) -> Floats:
-    """Upper 3x4 of a `to_world`, whatever holds it; of none that of a shape which stays in its place."""
+    """Return the upper 3x4 of a `to_world` in any of its forms, and that of the identity where there is none."""
     if transform is None:
         return np.eye(4)[:3]
     return np.array(getattr(transform, "matrix", transform), np.float64).reshape(4, 4)[:3]

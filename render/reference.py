@@ -159,13 +159,13 @@ def open_reference(path: str | Path) -> Reference:
 
 
 def _unpacks(file: Path) -> bool:
-    """Whether a file says that it unpacks into no more than half floats pack into."""
+    """Whether a file, by its own directory, unpacks to no more than `MOST_PACKED` times its size."""
     with ZipFile(file) as packed:
         return sum(part.file_size for part in packed.infolist()) <= MOST_PACKED * file.stat().st_size
 
 
 def save_reference(path: Path, transport: Transport, certificate: Mapping[str, Any]) -> None:
-    """Write a reference. What half floats round off is part of the error that the file states."""
+    """Write a reference. The error that the file states includes the rounding to half floats."""
     stored, scale = _half(transport.light.mean)
     rounding = stored * scale - transport.light.mean
     arrays = {
@@ -190,10 +190,10 @@ def save_reference(path: Path, transport: Transport, certificate: Mapping[str, A
 
 
 def _half(planes: Planes) -> tuple[Any, Planes]:
-    """Planes in half floats, and the factor that each is stored over: (group, band, 1, 1).
+    """Return planes as half floats, and the factors (group, band, 1, 1) that turn them back into light.
 
-    A plane's largest value is stored as `_LARGEST_HALF`: light of 1e-9 of it keeps 11 bits, where a lamp in view is a
-    million times brighter than what it lights.
+    A plane's largest value is stored as `_LARGEST_HALF`. Light of 1e-9 of it then keeps 11 bits, which is enough,
+    because a lamp in view is a million times brighter than what it lights.
     """
     largest = planes.max(axis=(2, 3), keepdims=True)
     scale = np.where(largest > 0, largest / _LARGEST_HALF, np.float32(1))

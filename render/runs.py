@@ -81,7 +81,7 @@ class Drawn:
 
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
-    """Return the means before the first run. With `split`, indirect light is also kept by itself."""
+    """Return means of no samples, for a render to begin with. With `split`, indirect light has means of its own too."""
     bands = film.wavelength_nm.size
     groups = scene.groups.values()
     return Means(

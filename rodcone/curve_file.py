@@ -156,7 +156,7 @@ def _parsed(number: int, text: str, separator: str | None) -> _Line:
 
 
 def _cells(text: str, separator: str | None) -> tuple[str, ...]:
-    """Cells of a line, without the empty ones at its end that spreadsheets leave."""
+    """Split a line into cells, without the empty ones that spreadsheets leave at its end."""
     if separator is None:
         return tuple(text.split())
     line = text.rstrip(f"{separator} \t")
@@ -168,7 +168,7 @@ def _cells(text: str, separator: str | None) -> tuple[str, ...]:
 
 
 def _number(cell: str, separator: str | None) -> float | None:
-    """Number of a cell, with a decimal comma where the comma is no separator; None for anything else."""
+    """Return a cell's number, else None. A comma is its decimal point, unless commas separate the cells."""
     if "_" in cell or (separator == "," and "," in cell) or ("," in cell and "." in cell):
         return None
     try:
@@ -178,10 +178,10 @@ def _number(cell: str, separator: str | None) -> float | None:
 
 
 def _table(lines: Sequence[_Line], place: str) -> list[_Line]:
-    """Rows of the one table among lines, none of which may be a broken row.
+    """Return the rows of the only table among lines; refuse lines that are broken rows, and further tables.
 
-    A light meter lists one spectrum in coarse and in fine steps: of tables in its spelling that have the same ends, the
-    finest is taken.
+    A light meter lists one spectrum in coarse and in fine steps. Of such tables with the same first and last wavelength
+    the finest is taken.
     """
     blocks: list[list[_Line]] = []
     for before, line in zip([None, *lines[:-1]], lines, strict=True):

@@ -56,17 +56,17 @@ def write_files(files: Mapping[Path, str | bytes | memoryview]) -> None:
 
 
 def is_half_written(path: Path) -> bool:
-    """Whether a path is a file that `replacing` had begun to write; of a killed program it stays behind."""
+    """Whether a path is a file that `replacing` had begun to write, as a killed program leaves it behind."""
     return bool(_HALF_WRITTEN.fullmatch(path.name)) and path.is_file() and not path.is_symlink()
 
 
 def read_bounded(path: Path, most_bytes: int) -> bytes:
-    """Content of a file.
+    """Read a file of at most `most_bytes` bytes.
 
     Raises
     ------
     ValueError
-        For a folder, a pipe or a device, which may never end, and for more bytes than allowed.
+        For a folder, for a pipe or a device, which may never end, and for a larger file.
     OSError
         Where there is no file, or it can't be read.
     """

@@ -86,7 +86,8 @@ def arrays() -> ModuleType:
 def at_least_two_threads() -> Iterator[None]:
     """Give Dr.Jit a second thread for a while: Mitsuba reads OpenEXR files in its threads.
 
-    The thread that asks waits without helping, so with one thread (a machine of one core) it would wait for ever.
+    The thread that calls Mitsuba waits and doesn't read itself. With one thread, on a machine of one core, it would
+    wait for ever.
     """
     count = dr.thread_count()
     dr.set_thread_count(max(2, count))
@@ -97,7 +98,7 @@ def at_least_two_threads() -> Iterator[None]:
 
 
 def release_memory() -> None:
-    """Give free memory of Dr.Jit and the C library back: of a render, or of many small calls in a row."""
+    """Return free memory of Dr.Jit and the C library to the system, after a render or after many small calls."""
     if backend() != "numpy":
         dr.flush_malloc_cache()
     if sys.platform == "linux" and hasattr(library := ctypes.CDLL(None), "malloc_trim"):  # glibc's

@@ -12,17 +12,17 @@ GB = 1e9
 # Counted from the arrays held at once, and held against peaks that were measured (`tests/rodcone/test_memory.py`).
 _TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
-_DENOISER_BYTES = 1300  # a pixel, of Open Image Denoise
-_DENOISER_LIBRARY_BYTES = 200e6  # and what its folds' launches leave with Dr.Jit
-# While a render draws: its means, both halves' sums of a launch by group, and two copies of one group's.
+_DENOISER_BYTES = 1300  # per pixel, by Open Image Denoise
+_DENOISER_LIBRARY_BYTES = 200e6  # by its library, and by what Dr.Jit keeps of the folds' launches
+# While a render draws: its means, the sums of a launch for each half and group, and two copies of one group's sums.
 _MEANS_ARRAYS, _SUMS_ARRAYS, _COPIES = 2, 2, 2
 _LAUNCH_BYTES = 4 * (1 << 24)  # all channels of a launch at most (`render.runs.MOST_FLOATS`)
-_CHANNELS_BESIDE = 4  # bands
-_LAUNCHES = 2.5  # launches' channels that Dr.Jit keeps: these, their sums, and one copy
-_OTHER_LAUNCHES = 1.0  # for each group more, whose launches are of other sizes once a render takes many samples
-_MANY_SPP = 32
+_CHANNELS_BESIDE = 4  # channels of a launch beside its bands
+_LAUNCHES = 2.5  # how many launches' channels Dr.Jit keeps: one launch's, their sums, and one copy
+_OTHER_LAUNCHES = 1.0  # as many more for each further group, whose launches differ in size in a render of many samples
+_MANY_SPP = 32  # samples per pixel from which on a render has many
 _RENDERER_BYTES = 224e6  # libraries and compiled kernels
-_RENDER_BYTES = 120  # a pixel, for any number of bands: its order, its rate
+_RENDER_BYTES = 120  # per pixel, whatever the number of bands: its order, its rate
 # What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
 # from, an image forming of one of them with its copy for the lens.
 _VIEW_ARRAYS = 10
@@ -30,8 +30,8 @@ _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
 _MAPPED_BYTES = 200e6  # addresses of libraries and threads that a render loads, beyond the memory that they hold
-_FILE_BANDS = 40  # of a picture file
-_FILE_PACKING = 1.5  # its bytes of float32 over those on disk: 1.2 with the noise of a render, more without
+_FILE_BANDS = 40  # bands of a picture file
+_FILE_PACKING = 1.5  # bytes of a picture file in float32 over those on disk: 1.2 with a render's noise, more without
 
 
 @dataclass(frozen=True)

@@ -21,8 +21,10 @@ from sensor.readings.resolve import at_channel, by_site, chip_readings, resolve
 from sensor.readout import spread_charge, unclipped_variance
 from sensor.response import behind_filters, channel_electrons, mixing_of
 
-MOST_FULL = 0.5  # share of the pixels above which an exposure is hardly meant
-DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3  # noise alone takes 3e-5 of the dark pixels so far above their mean
+MOST_FULL = 0.5  # share of full pixels above which an exposure is hardly meant, and a warning says so
+# A pixel is lit from this many deviations of dark noise on, which 3e-5 of dark pixels reach by chance; and the share of
+# lit pixels below which a warning says that the frame is dark.
+DARK_SIGMAS, LEAST_LIT = 4.0, 1e-3
 AUTO, AUTO_W, AUTO_INFORMATION = "auto", "auto:W", "auto:information"
 # What a camera exposes for, by the rule's name; in a mosaic without G `sensor.cfa.unit_channel` is in its place.
 RULES: Mapping[str, str] = MappingProxyType(
@@ -32,14 +34,14 @@ RULES: Mapping[str, str] = MappingProxyType(
         AUTO_INFORMATION: "the time of a ladder that leaves the least expected error in the picture",
     }
 )
-# Of `picture_error`: what is known of a neighbourhood's colour and of a pixel's detail before they are measured.
+# For `picture_error`: how much a neighbourhood's colour and a pixel's detail vary before anything is measured.
 _COLOUR, _DETAIL = 0.2, 0.3  # relative standard deviations
-_TILES = 4  # whose samples tell a colour
-_CLEAR_SIGMAS = 3.0  # below the well, where a reading surely isn't cut
-_GAMMA = 2.4  # root by which sRGB encodes
-_DARKEST = 0.003  # of white, where sRGB's root becomes a line
-_LADDER_THIRDS = -6, 19  # of a stop below the time by green
-_METERED_TILES = 512
+_TILES = 4  # tiles whose samples together show a neighbourhood's colour
+_CLEAR_SIGMAS = 3.0  # standard deviations below full well, from which on down a sample surely isn't clipped
+_GAMMA = 2.4  # exponent of sRGB's encoding
+_DARKEST = 0.003  # share of white below which sRGB's encoding is a line
+_LADDER_THIRDS = -6, 19  # thirds of a stop below green's time: the first step of the ladder, and one past the last
+_METERED_TILES = 512  # tiles that a meter looks at, at most
 
 
 def auto_exposure_s(

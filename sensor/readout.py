@@ -188,13 +188,15 @@ def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[
 def noise_variance(
     expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> NDArray[np.float64]:
-    """Variance of one pixel of one chip drawn at random [e-^2], shape of `expected_e`, clipped as its samples are.
+    """Compute the variance of each sample over chips and exposures [e-^2], in the shape of `expected_e`.
 
-    Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
-    and column offsets, read noise and quantisation (a DN^2 / 12); beside the well, the converter's top and its 0 what
-    they leave of these (`sensor.readings.clipping`). Of several readings, that of the merge over the share of the pixel
-    that all hold together, in which clipping is left out; a camera that switches its gain looks at `expected_e` as one
-    frame.
+    It is the sum of shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was
+    collected, DSNU and column offsets, read noise, and quantisation (a DN^2 / 12). Near the full well, the converter's
+    top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
+
+    For a camera that merges several readings, a sample is the merged electrons over the share of the pixel's electrons
+    that the readings hold together; clipping is left out. A camera that switches its gain chooses it by `expected_e`,
+    taken as one frame.
 
     Parameters
     ----------
@@ -205,19 +207,20 @@ def noise_variance(
     exposure_s : float
         For the dark current [s].
     channel : str, optional
-        Channel of all of them; left out, they are a mosaic's, (h, w). Cameras that read all channels alike don't ask.
+        Channel of all pixels; left out, they are those of a mosaic, (h, w). It changes nothing for a camera that reads
+        all channels alike.
     """
     expected = np.asarray(expected_e, dtype=np.float64)
     return frame_variance(expected, resolve(sensor, expected, exposure_s, channel))
 
 
 def frame_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """`noise_variance` of a frame whose camera is resolved."""
+    """Compute `noise_variance` for a frame whose camera is resolved into readings."""
     return frame_moments(expected_e, readings).variance_e2
 
 
 def frame_moments(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> Moments:
-    """Mean and variance of a frame's clipped samples, and the slope of the mean; of several readings unclipped."""
+    """Return mean, variance and slope of a frame's clipped samples; clipping is left out for several readings."""
     light_e = collected_e(expected_e, readings)
     if several(readings):
         return Moments(light_e, merged_variance(light_e, readings), np.ones_like(light_e))

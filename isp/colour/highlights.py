@@ -16,8 +16,9 @@ from isp.planes import box_sums, rows_at
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
 
-LIT = 0.25  # of the level of highlights: dark samples beside a sharp lamp, and its halo, are under it
-FULL = 0.97  # of it: what shot noise and gains that differ leave of a sample at that level
+# Shares of the level of highlights.
+LIT = 0.25  # a sample above it belongs to a lamp; dark samples beside a sharp lamp, and its halo, are below
+FULL = 0.97  # a sample above it may be at that level itself, because shot noise and unequal gains move it as much
 
 
 def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:

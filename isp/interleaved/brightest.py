@@ -14,10 +14,11 @@ from isp.planes import BLOCK_ROWS
 from isp.settings import SIGMA_S, Settings
 from sensor.raw import RawImage, noise_at_sites
 
-# Of a flat field's samples 3 in 10 000 or fewer are left out at a pixel, and 0.3 % of the light at most, at 0.2 e-.
-SIGMAS = 2.5  # over the brightest of 9 or more
-MOST_SIGMAS = 1e3  # beyond it there is no bound
-FEWEST_E = 2.25  # 1 and 2 electrons count where 9 samples hold none
+# With these numbers a pixel of a flat field leaves out at most 3 of 10 000 samples, and at most 0.3 % of the light,
+# which it does at 0.2 e-.
+SIGMAS = 2.5  # noise above the brightest of the 9 or more samples around, up to which a sample counts
+MOST_SIGMAS = 1e3  # from here on there is no bound
+FEWEST_E = 2.25  # without dark noise, samples of 1 and 2 electrons count even where all samples around hold none
 
 
 def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings) -> NDArray[Any]:
@@ -28,8 +29,8 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
 
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
-    z is `SIGMAS` up to the default sigma_s and rises with it: who lets all patches count as similar gets no bound, nor
-    does who takes the paper's distance. The noise is `sensor.raw.noise_at_sites`.
+    z is `SIGMAS` up to the default sigma_s, and rises in proportion beyond it. Where settings let all patches count as
+    similar, and for the paper's distance, there is no bound. The noise is `sensor.raw.noise_at_sites`.
 
     Parameters
     ----------

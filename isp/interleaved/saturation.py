@@ -27,20 +27,21 @@ def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
 
 
 def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
-    """`saturated_fraction` of the mosaic's saturated samples, (h, w)."""
+    """Compute `saturated_fraction` from the mosaic's saturated samples `full`; both have the shape (h, w)."""
     if "W" not in "".join(tile):
         return np.ones(full.shape)
     alpha = np.zeros(full.shape)
     box = []
     if not full.any():
         return alpha
-    # Around full samples alone: half a window and a tent to reach, and half a window to count the pixels in it.
+    # Only the rectangle around full samples is computed. Its margin is what a window and the interpolation reach.
     margin = window + 2 * max(len(tile), len(tile[0]))
     for axis, step in enumerate((len(tile), len(tile[0]))):
         lines = np.flatnonzero(full.any(axis=1 - axis))
         box.append(slice(max(int(lines[0]) - margin, 0) // step * step, int(lines[-1]) + margin + 1))
     saturated = fill(full[box[0], box[1]].astype(np.float32), tile, "W") > 0.0
-    # Saturated pixels in the window over all of its pixels in the frame; small whole numbers: 0 and 1 are exact.
+    # Alpha is the number of saturated pixels in the window over the number of its pixels within the frame. Both are
+    # small whole numbers, so 0 and 1 are exact.
     half = window // 2
     count = box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
     pixels = [np.arange(size) for size in saturated.shape]

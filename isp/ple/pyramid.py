@@ -112,7 +112,7 @@ def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[t
 
 
 def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> PatchLight:
-    """Light of patches of 4x4 cells from their own sums, each channel as sure as its noise; full Ws left out."""
+    """Estimate the light of patches of 4x4 cells from their own sums, weighted by noise, without full Ws."""
     gains, dark = (np.array(values)[list(cells.index)] for values in (cells.sampling.gains, cells.sampling.dark_e))
     weights = gains / (np.maximum(_medians(cells), 0.1) + dark**2)
     mode: Literal["reflect", "symmetric"] = "symmetric" if cells.presence.all() else "reflect"  # which keeps the mosaic
@@ -140,9 +140,9 @@ def _medians(cells: Cells) -> NDArray[np.float64]:
 def _from_coarser(
     coarse: ScaleEstimate, before: Sampling, now: Sampling, sums: PatchLight
 ) -> tuple[Singles, PatchPilot]:
-    """Light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
+    """Estimate light and pilot of each patch of a scale, from the coarser scale's estimate and the patch's own light.
 
-    A patch of the finer scale covers 4x4 cells of the coarser one, or 2x2 where it is of cells itself.
+    A patch of 8x8 pixels covers 4x4 cells of the coarser scale; a patch of 4x4 cells covers 2x2 of the coarser ones.
     """
     values = np.empty((*coarse.planes.shape[:2], 7), np.float32)
     for first in range(0, len(values), TOGETHER):
@@ -159,7 +159,7 @@ def _from_coarser(
 
 
 def _in_finer_units(planes: Singles, variance: Singles, before: Sampling, now: Sampling) -> NDArray[np.float64]:
-    """Cells of a scale in a finer one's units of noise: roots by channel, their variance, light, its variance."""
+    """Convert a scale's cells to a finer scale's units of noise: roots, their mean variance, light, its variance."""
     values = np.empty((7, *planes.shape[:2]))
     values[4] = 0.0
     for c in range(4):

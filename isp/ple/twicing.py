@@ -30,13 +30,13 @@ from rodcone.types import Singles
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
-CELL = 4  # pixels a side: a tile has at most as many
-REACH = 4  # cells on each side of one
-SURE = 1.5  # chi^2 up to which nothing is added: with 1, hues are a little nearer, but black has coloured clouds
-LIKELY_BIAS = 0.5  # of a colour's estimate, standard deviation [share of its light]
-ALIKE = 1.0  # between cells of one colour [units of a sample's noise]
+CELL = 4  # side of a cell [pixels]; no tile is larger
+REACH = 4  # cells on each side whose residuals count
+SURE = 1.5  # chi^2 up to which nothing is added; 1 would bring hues a little nearer, but coloured clouds into black
+LIKELY_BIAS = 0.5  # standard deviation of the bias that a colour's estimate is expected to have [share of its light]
+ALIKE = 1.0  # standard deviation of the weight over the difference of two cells' estimates [units of a sample's noise]
 TOGETHER = 16  # rows of cells that are worked on together
-LAMP_SIGMAS = 6.0  # root of a cell's summed squares, beyond which no even surface lies there
+LAMP_SIGMAS = 6.0  # root of a cell's summed squared residuals, above which it holds no even surface
 _LEAST = np.float32(1e-12)
 
 

@@ -160,7 +160,8 @@ _GAINS = measured()
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
     {name: replace(processor, noise_gains=_GAINS.get(name)) for name, processor in _PLAIN.items()}
 )
-# What a study may name: of a processor with measured gains also NAME_published, with the plain matrix of its source.
+# Names that a study may use. A processor with measured noise gains also goes by NAME_published, with the plain colour
+# matrix of its source.
 NAMED: Mapping[str, Processor] = MappingProxyType(
     {
         **PROCESSORS,

@@ -20,13 +20,13 @@ from isp.processors.demosaic import require_bayer
 from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import Tile, mask
 
-REACH = 28  # pixels that a value depends on along one axis: 15 for a green, 13 more for R and B
+REACH = 28  # how far away [pixels] the mosaic may still change a value: 15 for green, 13 more for R and B
 _GREEN_WINDOW, _COLOUR_WINDOW = 7, 11  # pixels along a side of the guided filters' windows
 _SECOND = np.array([-1.0, 0.0, 2.0, 0.0, -1.0])  # Laplacian along one axis of samples two apart
 _BETWEEN = np.array([0.5, 1.0, 0.5])  # interpolates samples two apart
 _GAUSSIAN = np.exp(-(np.arange(5) ** 2) / 2.0)  # weight of colour differences towards one side, by distance
-_ROUNDING = 1e-6  # of a mean square: differences of such under this say nothing
-_LEAST = 1e-10  # under any gradient or Laplacian of noise, to divide by
+_ROUNDING = 1e-6  # share of a mean square, below which a difference of two mean squares is rounding alone
+_LEAST = 1e-10  # added to divisors; far below any gradient or Laplacian of noise
 
 
 def residual_interpolation(mosaic: Mosaic, cfa: Tile) -> Image:

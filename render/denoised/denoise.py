@@ -18,12 +18,12 @@ from rodcone.types import Planes
 
 EXTRA = "denoise"
 SPECTRA = 6  # two calls of the denoiser, with three planes each
-LEAST_ALBEDO = 0.02  # of darker surfaces too, because their light divided by albedo would be noise alone
+LEAST_ALBEDO = 0.02  # smallest albedo that light is divided by: divided by a darker surface's it would be noise alone
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
 MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
 ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values: squares of single-precision numbers
-_PLANES = 3  # that the denoiser takes in one call
+_PLANES = 3  # planes that the denoiser takes in one call
 
 
 @dataclass(frozen=True)

@@ -380,7 +380,7 @@ class Tracer:
 
 
 def _differs(sample: BsdfSample, others: list[BsdfSample]) -> Mask:
-    """Whether the BSDF sampled another way at other wavelengths."""
+    """Whether the BSDF sampled another component, or with another density, at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
         chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * abs(sample.pdf)

@@ -1,4 +1,4 @@
-"""Means of paths over spans of their points."""
+"""Mean light of paths per pixel, over consecutive points of their low-discrepancy sequences."""
 
 import math
 import re
@@ -16,13 +16,13 @@ from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
 
-LANES = 16  # of the widest packet of paths
+LANES = 16  # paths of the widest packet that Embree traces together
 _COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
 
 @dataclass(frozen=True)
 class Span:
-    """Points from `start` on: `chunks` chunks of `chunk` points."""
+    """Consecutive points of each pixel's sequence: from `start` on, `chunks` chunks of `chunk` points each."""
 
     start: int
     chunk: int
@@ -30,7 +30,7 @@ class Span:
 
 
 def seed_of(*coordinates: int) -> int:
-    """Seed of 32 bits from the render's own and what it is for."""
+    """Derive a seed of 32 bits from numbers: the render's own seed, and numbers that say what the seed is for."""
     return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
 
 
@@ -44,20 +44,21 @@ def tracers(loaded: LoadedScene, film: Film, most_bands: int, seed: int, *, spli
 def traced(
     trace: Callable[[UInt, Points], Channels], rates: NDArray[np.uint32], span: Span, threads: int, seed: int
 ) -> dict[str, Planes]:
-    """Means over each chunk of the channels that a tracer gives, by name, each (chunk, channel, h, w).
+    """Trace paths and average what they give over each chunk of points: by name, each (chunk, channel, h, w).
 
-    Of a pixel at rate r the points are r times as many: a chunk of it has r times the span's points.
+    A pixel of rate r has r times as many points as one of rate 1: its chunks are r times as long.
 
     Raises
     ------
     InputError
-        Where a material chose by wavelength.
+        Where a material sampled another direction at another wavelength.
     """
     mi = mitsuba_module()
     flat = rates.ravel()
     order = np.argsort(flat, kind="stable")
-    # Paths of one packet change each other's last bits: Embree goes through its tree in another way once few are left.
-    # So a packet holds the same paths whatever the launch, and a rate's last pixel fills its last packet up.
+    # Paths of one packet change each other's last bits, because Embree traverses its tree in another way once few paths
+    # are left. So a packet holds the same paths in every launch, and copies of a rate's last pixel fill its last
+    # packet.
     together = LANES // math.gcd(LANES, span.chunk)
     by_rate = np.split(order, np.flatnonzero(np.diff(flat[order])) + 1)
     order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in by_rate])
@@ -127,7 +128,7 @@ def _launched(
 
 
 def _refusal(error: RuntimeError) -> InputError:
-    """What Mitsuba can't render: a plain line for the case that is met in good scenes, else its own words."""
+    """Say what Mitsuba can't render: for a fault of otherwise good scenes in plain words, else in Mitsuba's own."""
     words = mitsuba_words(error)
     if colour := _COLOUR_FOR_NUMBER.search(words):
         return InputError(

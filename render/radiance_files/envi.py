@@ -126,7 +126,7 @@ def open_envi(header: Path) -> EnviPicture:
 
 
 def _fields(header: Path) -> dict[str, str]:
-    """Fields of a header by their names; one that changes values and isn't applied is refused."""
+    """Read a header's fields by name; a field that would change values, and that this program ignores, is refused."""
     if require_file(header) > _MOST_HEADER_BYTES:
         raise InputError(f"its header is over {_MOST_HEADER_BYTES} bytes; give the .hdr of an ENVI picture")
     text = header.read_text("utf-8", errors="replace")

@@ -116,7 +116,10 @@ def assemble(mi: ModuleType, name: str, description: Node, extend: str | None = 
 
 
 def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
-    """Longest path and first depth of Russian roulette, of the first integrator that has paths, alone or in another."""
+    """Return the longest path and the depth at which Russian roulette begins, as the first path integrator states them.
+
+    It may stand by itself or within another integrator.
+    """
     nodes = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
     if not nodes:
         direct = any(node["type"] in ("direct", "direct_projective") for node in integrators)
@@ -130,7 +133,7 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
 
 
 def _check_left_out(mi: ModuleType, name: str, description: Node) -> None:
-    """Raise for a property that changes the picture, of a part that the engine doesn't take over."""
+    """Raise `InputError` for a property that would change the picture, of a part that this engine replaces."""
     for _, node in walk(description):
         kind = _kind(mi, node).replace("reconstructionfilter", "rfilter")
         if kind in _LEFT_OUT:
@@ -146,7 +149,7 @@ def _kind(mi: ModuleType, part: Any) -> str:
 
 
 def _camera(mi: ModuleType, name: str, description: Node, notes: list[str]) -> tuple[Node, tuple[int, int]]:
-    """First camera that can be rendered, without film and sampler, and its film's size."""
+    """Return the first camera that this engine renders, without its film and sampler, and the size of its film."""
     sensors = [part for part in description.values() if _kind(mi, part) == "sensor"]
     # A film or sampler may stand in the scene itself, and be referred to.
     named = {part.get("id", key): part for key, part in description.items() if _kind(mi, part) in _LEFT_OUT}

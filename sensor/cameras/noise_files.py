@@ -18,10 +18,11 @@ _UNTOLD = {
 
 
 def dng_numbers(path: Path) -> PixelNumbers:
-    """Pixel from a digital negative's NoiseProfile (DNG 1.4 specification, tag 51041): N(x)^2 = S x + O.
+    """Read a pixel's full well and dark noise from a digital negative's NoiseProfile.
 
-    x goes from black to white, so white is 1 / S electrons and a dark pixel's noise sqrt(O) / S. That holds at the
-    exposure index of the photograph; the photodiode may hold more at a lower one.
+    The profile (DNG 1.4 specification, tag 51041) states the variance S x + O of a signal x from black (0) to white
+    (1). White is therefore 1 / S electrons, and a dark pixel's noise sqrt(O) / S electrons. That holds at the exposure
+    index of the photograph; at a lower index the photodiode may hold more.
 
     Raises
     ------
@@ -29,7 +30,7 @@ def dng_numbers(path: Path) -> PixelNumbers:
         For a file that can't be read, or one without a profile.
     """
     raw, _ = open_raw(path)
-    profile = read_noise_profile(path, 1.0)  # of full scale 1: its gain is all of white's electrons
+    profile = read_noise_profile(path, 1.0)  # for a full scale of 1 DN, so its gain is the electrons of white
     if profile is None:
         raise InputError(
             f"noise: {str(path)!r} has no NoiseProfile of use; allowed: a .dng that has one; measure the camera's own: "

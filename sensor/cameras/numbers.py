@@ -192,7 +192,7 @@ def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves:
 
 
 def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
-    """Responses as CSV: curves, or a source's one wavelength; empty without either."""
+    """Write responses as CSV: curves, or the efficiency at the one wavelength that is known; empty without both."""
     if shape is not None:
         return responses_csv(shape.curves)
     if numbers.efficiency is not None:
@@ -202,7 +202,7 @@ def curves_csv(numbers: PixelNumbers, shape: Curves | None) -> str:
 
 
 def responses_csv(curves: Mapping[str, Spectrum]) -> str:
-    """Curves by channel as CSV, at the first one's wavelengths."""
+    """Write the curves of all channels as CSV, at the wavelengths of the first one."""
     nm = next(iter(curves.values())).wavelength_nm
     columns = [np.interp(nm, curve.wavelength_nm, curve.values) for curve in curves.values()]
     rows = [[f"{x:g}", *(f"{column[index]:.6f}" for column in columns)] for index, x in enumerate(nm)]

@@ -132,20 +132,20 @@ def dark_current(slopes: NDArray[np.float64], gain_dn_per_e: Estimate) -> tuple[
 
 
 def _electrons(variance_dn2: float, error_dn2: float, gain_dn_per_e: Estimate) -> Estimate:
-    """Standard deviation in electrons from a variance in DN^2; the gain's error comes on top."""
+    """Convert a variance in DN^2 to a standard deviation in electrons; its error includes that of the gain."""
     slope, error = gain_dn_per_e
     value, error_e = _root(variance_dn2 / slope**2, error_dn2 / slope**2)
     return value, hypot(error_e, value * error / slope)
 
 
 def _root(variance: float, error: float) -> Estimate:
-    """Root of an estimated variance; one that isn't above three errors, as of none, the root of the error."""
+    """Return the root of an estimated variance and its error; below three errors of the variance, its error's root."""
     value = sqrt(max(variance, 0.0))
     return value, error / (2 * value) if variance > 3 * error else sqrt(error)
 
 
 def _squares(image: NDArray[np.float64]) -> Floats:
-    """Mean square of each column's deviations from the image's mean, shape (w,)."""
+    """Return the mean square of each column's deviations from the image's mean, shape (w,)."""
     return np.asarray(np.mean((image - image.mean()) ** 2, axis=0))
 
 

@@ -309,7 +309,7 @@ def _notes(points: Sequence[LightPoint], darks: Sequence[LightStack], gain: Syst
 
 
 def _stacks(flats: Sequence[NDArray[np.uint16]]) -> list[list[NDArray[np.uint16]]]:
-    """Frames of the same light together, from dark to bright; those that stand alone are refused."""
+    """Group frames of the same light, from dark to bright; refuse a frame that is the only one at its light."""
     means = [float(frame.mean()) for frame in flats]
     stacks: list[list[int]] = []
     for index in np.argsort(means).tolist():
@@ -327,7 +327,10 @@ def _stacks(flats: Sequence[NDArray[np.uint16]]) -> list[list[NDArray[np.uint16]
 
 
 def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[Site]:
-    """Mean and temporal variance by position, each frame's own brightness taken off: lamps flicker (eqs. 18, 44)."""
+    """Return mean and temporal variance for each position in the tile (eqs. 18, 44).
+
+    Each frame's own mean is subtracted, because lamps flicker.
+    """
     height, width = len(tile), len(tile[0])
     sites = []
     for row in range(height):
@@ -338,7 +341,7 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[Site]:
             rest -= rest.mean(axis=(1, 2), keepdims=True)
             freedom = (len(frames) - 1) * (mean.size - 1)
             variance = float(np.sum(rest**2)) / freedom
-            error = max(variance, QUANTISATION_DN2) * sqrt(2 / freedom)  # the same file twice varies in nothing
+            error = max(variance, QUANTISATION_DN2) * sqrt(2 / freedom)  # not 0 for one file given twice
             sites.append(Site(mean, variance, error, len(frames)))
     return sites
 

@@ -102,7 +102,9 @@ def take_stack(expose: Expose, light_e: float, exposure_s: float, frames: int) -
 
 
 def column_variance(image: NDArray[np.float64]) -> tuple[float, float]:
-    """Variance of what a column's pixels share, and its standard error; the pixels' own share is subtracted.
+    """Estimate the variance of the offsets that the pixels of a column share, and its standard error.
+
+    The part of the column means' variance that comes from independent pixels is subtracted.
 
     Parameters
     ----------
@@ -116,7 +118,7 @@ def column_variance(image: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def dark_slopes(expose: Expose, exposures_s: Sequence[float]) -> NDArray[np.float64]:
-    """Slope of each pixel's dark reading over exposure time [DN/s], shape (h, w); two frames a time."""
+    """Fit the slope of each pixel's dark signal over exposure time [DN/s], shape (h, w), from two frames per time."""
     times = np.asarray(exposures_s, dtype=np.float64)
     centred = times - times.mean()
     sums = sum(
@@ -127,7 +129,7 @@ def dark_slopes(expose: Expose, exposures_s: Sequence[float]) -> NDArray[np.floa
 
 
 def hot_pixels(slopes: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Where a pixel's dark current stands 6 robust standard deviations above the median, shape (h, w)."""
+    """Mark pixels whose dark current is over 6 robust standard deviations above the median, shape (h, w)."""
     median = np.median(slopes)
     spread = 1.4826 * np.median(np.abs(slopes - median))  # of a normal distribution, from the median deviation
     return np.asarray(slopes > median + 6 * spread)

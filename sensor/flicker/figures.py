@@ -94,7 +94,7 @@ def _of_pieces(waveform: Waveform, exposure_s: float, tolerance: float) -> tuple
 
 
 def _crossings(a: Floats, b: Floats, c: Floats) -> list[Floats]:
-    """Both roots of a u^2 + b u + c, each clipped to 0 to 1; 0 where there is none."""
+    """Return both roots of a u^2 + b u + c, each clipped to the range 0 to 1, and 0 for a root that isn't there."""
     with np.errstate(divide="ignore", invalid="ignore"):
         root = np.sqrt(b**2 - 4 * a * c)
         half = -(b + np.where(b >= 0, root, -root)) / 2

@@ -20,10 +20,10 @@ MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 
 
 
 def raw_to_json(raw: RawImage, **more: Any) -> str:
-    """Everything of a raw image but its pixels, and the keys of `more`.
+    """Write as JSON all that a raw image holds beside its pixels, and the keys of `more`.
 
-    Python writes the shortest decimals that read back as the same float64. Keys of `_OPTIONAL` are left out
-    where there is none.
+    Numbers are the shortest decimals that read back as the same float64. A key of `_OPTIONAL` is left out where it has
+    no value.
 
     Raises
     ------

@@ -205,10 +205,10 @@ class Session:
         self._send(whose | {"kind": "error", "message": words}, ())
 
     def _render_on(self) -> None:
-        """Render the next state, and show what is in view again."""
+        """Render the next, finer state, and answer the page's last request again from it."""
         try:
             rendered = next(self._states)
-        except Exception as error:  # a generator that raised has ended: no state follows, or another scene's
+        except Exception as error:  # the generator has ended: only another scene's states can follow
             self._rendering = isinstance(error, Overtaken)
             words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
             self._failure = "" if self._rendering else words

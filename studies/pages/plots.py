@@ -165,9 +165,9 @@ def spread(heights: Sequence[float], gap: float, low: float, high: float) -> lis
 COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; width of all, and height of the highest [points]
 BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
-# a sensor each, in turn
+# line styles, which sensors take in turn
 LINES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)), (0, (9, 3)), (0, (3, 1)))
-MOST_NAMES = 20  # one above the other in a plot
+MOST_NAMES = 20  # names that a plot lists one above the other
 LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # starlight to sunlit snow
 SNR = 10.0  # 20 dB
 
@@ -175,13 +175,13 @@ Curves = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]  # by cha
 
 
 def lights_svg(lights: Mapping[str, Spectrum]) -> str:
-    """Draw spectra by name, each in bands of 5 nm, its greatest 1."""
+    """Draw spectra by name in bands of 5 nm, each over its greatest value."""
     spectra = {name: light.band_average(NM, BAND_NM) for name, light in lights.items()}
     return _svg({name: {"": (NM, values / values.max())} for name, values in spectra.items()})
 
 
 def responses_svg(responses: Mapping[str, Responses]) -> str:
-    """Draw electrons per photon by name; relative ones have a greatest of 1."""
+    """Draw curves of electrons per photon by name; the greatest value of relative curves is 1."""
     return _svg(
         {
             name: {channel: (curve.wavelength_nm, curve.values) for channel, curve in response.curves.items()}

@@ -34,7 +34,9 @@ from studies.sweep.provenance import in_words, made_by, require_alike, threads, 
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
-MOST_CELLS = 1000  # pictures of a first seed on one page: its words compare any two values of an axis
+# Pictures of the first seed that a page takes; a larger study is shown in part, because the page compares any two
+# values of an axis in words.
+MOST_CELLS = 1000
 
 
 def sweep_report(
@@ -242,7 +244,7 @@ def environment() -> dict[str, Any]:
 
 
 def environment_of(rows: Sequence[Row]) -> dict[str, str]:
-    """Return what made the rows, whichever run did: versions, variants and engines, threads, machines."""
+    """Return the versions, variants, engines, threads and machines that made the rows, over all runs."""
     environment: dict[str, dict[str, None]] = {}
     for row in rows:
         for name, value in {**in_words(made_by(row)), "threads": str(row.threads), "machine": row.machine}.items():

@@ -148,7 +148,15 @@ _CHECKS: Mapping[str, Callable[..., tuple[ClaimCheck, ...]]] = {
 
 
 def with_default(claims_of: Callable[[T], Sequence[Claim]], by_camera: Mapping[str, T]) -> tuple[Claim, ...]:
-    """Claims of what the paper's own method gave, with the values of the same claims of what the default gave."""
+    """Judge the claims on the results of the paper's own method, and add to each check what the default method gave.
+
+    Parameters
+    ----------
+    claims_of : callable
+        Judges the claims on the results of one method.
+    by_camera : mapping of str to object
+        Results by method, for the two of `CAMERAS`.
+    """
     return tuple(
         replace(
             claim,

@@ -25,12 +25,14 @@ from studies.photograph.camera import calibrate
 from studies.score.figure import Definition, Merit, not_measured, without_noise_bias
 
 GREYS = 6  # the chart's last row
-SIDE_PX, CHIPS = 64, 8  # pixels of a patch, and chips that see it in one measurement
-FRAMES_SHARE, MOST_FRAMES = 0.003, 16  # read noise over the top from which on a chip takes several frames; most of them
-ACROSS, BORDER = 5, 2  # patches, and pixels of a patch's border that crosstalk reaches
-WHITE_SHARE = 0.7  # of the converter's top, for a perfect white in the most sensitive channel
+SIDE_PX, CHIPS = 64, 8  # side of a patch [pixels], and number of chips that see it in one measurement
+# A chip takes several frames if its read noise is above this share of the converter's top, so many that their mean's
+# noise comes down to it; and the most frames that it takes.
+FRAMES_SHARE, MOST_FRAMES = 0.003, 16
+ACROSS, BORDER = 5, 2  # patches in a row, and the border of a patch that crosstalk reaches [pixels]
+WHITE_SHARE = 0.7  # share of the converter's top at which the most sensitive channel reads a perfect white
 INDEX_FACTOR = 5.5  # ISO 17321-1
-COLOURS = 3  # channels that tell colours
+COLOURS = 3  # number of channels that a camera needs to distinguish colours
 INDEX = Merit(
     "iso_17321.index",
     "sensitivity metamerism index",

@@ -34,7 +34,7 @@ def iso_speed(sensor: SensorConfig) -> float | None:
 
 
 def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:
-    """Camera at a gain as a study writes it: ``own``, a factor such as ``8``, or a speed such as ``ISO 400``.
+    """Set a camera's gain from a study's text: ``own``, a factor such as ``8``, or a speed such as ``ISO 400``.
 
     Raises
     ------

@@ -75,8 +75,9 @@ def locked_folder(out: Path) -> Iterator[None]:
 
 
 def _remove_half_written(out: Path) -> None:
+    """Remove files that a killed run left half-written; call it under the sweep's lock."""
     for top in (out / name for name in FOLDERS):
-        # of a linked folder, which others may share, no lock of this one tells who is at work in it
+        # A linked folder is left alone, because others may share it, and this sweep's lock doesn't cover them.
         for folder, _, files in os.walk(top) if not top.is_symlink() else ():
             for file in files:
                 path = Path(folder) / file

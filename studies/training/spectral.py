@@ -77,9 +77,9 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
 
 
 def _draw_light(rng: np.random.Generator, to_bands: NDArray[np.float64]) -> KnownLight:
-    """Draw a light over D65, less what a balance of three channels takes off it; in one of `UNKNOWN` the whole.
+    """Draw a light as a ratio to D65, and balance it as three channels can; one light in `UNKNOWN` isn't balanced.
 
-    So signals of channels are as unlike each other as under the lights that `ple`'s prior knows.
+    Signals of channels then differ from each other as much as under the lights that `ple`'s prior knows.
     """
     widths = band_widths(NM)
     over_d65 = np.divide(*(illuminant(name).band_average(NM, widths) for name in (draw_illuminant(rng), "D65")))
@@ -92,7 +92,7 @@ def _draw_light(rng: np.random.Generator, to_bands: NDArray[np.float64]) -> Know
 
 
 def photographs_reflectances() -> NDArray[np.float64]:
-    """Luminous reflectances of patches of photographs, each photograph counting the same, at `QUANTILES`."""
+    """Return the `QUANTILES` of the luminous reflectance of photographs' patches; photographs count equally."""
     by_photograph = []
     for name in PHOTOGRAPHS:
         encoded = getattr(data, name)() / 255.0
@@ -106,7 +106,7 @@ def photographs_reflectances() -> NDArray[np.float64]:
 
 
 def _save(fit: Prior, edges_nm: NDArray[np.float64], spectra: NDArray[np.float64], path: Path) -> None:
-    """Factors and basis in half precision."""
+    """Write the prior to a file, with its factors and its basis in half precision."""
     lower = fit.factors[:, *np.tril_indices(fit.factors.shape[1])].astype(np.float16)
     with replacing(path) as (place,), place.open("wb") as file:
         np.savez_compressed(

@@ -18,15 +18,15 @@ from studies.training.pictures import LIGHTS, Planes, draw_light, draw_pictures,
 
 Matrix = NDArray[np.float32]
 
-COMPONENTS, DIRECTIONS, STEPS = 48, 112, 10
-PATCHES = 3500  # of each 65 536 pixels
-_LEAST_LIGHT = 5e-3  # of white, in a patch's mean: darker ones are grain
+COMPONENTS, DIRECTIONS, STEPS = 48, 112, 10  # Gaussians, principal directions, steps of expectation and maximisation
+PATCHES = 3500  # patches drawn per 65 536 pixels
+_LEAST_LIGHT = 5e-3  # mean of a patch, as a share of white, below which it is left out because it is mostly grain
 _FLOOR = 2e-6  # added to every variance
-_LEAST_PART = 1e-3  # of a patch that still counts for a component
+_LEAST_PART = 1e-3  # probability that a patch belongs to a component, below which it doesn't count for it
 
 
 def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix:
-    """Random patches, turned and mirrored, in roots of signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
+    """Draw patches, turned and mirrored: the root of each signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
     rows = []
     for picture in pictures:
         patches = cut_patches(picture, rng)
@@ -39,7 +39,7 @@ def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix
 
 
 def cut_patches(picture: Planes, rng: np.random.Generator) -> Planes:
-    """Random patches of a picture, turned and mirrored, shape (patch, 8, 8, channel)."""
+    """Cut random patches from a picture, turned and mirrored at random, shape (patch, 8, 8, channel)."""
     count = max(200, PATCHES * picture[..., 0].size // 65536)
     ys, xs = (rng.integers(0, size - PATCH + 1, count) for size in picture.shape[:2])
     patches = np.stack([picture[y : y + PATCH, x : x + PATCH] for y, x in zip(ys, xs, strict=True)])
@@ -95,7 +95,7 @@ def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
 
 
 def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-    """Weights, centres, lower factors of the covariances, and each patch's part in each component."""
+    """Return weights, centres, the covariances' lower factors, and the probability of each component for each patch."""
     count, size = reduced.shape
     centres = np.empty((COMPONENTS, size), np.float32)
     factors = np.empty((COMPONENTS, size, size), np.float32)
@@ -107,7 +107,7 @@ def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix
             part = parts[members_of, k, None]
             centres[k] = (part * reduced[members_of]).sum(axis=0) / members[k]
             off = reduced[members_of] - centres[k]
-            # A component of few patches is drawn towards 0: its covariance has more numbers than they can tell.
+            # The covariance of a component of few patches is drawn towards 0, because they can't determine it.
             covariance = ((off * part).T @ off).astype(np.float64) / (members[k] + size)
             factors[k] = np.linalg.cholesky(covariance + _FLOOR * np.eye(size))
             inverse = np.linalg.inv(factors[k].astype(np.float64)).astype(np.float32)
