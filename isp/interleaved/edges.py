@@ -16,11 +16,13 @@ from isp.interleaved.kernel.edges import (
     CORRELATION,
     FAR,
     FEW,
+    HIDDEN,
     MISSED,
     NEAR,
     REACH,
     SMALL,
     SPREAD,
+    STEP,
     TINY,
     UNKNOWN,
     channel_noise,
@@ -54,12 +56,16 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     their squared distances to planes over N_y, and chi_0^2 that weighted by exp(-2 r_y^2), it counts less where
     contrast is a lamp's and the samples lie on their planes:
 
-        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P) - min(1, 3 / sum_c <D_c^2> / (nu_c N_c)) D,
+        F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P).
 
-    the last for a colour that noise hides, which is that of the surroundings: with 1 / nu_c the frame's mean of
-    1 / noise gain, r_c the ratio of channel c to W in the sum of 3 x 3 planes, 24 pixels apart, each over b^2, b the
-    largest of its W, m_W and (nu_W N_W)^(1/2), so that a lamp has no say, and <> the mean over the window,
-    D_c = P_c - r_c P_W.
+    Where E_W is brighter or darker than all P_W of the window, by d, d m / m_W / max(1, chi^2) is taken off E before:
+    else noise makes dark pixels beside bright things. For a colour that noise hides that of the surroundings stands,
+
+        F_c -= min(1, 5 / sum_c <D_c^2> / (nu_c N_c)) (A_c - r_c A_W),    A = P + max(0, 1 - e) (F - P),
+
+    with 1 / nu_c the frame's mean of 1 / noise gain, r_c the ratio of channel c to W, (nu_W N_W)^(1/2) at least, in the
+    sum of 5 x 5 planes, 12 pixels apart, each by how like it is to m, exp(-1/2) where they differ by one sample's noise
+    in one channel, so that a lamp has no say, and <> the mean over the window, D_c = P_c - r_c P_W.
 
     The colour of light isn't known where it fills less than half of a window on black, e > 1, as far as its planes miss
     the samples or it lies between those of a channel, l = (n - 1.5 s) / m_W with n the mean of P_W over the nine pixels
@@ -123,7 +129,7 @@ def _sharpen(
     *samples: NDArray[Any],
 ) -> Floats:
     """Sharpen in double precision; planes and samples reach `FAR` pixels further. `.kernel.edges` does it in single."""
-    far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::FAR, ::FAR]
+    far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::STEP, ::STEP]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))
     window = sliding_window_view(planes, (2 * REACH + 1,) * 2, axis=(0, 1))
@@ -143,11 +149,18 @@ def _sharpen(
     noise = np.maximum(shot * light + dark, TINY)
     variance = np.einsum("...cc->...c", covariance)
     contrast = (variance / noise).sum(axis=2, keepdims=True) / (1.0 + (light**2 / noise).sum(axis=2, keepdims=True))
-    faint = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
-    around = (far / np.maximum(far[..., 3:, :, :], faint[..., None, None, None]) ** 2).sum(axis=(3, 4))
-    tint = np.maximum(around, 0.0) / np.maximum(around[..., 3:], TINY)
+
+    def in_noise(values: Floats) -> Floats:
+        return np.asarray(2.0 / shot * np.sqrt(shot * np.maximum(values, 0.0) + dark))
+
+    beside = np.moveaxis(far, 2, -1)  # (h, w, 5, 5, channel)
+    alike = np.exp(-0.5 * ((in_noise(beside) - in_noise(mean)[:, :, None, None]) ** 2).sum(axis=-1))
+    around = (alike[..., None] * beside).sum(axis=(2, 3))
+    faint = np.maximum(alike.sum(axis=(2, 3)) * np.sqrt(nu[3] * noise[..., 3]), TINY)
+    tint = np.maximum(around, 0.0) / np.maximum(around[..., 3], faint)[..., None]
+    tint[..., 3] = 1.0
     apart = variance + tint * (tint * variance[..., 3:] - 2.0 * covariance[..., 3]) + (mean - tint * mean[..., 3:]) ** 2
-    hidden = 3.0 / np.maximum((apart / (nu * noise)).sum(axis=2, keepdims=True), 3.0)
+    hidden = HIDDEN / np.maximum((apart / (nu * noise)).sum(axis=2, keepdims=True), HIDDEN)
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]
     covariance = SPREAD[0] * covariance + SPREAD[1] * shading
 
@@ -162,18 +175,25 @@ def _sharpen(
     weights = np.linalg.solve(CORRELATION * among_samples + counted[..., None] * np.eye(9), residual[..., None])
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
-    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    # Brighter or darker than all planes of the window only as far as the samples tell it from noise.
     squares = (sample - value) ** 2 / sample_noise
+    of_white = window[:, :, 3]
+    within = np.clip(estimate[..., 3], of_white.min(axis=(2, 3)), of_white.max(axis=(2, 3)))
+    beyond = (within - estimate[..., 3]) / np.maximum(squares.mean(axis=2), 1.0)
+    estimate = estimate + (beyond / np.maximum(light[..., 3], TINY))[..., None] * light
+
+    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
     # A colour that noise hides is the surroundings'.
-    sharp -= hidden * (plane - tint * plane[..., 3:])
+    even = plane + np.maximum(1.0 - contrast, 0.0) * (sharp - plane)
+    sharp -= hidden * (even - tint * even[..., 3:])
 
     # Light of unknown colour.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
-    of_white = np.maximum(window[..., 3, :, :], 0.0)
-    least = np.min([of_white[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
-    between = (of_white[..., 1:-1, 1:-1].mean(axis=(2, 3)) - 1.5 * least) / np.maximum(light[..., 3], TINY)
+    lit = np.maximum(of_white, 0.0)
+    least = np.min([lit[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
+    between = (lit[..., 1:-1, 1:-1].mean(axis=(2, 3)) - 1.5 * least) / np.maximum(light[..., 3], TINY)
     missed = np.minimum(np.maximum(squares.mean(axis=2) / MISSED, between), 1.0)[..., None]
     lamp = (1.0 - 1.0 / np.maximum(contrast, 1.0) ** 2) * missed
     black = np.minimum(contrast, 1.0)

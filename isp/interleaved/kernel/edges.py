@@ -22,7 +22,9 @@ SIDE = 2 * REACH + 1
 SPREAD = 0.75, 1.75
 FULL = 0.95  # of the well, from which on there may be more light than was read
 MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
-FAR = 24  # pixels between the 3 x 3 planes of the surroundings; 5 x 5, 12 apart, bring 0.03 dB for 5 % of the time
+FAR = 24  # pixels to either side from which the surroundings' colour comes
+STEP = 12  # pixels between their 5 x 5 places
+HIDDEN = 5.0  # chi^2 of a colour up to which noise hides it all: with 3, clouds stay in the dark; with 9, charts pale
 APART = 9.0  # squared standard deviations by which a sample stands out of its plane
 # Contrast from which on light is small: at 1 edges of windows show their tile, at 2 halos of lamps have 15 % more hues.
 SMALL = 1.5
@@ -70,15 +72,15 @@ def sharpen_frame(
 
     starts = places(range(FAR - REACH, FAR + REACH + 1))
     window = [dr.gather(jit.Array4f, frame, start) for line in starts for start in line]
-    far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, FAR)) for start in line]
+    far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, STEP)) for start in line]
     near, plane = range(REACH - 1, REACH + 2), window[len(window) // 2]
     sample = [dr.gather(jit.Float, electrons, starts[i][j]) for i in near for j in near]
     beside = range(FAR - 1, FAR + 2)
     row_cell, column_cell = lines(row_cells, row, beside), lines(column_cells, column, beside)
     site = [dr.gather(jit.UInt, cells, r + c) for r in row_cell for c in column_cell]
 
-    # What the window holds: m, C, N, e (contrast), b (faint is its least), r (tint), <D^2> (apart), and the share that
-    # noise hides. Moments are about the middle pixel, as squares of light have too many digits.
+    # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides. Moments are
+    # about the middle pixel, as squares of light have too many digits.
     away = [value - plane for value in window]
     offset = sum(away[1:], away[0]) / SIDE**2
     mean = plane + offset
@@ -90,12 +92,18 @@ def sharpen_frame(
     light, noise = larger(mean, 0.0), larger(shot * larger(mean, 0.0) + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
-    faint = larger(light[3], dr.sqrt(nu[3] * noise[3]))
-    around = [values / dr.square(larger(values[3], faint)) for values in far]
-    around = sum(around[1:], around[0])
-    tint = larger(around, 0.0) / larger(around[3], TINY)
+
+    def in_noise(values: Any) -> Any:
+        return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
+
+    own = in_noise(mean)
+    alike = [dr.exp(-0.5 * dr.sum(dr.square(in_noise(values) - own))) for values in far]
+    around = sum((w * values for w, values in zip(alike, far, strict=True)), 0.0)
+    faint = larger(sum(alike, 0.0) * dr.sqrt(nu[3] * noise[3]), TINY)
+    tint = larger(around, 0.0) / larger(around[3], faint)
+    tint = jit.Array4f(tint[0], tint[1], tint[2], 1.0)
     apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
-    hidden = 3.0 / larger(dr.sum(apart / (nu * noise)), 3.0)
+    hidden = HIDDEN / larger(dr.sum(apart / (nu * noise)), HIDDEN)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
 
     # The best linear estimate.
@@ -113,19 +121,25 @@ def sharpen_frame(
     terms = [float(CORRELATION[4, y]) * weights[y] * to_samples[y] for y in range(9)]
     estimate = mean + sum(terms[1:], terms[0])
 
-    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    # Brighter or darker than all planes of the window only as far as the samples tell it from noise.
     squares = [dr.square(e - v) / n for e, v, n in zip(sample, value, sample_noise, strict=True)]
     chi_squared = sum(squares[1:], squares[0]) / 9.0
+    of_white = [values[3] for values in window]
+    within = larger(dr.minimum(estimate[3], reduce(larger, of_white)), reduce(dr.minimum, of_white))
+    estimate += (within - estimate[3]) / larger(chi_squared, 1.0) * light / larger(light[3], TINY)
+
+    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
     chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
     sharp = plane + larger(1.0 - dr.square(dr.square(contrast)) / (1.0 + chi_squared_near), 0.0) * (estimate - plane)
 
     # A colour that noise hides is the surroundings'.
-    sharp -= hidden * (plane - tint * plane[3])
+    even = plane + larger(1.0 - contrast, 0.0) * (sharp - plane)
+    sharp -= hidden * (even - tint * even[3])
 
     # Light of unknown colour: q (hue) and q_c. W is channel 3.
     channels_full = [dr.select(f, jit.UInt(1) << s, 0) for f, s in zip(is_full, site, strict=True)]
     full = reduce(or_, channels_full)  # a bit a channel
-    lamp = _lamp([values[3] for values in window], light[3], contrast, chi_squared)
+    lamp = _lamp(of_white, light[3], contrast, chi_squared)
     black = dr.minimum(contrast, 1.0)
     hue = dr.select((full & 0b111) > 0, black, dr.select(full > 0, dr.square(dr.square(black)), lamp))
     unknown = jit.Array4f([dr.select((full & 1 << c) > 0, 1.0, hue) for c in range(4)])

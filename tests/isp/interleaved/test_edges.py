@@ -65,16 +65,20 @@ def by_hand(raw, planes, gains, noise_gain, row, column):
     to_pixel = np.array([[covariance[c, own[a]] * apart[4][a] for a in kept] for c in range(4)])
     estimate = mean + to_pixel @ np.linalg.inv(matrix) @ (samples - mean[own])[kept]
     mirrored = np.pad(np.arange(16), 24, mode="reflect")
-    around = planes[np.ix_(*(mirrored[x : x + 49 : 24] for x in (row, column)))].reshape(9, 4)
-    brightness = np.maximum(around[:, 3:], max(mean[3], np.sqrt(noise_gain[3] * noise[3])))
-    around = (around / brightness**2).sum(axis=0)
+    around = planes[np.ix_(*(mirrored[x : x + 49 : 12] for x in (row, column)))].reshape(25, 4)
+    steps = 2.0 * (np.sqrt(around + dark) - np.sqrt(mean + dark))  # in samples' noise
+    alike = np.exp(-0.5 * (steps**2).sum(axis=1))
+    tint = alike @ around / max(alike @ around[:, 3], alike.sum() * np.sqrt(noise_gain[3] * noise[3]), 1e-9)
+    tint[3] = 1.0
     squares = (samples - on_planes) ** 2 / read
     near = [np.exp(-2.0 * ((i - row) ** 2 + (j - column) ** 2)) for i, j in places]
     counts = max(0.0, 1.0 - contrast**4 / (1.0 + np.average(squares, weights=near)))
-    hidden = planes[row, column] - around / around[3] * planes[row, column, 3]
-    distances = ((window - around / around[3] * window[:, 3:]) ** 2).mean(axis=0)
+    beyond = estimate[3] - np.clip(estimate[3], window[:, 3].min(), window[:, 3].max())
+    estimate -= beyond * mean / mean[3] / max(1.0, squares.mean())
+    distances = ((window - tint * window[:, 3:]) ** 2).mean(axis=0)
     sharp = planes[row, column] + counts * (estimate - planes[row, column])
-    sharp -= min(1.0, 3.0 / (distances / noise_gain / noise).sum()) * hidden
+    even = planes[row, column] + max(0.0, 1.0 - contrast) * (sharp - planes[row, column])
+    sharp -= min(1.0, 5.0 / (distances / noise_gain / noise).sum()) * (even - tint * even[3])
     full = [any(o == c and a not in kept for a, o in enumerate(own)) for c in range(4)]
     white = window[:, 3].reshape(5, 5)
     between = white[1:4, 1:4].mean() - 1.5 * min(white[i::2, j::2].mean() for i, j in product((0, 1), repeat=2))
@@ -126,6 +130,29 @@ def test_colours_that_noise_hides_are_the_surroundings_and_others_stay():
     before, after = (part / part[..., 3:] for part in (planes, got))
     assert (after[48:, 48:].std(axis=(0, 1)) < 0.5 * before[48:, 48:].std(axis=(0, 1)))[:3].all()
     assert got[18:22, 18:22, 2].mean() == pytest.approx(patch[2:6, 2:6, 2].mean(), rel=0.1)
+
+
+def test_noise_makes_no_dark_pixels_beside_a_bright_wall():
+    """Planes as the light is, and samples of 7 to 48 e- in W: no dark pixel under half of its own light.
+
+    Of 4608 dark pixels 110 were, when the estimate could be darker than all planes of its window.
+    """
+    light = 0.012 * np.where(np.arange(96) % 16 < 8, 1.0, 0.15)
+    truth = shaded(np.broadcast_to(light, (96, 96)))
+    raw = frame(np.random.default_rng(5).poisson(truth))
+    planes = gaussian_filter(truth, (0.0, 0.5, 0.0))
+    got = sharpen(read(raw), planes, GAINS, np.full(truth.shape, 0.02))[..., 3]
+    dark = light == light.min()
+    assert (got > 0.5 * truth[..., 3])[:, dark].all()
+
+
+def test_a_hidden_colour_is_that_of_like_surroundings():
+    """Stripes of 12 pixels: of the 25 places 10 lie on those of another colour, four times as bright."""
+    bright = (np.arange(96) // 12 % 2 == 1)[:, None]
+    planes = np.broadcast_to(np.where(bright, 0.2 * COLOUR, 0.05 * COLOUR * [2.0, 1.0, 0.5, 1.0]), (96, 96, 4)).copy()
+    got = sharpen(read(frame(planes)), planes, GAINS, np.ones(planes.shape))
+    middle = np.arange(96) % 12 // 4 == 1  # whose window lies on one stripe
+    assert got[:, middle] == pytest.approx(planes[:, middle], rel=0.01)
 
 
 def test_edges_of_light_lose_most_of_their_fringes():
