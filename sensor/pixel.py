@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import hypot
-from typing import Annotated
+from typing import Annotated, Any
 
 from rodcone.display import brief
 from rodcone.errors import InputError, require_fields, require_name, require_range, require_whole
@@ -40,6 +40,11 @@ class PixelConfig:
         Share of pixels that leak, and the dark current that they have on top of the others'.
     crosstalk : float
         Share of a pixel's photo-electrons that each of its four neighbours collects instead.
+    row_noise_e : float
+        Part of `read_noise_e` that all pixels of a row have together, anew for each row and frame [e-].
+    response_bend : float
+        c of the response n (1 + c (1 - n / full_well_e)) of n collected electrons: its slope is 1 + c in the dark and
+        1 - c at the well, and both ends stay where they are. 0 for a straight one. Development takes any for straight.
     binned_well_e : float
         Electrons at which the sum of four pixels clips where they bin in charge: what the floating diffusion that they
         share holds. 0 for four times the well.
@@ -67,6 +72,8 @@ class PixelConfig:
     hot_pixel_share: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0
     hot_pixel_dark_current_e_per_s: Annotated[float, (0.0, 1e12, "give electrons per second, 0 for none")] = 0.0
     crosstalk: Annotated[float, (0.0, 0.25, "give the share that goes to each of four neighbours, 0 for none")] = 0.0
+    row_noise_e: float = 0.0
+    response_bend: Annotated[float, (-0.5, 0.5, "give a fraction, 0 for a straight response")] = 0.0
     binned_well_e: float = 0.0
 
     __repr__ = brief
@@ -76,6 +83,9 @@ class PixelConfig:
         if self.binned_well_e:
             fix = "the floating diffusion holds one full well at least; give electrons, 0 for four wells"
             require_range("binned_well_e", self.binned_well_e, self.full_well_e, 1e12, fix)
+        if self.row_noise_e:
+            fix = "it is a part of the read noise; give electrons, 0 for none"
+            require_range("row_noise_e", self.row_noise_e, 0.0, self.read_noise_e, fix)
         require_range("prnu with column_gain_spread", self.fixed_gain, 0.0, 1.0, "make the root of their squares less")
 
     @property
@@ -87,6 +97,14 @@ class PixelConfig:
     def fixed_gain(self) -> float:
         """Standard deviation over pixels of all relative gains: PRNU and column gains."""
         return hypot(self.prnu, self.column_gain_spread)
+
+    def bent_e(self, collected_e: Any) -> Any:
+        """Electrons that are read of those collected: `response_bend`; any array, of Dr.Jit too."""
+        return collected_e * ((1.0 + self.response_bend) - collected_e * (self.response_bend / self.full_well_e))
+
+    def bent_slope(self, collected_e: Any) -> Any:
+        """Slope of `bent_e`."""
+        return (1.0 + self.response_bend) - collected_e * (2.0 * self.response_bend / self.full_well_e)
 
     @property
     def swing_e(self) -> float:

@@ -63,22 +63,36 @@ def convert(
 ) -> NDArray[np.uint16]:
     """Digital numbers of what the wells hold, shape (h, w); binned, (h / 2, w / 2).
 
-    Pixels that bin in charge are summed, and their floating diffusion clips; the column's amplifier multiplies; fixed
-    offsets and read noise, before the gain and after it, are added; the converter, whose top is the well over the gain,
-    rounds and clips; readings that bin in digital numbers are summed.
+    Pixels that bin in charge are summed, and their floating diffusion clips; the response bends; the column's amplifier
+    multiplies; fixed offsets and read noise, before the gain and after it, are added; the converter, whose top is the
+    well over the gain, rounds and clips; readings that bin in digital numbers are summed.
     """
     converter = sensor
     if sensor.in_charge:
         collected_e = np.minimum(block_sums(collected_e), sensor.pixel.full_well_e)
     else:
         converter = sensor.photosites
-    read_e = collected_e if device.column_gain is None else collected_e * device.column_gain
+    read_e = converter.pixel.bent_e(collected_e) if converter.pixel.response_bend else collected_e
+    read_e = read_e if device.column_gain is None else read_e * device.column_gain
     read_e = read_e + device.dark_offset_e
     if converter.read_noise_e:
-        read_e += converter.read_noise_e * normals(key, NoiseTerm.READ, read_e.shape, reading)
+        read_e += pixel_read_noise_e(converter) * normals(key, NoiseTerm.READ, read_e.shape, reading)
+    if converter.pixel.row_noise_e:
+        read_e += row_noise_e(converter, key, read_e.shape[0], reading)[:, None]
     dn = np.rint(read_e / converter.gain_e_per_dn + converter.black_dn)
     dn = np.clip(dn, 0, converter.white_dn).astype(np.uint16)
     return dn if sensor.in_charge else sensor.pixel_sums(dn)
+
+
+def pixel_read_noise_e(converter: SensorConfig) -> float:
+    """Part of the read noise that each pixel has by itself [e-]."""
+    row_e = converter.pixel.row_noise_e
+    return sqrt(converter.read_noise_e**2 - row_e**2) if row_e else converter.read_noise_e
+
+
+def row_noise_e(converter: SensorConfig, key: int, rows: int, reading: int) -> NDArray[np.float64]:
+    """Draw the part of the read noise that the pixels of each row share [e-], (h,)."""
+    return converter.pixel.row_noise_e * normals(key, NoiseTerm.ROW, (rows, 1), reading)[:, 0]
 
 
 def draw_mean_frame(
@@ -191,8 +205,9 @@ def noise_variance(
     """Compute the variance of each sample over chips and exposures [e-^2], in the shape of `expected_e`.
 
     It is the sum of shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was
-    collected, DSNU and column offsets, read noise, and quantisation (a DN^2 / 12). Near the full well, the converter's
-    top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
+    collected, DSNU and column offsets, read noise of pixels and of rows, and quantisation (a DN^2 / 12). Of a bent
+    response it is the variance of its samples, which development takes for straight. Near the full well, the
+    converter's top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
 
     For a camera that merges several readings, a sample is the merged electrons over the share of the pixel's electrons
     that the readings hold together; clipping is left out. A camera that switches its gain chooses it by `expected_e`,
@@ -262,7 +277,7 @@ def noise_sources(
 ) -> dict[str, float]:
     """Standard deviation of each source of a pixel's noise in an even field [e-], by name.
 
-    Their squares sum to `noise_variance` where nothing clips, which says what each of them is.
+    Their squares sum to `noise_variance` where nothing clips or bends, which says what each of them is.
     """
     return sources_of(expected_e, at_channel(resolve(sensor, np.array([expected_e]), exposure_s, channel), channel))
 
@@ -288,10 +303,11 @@ def as_raw(
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel
     dark_e = min(pixel.dark_current_e_per_s * exposure_s, pixel.full_well_e)
+    read_dark_e = pixel.bent_e(dark_e) if pixel.response_bend else dark_e
     return RawImage(
         dn=dn,
         cfa=sensor.cfa,
-        black_dn=min(sensor.black_dn + dark_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
+        black_dn=min(sensor.black_dn + read_dark_e / sensor.gain_e_per_dn, sensor.white_dn - 1),
         white_dn=sensor.white_dn,
         gain_e_per_dn=sensor.gain_e_per_dn,
         read_noise_e=hypot(sensor.read_noise_e, sqrt(dark_e)),

@@ -17,7 +17,7 @@ from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson_single
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
-from sensor.readout import convert, spread_charge
+from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max
@@ -163,9 +163,13 @@ def read_frame(
 
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
     read_e = jit.Float64(collected_e)
+    if pixel.response_bend:
+        read_e = pixel.bent_e(read_e)
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
-    read_noise_e = dr.opaque(jit.Float64, one.read_noise_e) * jit.Float64(read_normal)
+    read_noise_e = dr.opaque(jit.Float64, pixel_read_noise_e(one)) * jit.Float64(read_normal)
+    if pixel.row_noise_e:
+        read_noise_e += dr.gather(jit.Float64, upload(row_noise_e(one, key, expected_e.shape[0], reading)), row)
     read_e += upload(device.dark_offset_e, copy_under=COPY_UNDER) + read_noise_e
     dn = read_e / dr.opaque(jit.Float64, one.gain_e_per_dn) + dr.opaque(jit.Float64, one.black_dn)
     dn = jit.Int(dr.clip(dr.round(dn), 0.0, dr.opaque(jit.Float64, float(one.white_dn))))

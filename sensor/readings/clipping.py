@@ -75,28 +75,44 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     mean = light + hot_e
     variance = law.variance(light)
     slope = np.ones_like(light)
-    well_e = sensor.pixel.full_well_e / share - dark_e
-    top_e = reading.headroom_e
+    black_e = dark_e
+    well_e, top_e = sensor.pixel.full_well_e / share - dark_e, reading.headroom_e
+    if sensor.pixel.response_bend:
+        mean, slope, black_e = _bent(mean + dark_e, dark_e, reading)
+        variance = variance + (slope**2 - 1) * total(reading.sources[name] for name in _COUNTED).variance(light)
+        well_e, top_e = well_e + dark_e - black_e, top_e + dark_e - black_e
 
     # Clip at the well and at the converter's top.
     near = mean + FAR * np.sqrt(variance) > top_e
     if near.any():
-        counted = total(reading.sources[name] for name in _COUNTED).variance(light[near])
+        counted = total(reading.sources[name] for name in _COUNTED).variance(light[near]) * slope[near] ** 2
         after_e = np.sqrt(np.maximum(variance[near] - counted, 0.0))
         first, second, open_ = _over_reading(mean[near], counted, after_e, well_e, top_e)
         mean[near] += first
-        variance[near], slope[near] = second - first**2, open_
+        variance[near], slope[near] = second - first**2, open_ * slope[near]
 
     # Clip at black: only the noise of reading takes samples there, for counts aren't negative; rounding clips none.
-    bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - dark_e
+    bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - black_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
     after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))
     low = ~near & (mean - LOW * np.sqrt(np.maximum(after_e2 - rounding_e2, 0.0)) < bottom_e)
     if low.any():
         first, second, open_ = censored(-mean[low], variance[low] - rounding_e2, -bottom_e)
         mean[low] -= first
-        variance[low], slope[low] = second - first**2 + rounding_e2 * open_, open_
+        variance[low], slope[low] = second - first**2 + rounding_e2 * open_, open_ * slope[low]
     return Moments(*(np.reshape(x, shape) for x in (mean - hot_e, np.maximum(variance, 0.0), slope)))
+
+
+def _bent(collected_e: Floats, dark_e: float, reading: PlainReading) -> tuple[Floats, Floats, float]:
+    """Mean above black and slope of what is read of the electrons collected, and what those of the dark current read.
+
+    Beyond the well, where samples clip, the response goes on straight.
+    """
+    pixel, share = reading.sensor.pixel, reading.share
+    own_e = np.minimum(collected_e * share, pixel.full_well_e)
+    slope = pixel.bent_slope(own_e)
+    black_e = pixel.bent_e(dark_e * share) / share
+    return pixel.bent_e(own_e) / share + slope * (collected_e - own_e / share) - black_e, slope, black_e
 
 
 def _over_reading(

@@ -18,13 +18,14 @@ NAMES = (("camera", BLUE, "-"), ("twin", ORANGE, "--"))
 
 def twin_page(twin: Twin, title: str, version: str) -> str:
     """Write the page: verdicts, photon transfer, and dark and flat frames side by side."""
+    bend = twin.numbers.pixel["response_bend"]
     return write_out(
         "twin.html.j2",
         title=title,
         version=version,
         comparisons=twin.comparisons,
         alike=sum(one.alike for one in twin.comparisons),
-        notes=twin.figures.notes,
+        notes=(*twin.figures.notes, f"response_bend is {bend.value:.4f}: {bend.source}"),
         transfer=svg_address(transfer_svg(twin)),
         dark=svg_address(pair_svg(twin.dark, "Dark")),
         bright=svg_address(pair_svg(twin.bright, "Flat")),

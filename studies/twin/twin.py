@@ -2,12 +2,13 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import erfc, hypot, isnan, sqrt
+from math import erfc, hypot, isnan, nan, sqrt
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
 from rodcone.types import Floats
 from sensor.cameras.frame_sets import FrameSet, LightFrames, read_pixels
@@ -16,11 +17,21 @@ from sensor.cameras.numbers import PixelNumbers, SourcedValue
 from sensor.capture import expose
 from sensor.config import LensConfig, SensorConfig
 from sensor.device import Device, draw_device
-from sensor.emva1288.estimators import FIT_SHARE
-from sensor.emva1288.from_frames import MOST_CLIPPED, NORMAL_95, FrameFigures, LightStack, stack_of, without_surface
+from sensor.emva1288.estimators import FIT_SHARE, LINEAR_RANGE
+from sensor.emva1288.from_frames import (
+    MOST_CLIPPED,
+    NORMAL_95,
+    TOLD,
+    FrameFigures,
+    LightStack,
+    stack_of,
+    without_surface,
+)
 from sensor.pixel import PixelConfig
 
 APART = 0.01  # probability under which two samples are told apart, over all tests of one kind
+LEAST_BENT = 4  # lights from which the response's bend is fitted
+MOST_BENT = 0.3  # bend that is looked for
 SIMULATED_UM = 5.0  # pitch of the simulated pixel, which light given in electrons doesn't ask for
 
 
@@ -60,6 +71,33 @@ class TwinFigure:
             f"{self.name}: {self.ratio:.3f} of the camera's {self.place}, interval {self.low:.3f} to {self.high:.3f}: "
             f"{told} at {APART:.0%}"
         )
+
+
+@dataclass(frozen=True)
+class Response:
+    """Response of the twin: S = W f(e / well), f(x) = x (1 + bend (1 - x)), W being white above black.
+
+    Attributes
+    ----------
+    bend : float
+        `PixelConfig.response_bend`.
+    gain_dn_per_e : float
+        DN per electron of a full well.
+    source : str
+        Where the bend comes from, or why it is 0.
+    """
+
+    bend: float
+    gain_dn_per_e: float
+    source: str
+
+    def light_e(self, signal_dn: Floats, white_dn: float) -> Floats:
+        """Electrons that read as a signal."""
+        if not self.bend:
+            return np.asarray(signal_dn / self.gain_dn_per_e)
+        slope = 1 + self.bend
+        share = 2 * signal_dn / white_dn / (slope + np.sqrt(slope**2 - 4 * self.bend * signal_dn / white_dn))
+        return np.asarray(share * white_dn / self.gain_dn_per_e)
 
 
 @dataclass(frozen=True)
@@ -119,22 +157,24 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
     bright = _largest(frames, lit=True, most_dn=figures.black_dn + room_dn)
     dark_dn, bright_dn = (_pixels(light, frames) for light in (dark, bright))
     mean = {False: _mean_image(dark_dn), True: _mean_image(bright_dn)}
-    numbers = _with_columns(frame_numbers(figures, [Path(name)]), figures, dark_dn, bright_dn)
+    response = response_of(figures)
+    numbers = _with_patterns(frame_numbers(figures, [Path(name)]), figures, response, dark_dn, bright_dn)
     sensor = _sensor(numbers, figures)
 
     # The same lights with the twin
     rng = np.random.default_rng([seed, 1])
     device = draw_device(sensor, mean[True].shape, np.random.default_rng([seed, 0]))
-    gain = figures.gain_dn_per_e.value
+    range_dn = figures.white_dn - figures.black_dn
     signal = mean[True] - figures.black_dn
     surface = (signal - without_surface(signal)) / signal.mean()
     points = [point for point in figures.points if point.clipped <= MOST_CLIPPED and np.all(point.signal_dn > 0)]
     stacks = []
     for point in points:
-        light_e = surface / surface.mean() * _site_light(point.signal_dn / gain, figures, mean[True].shape)
+        site_e = response.light_e(point.signal_dn, range_dn)
+        light_e = surface / surface.mean() * _site_light(site_e, figures, mean[True].shape)
         stacks.append(stack_of(_taken(light_e, sensor, device, rng, point.frames), figures.cfa, figures.white_dn))
     twin_dark = _taken(np.zeros(mean[False].shape), sensor, device, rng, len(dark_dn))
-    light_e = surface / surface.mean() * signal.mean() / gain
+    light_e = surface / surface.mean() * response.light_e(signal.mean(), range_dn)
     twin_bright = _taken(light_e, sensor, device, rng, len(bright_dn))
 
     # Figures of both
@@ -179,17 +219,64 @@ def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFr
     return max(ranked, key=lambda one: one[:2])[2]
 
 
-def _with_columns(
-    numbers: PixelNumbers, figures: FrameFigures, dark: Sequence[NDArray[Any]], bright: Sequence[NDArray[Any]]
+def response_of(figures: FrameFigures) -> Response:
+    """Fit the response's bend to the variance by light, where the means by photons don't deny it.
+
+    Shot noise of e electrons has the variance (g f')^2 e of the mean g e f / x, so that variance over mean is
+    g f'^2 x / f: about g (1 + bend (1 - 3 x)). The mean over photons follows 1 + bend (1 - x). Lights count alike,
+    because real lamps scatter K by more than the frames' noise does.
+    """
+    white_dn = figures.white_dn - figures.black_dn
+    points = [p for p in figures.points if p.clipped <= MOST_CLIPPED]
+    signal = np.array([p.signal_dn.mean() for p in points])
+    gain = np.array([p.gain.mean() for p in points])
+    photons = np.array([p.photons for p in points])
+    used = (signal >= LINEAR_RANGE[0] * white_dn) & (signal <= LINEAR_RANGE[1] * white_dn)
+    straight = figures.gain_dn_per_e.value
+    if np.count_nonzero(used) < LEAST_BENT or not abs(figures.gain_change) > TOLD * figures.gain_change_error:
+        return Response(0.0, straight, "K's change with light isn't told from 0")
+    signal, gain, photons = signal[used], gain[used], photons[used]
+
+    def fitted(bend: float) -> tuple[float, float]:
+        """Misfit and gain of a bend."""
+        slope = 1 + bend
+        share = Response(bend, 1.0, "").light_e(signal, white_dn) / white_dn
+        shape = (slope - 2 * bend * share) ** 2 / (slope - bend * share)
+        scale = float(np.sum(shape * gain) / np.sum(shape**2))
+        return float(np.sum((gain - scale * shape) ** 2)), scale
+
+    bend = float(minimize_scalar(lambda x: fitted(x)[0], bounds=(-MOST_BENT, MOST_BENT), method="bounded").x)
+    by_means = nan
+    if not np.any(np.isnan(photons)):
+        slope, start = np.polyfit(signal, signal / photons, 1)
+        by_means = -slope * white_dn / (start + slope * white_dn)
+        if by_means / bend < 0.5:
+            denied = f"noise by light would give {bend:.3f}, but means by photons give {by_means:.3f}"
+            return Response(0.0, straight, f"{denied}: K changes by another cause")
+    told = "" if isnan(by_means) else f"; means by photons give {by_means:.3f}"
+    return Response(bend, fitted(bend)[1], f"noise of {signal.size} lights, variance over mean{told}")
+
+
+def _with_patterns(
+    numbers: PixelNumbers,
+    figures: FrameFigures,
+    response: Response,
+    dark: Sequence[NDArray[Any]],
+    bright: Sequence[NDArray[Any]],
 ) -> PixelNumbers:
-    """Numbers with the columns' share taken out of DSNU and PRNU, and the well for a whole black level."""
-    gain = figures.gain_dn_per_e.value
+    """Numbers with the columns' share taken out of DSNU and PRNU, the rows' noise, the response, and the whole well.
+
+    The well is that of a whole black level; electrons are those of the response's gain.
+    """
+    gain = response.gain_dn_per_e
     black = round(figures.black_dn)
     dark_dn2 = _column_variance(dark)
     signal = float(np.mean(bright) - np.mean(dark))
     bright_dn2 = max(_column_variance(bright) - dark_dn2, 0.0)
     offset_e, spread = sqrt(dark_dn2) / gain, sqrt(bright_dn2) / signal
     pixel = dict(numbers.pixel)
+    for key in ("read_noise_e", "dsnu_e"):
+        pixel[key] = replace(pixel[key], value=pixel[key].value * figures.gain_dn_per_e.value / gain)
     rest = {"dsnu_e": offset_e, "prnu": spread}
     for key, columns in rest.items():
         whole = pixel[key].value
@@ -197,6 +284,9 @@ def _with_columns(
     pixel["column_offset_e"] = SourcedValue(offset_e, f"column means of {len(dark)} dark frames")
     pixel["column_gain_spread"] = SourcedValue(spread, f"column means of {len(bright)} flat frames, surface taken out")
     pixel["full_well_e"] = replace(pixel["full_well_e"], value=(figures.white_dn - black) / gain)
+    row_e = min(sqrt(_row_variance(dark)) / gain, pixel["read_noise_e"].value)
+    pixel["row_noise_e"] = SourcedValue(row_e, f"row means of {len(dark)} dark frames less their mean frame")
+    pixel["response_bend"] = SourcedValue(response.bend, response.source)
     return replace(numbers, pixel=pixel)
 
 
@@ -209,6 +299,16 @@ def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
     of_pixels = float(np.mean(np.var(image, axis=0, ddof=1))) / int(image.shape[0])
     of_columns = float(np.mean(np.diff(image.mean(axis=0)) ** 2)) / 2
     return max(of_columns - of_pixels, 0.0)
+
+
+def _row_variance(frames: Sequence[NDArray[Any]]) -> float:
+    """Temporal variance that the pixels of a row have together, over what their own noise leaves in its mean [DN^2]."""
+    mean = _mean_image(frames)
+    freedom = (len(frames) - 1) / len(frames)
+    rest = [frame - mean - (frame.mean() - mean.mean()) for frame in frames]
+    of_rows = float(np.mean([np.var(one.mean(axis=1), ddof=1) for one in rest])) / freedom
+    of_pixels = float(np.mean([np.mean(np.var(one, axis=1, ddof=1)) for one in rest])) / freedom
+    return max(of_rows - of_pixels / int(mean.shape[1]), 0.0)
 
 
 def _sensor(numbers: PixelNumbers, figures: FrameFigures) -> SensorConfig:
