@@ -68,7 +68,7 @@ def score(
     seed
         Seed of the chips and frames.
     out
-        File to write as well: a sheet (.html), which is one printed page for one or two sensors, or a table (.csv).
+        File to write as well: a sheet (.html; it prints on one page, of two sensors on two), or a table (.csv).
     json
         Print one JSON object: a list of figures for each sensor.
     """

@@ -1,6 +1,7 @@
-"""A sheet of a camera's figures of merit, to be printed on one page."""
+"""A sheet of cameras' figures of merit, to be printed: one page for one camera, two for two."""
 
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 from math import isfinite
 
 from matplotlib import rc_context
@@ -25,10 +26,11 @@ def score_page(
                 missing.setdefault(f"{one.title}: {one.missing}", []).append(camera)
             else:
                 rows.setdefault(one.name, {})[camera] = one
+    lines = [(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values()]
     return write_out(
         "score.html.j2",
         cameras=list(scores),
-        rows=[(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values()],
+        groups=[list(group) for _, group in groupby(lines, key=lambda line: line[0].name.partition(".")[0])],
         chart=svg_address(curves_svg(curves)),
         missing=[(reason, of if len(scores) > 1 else []) for reason, of in missing.items()],
         number=number_text,

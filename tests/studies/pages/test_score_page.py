@@ -16,7 +16,7 @@ LIGHT = [AtLight(lux, snr, snr + 0.1, share, share) for lux, snr, share in ((0.1
 # As many as a plain camera has, with conditions as long as the longest.
 MERITS = [
     Merit(
-        f"group.figure_{number}",
+        f"group{number // 6}.figure_{number}",
         f"a figure of merit with a long name, {number}",
         "cycles/px",
         "ISO 12233:2017, annex D (e-SFR)",
@@ -26,7 +26,7 @@ MERITS = [
         low=0.0121,
         high=0.0125,
     )
-    for number in range(32)
+    for number in range(50)
 ]
 
 
@@ -52,13 +52,18 @@ def test_a_figure_that_a_camera_lacks_is_a_dash_and_one_without_an_interval_has_
 
 @CHROME.NEEDED
 @pytest.mark.thorough
-@pytest.mark.parametrize("cameras", [("low_noise",), ("low_noise", "table1_output_3um")])
-def test_a_sheet_of_one_or_two_cameras_prints_on_one_page(
-    cameras: tuple[str, ...], tmp_path: Path, browser: Any
+@pytest.mark.parametrize(("cameras", "pages"), [(("low_noise",), 1), (("low_noise", "table1_output_3um"), 2)])
+def test_a_sheet_of_one_camera_prints_on_one_page_and_of_two_on_two(
+    cameras: tuple[str, ...], pages: int, tmp_path: Path, browser: Any
 ) -> None:
-    """Pages as the PDF's own page tree counts them."""
+    """Pages as the PDF's own page tree counts them; all of the table's text has 8 points, 10.67 px, or more."""
     path = tmp_path / "sheet.html"
     path.write_text(sheet(*cameras), "utf-8")
-    printed = CHROME.open_page(browser, path).pdf(prefer_css_page_size=True)
-    (count,) = re.findall(rb"/Type /Pages\s[^>]*?/Count (\d+)", printed)
-    assert int(count) == 1
+    page = CHROME.open_page(browser, path)
+    (count,) = re.findall(rb"/Type /Pages\s[^>]*?/Count (\d+)", page.pdf(prefer_css_page_size=True))
+    assert int(count) == pages
+    page.emulate_media(media="print")
+    sizes = "[...document.querySelectorAll('td, th, td small, p')].map(x => parseFloat(getComputedStyle(x).fontSize))"
+    assert min(page.evaluate(sizes)) >= 8 * 96 / 72 - 0.01
+    shown = "[...document.querySelectorAll('tr.print, td.defined')].filter(x => x.offsetParent).length"
+    assert page.evaluate(shown) == len(MERITS)  # what defines each figure, once
