@@ -79,29 +79,12 @@ def sharpen_frame(
     row_cell, column_cell = lines(row_cells, row, beside), lines(column_cells, column, beside)
     site = [dr.gather(jit.UInt, cells, r + c) for r in row_cell for c in column_cell]
 
-    # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides. Moments are
-    # about the middle pixel, as squares of light have too many digits.
-    away = [value - plane for value in window]
-    offset = sum(away[1:], away[0]) / SIDE**2
-    mean = plane + offset
-    products = {
-        (c, d): sum((a[c] * a[d] for a in away), 0.0) / SIDE**2 - offset[c] * offset[d]
-        for c, d in combinations_with_replacement(range(4), 2)
-    }
-    covariance = [jit.Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
+    # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides.
+    mean, covariance = _moments(window)
     light, noise = larger(mean, 0.0), larger(shot * larger(mean, 0.0) + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
-
-    def in_noise(values: Any) -> Any:
-        return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
-
-    own = in_noise(mean)
-    alike = [dr.exp(-0.5 * dr.sum(dr.square(in_noise(values) - own))) for values in far]
-    around = sum((w * values for w, values in zip(alike, far, strict=True)), 0.0)
-    faint = larger(sum(alike, 0.0) * dr.sqrt(nu[3] * noise[3]), TINY)
-    tint = larger(around, 0.0) / larger(around[3], faint)
-    tint = jit.Array4f(tint[0], tint[1], tint[2], 1.0)
+    tint = _tint_of_like_places(mean, far, shot, dark, dr.sqrt(nu[3] * noise[3]))
     apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
     hidden = HIDDEN / larger(dr.sum(apart / (nu * noise)), HIDDEN)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
@@ -157,6 +140,32 @@ def sharpen_frame(
     dr.scatter(result, sharp, pixel, mode=dr.ReduceMode.NoConflicts)
     dr.eval(result)
     return np.asarray(result.numpy().reshape(planes.shape))
+
+
+def _moments(window: list[Any]) -> tuple[Any, list[Any]]:
+    """M and the rows of C of a window, about its middle pixel, since squares of light have too many digits."""
+    middle = window[len(window) // 2]
+    away = [value - middle for value in window]
+    offset = sum(away[1:], away[0]) / SIDE**2
+    products = {
+        (c, d): sum((a[c] * a[d] for a in away), 0.0) / SIDE**2 - offset[c] * offset[d]
+        for c, d in combinations_with_replacement(range(4), 2)
+    }
+    return middle + offset, [arrays().Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
+
+
+def _tint_of_like_places(mean: Any, far: list[Any], shot: Any, dark: Any, faint: Any) -> Any:
+    """r, the colour of those of the places `far` whose light is like a window's; `faint` is the noise of W."""
+
+    def in_noise(values: Any) -> Any:
+        return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
+
+    own = in_noise(mean)
+    alike = [dr.exp(-0.5 * dr.sum(dr.square(in_noise(values) - own))) for values in far]
+    first, *others = [w * values for w, values in zip(alike, far, strict=True)]
+    around = sum(others, first)
+    tint = larger(around, 0.0) / larger(around[3], larger(sum(alike, 0.0) * faint, TINY))
+    return arrays().Array4f(tint[0], tint[1], tint[2], 1.0)
 
 
 def _lamp(white: list[Any], light: Any, contrast: Any, chi_squared: Any) -> Any:

@@ -213,7 +213,9 @@ def test_threads_of_every_guide_are_the_reference(turns):
 
 @pytest.mark.skipif(backend() == "numpy", reason="nothing is compiled without Dr.Jit")
 def test_other_sizes_sigmas_and_phases_run_the_kernels_that_are_compiled_already():
-    for settings in (Settings(patch=5), PAPER_5X5):
+    # Narrow weights of raw samples also run the form whose scale moves along with them.
+    narrow = Settings(patch=5, sigma_d=2.0, sigma_s=4.0, distance="raw")
+    for settings in (Settings(patch=5), PAPER_5X5, narrow):
         reconstruct(half_saturated(), settings)
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
         for turns, sigma in ((1, 3.0), (3, math.inf)):
