@@ -98,14 +98,6 @@ class PixelConfig:
         """Standard deviation over pixels of all relative gains: PRNU and column gains."""
         return hypot(self.prnu, self.column_gain_spread)
 
-    def bent_e(self, collected_e: Any) -> Any:
-        """Electrons that are read of those collected: `response_bend`; any array, of Dr.Jit too."""
-        return collected_e * ((1.0 + self.response_bend) - collected_e * (self.response_bend / self.full_well_e))
-
-    def bent_slope(self, collected_e: Any) -> Any:
-        """Slope of `bent_e`."""
-        return (1.0 + self.response_bend) - collected_e * (2.0 * self.response_bend / self.full_well_e)
-
     @property
     def swing_e(self) -> float:
         """Electrons that fill the voltage swing: reported, not applied (Table 1's disagrees with its own well)."""
@@ -320,3 +312,13 @@ def pixel_of_readings(pixel: PixelConfig, readings: Sequence[Reading]) -> PixelC
         read_noise_e=min(x.read_noise_e / x.share for x in readings),
         dsnu_e=min(x.dsnu_e / x.share for x in readings),
     )
+
+
+def bent_e(collected_e: Any, pixel: PixelConfig) -> Any:
+    """Compute the electrons that are read of those collected: `response_bend`; any array, of Dr.Jit too."""
+    return collected_e * ((1.0 + pixel.response_bend) - collected_e * (pixel.response_bend / pixel.full_well_e))
+
+
+def bent_slope(collected_e: Any, pixel: PixelConfig) -> Any:
+    """Compute the slope of `bent_e`."""
+    return (1.0 + pixel.response_bend) - collected_e * (2.0 * pixel.response_bend / pixel.full_well_e)

@@ -11,6 +11,7 @@ from rodcone.errors import InputError
 from sensor.cfa import block_sums
 from sensor.config import SensorConfig
 from sensor.device import Device
+from sensor.pixel import bent_e
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
 from sensor.readings.channels import join
@@ -72,7 +73,7 @@ def convert(
         collected_e = np.minimum(block_sums(collected_e), sensor.pixel.full_well_e)
     else:
         converter = sensor.photosites
-    read_e = converter.pixel.bent_e(collected_e) if converter.pixel.response_bend else collected_e
+    read_e = bent_e(collected_e, converter.pixel) if converter.pixel.response_bend else collected_e
     read_e = read_e if device.column_gain is None else read_e * device.column_gain
     read_e = read_e + device.dark_offset_e
     if converter.read_noise_e:
@@ -303,7 +304,7 @@ def as_raw(
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel
     dark_e = min(pixel.dark_current_e_per_s * exposure_s, pixel.full_well_e)
-    read_dark_e = pixel.bent_e(dark_e) if pixel.response_bend else dark_e
+    read_dark_e = bent_e(dark_e, pixel) if pixel.response_bend else dark_e
     return RawImage(
         dn=dn,
         cfa=sensor.cfa,

@@ -16,6 +16,7 @@ from sensor.cfa import channel_map, channels, check_covers
 from sensor.config import SensorConfig
 from sensor.device import Device
 from sensor.kernel.poisson import alias_table, poisson_single
+from sensor.pixel import bent_e
 from sensor.random import MULTIPLIERS, ROUNDS, WEYL, NoiseTerm
 from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_charge
 
@@ -164,7 +165,7 @@ def read_frame(
     # Double precision behind the well: whole electrons lie on the same DN as in the NumPy form.
     read_e = jit.Float64(collected_e)
     if pixel.response_bend:
-        read_e = pixel.bent_e(read_e)
+        read_e = bent_e(read_e, pixel)
     if device.column_gain is not None:
         read_e *= dr.gather(jit.Float64, upload(device.column_gain), column)
     read_noise_e = dr.opaque(jit.Float64, pixel_read_noise_e(one)) * jit.Float64(read_normal)

@@ -23,6 +23,7 @@ from scipy.special import ndtr
 from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.noise_law import total
+from sensor.pixel import bent_e, bent_slope
 from sensor.readings.resolve import PlainReading
 
 FAR = 7.0  # standard deviations; a sample farther from a bound never clips there
@@ -110,9 +111,9 @@ def _bent(collected_e: Floats, dark_e: float, reading: PlainReading) -> tuple[Fl
     """
     pixel, share = reading.sensor.pixel, reading.share
     own_e = np.minimum(collected_e * share, pixel.full_well_e)
-    slope = pixel.bent_slope(own_e)
-    black_e = pixel.bent_e(dark_e * share) / share
-    return pixel.bent_e(own_e) / share + slope * (collected_e - own_e / share) - black_e, slope, black_e
+    slope = bent_slope(own_e, pixel)
+    black_e = bent_e(dark_e * share, pixel) / share
+    return bent_e(own_e, pixel) / share + slope * (collected_e - own_e / share) - black_e, slope, black_e
 
 
 def _over_reading(
