@@ -265,6 +265,7 @@ def score(
     *,
     processor: str | None = None,
     trust_code: bool = False,
+    step: Step | None = None,
 ) -> list[Merit]: ...
 def snr(electrons: ArrayLike, sensor: _Sensor, exposure_s: _Seconds, channel: str | None = None) -> Floats: ...
 def sweep(

@@ -1,5 +1,6 @@
 """The command `rodcone score`: the figures of merit that data sheets and test houses state."""
 
+import sys
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from importlib import metadata
@@ -11,6 +12,7 @@ from cyclopts import Parameter
 from rodcone.csv_file import csv_text
 from rodcone.errors import InputError, require_range
 from rodcone.files import write_files
+from rodcone.progress import progress
 from sensor.config import SensorConfig
 from sensor.presets import preset
 from studies.commands.console import Time, print_json, print_table, require_place, say
@@ -18,6 +20,7 @@ from studies.pages.score_page import number_text, score_page
 from studies.score.figure import Merit
 from studies.score.over_light import over_light
 from studies.score.score import score as merits_of
+from studies.study.gain import at_gain, gain_text
 
 HEAD = ("figure", "unit", "computed", "measured", "95 % from", "to", "defined by")
 MOST_SENSORS = 4
@@ -32,6 +35,8 @@ def score(
     exposure: Time = 0.033,
     f_number: float | None = None,
     diffraction: float | None = None,
+    gain: float | None = None,
+    iso: float | None = None,
     processor: str | None = None,
     trust_code: bool = False,
     sweep: bool = False,
@@ -50,7 +55,7 @@ def score(
     sensors
         One or more sensor presets by name, or preset files.
     only
-        Groups such as iso_12232, or figures such as iso_12232.noise_speed_10; all by default.
+        Groups such as iso_12232, or figures such as iso_12232.noise_speed_10, with commas between them; all by default.
     light
         Illuminant of all figures whose definition doesn't name another one.
     exposure
@@ -59,6 +64,10 @@ def score(
         F-number of the lens; the preset's own by default.
     diffraction
         Width of the lens's point image over an ideal one's, 0 for none; the preset's own by default.
+    gain
+        Gain over that at which a full well reads the converter's top; the preset's own by default.
+    iso
+        The same as a saturation-based speed.
     processor
         Measure pictures developed by it as well: of rodcone list processors, or mine.py:develop.
     trust_code
@@ -83,18 +92,26 @@ def score(
         )
     if sweep and only:
         raise InputError("only: figures beside --sweep, which has its own; allowed: one of the two; leave one out")
-    cameras = {name: _with_lens(preset(name), f_number, diffraction) for name in sensors}
+    names = [name for text in only or () for name in text.split(",")]
+    text = gain_text(gain, iso)
+    cameras = {name: _with_lens(at_gain(preset(name), text), f_number, diffraction) for name in sensors}
     if sweep:
         _print_sweep(cameras, light, exposure, seed, out, json=json)
         return
     # Figures, and where they go.
     found = {}
     for name, sensor in cameras.items():
-        say(f"{name}: measuring, some 10 s" if not only else f"{name}: measuring")
-        found[name] = merits_of(sensor, light, exposure, only or (), seed, processor=processor, trust_code=trust_code)
+        say(f"{name}: measuring, some 10 s" if not names else f"{name}: measuring")
+        with progress(sys.stderr) as step:
+            found[name] = merits_of(
+                sensor, light, exposure, names, seed, processor=processor, trust_code=trust_code, step=step
+            )
     if out is not None and out.suffix.lower() == ".html":
         curves = {name: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}
-        lens = "; ".join(f"{name} at f/{sensor.lens.f_number:g}" for name, sensor in cameras.items())
+        lens = "; ".join(
+            f"{name} at f/{sensor.lens.f_number:g}" + (f", gain {sensor.gain:g}" if sensor.gain != 1 else "")
+            for name, sensor in cameras.items()
+        )
         set_up = f"Under {light}, {exposure * 1e3:.4g} ms, unless a row says otherwise: {lens}."
         write_files({out: score_page(found, curves, set_up, metadata.version("rodcone"))})
     elif out is not None:

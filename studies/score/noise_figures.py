@@ -10,7 +10,11 @@ from math import isfinite, log10, nan, pi, sqrt
 
 import numpy as np
 
+from rodcone.types import Floats
+from scenes.oecf import BRIGHTEST, grey_scale
 from sensor.config import SensorConfig
+from sensor.pixel import bent_e
+from sensor.readings.resolve import several
 from studies.metrics.truth import GREY, named_light
 from studies.photograph.snr import electrons_at_snr, snr
 from studies.score.even_field import EvenField, even_field
@@ -19,7 +23,9 @@ from studies.study.gain import ISO_SATURATION_LUX_S
 
 ISO_NOISE_LUX_S = 10.0  # the noise-based speed is 10 over the exposure that has the signal-to-noise ratio
 REFERENCE_SHARE = 0.13  # of the saturation luminance, at which ISO 15739 takes the signal-to-noise ratio
-RAMP = (0.1, 0.2, 0.35, 0.5, 0.65)  # of saturation: light at which the response is measured
+RAMP_TOP = 0.65  # of saturation: light of the grey scale's brightest patch, at which the response is measured
+# Light of the grey scale of ISO 14524, whose 12 patches have a contrast of 100, over saturation.
+RAMP: Floats = RAMP_TOP / BRIGHTEST * np.array(grey_scale(12, 100.0))
 # Of an overexposed field's samples, which reads the converter's top: half of them are less, by what noise took off.
 SATURATED_PERCENT = 95.0
 LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # of the light that the closed form gives, around which a figure is searched
@@ -34,29 +40,7 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
     field = even_field(sensor, named_light(light), exposure_s, channel)
     words = field_words(field, light)
     at_saturation = field.headroom_e / field.electrons_per_cd_m2
-    e_per_lux_s = field.electrons_per_cd_m2 / field.lux_s_per_cd_m2
-    slope = Merit(
-        "oecf.slope",
-        "slope of the opto-electronic conversion",
-        "e-/(lux s)",
-        "ISO 14524",
-        f"{channel}, raw, a ramp of {len(RAMP)} even fields up to {100 * RAMP[-1]:.0f} % of saturation, {light}",
-        e_per_lux_s,
-    )
-    speed = Merit(
-        "iso_12232.saturation_speed",
-        "saturation-based speed",
-        "ISO",
-        "ISO 12232:2019, 6.2: 78 / H",
-        f"{words}; the mean reads the converter's top, no half stop taken off",
-        _saturation_speed(field, e_per_lux_s),
-    )
-
-    def measure_response(rng: np.random.Generator) -> tuple[float, float]:
-        found = _slope_e(field, rng)
-        return found, _saturation_speed(field, found)
-
-    yield Definition((slope, speed), measure_response)
+    yield _conversion(field, light)
 
     def noise_speed(ratio: int, quality: str) -> Named:
         name, title = f"iso_12232.noise_speed_{ratio}", f"noise-based speed, S/N {ratio}, {quality}"
@@ -75,6 +59,41 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
     yield _light_for_ratio(field, 10.0, [noise_speed(10, "first acceptable"), (snr10, lambda cd_m2: cd_m2 * pi / GREY)])
     yield _snr1s(sensor, channel)
     yield from _iso_15739(field, words, at_saturation)
+
+
+def _conversion(field: EvenField, light: str) -> Definition:
+    """Define slope and gamma of the conversion, and the speed that follows from them."""
+    e_per_lux_s = field.electrons_per_cd_m2 / field.lux_s_per_cd_m2
+    scale = (
+        f"{field.channel}, raw, a grey scale of {len(RAMP)} patches from {100 * RAMP[-1]:.2g} to {100 * RAMP[0]:.0f} % "
+        f"of saturation, {light}, a dark frame subtracted"
+    )
+    expected = response_figures(field, _expected_e(field, RAMP * field.headroom_e))
+    slope = Merit(
+        "oecf.slope", "slope of the opto-electronic conversion", "e-/(lux s)", "ISO 14524", scale, expected[0]
+    )
+    gamma = Merit(
+        "oecf.gamma",
+        "gamma of the opto-electronic conversion",
+        "1",
+        "ISO 14524: slope of log signal over log exposure",
+        f"{scale}; 1 of a straight response",
+        expected[1],
+    )
+    speed = Merit(
+        "iso_12232.saturation_speed",
+        "saturation-based speed",
+        "ISO",
+        "ISO 12232:2019, 6.2: 78 / H",
+        f"{field_words(field, light)}; the mean reads the converter's top, no half stop taken off",
+        _saturation_speed(field, e_per_lux_s),
+    )
+
+    def measure_response(rng: np.random.Generator) -> tuple[float, float, float]:
+        found, bend = response_figures(field, _measured_e(field, rng))
+        return found, bend, _saturation_speed(field, found * e_per_lux_s / expected[0])
+
+    return Definition((slope, gamma, speed), measure_response)
 
 
 def field_words(field: EvenField, light: str) -> str:
@@ -112,12 +131,31 @@ def _saturation_speed(field: EvenField, e_per_lux_s: float) -> float:
     return ISO_SATURATION_LUX_S * e_per_lux_s / field.headroom_e
 
 
-def _slope_e(field: EvenField, rng: np.random.Generator) -> float:
-    """Fit the response to a ramp of even fields by least squares [e-/(lux s)]."""
+def response_figures(field: EvenField, read_e: Floats) -> tuple[float, float]:
+    """Fit what the grey scale's patches read: its slope [e-/(lux s)], and that of its logarithm over the light's."""
+    lux_s = RAMP * field.headroom_e / field.electrons_per_cd_m2 * field.lux_s_per_cd_m2
+    slope = np.polyfit(lux_s, read_e, 1)[0]
+    gamma = np.polyfit(np.log(lux_s), np.log(np.maximum(read_e, 1e-9)), 1)[0]
+    return float(slope), float(gamma)
+
+
+def _expected_e(field: EvenField, collected_e: Floats) -> Floats:
+    """Return what is read of photo-electrons without noise and less the dark, which a bent response changes."""
+    if several(field.readings):
+        return collected_e
+    (reading,) = field.readings
+    pixel, share = reading.sensor.pixel, reading.share
+    dark_e = pixel.dark_current_e_per_s * reading.exposure_s
+    read_e: Floats = (bent_e(collected_e * share + dark_e, pixel) - bent_e(dark_e, pixel)) / share
+    return read_e
+
+
+def _measured_e(field: EvenField, rng: np.random.Generator) -> Floats:
+    """Measure what a chip reads of the grey scale's patches, less what it reads in the dark."""
     chip = field.draw_chip(rng)
-    light = np.array(RAMP) * field.headroom_e / field.electrons_per_cd_m2
-    electrons = [field.samples_e(field.shoot(x, chip, rng)).mean() for x in light]
-    return float(np.polyfit(light * field.lux_s_per_cd_m2, electrons, 1)[0])
+    light = (0.0, *(RAMP * field.headroom_e / field.electrons_per_cd_m2).tolist())
+    means_e: Floats = np.array([field.samples_e(field.shoot(x, chip, rng)).mean() for x in light])
+    return np.asarray(means_e[1:] - means_e[0])
 
 
 def ratio_at(field: EvenField, luminance: float, rng: np.random.Generator) -> float:

@@ -4,6 +4,7 @@ from collections.abc import Iterator, Sequence
 from math import nan
 
 from rodcone.errors import InputError, require_whole
+from rodcone.progress import Step, progress_bar
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import characterise
 from sensor.readings.resolve import at_channel, chip_readings
@@ -55,6 +56,7 @@ def score(
     *,
     processor: str | None = None,
     trust_code: bool = False,
+    step: Step | None = None,
 ) -> list[Merit]:
     """Compute a camera's figures of merit, and measure each on simulated frames.
 
@@ -73,6 +75,8 @@ def score(
         Of `rodcone.processors()`, or ``mine.py:develop``: whose pictures are measured too (``developed``).
     trust_code : bool
         Consent to run ``mine.py``, which may do all that its user may.
+    step : callable, optional
+        Takes what is measured, and the share of the work that is done, 0 to 1.
 
     Returns
     -------
@@ -93,18 +97,29 @@ def score(
     >>> row.title, row.agrees
     ('SNR10: light for a ratio of 10', True)
     """
+    # What is asked for.
     require_whole("seed", seed, 0, 2**31, "give a whole number")
     for name in only:
         if name.partition(".")[0] not in GROUPS:
             raise InputError(f"only: {name!r} is not known; allowed: {', '.join(GROUPS)}; write one of them")
     if processor is None and any(name.partition(".")[0] == "developed" for name in only):
         raise InputError("only: 'developed' without a processor; allowed beside one; name it, as --processor ple")
-    wanted = list(definitions(sensor, light, exposure_s, only))
+    wanted = [
+        definition
+        for definition in definitions(sensor, light, exposure_s, only)
+        if any(_wanted(merit.name, only) for merit in definition.merits)
+    ]
     if processor is not None and _group_wanted("developed", only):
         wanted += developed_figures(sensor, light, exposure_s, processor, trust_code=trust_code)
-    found = [merit for definition in wanted for merit in measured(definition, seed)]
-    if _group_wanted("emva_1288", only):
-        found += _emva(sensor, exposure_s, seed)
+    # Its measurement.
+    found: list[Merit] = []
+    with progress_bar(step) as tell:
+        for number, definition in enumerate(wanted):
+            tell(definition.merits[0].title, number / (len(wanted) + 1))
+            found += measured(definition, seed)
+        if _group_wanted("emva_1288", only):
+            tell("EMVA 1288", len(wanted) / (len(wanted) + 1))
+            found += _emva(sensor, exposure_s, seed)
     return [merit for merit in found if _wanted(merit.name, only)]
 
 

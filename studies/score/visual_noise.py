@@ -74,26 +74,29 @@ def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Def
 
 
 def _variances(field: EvenField, electrons: float) -> Floats:
-    """Return the variances that each pixel has by itself, and that a column's pixels share [e-^2]."""
+    """Return the variances that each pixel has by itself, that a column's pixels share, and that a row's do [e-^2]."""
     light_e, readings = np.array([electrons]), field.readings
     if several(readings):
         by_source = {name: float(values[0]) for name, values in merged_variances(light_e, readings).items()}
     else:
         by_source = {name: float(law.variance(light_e)[0]) for name, law in readings[0].sources.items()}
-    shared = sum(by_source[name] for name in COLUMNS)
-    return np.array([sum(by_source.values()) - shared, shared])
+    columns = sum(by_source[name] for name in COLUMNS)
+    pixel = readings[0].sensor.pixel  # whose share of the read noise merged readings are taken to have as well
+    rows = by_source["read noise"] * (pixel.row_noise_e / pixel.read_noise_e) ** 2 if pixel.row_noise_e else 0.0
+    return np.array([sum(by_source.values()) - columns - rows, columns, rows])
 
 
 def _expected(variances: Floats, matrix: Floats) -> float:
-    """Return the visual noise of relative variances of the channels, (channel, 2): of pixels, and of columns.
+    """Return the visual noise of relative variances of the channels, (channel, 3): of pixels, columns and rows.
 
     In cosine space, where the eye's blur is a product, noise is the same at all frequencies, that of columns at those
-    that don't change down a column.
+    that don't change down a column, that of rows at those that don't change along a row.
     """
     cycles = np.arange(SIDE_PX) / (2 * SIDE_PX) * PIXELS_PER_DEGREE
     passed = np.stack([transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
     passed[0, 0] = 0.0  # the mean isn't noise
-    kept = (np.einsum("hwi,hwj->ij", passed, passed) / SIDE_PX**2, passed[0].T @ passed[0] / SIDE_PX)
+    every = np.einsum("hwi,hwj->ij", passed, passed) / SIDE_PX**2
+    kept = (every, passed[0].T @ passed[0] / SIDE_PX, passed[:, 0].T @ passed[:, 0] / SIDE_PX)
     to_xyz = SRGB_TO_XYZ @ matrix
     to_opponent, to_eye = XYZ_TO_OPPONENT @ to_xyz, np.linalg.inv(XYZ_TO_OPPONENT)
     opponent = sum(to_opponent * of @ to_opponent.T * share for of, share in zip(variances.T, kept, strict=True))

@@ -112,10 +112,11 @@ def test_score_asks_for_the_lens_and_light_that_are_typed_and_tells_each_figure(
     monkeypatch.setattr(score_command, "over_light", stand_in(CURVE))
     names = ("low_noise", "table1_output")
     words = ("score", *names, "--light", "A", "--exposure", "20ms", "--f-number", 4, "--diffraction", 0.5, "--seed", 3)
-    only = ("--only", "snr10", "--only", "a.one")
+    only = ("--only", "snr10,a.one", "--only", "b", "--gain", 2)
     told = json.loads(printed(*words, *only, "--json", "-o", tmp_path / "sheet.csv"))
     for name, (sensor, *rest) in zip(names, asked, strict=True):
-        assert rest == ["A", 0.02, ["snr10", "a.one"], 3]
+        assert rest == ["A", 0.02, ["snr10", "a.one", "b"], 3]
+        assert sensor.gain == 2.0
         assert (sensor.lens.f_number, sensor.lens.diffraction) == (4.0, 0.5)
         assert sensor.pixel == preset(name).pixel
     agree = [True, False, None]

@@ -338,7 +338,21 @@ def test_the_measured_response_is_near_its_closed_form_and_says_what_was_photogr
         error = (row.high - row.low) / 2 / 4.303  # Student's t of 2 degrees
         assert abs(row.computed - row.measured) < 6 * max(error, 1e-3 * abs(row.computed))
         assert row.measured - row.low == pytest.approx(row.high - row.measured)
-    assert "a ramp of 5 even fields up to 65 % of saturation" in rows["oecf.slope"].conditions
+    assert "a grey scale of 12 patches from 0.65 to 65 % of saturation" in rows["oecf.slope"].conditions
+    assert rows["oecf.gamma"].computed == pytest.approx(1.0, abs=1e-12)
+
+
+@pytest.mark.thorough
+def test_a_bent_response_has_the_gamma_of_its_parabola() -> None:
+    """e (1.1 - 0.1 e / well) on patches from 0.65 to 65 %: less than 1, and frames show it; 12 standard errors."""
+    sensor = shot_noise_camera(response_bend=0.1)
+    lit = 0.65 * (np.linspace(1.0, 100 ** (-1 / 3), 12)) ** 3
+    gamma = np.polyfit(np.log(lit), np.log(lit * (1.1 - 0.1 * lit)), 1)[0]
+    rows = {row.name: row for row in score(sensor, only=["oecf"])}
+    assert rows["oecf.gamma"].computed == pytest.approx(gamma, abs=1e-4)
+    assert 0.97 < gamma < 0.99
+    for row in rows.values():
+        assert abs(row.measured - row.computed) < 3 * (row.high - row.low)
 
 
 def test_measured_sharpness_and_contrast_are_near_their_closed_forms(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -92,6 +92,18 @@ def test_visual_noise_with_stripes_of_columns_is_what_frames_show() -> None:
     assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
 
 
+@pytest.mark.thorough
+def test_visual_noise_with_stripes_of_rows_is_what_frames_show() -> None:
+    """All of 20 e- of read noise in rows: within 12 standard errors of the mean of eight measurements."""
+    sensor = public.low_noise()
+    loud = replace(sensor, pixel=replace(sensor.pixel, read_noise_e=20.0))
+    striped = replace(sensor, pixel=replace(loud.pixel, row_noise_e=20.0))
+    (merit,) = measured(raw_visual_noise(striped, "D65", 0.033), 0)
+    (plain,) = raw_visual_noise(loud, "D65", 0.033).merits
+    assert merit.computed > 1.2 * plain.computed
+    assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
+
+
 AS_READ = """
 import numpy as np
 
