@@ -151,9 +151,8 @@ def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
         if facts["key"] in files:
             truth = true_picture(arrays["rgb"].astype(np.float64))
             encoded = read_picture(files[facts["key"]], truth.encoded.shape[:2])
-            figures = vars(picture_quality(encoded, truth.encoded, truth.lab))
-            linear = decode_srgb(encoded)
-            figures |= vars(appearance(linear, encode_srgb(linear), truth, facts["white_cd_m2"]))
+            figures = vars(picture_quality(encoded, truth))
+            figures |= vars(appearance(decode_srgb(encoded), truth, facts["white_cd_m2"]))
             mistakes = {x: psnr_db(np.clip(undo(encoded), 0, 1), truth.encoded) for x, undo in _MISTAKES.items()}
             place = {name: facts[name] for name in ("scene", "luminance_cd_m2", *_PLACE)}
             rows.append({**place, **figures, "mistakes": mistakes})

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from skimage.color import deltaE_cie76, deltaE_ciede2000, rgb2lab
-from skimage.metrics import structural_similarity
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import InputError
 from rodcone.types import Image
-from studies.metrics.flip import Seen, flip, seen
-from studies.metrics.s_cielab import eye_lab
+from studies.metrics.flip import Seen, flip, seen_light
+from studies.metrics.s_cielab import eye_lab_of_light
+from studies.metrics.ssim import LocalMoments, local_moments, ssim
 
 
 @dataclass(frozen=True)
@@ -52,32 +52,27 @@ def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
     return float(-10 * np.log10(mean_square)) if mean_square > 0 else float("inf")
 
 
-def picture_quality(
-    picture: NDArray[np.float64], truth: NDArray[np.float64], truth_lab: NDArray[np.float64] | None = None
-) -> Quality:
+def picture_quality(picture: NDArray[np.float64], truth: "NDArray[np.float64] | TruePicture") -> Quality:
     """Compare encoded sRGB pictures (h, w, 3) in [0, 1].
 
-    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. `truth_lab`, the
-    truth's CIELAB, saves its computation where many pictures are compared with one truth.
+    SSIM is Wang et al. 2004 with its Gaussian window; CIEDE2000 takes D65 as the white. A `TruePicture` as the truth
+    saves half of the work where many pictures are compared with one.
 
     Raises
     ------
     InputError
         For a value that is NaN or infinite.
     """
-    require_finite(picture=picture, truth=truth)
-    ssim = structural_similarity(
-        picture,
-        truth,
-        channel_axis=2,
-        data_range=1.0,
-        gaussian_weights=True,
-        sigma=1.5,
-        use_sample_covariance=False,
-        win_size=min(11, (min(picture.shape[:2]) - 1) // 2 * 2 + 1),
+    if isinstance(truth, TruePicture):
+        encoded, lab, moments = truth.encoded, truth.lab, truth.moments
+        require_finite(picture=picture)
+    else:
+        require_finite(picture=picture, truth=truth)
+        encoded, lab, moments = truth, rgb2lab(truth), local_moments(truth)
+    delta_e = deltaE_ciede2000(rgb2lab(picture), lab)
+    return Quality(
+        psnr_db(picture, encoded), ssim(picture, moments), float(np.median(delta_e)), float(np.percentile(delta_e, 95))
     )
-    delta_e = deltaE_ciede2000(rgb2lab(picture), rgb2lab(truth) if truth_lab is None else truth_lab)
-    return Quality(psnr_db(picture, truth), float(ssim), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
 
 
 @dataclass(frozen=True)
@@ -94,6 +89,8 @@ class TruePicture:
         CIELAB after the eye's blur.
     seen : Seen
         What FLIP needs of it.
+    moments : LocalMoments
+        What SSIM needs of it.
     """
 
     linear: Image
@@ -101,6 +98,7 @@ class TruePicture:
     lab: Image
     eye_lab: Image
     seen: Seen
+    moments: LocalMoments
 
 
 @dataclass(frozen=True)
@@ -127,18 +125,19 @@ def true_picture(linear: Image) -> TruePicture:
     """Compute what comparisons need of linear sRGB (h, w, 3); `InputError` for a value that is NaN or infinite."""
     require_finite(truth=linear)
     encoded = encode_srgb(linear)
-    return TruePicture(linear, encoded, rgb2lab(encoded), eye_lab(encoded), seen(encoded))
+    shown = np.clip(linear, 0.0, 1.0)
+    return TruePicture(
+        linear, encoded, rgb2lab(encoded), eye_lab_of_light(shown), seen_light(shown), local_moments(encoded)
+    )
 
 
-def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
+def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appearance:
     """Compare a picture with the truth, both of one scale: nothing is fitted to the picture.
 
     Parameters
     ----------
     linear : (h, w, 3) float64
         sRGB, not clipped; 1 stands for `white_cd_m2`.
-    encoded : (h, w, 3) float64
-        The same by `rodcone.colour_spaces.encode_srgb`.
     truth : TruePicture
     white_cd_m2 : float
         Luminance of white. FLIP and S-CIELAB compare the pictures as a display shows them, whatever this is; PU21
@@ -150,12 +149,13 @@ def appearance(linear: Image, encoded: Image, truth: TruePicture, white_cd_m2: f
         For a value that is NaN or infinite.
     """
     require_finite(picture=linear)
-    difference = deltaE_cie76(eye_lab(encoded), truth.eye_lab)
+    shown = np.clip(linear, 0.0, 1.0)
+    difference = deltaE_cie76(eye_lab_of_light(shown), truth.eye_lab)
     luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
     return Appearance(
         float(np.median(difference)),
         float(np.percentile(difference, 95)),
-        float(flip(encoded, truth.seen).mean()),
+        float(flip(seen_light(shown), truth.seen).mean()),
         pu21_psnr_db(*luminances),
     )
 

@@ -113,8 +113,8 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
         )
     scaled = linear * _brightness(luminance_of_srgb(linear), luminance_of_srgb(reference.linear))
     encoded = encode_srgb(scaled)
-    quality = quality_of(encoded, reference.truth.encoded, reference.truth.lab)
-    return asdict(quality) | asdict(appearance(scaled, encoded, reference.truth, reference.white_cd_m2))
+    quality = quality_of(encoded, reference.truth)
+    return asdict(quality) | asdict(appearance(scaled, reference.truth, reference.white_cd_m2))
 
 
 def _brightness(luminance: Image, reference: Image) -> float:

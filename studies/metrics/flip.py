@@ -42,7 +42,7 @@ class Seen:
 
     Attributes
     ----------
-    colour : (h, w, 3) float64
+    colour : (3, h, w) float64
         CIELAB of the blurred picture after the Hunt effect.
     edges, points : (h, w) float64
         Strength of edges, and of points and lines.
@@ -57,35 +57,39 @@ class Seen:
 
 def seen(encoded: NDArray[np.floating], pixels_per_degree: float = PIXELS_PER_DEGREE) -> Seen:
     """Return what FLIP needs of one picture, encoded sRGB (h, w, 3) in [0, 1]."""
-    xyz = decode_srgb(np.asarray(encoded, dtype=np.float64)) @ (TO_XYZ / WHITE[:, None]).T
-    luminance = np.ascontiguousarray(xyz[..., 1])
+    return seen_light(decode_srgb(np.asarray(encoded, dtype=np.float64)), pixels_per_degree)
+
+
+def seen_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Seen:
+    """Return what FLIP needs of a display's light, linear sRGB (h, w, 3) in [0, 1]."""
+    planes = np.ascontiguousarray(np.moveaxis(linear, -1, 0))
+    x, luminance, z = np.einsum("ij,j...->i...", TO_XYZ / WHITE[:, None], planes)
     # Planes of YCxCz: 116 Y - 16, 500 (X - Y), 200 (Y - Z). Blur keeps sums and constants, so it acts on X, Y, Z here.
-    planes = luminance, xyz[..., 0] - luminance, luminance - xyz[..., 2]
     y, x_less_y, y_less_z = (
-        _blurred(np.ascontiguousarray(plane), gaussians, pixels_per_degree)
-        for plane, gaussians in zip(planes, CONTRAST, strict=True)
+        _blurred(plane, gaussians, pixels_per_degree)
+        for plane, gaussians in zip((luminance, x - luminance, luminance - z), CONTRAST, strict=True)
     )
-    blurred = np.stack([y + x_less_y, y, y - y_less_z], axis=-1)
-    linear = np.clip(blurred @ np.linalg.inv(TO_XYZ / WHITE[:, None]).T, 0.0, 1.0)
-    return Seen(_hunt_lab(linear), *_features(luminance, pixels_per_degree), pixels_per_degree)
+    blurred = np.stack([y + x_less_y, y, y - y_less_z])
+    shown = np.clip(np.einsum("ij,j...->i...", np.linalg.inv(TO_XYZ / WHITE[:, None]), blurred), 0.0, 1.0)
+    return Seen(_hunt_lab(shown), *_features(luminance, pixels_per_degree), pixels_per_degree)
 
 
 def flip(
-    picture: NDArray[np.floating], truth: "NDArray[np.floating] | Seen", pixels_per_degree: float = PIXELS_PER_DEGREE
+    picture: "NDArray[np.floating] | Seen",
+    truth: "NDArray[np.floating] | Seen",
+    pixels_per_degree: float = PIXELS_PER_DEGREE,
 ) -> Image:
     """Return LDR-FLIP of each pixel, shape (h, w), from 0 (no difference) to 1; its mean is a picture's usual figure.
 
     Parameters
     ----------
-    picture : (h, w, 3) array
-        Encoded sRGB in [0, 1].
-    truth : (h, w, 3) array or Seen
-        The same; or what `seen` made of it, at the same pixels per degree.
+    picture, truth : (h, w, 3) array or Seen
+        Encoded sRGB in [0, 1]; or what `seen` made of it. An array is then seen at the other's pixels per degree.
     pixels_per_degree : float
         Of the eye's view; the default is FLIP's own.
     """
     second = truth if isinstance(truth, Seen) else seen(truth, pixels_per_degree)
-    first = seen(picture, second.pixels_per_degree)
+    first = picture if isinstance(picture, Seen) else seen(picture, second.pixels_per_degree)
     colour = _redistributed(_hyab(first.colour, second.colour))  # equation 11: Delta E_c
     feature = np.maximum(np.abs(first.edges - second.edges), np.abs(first.points - second.points))
     feature = (feature / np.sqrt(2)) ** Q_FEATURE  # equation 13: Delta E_f
@@ -101,7 +105,7 @@ def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_pe
     result = np.zeros_like(plane)
     for weight, line in zip(weights / weights.sum(), lines, strict=True):
         taps = line / line.sum()
-        result += weight * _along_both(plane, taps, taps)
+        result += weight * _along(_along(plane, taps, 0), taps, 1)
     return result
 
 
@@ -114,39 +118,42 @@ def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]
     at = np.arange(-ceil(3 * sigma), ceil(3 * sigma) + 1)
     gaussian = np.exp(-(at**2) / (2 * sigma**2))
     across = gaussian / gaussian.sum()
+    blurred_down = _along(luminance, across, 0)
     found = []
     for derivative in (-at * gaussian, (at**2 / sigma**2 - 1) * gaussian):
         positive = np.maximum(derivative, 0.0)
         negative = np.minimum(derivative, 0.0)
         taps = positive / positive.sum() - negative / negative.sum()
-        found.append(np.hypot(_along_both(luminance, across, taps), _along_both(luminance, taps, across)))
+        found.append(np.hypot(_along(blurred_down, taps, 1), _along(_along(luminance, taps, 0), across, 1)))
     return found[0], found[1]
 
 
-def _along_both(plane: Image, down: Floats, across: Floats) -> Image:
-    """Return a plane after one filter along columns and one along rows, the border's pixels going on beyond it."""
-    return np.asarray(correlate1d(correlate1d(plane, down, axis=0, mode="nearest"), across, axis=1, mode="nearest"))
+def _along(plane: Image, taps: Floats, axis: int) -> Image:
+    """Return a plane after a filter along one axis, the border's pixels going on beyond it."""
+    return np.asarray(correlate1d(plane, taps, axis=axis, mode="nearest"))
 
 
 def _hunt_lab(linear: Image) -> Image:
-    """Return CIELAB of linear sRGB whose chroma grows with the lightness, as Hunt found (equation 7)."""
-    ratio = linear @ (TO_XYZ / WHITE[:, None]).T
-    root = np.where(ratio > _SLOPE**3, np.cbrt(ratio), ratio / (3 * _SLOPE**2) + 4 / 29)
-    lightness = 116 * root[..., 1] - 16
-    a, b = 500 * (root[..., 0] - root[..., 1]), 200 * (root[..., 1] - root[..., 2])
-    return np.stack([lightness, 0.01 * lightness * a, 0.01 * lightness * b], axis=-1)
+    """Return CIELAB of planes of linear sRGB whose chroma grows with the lightness, as Hunt found (equation 7)."""
+    ratio = np.einsum("ij,j...->i...", TO_XYZ / WHITE[:, None], linear)
+    root = np.cbrt(ratio)
+    dark = ratio <= _SLOPE**3
+    root[dark] = ratio[dark] / (3 * _SLOPE**2) + 4 / 29
+    x, y, z = root
+    lightness = 116 * y - 16
+    return np.stack([lightness, 5 * lightness * (x - y), 2 * lightness * (y - z)])
 
 
 def _hyab(first: Image, second: Image) -> Image:
     """Return the distance of colours by HyAB: of lightness by its size, of a and b Euclid's (equation 8)."""
-    difference = first - second
-    return np.asarray(np.abs(difference[..., 0]) + np.hypot(difference[..., 1], difference[..., 2]))
+    lightness, a, b = first - second
+    return np.asarray(np.abs(lightness) + np.hypot(a, b))
 
 
 def _redistributed(distance: Image) -> Image:
     """Return colour distances mapped to [0, 1]: up to p_c of the largest by one line, then by a flat one (4.1.3)."""
-    green, blue = (_hunt_lab(np.array([[colour]])) for colour in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
-    largest = float(_hyab(green, blue)[0, 0]) ** Q_COLOUR
+    green, blue = (_hunt_lab(np.array(colour)) for colour in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
+    largest = float(_hyab(green, blue)) ** Q_COLOUR
     knee = P_COLOUR * largest
     power = distance**Q_COLOUR
     steep = P_KNEE / knee * power

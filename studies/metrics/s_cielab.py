@@ -7,9 +7,11 @@ three opponent planes, each blurred by the eye's own spread, back to XYZ, then C
 import numpy as np
 from numpy.typing import NDArray
 from scipy.fft import dctn, idctn
-from skimage.color import deltaE_cie76, rgb2xyz, xyz2lab
+from skimage.color import deltaE_cie76, xyz2lab
+from skimage.color.colorconv import xyz_from_rgb
 
-from rodcone.types import Floats
+from rodcone.colour_spaces import decode_srgb
+from rodcone.types import Floats, Image
 
 # A 3840 pixels wide, 0.7 m wide display seen from 0.7 m: FLIP's own default, so that both look from one place.
 PIXELS_PER_DEGREE = 3840 * np.pi / 180
@@ -30,28 +32,42 @@ SPREADS = (
 
 def transfer(plane: int, cycles_per_degree: Floats) -> Floats:
     """Factor on the contrast of a grating of each frequency in opponent plane 0, 1 or 2; 1 at frequency 0."""
-    weights, spreads_deg = np.array(SPREADS[plane]).T
-    gaussians = np.exp(-((np.pi * spreads_deg * np.asarray(cycles_per_degree)[..., None]) ** 2))
-    return np.asarray(gaussians @ (weights / weights.sum()))
+    return np.asarray(_gaussians(plane, cycles_per_degree) @ _weights(plane))
 
 
 def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """XYZ (h, w, 3) after the eye's blur, the picture mirrored at its borders.
 
     In cosine space, where a mirrored blur is a product: exact for any spread, the 4.3 degrees' too, in O(n log n).
+    There each Gaussian is one of the rows' frequencies times one of the columns'.
     """
-    opponent = xyz @ XYZ_TO_OPPONENT.T
-    height, width = xyz.shape[:2]
-    vertical, horizontal = (np.arange(n) / (2 * n) * pixels_per_degree for n in (height, width))
-    frequency = np.hypot(vertical[:, None], horizontal[None, :])
-    spectrum = dctn(opponent, axes=(0, 1))
-    spectrum *= np.stack([transfer(plane, frequency) for plane in range(3)], axis=-1)
+    spectrum = dctn(xyz @ XYZ_TO_OPPONENT.T, axes=(0, 1))
+    down, across = (np.arange(n) / (2 * n) * pixels_per_degree for n in xyz.shape[:2])
+    for plane in range(3):
+        spectrum[..., plane] *= (_gaussians(plane, down) * _weights(plane)) @ _gaussians(plane, across).T
     return np.asarray(idctn(spectrum, axes=(0, 1)) @ np.linalg.inv(XYZ_TO_OPPONENT).T)
+
+
+def _gaussians(plane: int, cycles_per_degree: Floats) -> Floats:
+    """Return the factors of an opponent plane's Gaussians on contrast at each frequency, along a last axis."""
+    spreads_deg = np.array(SPREADS[plane])[:, 1]
+    return np.exp(-((np.pi * spreads_deg * np.asarray(cycles_per_degree)[..., None]) ** 2))
+
+
+def _weights(plane: int) -> Floats:
+    """Return the weights of an opponent plane's Gaussians, of sum 1."""
+    weights = np.array(SPREADS[plane])[:, 0]
+    return np.asarray(weights / weights.sum())
 
 
 def eye_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
     """CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
-    return np.asarray(xyz2lab(eye_xyz(rgb2xyz(encoded), pixels_per_degree)))
+    return eye_lab_of_light(decode_srgb(encoded), pixels_per_degree)
+
+
+def eye_lab_of_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Image:
+    """CIELAB of a display's light, linear sRGB (h, w, 3) in [0, 1], after the eye's blur."""
+    return np.asarray(xyz2lab(eye_xyz(linear @ xyz_from_rgb.T, pixels_per_degree)))
 
 
 def s_cielab(

@@ -97,8 +97,8 @@ def run_cell(cell: Cell) -> Row:
     # Measure.
     figures, measure_s, first_measure_s = timed(
         lambda: {
-            **vars(picture_quality(encoded, truth.encoded, truth.lab)),
-            **vars(appearance(linear, encoded, truth, cell.white_cd_m2)),
+            **vars(picture_quality(encoded, truth)),
+            **vars(appearance(linear, truth, cell.white_cd_m2)),
             **vars(target_figures(names["scene"], linear, truth.linear)),
         },
         *("measure", names["scene"], raw.shape),

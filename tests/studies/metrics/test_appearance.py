@@ -8,6 +8,7 @@ from outside_truth import colour_science
 from refusal import refusal
 from scipy.ndimage import correlate
 from skimage.color import deltaE_ciede2000, rgb2lab
+from skimage.metrics import structural_similarity
 
 from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
 from studies.metrics.appearance import appearance, picture_quality, psnr_db, pu21_encode, pu21_psnr_db, true_picture
@@ -40,6 +41,19 @@ def test_ssim_is_the_papers_equation() -> None:
     assert picture_quality(second, first).ssim == pytest.approx(ssim(second, first), rel=1e-9)
 
 
+def test_ssim_of_a_picture_smaller_than_its_window_is_scikit_images() -> None:
+    for shape in ((24, 31, 3), (9, 40, 3), (6, 7, 3)):
+        first, second = np.random.default_rng(1).uniform(0, 1, (2, *shape))
+        options = {"channel_axis": 2, "data_range": 1.0, "gaussian_weights": True, "use_sample_covariance": False}
+        theirs = structural_similarity(first, second, win_size=min(11, (min(shape[:2]) - 1) // 2 * 2 + 1), **options)
+        assert picture_quality(first, second).ssim == pytest.approx(theirs, abs=1e-12), shape
+
+
+def test_a_truth_computed_once_gives_the_same_figures() -> None:
+    truth = true_picture(TRUTH)
+    assert picture_quality(encode_srgb(PICTURE), truth) == picture_quality(encode_srgb(PICTURE), truth.encoded)
+
+
 def test_the_95th_percentile_sees_what_the_median_does_not() -> None:
     truth = np.full((20, 20, 3), 0.5)
     picture = truth.copy()
@@ -55,7 +69,7 @@ def test_a_picture_that_is_not_finite_has_no_quality() -> None:
         [
             psnr_db,
             picture_quality,
-            lambda picture, truth: appearance(picture, picture, true_picture(truth), 40.0),
+            lambda picture, truth: appearance(picture, true_picture(truth), 40.0),
             lambda picture, truth: pu21_psnr_db(picture[..., 0], truth[..., 0]),
         ],
         [np.nan, np.inf, -np.inf],
@@ -76,7 +90,7 @@ PICTURE = TRUTH + RNG.normal(0, 0.1, TRUTH.shape)
 
 def test_each_figure_is_its_own_module_s() -> None:
     picture, truth = encode_srgb(PICTURE), encode_srgb(TRUTH)
-    found = appearance(PICTURE, picture, true_picture(TRUTH), 40.0)
+    found = appearance(PICTURE, true_picture(TRUTH), 40.0)
     seen = s_cielab(picture, truth)
     assert found.s_cielab_median == pytest.approx(np.median(seen), rel=1e-12)
     assert found.s_cielab_p95 == pytest.approx(np.percentile(seen, 95), rel=1e-12)
@@ -88,12 +102,12 @@ def test_each_figure_is_its_own_module_s() -> None:
 
 
 def test_absolute_luminance_counts_for_pu21_alone_and_an_error_above_white_too() -> None:
-    encoded, truth = encode_srgb(PICTURE), true_picture(TRUTH)
-    dim, bright = (appearance(PICTURE, encoded, truth, white) for white in (0.4, 4000.0))
+    truth = true_picture(TRUTH)
+    dim, bright = (appearance(PICTURE, truth, white) for white in (0.4, 4000.0))
     assert (dim.flip_mean, dim.s_cielab_p95) == (bright.flip_mean, bright.s_cielab_p95)
     assert dim.pu21_psnr_db > bright.pu21_psnr_db + 10  # at 0.4 cd/m^2 the eye tells few steps apart
     glaring = np.full((24, 32, 3), 2.0)
-    above = appearance(glaring, encode_srgb(glaring), true_picture(glaring * 1.5), 40.0)
+    above = appearance(glaring, true_picture(glaring * 1.5), 40.0)
     assert above.flip_mean == 0.0  # a display clips both
     assert 10 < above.pu21_psnr_db < 30
 

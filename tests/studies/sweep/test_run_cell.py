@@ -83,10 +83,7 @@ def test_a_cell_is_its_steps_written_out(tmp_path: Path) -> None:
     linear = NAMED["bayer"].develop(raw, colours, balance=neutral).rgb / (neutral[1] * white)
     truth = true_srgb(radiance, light, white)
     encoded = encode_srgb(linear)
-    quality, seen = (
-        picture_quality(encoded, encode_srgb(truth)),
-        appearance(linear, encoded, true_picture(truth), white),
-    )
+    quality, seen = (picture_quality(encoded, encode_srgb(truth)), appearance(linear, true_picture(truth), white))
 
     assert row.exposure_s == pytest.approx(exposure_s, rel=1e-6)  # the level is put on before or after float32
     assert row.psnr_db == pytest.approx(quality.psnr_db, abs=1e-3)

@@ -1,0 +1,55 @@
+"""SSIM of Wang, Bovik, Sheikh & Simoncelli 2004, with what one picture needs by itself kept between comparisons.
+
+Numbers of equations are theirs. Each local mean weighs an 11 x 11 window by a Gaussian of 1.5 pixels.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+
+from rodcone.types import Image
+
+SIGMA_PX, REACH_PX = 1.5, 5  # of the window: its standard deviation, and its pixels on each side
+C1, C2 = 0.01**2, 0.03**2  # equations 7 and 9, for values in [0, 1]
+
+
+@dataclass(frozen=True)
+class LocalMoments:
+    """What SSIM needs of one picture.
+
+    Attributes
+    ----------
+    planes : (3, h, w) float64
+        The picture's own values.
+    mean, variance : (3, h, w) float64
+        Local ones, equations 14 and 15.
+    """
+
+    planes: Image
+    mean: Image
+    variance: Image
+
+
+def local_moments(picture: NDArray[np.floating]) -> LocalMoments:
+    """Return what SSIM needs of one picture (h, w, 3) of values in [0, 1]."""
+    planes = np.ascontiguousarray(np.moveaxis(np.asarray(picture, dtype=np.float64), -1, 0))
+    mean = _local_mean(planes)
+    return LocalMoments(planes, mean, _local_mean(planes * planes) - mean * mean)
+
+
+def ssim(picture: NDArray[np.floating], truth: LocalMoments) -> float:
+    """Return the mean SSIM over pixels and channels, without the border that a window leaves, where one fits."""
+    one = local_moments(picture)
+    shared = _local_mean(one.planes * truth.planes) - one.mean * truth.mean  # equation 16
+    light = (2 * one.mean * truth.mean + C1) / (one.mean**2 + truth.mean**2 + C1)
+    similar = light * (2 * shared + C2) / (one.variance + truth.variance + C2)  # equation 13
+    border = min(REACH_PX, (min(picture.shape[:2]) - 1) // 2)
+    height, width = picture.shape[:2]
+    return float(similar[:, border : height - border, border : width - border].mean())
+
+
+def _local_mean(planes: Image) -> Image:
+    """Return each pixel's mean under the window, the picture mirrored at its borders."""
+    return np.asarray(gaussian_filter(planes, (0, SIGMA_PX, SIGMA_PX), truncate=REACH_PX / SIGMA_PX))
