@@ -20,7 +20,7 @@ from studies.commands.console import print_json, print_table, require_place, tol
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.gain_plot import gain_svg
-from studies.study.cost import START_S, cores
+from studies.study.cost import START_S, cores, pace
 from studies.study.levels import UNITS, levels_between, parse_exposure, parse_level
 
 _TABLES_S, _ERROR_S = 12.0, 0.05  # processor seconds: tables of the prior, and a camera at one level
@@ -37,7 +37,7 @@ class _Cost:
     @property
     def seconds(self) -> float:
         """Time on this machine's cores, if they are idle."""
-        return START_S + (_TABLES_S + _ERROR_S * self.cameras * self.levels) / cores()
+        return pace() * (START_S + (_TABLES_S + _ERROR_S * self.cameras * self.levels) / cores())
 
     def words(self) -> str:
         """One line: time and memory, and what half of it would take."""

@@ -1,13 +1,18 @@
 """What a picture costs in time, memory and samples, before anything is computed.
 
 The numbers are processor seconds on a server's cores with AVX-512 (`benchmarks/bench_picture.py` prints them for
-another machine). What all cores share is divided by their number. Scenes differ: a chart's samples cost a third.
+another machine); `pace` says how much longer another machine takes. What all cores share is divided by their number.
+Scenes differ: a chart's samples cost a third.
 """
 
 import os
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
+from time import process_time
 from typing import Any
+
+import numpy as np
 
 from render.limits import PILOT_FROM
 from rodcone.memory import GB, Memory, memory
@@ -18,6 +23,8 @@ _RENDER_S = 1.1e-6  # a pixel, sample and light group in 20 bands
 _PATHS = 0.7  # share of it that doesn't grow with the bands
 _COMPILE_S = 0.3  # a band, where no kernel is kept on disk
 PILOT_SPP = 32  # samples per pixel of the pilot that goes before a long render
+# A fixed piece of work on the machine of these numbers: 2.2 times less than on one with AVX2, as `make test` is.
+_WORK_S = 8.8e-3
 KERNELS = Path.home() / ".drjit"
 
 
@@ -67,7 +74,7 @@ class PictureCost:
         render = render_seconds(self.pixels, self.bands, self.groups, spp) * (1.5 if self.denoised else 1.0)
         render = min(render, self.max_seconds or render)
         compiled = _COMPILE_S * self.bands if spp and not kernels_kept() else 0.0
-        return START_S + compiled + render + self.after_s * self.pixels * self.bands
+        return pace() * (START_S + compiled + self.after_s * self.pixels * self.bands) + render
 
     def facts(self) -> dict[str, Any]:
         """What ``--dry-run --json`` prints."""
@@ -102,7 +109,26 @@ def render_seconds(pixels: int, bands: int, groups: int, spp: float) -> float:
     """Time of a render on this machine's cores."""
     samples = spp + (PILOT_SPP if spp > PILOT_FROM else 0)
     each_s = _RENDER_S * (_PATHS + (1 - _PATHS) * bands / 20)
-    return each_s * pixels * groups * samples / cores()
+    return pace() * each_s * pixels * groups * samples / cores()
+
+
+@cache
+def pace() -> float:
+    """Measure the time that this machine takes for what takes 1 on the machine of the numbers, by a piece of work."""
+    return min(_work_s() for _ in range(3)) / _WORK_S
+
+
+def _work_s() -> float:
+    """Processor seconds of a loop in Python and of transforms and exponentials in NumPy, a third each or so."""
+    begun = process_time()
+    total, picture = 0, np.linspace(0.1, 1.0, 1 << 16, dtype=np.float32).reshape(256, 256)
+    for number in range(100_000):
+        total += number * number
+    for _ in range(3):
+        np.fft.rfft2(picture)
+    for _ in range(20):
+        picture = np.sqrt(np.exp(-picture))
+    return process_time() - begun
 
 
 def kernels_kept() -> bool:

@@ -14,7 +14,7 @@ from rodcone.memory import memory
 from rodcone.progress import duration
 from studies.budget.ledger import Plan
 from studies.budget.starting_points import plan_from_settings, reference_plan
-from studies.study.cost import START_S, cores, render_seconds
+from studies.study.cost import START_S, cores, pace, render_seconds
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, film_of, open_all
 from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
@@ -175,15 +175,16 @@ def _seconds(
     first_s = _FIRST_S + sum(costs[1] for costs in own)
     images = len(study.sensors) * len(study.spectra) * len(study_mosaics(study))
     seconds = START_S * (2 if workers > 1 else 1) + first_s * max(1.0, workers / cores()) + report_s
+    lights = 0.0
     for part in parts:
         pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale
         light = render_seconds(1, part.bands, part.groups, part.spp) * pixels if part.spp else 0.0
-        light = min(light, study.render.max_seconds or light)
+        lights += min(light, study.render.max_seconds or light)
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
-        seconds += light + pixels * part.bands * (_SHARED_S * images + _READ_S * (part.spp == 0))
+        seconds += pixels * part.bands * (_SHARED_S * images + _READ_S * (part.spp == 0))
         seconds += cells / len(parts) * (each / at_once + of_cell_s) + _PILOT_S * planned
-    return seconds
+    return lights + pace() * seconds
 
 
 def _develop_s(processor: str) -> tuple[float, float]:

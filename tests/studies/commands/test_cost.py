@@ -1,5 +1,6 @@
 """What a command says that it will cost: closed forms of the estimate, and that nothing is computed before."""
 
+import inspect
 import json
 import sys
 from dataclasses import replace
@@ -14,12 +15,13 @@ from command_line import COST, call
 from render.radiance_files.radiance_source import extent_of
 from rodcone.memory import memory
 from rodcone.progress import duration
-from studies.commands import cli, develop
+from studies.commands import cli, develop, expect
 from studies.photograph import shot
 from studies.study import cost
-from studies.study.cost import START_S, PictureCost, render_seconds
+from studies.study.cost import START_S, PictureCost, pace, render_seconds
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
+from studies.sweep import cost as sweep_cost
 from studies.sweep.cost import Estimate, estimate, estimated
 
 PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
@@ -27,8 +29,10 @@ PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
 @pytest.fixture(autouse=True)
 def warm(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two cores, with kernels on disk."""
+    """Two cores of the machine that the numbers are of, with kernels on disk."""
     monkeypatch.setattr(cost, "kernels_kept", lambda: True)
+    for module in (cost, sweep_cost, expect):
+        monkeypatch.setattr(module, "pace", lambda: 1.0)
     monkeypatch.setattr(cost, "cores", lambda: 2)
 
 
@@ -50,6 +54,19 @@ def test_a_pictures_time_is_the_sum_of_its_parts(monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(cost, "kernels_kept", lambda: False)
     assert PICTURE.seconds == pytest.approx(warm + 0.3 * 20)
     assert replace(PICTURE, spp=0).seconds == pytest.approx(START_S + after), "no render is compiled"
+
+
+def test_a_slower_machine_takes_longer_but_for_a_renders_own_limit(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole, limited = PICTURE.seconds, replace(PICTURE, max_seconds=0.5).seconds
+    monkeypatch.setattr(cost, "pace", lambda: 2.0)
+    assert PICTURE.seconds == pytest.approx(2 * whole)
+    assert replace(PICTURE, max_seconds=0.5).seconds == pytest.approx(2 * (limited - 0.5) + 0.5)
+
+
+def test_the_pace_is_that_of_a_fixed_piece_of_work(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock = iter([0.0, 0.03, 1.0, 1.0176, 2.0, 2.02])
+    monkeypatch.setattr(cost, "process_time", lambda: next(clock))
+    assert inspect.unwrap(pace)() == pytest.approx(2.0), "the least of three, as other programs only delay"
 
 
 def test_its_line_says_time_memory_and_samples_and_half_of_it() -> None:
