@@ -3,11 +3,13 @@
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.engine import render
+from render.error_estimates import Halves
 from render.geometry import horizontal_view_deg
 from render.radiance_files.photo import SURFACES
 from render.spectrum import Spectrum, fine_bands
@@ -28,13 +30,14 @@ from studies.study.scene_source import open_radiance_file
 from studies.study.study import OWN, Study, conditions, most_spp, study_mosaics
 
 PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
+FILE_SIDE = 128  # the same of a picture file's pilot, which costs no render
 PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
 PILOT_SPP = 128
 
 
 @dataclass(frozen=True)
 class Pilot:
-    """A scene rendered small with few samples, in fine bands. A picture file is its own pilot.
+    """A scene rendered small with few samples, in fine bands, or a picture file of fewer pixels.
 
     Attributes
     ----------
@@ -57,10 +60,11 @@ class Pilot:
 def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: Path | None = None) -> Pilot:
     """Render a scene's pilot, and group its fine bands into each of some numbers of wide ones.
 
-    A picture file keeps its own bands.
+    A picture file keeps its own bands; of a larger one than `FILE_SIDE`, whole blocks of pixels become one.
     """
     if opened.scene is None:
         transport = open_radiance_file(opened.choice.source, opened.white, opened.choice.spectra or SURFACES)[0]
+        transport = _in_blocks(transport, -(-max(transport.counts.shape) // FILE_SIDE))
         single = [np.array([band]) for band in range(transport.wavelength_nm.size)]
         return Pilot(opened, transport, {len(single): single})
     nm, width_nm = reference_bands(opened, study)
@@ -76,6 +80,33 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
         cache=cache,
     )
     return Pilot(opened, transport, {count: band_groups(width_nm, count) for count in counts})
+
+
+def _in_blocks(transport: Transport, side: int) -> Transport:
+    """Average blocks of so many rows and columns, those at the far borders smaller.
+
+    What levels are computed from stays that of the whole picture.
+    """
+    if side == 1:
+        return transport
+    starts = [np.arange(0, length, side) for length in transport.counts.shape]
+
+    def sums(planes: NDArray[Any]) -> NDArray[Any]:
+        return np.add.reduceat(np.add.reduceat(planes, starts[0], axis=-2), starts[1], axis=-1)
+
+    pixels = sums(np.ones(transport.counts.shape, np.float32))
+
+    def halves(whole: Halves) -> Halves:
+        return Halves(sums(whole.mean) / pixels, sums(whole.difference) / pixels)
+
+    return replace(
+        transport,
+        light=halves(transport.light),
+        variance=sums(transport.variance) / pixels**2,
+        coverage=halves(transport.coverage),
+        seen=tuple(halves(group) for group in transport.seen),
+        counts=sums(transport.counts),
+    )
 
 
 def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:

@@ -21,12 +21,14 @@ from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.budget import plan as planning
 from studies.budget.costs import cost_over_reference
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, Term, ledger_html
+from studies.budget.pilot import make_pilot
 from studies.budget.plan import plan
 from studies.budget.plan_text import plan_json, plan_table
 from studies.budget.starting_points import plan_from_settings, reference_plan, starting_point
 from studies.budget.summary import summary
 from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel, LensTerms, RenderModel
+from studies.study.scene_source import open_radiance_file
 from studies.study.study import BudgetShares, Condition, RenderLimits, SceneChoice, Study, conditions
 
 SMALL = Study(
@@ -394,3 +396,17 @@ def test_the_summary_and_costs_are_counted_once_more() -> None:
     assert [line.split() for line in text.getvalue().splitlines() if line.startswith("1cd/m2")] == [
         ["1cd/m2", "10", "2", "10%", "10%", "(50%)", "4%"]
     ]
+
+
+def test_the_pilot_of_a_large_picture_has_the_means_of_its_blocks(tmp_path: Path) -> None:
+    cube = np.random.default_rng(5).uniform(0.1, 0.9, (130, 300, 3)).astype(np.float32)
+    np.save(tmp_path / "wall.npy", cube)
+    (tmp_path / "wall.toml").write_text('holds = "radiance"\nwavelength_nm = [400, 550, 700]\n', "utf-8")
+    study = replace(SMALL, scenes=(SceneChoice(str(tmp_path / "wall.npy")),))
+    (opened,) = open_all(study).values()
+    pilot = make_pilot(opened, study, [3])
+    whole = open_radiance_file(opened.choice.source, opened.white)[0]
+    assert pilot.transport.coverage.mean.shape == (44, 100), "blocks of three, the last row's of one"
+    small, large = (x.relight(luminance_cd_m2=1.0).values for x in (pilot.transport, whole))
+    np.testing.assert_allclose(small[7, 9], large[21:24, 27:30].mean(axis=(0, 1)), rtol=1e-5)
+    np.testing.assert_allclose(small[43, 99], large[129:, 297:].mean(axis=(0, 1)), rtol=1e-5)
