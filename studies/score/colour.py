@@ -22,6 +22,7 @@ from sensor.optics import form_image
 from sensor.response import electrons_per_irradiance, expected_electrons, mixing_of
 from studies.metrics.truth import Light, named_light
 from studies.photograph.camera import calibrate
+from studies.score.even_field import without_blur
 from studies.score.figure import Definition, Merit, not_measured, without_noise_bias
 
 GREYS = 6  # the chart's last row
@@ -137,7 +138,8 @@ def _chart_e(sensor: SensorConfig, light: Light, surfaces: Floats, exposure_s: f
     for reflectance in (*surfaces, np.ones_like(light.spectrum)):
         values = np.broadcast_to(reflectance * light.spectrum, (rows, columns, light.spectrum.size)).copy()
         radiance = SpectralRadiance(values, light.wavelength_nm, width_nm=light.width_nm, light=light.lamp)
-        patches.append(np.tile(expected_electrons(form_image(radiance, sensor), sensor, exposure_s), repeats))
+        image = form_image(radiance, without_blur(sensor))
+        patches.append(np.tile(expected_electrons(image, sensor, exposure_s), repeats))
     chart_e = np.block([patches[row * ACROSS : (row + 1) * ACROSS] for row in range(ACROSS)])
     return np.asarray(chart_e * WHITE_SHARE * sensor.top_e / sensor.sites**2 / patches[-1].max())
 

@@ -32,7 +32,7 @@ CONFUSION_UM, PDR_RATIO = 22.0, 20.0  # circle on a sensor of 36 x 24 mm, and th
 
 def print_figures(field: EvenField, words: str) -> Iterator[Definition]:
     """Define the figures of an even field's channel, and of the three channels that tell colours."""
-    like = "like a test house's, by its published definition"
+    like = "like a test house's"
     stops = Merit(
         "print.landscape",
         "dynamic range in stops, down to a ratio of 1",

@@ -120,7 +120,8 @@ def score(
         if _group_wanted("emva_1288", only):
             tell("EMVA 1288", len(wanted) / (len(wanted) + 1))
             found += _emva(sensor, exposure_s, seed)
-    return [merit for merit in found if _wanted(merit.name, only)]
+    in_order = sorted(found, key=lambda merit: GROUPS.index(merit.name.partition(".")[0]))
+    return [merit for merit in in_order if _wanted(merit.name, only)]
 
 
 def _wanted(name: str, only: Sequence[str]) -> bool:

@@ -177,6 +177,20 @@ def test_what_a_camera_does_not_have_is_left_out_with_its_reason() -> None:
     assert all(np.isnan([row.computed, row.measured]).all() and row.agrees is None for row in rows.values())
 
 
+def test_an_even_field_is_the_same_behind_a_lens_that_blurs_it() -> None:
+    """Its frequency is 0, where each transfer is 1: the chart's patches and the field of a lens with defocus."""
+    sensor = public.low_noise("bayer")
+    blurred = replace(sensor, lens=replace(sensor.lens, defocus_um=20.0))
+    field = even_field(blurred, named_light("D65"), EXPOSURE_S, "G")
+    nm = np.arange(385.0, 780.0, 10.0)
+    lamp = public.illuminant("D65").band_average(nm, np.full(nm.size, 10.0))
+    lamp /= public.SpectralRadiance(lamp[None, None], nm, light=public.illuminant("D65")).luminance().mean()
+    radiance = public.SpectralRadiance(np.tile(lamp, (8, 8, 1)), nm, light=public.illuminant("D65"))
+    assert blurred.lens.diffraction > 0
+    seen_e = public.expected_electrons(public.form_image(radiance, blurred), blurred, EXPOSURE_S)
+    assert field.frame_e[:8, :8] == pytest.approx(seen_e, rel=2e-3)  # of bands of 10 nm
+
+
 def test_a_merge_s_seam_does_not_move_the_light_that_a_ratio_takes() -> None:
     """A parabola over +-25 % of light missed it by 1.1 %; 24 measurements, five standard errors."""
     sensor = public.preset("dual_gain")
