@@ -177,6 +177,7 @@ def test_the_mean_of_merged_readings_comes_back_in_every_range_of_light(name: st
     assert np.abs(back - levels).max() < 1.1 * most
 
 
+@pytest.mark.thorough
 def test_columns_gains_on_dark_current_are_in_the_transforms() -> None:
     """Of c^2 (e + D)^2 the term 2 c^2 D e grows with the light: k = 1 + 2 c^2 D is 1.22 here."""
     spread, dark_e, count = 0.05, 44.0, 200_000

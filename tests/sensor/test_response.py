@@ -130,6 +130,7 @@ def test_an_even_response_loses_the_photons_of_what_is_left_out():
         assert lost_shares(even, *bands(radiance)) == pytest.approx(dict.fromkeys("RGBW", expected), abs=1e-6)
 
 
+@pytest.mark.thorough
 @loop(("low_nm", "high_nm"), [(380, 650), (450, 650), (400, 700)])
 @pytest.mark.filterwarnings("ignore:radiance")
 def test_the_shares_are_what_the_electrons_of_equal_energy_light_lose(low_nm, high_nm):

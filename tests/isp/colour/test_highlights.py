@@ -47,6 +47,7 @@ def test_a_dark_sample_within_a_lamp_says_its_colour(tile):
         assert not white_lamps(raw, gains_of(raw)).any(), size
 
 
+@pytest.mark.thorough
 def test_white_lamps_come_out_grey_and_sodium_lamps_orange():
     """A lamp of 1x3 pixels was cyan where its red site was the dark one beside it."""
     tiles = {"ple_rgbw": RGBW_PHASES, "ple_bayer": BAYER_PHASES, "bayer": BAYER_PHASES}

@@ -310,6 +310,7 @@ def test_question_answer_and_first_chart_follow_the_menus(browser: Any, four: Pa
 LOWER = {"delta_e_median", "delta_e_p95", "s_cielab_median", "s_cielab_p95", "flip_mean", "chart_delta_e_mean"}
 
 
+@pytest.mark.thorough
 def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows(browser: Any, four: Path) -> None:
     page, report, level = CHROME.open_page(browser, four), compared(), 4
     for control, value in (("a", 3), ("b", 0), ("level", level)):
@@ -347,6 +348,7 @@ def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows
         assert page.evaluate("byId('key-top').textContent") == words
 
 
+@pytest.mark.thorough
 def test_the_address_holds_the_view_and_a_point_of_a_chart_its_level(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     page.evaluate("document.querySelectorAll('#lead-chart .mark')[0].dispatchEvent(new Event('click'))")
@@ -366,6 +368,7 @@ def test_the_address_holds_the_view_and_a_point_of_a_chart_its_level(browser: An
     assert strange == plain
 
 
+@pytest.mark.thorough
 def test_wheel_and_double_click_enlarge_about_the_pointer_and_the_wipe_follows(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     shown(page)
@@ -391,6 +394,7 @@ def test_wheel_and_double_click_enlarge_about_the_pointer_and_the_wipe_follows(b
     assert CHROME.complaints(page) == []
 
 
+@pytest.mark.thorough
 def test_what_is_shown_can_be_saved_as_numbers_and_as_a_picture(browser: Any, report: Path) -> None:
     page = CHROME.open_page(browser, report)
     shown(page)

@@ -64,6 +64,7 @@ def test_light_and_dark_current_of_several_readings_fit_the_well_together() -> N
         assert electrons_at_snr(beyond, hot, EXPOSURE_S) == inf
 
 
+@pytest.mark.thorough
 def test_a_ratio_is_told_up_to_the_deepest_reading_and_the_least_light_is_taken() -> None:
     """A switched camera has its SNR in the gain that it reads such light with; of two such lights the dimmer one."""
     deep = preset("dual_gain")
