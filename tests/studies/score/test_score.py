@@ -21,7 +21,7 @@ from studies.score import score as score_module
 from studies.score.contrast import accuracy, reading_distribution
 from studies.score.even_field import even_field
 from studies.score.noise_figures import light_for, ratio_at
-from studies.score.output_speeds import output_speeds
+from studies.score.output_speeds import decoded, output_speeds
 from studies.score.over_light import over_light
 from studies.score.score import GROUPS, definitions, score
 from studies.score.sharpness import edge_coverage
@@ -210,6 +210,18 @@ def test_the_light_for_a_figure_is_where_a_power_of_light_crosses_it_within_the_
             assert found == pytest.approx(7.0 * wanted, rel=1e-9)
     for goal, wanted in ((2.0, 0.94), (4.0, 1.06)):  # 3 at the middle: too much, too little
         assert light_for(lambda x: 3.0 * (7.0 / x), goal, 7.0) == pytest.approx(7.0 * wanted)
+
+
+def test_an_srgb_value_is_found_on_a_ladder_without_the_curves_bend() -> None:
+    """Of values without noise the light is exact; encoded values would miss it by 4.5e-5."""
+    goal = 118 / 255
+
+    def shown(light: float) -> float:
+        return 1.055 * (light / 5.0) ** (1 / 2.4) - 0.055
+
+    exact = 5.0 * ((goal + 0.055) / 1.055) ** 2.4
+    assert light_for(lambda x: decoded(shown(x)), decoded(goal), exact) == pytest.approx(exact, rel=1e-6)
+    assert light_for(shown, goal, exact) / exact - 1 == pytest.approx(4.5e-5, abs=1e-5)
 
 
 def test_a_wider_aperture_and_a_longer_exposure_need_less_light() -> None:
