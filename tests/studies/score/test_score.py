@@ -14,6 +14,7 @@ from scipy.stats import binom
 import rodcone as public
 from sensor.config import SensorConfig
 from sensor.emva1288.characterise import FigureOfMerit
+from studies.metrics.mtf import edge_response
 from studies.metrics.truth import named_light, neutral_electrons
 from studies.photograph.snr import electrons_at_snr
 from studies.score import figure as figure_module
@@ -484,3 +485,30 @@ def test_intervals_of_each_row_hold_the_closed_form_as_often_as_they_say() -> No
     assert {name: count for name, count in missed.items() if count > 6} == {}
     assert asked > 300
     assert outside <= binom.isf(1e-3, asked, 0.05), (outside, asked)
+
+
+def slanted_edge_mtf(picture: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Measure an MTF by ISO 12233's steps, apart from the program: rows' centroids, a line, bins of a quarter pixel."""
+    height, width = picture.shape
+    columns = np.arange(width - 1) + 0.5
+    slopes = np.diff(picture, axis=1)
+    line = np.polyfit(np.arange(height), slopes @ columns / slopes.sum(axis=1), 1)
+    distance = np.arange(width) - np.polyval(line, np.arange(height))[:, None]
+    distance *= np.cos(np.arctan(line[0]))
+    bins = np.rint(4 * distance).astype(int)
+    reach = 4 * width // 2 - 16
+    edge = np.array([picture[bins == at].mean() for at in range(-reach, reach + 1)])
+    spread = np.diff(edge) * np.hamming(edge.size - 1)
+    frequency = np.fft.rfftfreq(spread.size, 0.25)
+    response = np.abs(np.fft.rfft(spread))
+    return frequency, response / response[0] / np.sinc(frequency / 4) ** 2  # bins, and differences between them
+
+
+def test_the_mtf_is_that_of_a_second_implementation() -> None:
+    """Of the pixel's own aperture: within 0.001 up to Nyquist; of bins and differences uncorrected 0.02 apart."""
+    picture = 0.2 + 0.6 * edge_coverage(128)
+    frequency, mtf = slanted_edge_mtf(picture)
+    found = edge_response(picture)
+    low = frequency <= 0.5
+    seen = np.interp(frequency[low], found.frequency_cycles_per_px, found.mtf)
+    assert np.abs(seen - mtf[low]).max() < 1e-3
