@@ -4,7 +4,6 @@ A name is imported from its module when it is asked for, so that `import rodcone
 Mitsuba nor Dr.Jit. It only chooses the LLVM library that Dr.Jit will load: import rodcone before `mitsuba` or `drjit`.
 """
 
-import tomllib
 from pathlib import Path as _Path
 from typing import Any
 
@@ -17,23 +16,25 @@ _require_no_shadow()
 # Public name: module and attribute. Its strings are the one exemption from the layers (rodcone is the ground that
 # the other packages stand on): import-linter sees no imports here, since nothing is imported until a user asks.
 # docs/make/public_stub.py writes `__init__.pyi`, the same names with their types, from them and from the functions. No
-# module of this package may bear one of them.
-_PUBLIC = {
-    name: tuple(place.split(":"))
-    for name, place in tomllib.loads(_Path(__file__).with_name("public.toml").read_text("utf-8")).items()
-}
-
-__all__ = sorted(_PUBLIC)  # noqa: PLE0605
+# module of this package may bear one of them. The file is read when a name is asked for: commands ask for none.
 
 
 def __getattr__(name: str) -> Any:
     """Import a public name from its module: a class, or a function with the checks of `rodcone.doors` before it."""
+    if name == "_PUBLIC":
+        places = imported("tomllib").loads(_Path(__file__).with_name("public.toml").read_text("utf-8"))
+        globals()[name] = {public: tuple(place.split(":")) for public, place in places.items()}
+        return globals()[name]
+    if name == "__all__":
+        globals()[name] = sorted(__getattr__("_PUBLIC"))
+        return globals()[name]
     if name == "__version__":
         globals()[name] = imported("importlib.metadata").version("rodcone")
         return globals()[name]
-    if name not in _PUBLIC:
+    public = __getattr__("_PUBLIC")
+    if name not in public:
         raise AttributeError(f"module 'rodcone' has no attribute {name!r}")
-    module, attribute = _PUBLIC[name]
+    module, attribute = public[name]
     value = getattr(imported(module), attribute)
     globals()[name] = value if isinstance(value, type) else door(name, value)
     return globals()[name]
@@ -41,4 +42,4 @@ def __getattr__(name: str) -> Any:
 
 def __dir__() -> list[str]:
     """Return the names that tab shows."""
-    return [*__all__, "__version__"]
+    return [*__getattr__("__all__"), "__version__"]

@@ -3,7 +3,6 @@
 import errno
 import os
 import re
-import secrets
 import shutil
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -109,7 +108,7 @@ def inside(folder: Path, name: str) -> Path:
 
 def _place_beside(path: Path) -> Path:
     """New path beside a path, in a folder that can be written, with its ending, by which writers choose a format."""
-    place = path.with_name(f".rodcone-{secrets.token_hex(8)}{path.suffix}")
+    place = path.with_name(f".rodcone-{os.urandom(8).hex()}{path.suffix}")
     try:
         place.open("xb").close()
         place.unlink()

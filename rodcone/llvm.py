@@ -11,7 +11,6 @@ import sys
 import warnings
 from collections.abc import Iterable
 from glob import glob
-from importlib import metadata
 from pathlib import Path
 
 OLDEST_LLVM = 17  # 15 and 16 abort with "Cannot select: fmaximum" at the first kernel (measured with Dr.Jit 1.5)
@@ -31,11 +30,15 @@ def _newest(paths: Iterable[Path]) -> Path | None:
 
 
 def _wheel_library() -> Path | None:
-    try:
-        files = metadata.files("karellen-llvm-core") or []
-    except metadata.PackageNotFoundError:
-        return None
-    return _newest(Path(str(file.locate())).resolve() for file in files if llvm_version(Path(file.name)))
+    """Return the library of the wheel `karellen-llvm-core`, None where it isn't installed.
+
+    Its list of files is read as it stands: `importlib.metadata` alone takes as long as all else of `import rodcone`.
+    """
+    for folder in map(Path, sys.path):
+        for record in sorted(folder.glob("karellen_llvm_core-*.dist-info/RECORD")):
+            files = [folder / line.split(",")[0] for line in record.read_text("utf-8").splitlines()]
+            return _newest(file.resolve() for file in files if llvm_version(file))
+    return None
 
 
 def _system_library() -> Path | None:

@@ -4,8 +4,8 @@ import re
 import sys
 import warnings
 from collections.abc import Sequence
-from functools import cache
-from importlib import metadata
+from functools import cache, partial
+from importlib import import_module
 from typing import Any, get_args
 
 from cyclopts import App, CycloptsError, Parameter, Token, convert
@@ -39,41 +39,42 @@ app = App(
         "-o is short for --out. Beside a NAME.dng of RGBW, or of another mosaic that raw converters take for a wrong "
         "one such as GMCY, lies NAME_bayer.dng: give them that one."
     ),
-    version=lambda: metadata.version("rodcone"),
+    help_format="plaintext",  # to import Markdown's parser takes a third of the seconds of --help
+    version=lambda: import_module("importlib.metadata").version("rodcone"),
     # A flag has no --no-flag, a list no --empty-list; that a flag is off and a list empty goes without saying.
     default_parameter=Parameter(
         negative=(), converter=_converted, show_default=lambda value: None if value is False or value == () else value
     ),
 )
 
-
-app.command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
-app.command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
-app.command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
-app.command("studies.commands.dataset:dataset", name="dataset", help="Make raw frames and their truth to train on.")
-app.command("studies.commands.demo:demo", name="demo", help="Compare RGBW and Bayer from moonlight to daylight.")
-app.command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
-app.command("studies.commands.doctor:doctor", name="doctor", help="Say what is installed, and whether all is well.")
-app.command("studies.commands.expect:expect", name="expect", help="Compute which error to expect in which light.")
-app.command("studies.commands.explore:explore", name="explore", help="Open a page on which sliders change a camera.")
-app.command("studies.commands.judge:judge", name="judge", help="Measure pictures of a set against its truth.")
-app.command("studies.commands.list:list_names", name="list", help="List scenes, lights, sensors and other names.")
-app.command("studies.commands.mtf:mtf", name="mtf", help="Measure the sharpness of an edge in a picture.")
+_command = partial(app.command, help_format="markdown")
+_command("studies.commands.bench:bench", name="bench", help="Measure speed against error, stage by stage.")
+_command("studies.commands.develop:capture", name="capture", help="Photograph a scene into raw files.")
+_command("studies.commands.characterise:characterise", name="characterise", help="Measure a chip after EMVA 1288.")
+_command("studies.commands.dataset:dataset", name="dataset", help="Make raw frames and their truth to train on.")
+_command("studies.commands.demo:demo", name="demo", help="Compare RGBW and Bayer from moonlight to daylight.")
+_command("studies.commands.develop:develop", name="develop", help="Develop a raw file into a picture.")
+_command("studies.commands.doctor:doctor", name="doctor", help="Say what is installed, and whether all is well.")
+_command("studies.commands.expect:expect", name="expect", help="Compute which error to expect in which light.")
+_command("studies.commands.explore:explore", name="explore", help="Open a page on which sliders change a camera.")
+_command("studies.commands.judge:judge", name="judge", help="Measure pictures of a set against its truth.")
+_command("studies.commands.list:list_names", name="list", help="List scenes, lights, sensors and other names.")
+_command("studies.commands.mtf:mtf", name="mtf", help="Measure the sharpness of an edge in a picture.")
 app.command("studies.commands.new:app", name="new", help="Write files to start from: preset, study, cluster.")
-app.command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
-app.command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
-app.command("studies.commands.plot:plot", name="plot", help="Draw a metric of a sweep over light into a file.")
-app.command("studies.commands.demo:reference", name="reference", help="Render the light that studies photograph.")
-app.command("studies.commands.develop:render", name="render", help="Render a scene into a spectral OpenEXR file.")
-app.command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
-app.command("studies.commands.schema:schema", name="schema", help="Print the JSON Schema of sensor or study files.")
-app.command("studies.commands.score:score", name="score", help="Print figures of merit, computed beside measured.")
-app.command("studies.commands.characterise:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
-app.command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
-app.command("studies.commands.export:export", name="export", help="Write a sweep's results as CSV.")
-app.command("studies.commands.export:table", name="table", help="Print a sweep's figures as a Markdown table.")
-app.command("studies.commands.train:train", name="train", help="Train the prior of ple, ple_rgbw and ple_bayer.")
-app.command("studies.commands.twin:twin", name="twin", help="Set a real camera beside its simulated twin.")
+_command("studies.commands.paper:paper", name="paper", help="Compute the paper's figures and check its claims.")
+_command("studies.commands.plan:plan", name="plan", help="Compute a study's error budget and the cheapest model.")
+_command("studies.commands.plot:plot", name="plot", help="Draw a metric of a sweep over light into a file.")
+_command("studies.commands.demo:reference", name="reference", help="Render the light that studies photograph.")
+_command("studies.commands.develop:render", name="render", help="Render a scene into a spectral OpenEXR file.")
+_command("studies.commands.report:report", name="report", help="Write the report of a sweep as one HTML file.")
+_command("studies.commands.schema:schema", name="schema", help="Print the JSON Schema of sensor or study files.")
+_command("studies.commands.score:score", name="score", help="Print figures of merit, computed beside measured.")
+_command("studies.commands.characterise:snr", name="snr", help="Print the light in which a pixel reaches an SNR.")
+_command("studies.commands.sweep:sweep", name="sweep", help="Make every picture of a study, or those still missing.")
+_command("studies.commands.export:export", name="export", help="Write a sweep's results as CSV.")
+_command("studies.commands.export:table", name="table", help="Print a sweep's figures as a Markdown table.")
+_command("studies.commands.train:train", name="train", help="Train the prior of ple, ple_rgbw and ple_bayer.")
+_command("studies.commands.twin:twin", name="twin", help="Set a real camera beside its simulated twin.")
 app.register_install_completion_command(help="Let this shell complete rodcone's commands and options.")
 
 

@@ -27,7 +27,7 @@ from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
 from studies.commands.console import require_new, say
 
-app = App(name="new", help="Write files to start from.")
+app = App(help_format="markdown", name="new", help="Write files to start from.")
 _STUDIES = Path(__file__).parent.parent / "configs"
 _EYE = _STUDIES / "sensors" / "eye.toml"  # its receptors make no colour matrix, so it is no preset of `sensor.presets`
 _CLUSTER = Path(__file__).parent.parent / "data" / "dask.yaml"

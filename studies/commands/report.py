@@ -6,13 +6,12 @@ from pathlib import Path
 from rodcone.errors import InputError, require_absent, require_whole, unknown
 from rodcone.files import write_files
 from studies.commands.console import say
+from studies.commands.report_mark import REPORT, RESULTS, marked
 from studies.pages.report import render_report
 from studies.pages.report_compare import CAMERA, first_comparison, markdown
 from studies.pages.report_sweep import sweep_report
 from studies.sweep.database import last_run
 from studies.sweep.export import MOST_ROWS, axis_values, results_json
-
-FILE, RESULTS = "report.html", "results.json"
 
 
 def report(
@@ -45,7 +44,7 @@ def report(
     """
     if pictures is not None:
         require_whole("pictures", pictures, 1, 100_000, "give a number of pictures")
-    path = out or folder / FILE
+    path = out or folder / REPORT
     if path.suffix.lower() == ".md":
         write_files({path: _markdown(folder, path, camera, where)})
     else:
@@ -79,13 +78,15 @@ def write_results(folder: Path) -> Path:
     """
     run = last_run(folder)
     page, count = render_report(*sweep_report(folder, run=run)), len(run.rows)
-    if count > MOST_ROWS:  # none stays that says less than the sweep
-        write_files({folder / FILE: page})
+    results = None if count > MOST_ROWS else results_json(run)
+    files = {folder / REPORT: marked(folder, page, results, run.content)}
+    if results is None:  # none stays that says less than the sweep
+        write_files(files)
         (folder / RESULTS).unlink(missing_ok=True)
         say(f"{count} rows are too many for {RESULTS}: rodcone export {folder} -o rows.csv writes them")
     else:
-        write_files({folder / FILE: page, folder / RESULTS: results_json(run)})
-    return folder / FILE
+        write_files({**files, folder / RESULTS: results})
+    return folder / REPORT
 
 
 def write_report(

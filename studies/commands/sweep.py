@@ -19,7 +19,7 @@ from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_study
 from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.commands.console import INTERRUPTED, print_result, say, told
-from studies.commands.report import write_results
+from studies.commands.report_mark import REPORT, is_current
 from studies.photograph.clock import Clock
 from studies.study.cost import cores
 from studies.study.study import AUTOMATIC, Study
@@ -180,7 +180,11 @@ def make_all(
         with clock.stage("plan"):
             plan = planned(step)
         swept = run_sweep(study, out, plan, runner, step, clock=clock)
-        report = write_results(out)
+        report = out / REPORT
+        if swept.made or not is_current(out):
+            from studies.commands.report import write_results  # takes a second, for what draws a page
+
+            report = write_results(out)
     say(*swept.notes)
     return swept, report
 

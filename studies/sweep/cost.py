@@ -20,7 +20,7 @@ from studies.study.lit_scene import OpenedScene, film_of, open_all
 from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
 from studies.sweep.database import FILE
 from studies.sweep.export import read_rows
-from studies.sweep.provenance import code_version
+from studies.sweep.provenance import versions
 
 # Processor seconds on a server's cores with AVX-512, by 16 cells of the demo in one process.
 _SHARED_S = 7e-7  # a pixel and band of each image that cells share
@@ -118,7 +118,7 @@ def estimated(
     everything = reference or study.budget.model == REFERENCE
     plan = reference_plan(study) if everything else plan_from_settings(study)
     rows = read_rows(out) if (out / FILE).is_file() else []
-    code = code_version()
+    code = versions()["rodcone"]
     kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)
     return estimate(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
 

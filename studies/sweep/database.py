@@ -56,12 +56,15 @@ _CREATE = (
 
 @dataclass(frozen=True)
 class LastRun:
-    """The last run in a folder: its study, its seconds per stage, how many cells it asks for, and the rows made."""
+    """The last run in a folder: its study, its seconds per stage, how many cells it asks for, the rows made, and the
+    hash of all that but the seconds.
+    """
 
     study: dict[str, Any]
     stages: dict[str, float]
     wanted: int
     rows: list[Row]
+    content: str
 
 
 @contextmanager
@@ -208,13 +211,21 @@ def last_run(folder: Path) -> LastRun:
         runs = [_require_sound(values, "a run") for values in base.execute("SELECT * FROM runs ORDER BY rowid")]
         cells = list(rows(base))
         wanted = base.execute("SELECT count(*) FROM wanted").fetchone()[0]
+        hashed = content(base)
     if not runs or not cells:
         raise InputError(f"{folder}: its last run has made no cell yet; run rodcone sweep, which goes on")
     study = runs[-1][2]
     seconds = Counter[str]()
     for stages in (json.loads(run[3]) for run in runs if run[2] == study):
         seconds.update(stages)
-    return LastRun(json.loads(study), dict(seconds), wanted, cells)
+    return LastRun(json.loads(study), dict(seconds), wanted, cells, hashed)
+
+
+def content(base: sqlite3.Connection) -> str:
+    """Return the hash of what `last_run` reads, but for the seconds of the stages."""
+    study = base.execute("SELECT study FROM runs ORDER BY rowid DESC LIMIT 1").fetchone()
+    cells = base.execute("SELECT place, wanted.key, digest FROM wanted LEFT JOIN cells USING (key) ORDER BY place")
+    return digest([study, cells.fetchall()])
 
 
 def want(base: sqlite3.Connection, keys: Iterable[str | None]) -> None:

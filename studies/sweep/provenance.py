@@ -93,10 +93,16 @@ def provenance(
 def versions(processor: str | None = None) -> dict[str, str]:
     """Versions of all that makes numbers, of the backend in use and of a processor's own libraries too."""
     names = (*_PACKAGES, *(libraries(processor) if processor else ()))
-    result = {"rodcone": code_version(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
+    result = {"rodcone": _own_code(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
     if backend() != "numpy":
         result[backend()] = compiler_version()
     return result
+
+
+@cache
+def _own_code() -> str:
+    """Return `code_version` as it is when this process first asks."""
+    return code_version()
 
 
 def threads() -> int:

@@ -51,7 +51,7 @@ def run(**changes: object) -> LastRun:
         "longest_exposure_s": 0.066,
         **changes,
     }
-    return LastRun(study, {}, len(made), made)
+    return LastRun(study, {}, len(made), made, "")
 
 
 def plain(path: Path) -> str:

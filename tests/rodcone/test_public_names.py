@@ -124,6 +124,16 @@ def test_the_version_is_the_installed_one_and_is_read_when_it_is_asked_for() -> 
     assert in_new_python(code) == f"False {metadata.version('rodcone')} True"
 
 
+def test_neither_import_nor_help_loads_what_it_does_not_need() -> None:
+    code = "import sys, rodcone; print(sorted({'tomllib', 'importlib.metadata', 'numpy'} & sys.modules.keys()))"
+    assert in_new_python(code) == "[]"
+    show = (
+        "import sys, rodcone\nfrom studies.commands.cli import main\ntry: main(['--help'])\nexcept SystemExit: pass\n"
+    )
+    code = show + "print(sorted({'rich.markdown', 'importlib.metadata', 'numpy'} & sys.modules.keys()))"
+    assert in_new_python(code).splitlines()[-1] == "[]"
+
+
 def test_no_ground_module_bears_a_public_name() -> None:
     modules = {path.stem for path in ROOT.iterdir()}
     assert not modules & public._PUBLIC.keys(), "the module's import would hide the public name"

@@ -50,6 +50,28 @@ def test_sweep_prints_the_ledger_alone_and_the_table_follows(study: Path, tmp_pa
 
 
 @pytest.mark.thorough
+def test_a_run_that_makes_no_cell_leaves_the_report_where_it_says_what_is_stored(study: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    command = ["sweep", str(study), "-o", str(out), "--workers", "1", "--as-stated"]
+    page, results = out / "report.html", out / "results.json"
+
+    def written() -> list[bool]:
+        before = [path.stat().st_ino if path.exists() else 0 for path in (page, results)]  # a new file is renamed there
+        assert call(command)[0] == 0
+        return [path.stat().st_ino != old for path, old in zip((page, results), before, strict=True)]
+
+    assert written() == [True, True]
+    assert written() == [False, False]
+    page.write_bytes(page.read_bytes().replace(b"PSNR", b"PSNX"))  # changed, but as long as it was
+    assert written() == [True, True]
+    results.unlink()
+    assert written() == [True, True]
+    study.write_text(TEXT.replace('"25cd/m2"', '"1cd/m2"').replace('"1cd/m2", ', ""), "utf-8")  # asks for one cell
+    assert written() == [True, True]
+    assert len(json.loads(results.read_text("utf-8"))["rows"]) == 1
+
+
+@pytest.mark.thorough
 def test_a_sweep_follows_the_plan_and_reference_models_everything(study: Path, tmp_path: Path) -> None:
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--workers", "1"]
     for option in ([], ["--reference"], ["--as-stated"]):
@@ -108,7 +130,7 @@ def test_dry_run_counts_cells_of_this_code_alone_as_kept(study, tmp_path, monkey
     command = ["sweep", str(study), "-o", str(tmp_path / "out"), "--json"]
     made = json.loads(call([*command, "--workers", "1", "--as-stated"])[1])["made"]
     assert json.loads(call([*command, "--dry-run"])[1])["kept"] == made > 0
-    monkeypatch.setattr("studies.sweep.cost.code_version", lambda: "0.2.0+other")
+    monkeypatch.setattr("studies.sweep.cost.versions", lambda: {"rodcone": "0.2.0+other"})
     assert json.loads(call([*command, "--dry-run"])[1])["kept"] == 0
 
 

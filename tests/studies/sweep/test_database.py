@@ -19,6 +19,7 @@ from studies.sweep.database import (
     VERSION,
     LastRun,
     add,
+    content,
     done,
     forget_old,
     last_run,
@@ -104,7 +105,8 @@ def test_the_last_study_comes_with_the_seconds_of_all_its_runs(tmp_path: Path) -
             note_stages(base, run, {"renders": 99.0})
             note_stages(base, run, {"renders": seconds, "other": 0.5})
         note_run(base, "2026-01-01T00:00:00+00:00", "here", '{"a": 1}')  # killed before its first cell
-        assert last_run(tmp_path) == LastRun({"a": 1}, {"renders": 101.0, "other": 1.0}, 2, [ROW])
+        stages = {"renders": 101.0, "other": 1.0}
+        assert last_run(tmp_path) == LastRun({"a": 1}, stages, 2, [ROW], content(base))
         base.execute("UPDATE runs SET stages = replace(stages, '100.0', '900.0')")
         refusal(last_run, tmp_path, match="isn't what was written")
 
@@ -141,11 +143,11 @@ def test_another_version_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
 
 
 def test_a_file_that_is_no_database_is_refused_and_left_as_it_is(tmp_path: Path) -> None:
-    for content in (b"notes of mine " * 100, b"", b"SQLite format 3\0" + bytes(500)):
-        (tmp_path / FILE).write_bytes(content)
+    for damaged in (b"notes of mine " * 100, b"", b"SQLite format 3\0" + bytes(500)):
+        (tmp_path / FILE).write_bytes(damaged)
         with pytest.raises(InputError, match="it is no"), read_results(tmp_path):
             pass
-        assert (tmp_path / FILE).read_bytes() == content
+        assert (tmp_path / FILE).read_bytes() == damaged
     (tmp_path / FILE).write_bytes(b"notes of mine " * 100)
     with pytest.raises(InputError, match="it is no results database"), open_results(tmp_path):
         pass
