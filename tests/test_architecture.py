@@ -113,6 +113,15 @@ def test_a_package_defines_nothing() -> None:
         assert names <= {"__getattr__", "__dir__"}, name_of(path)
 
 
+def test_no_array_file_can_run_code() -> None:
+    """NumPy unpickles what a file holds if `allow_pickle` says so, and pickles can call anything."""
+    calls = [(path, node) for path in MODULES for node in nodes(path) if isinstance(node, ast.Call)]
+    said = [(path, word.value) for path, call in calls for word in call.keywords if word.arg == "allow_pickle"]
+    wrong = {name_of(path) for path, value in said if not (isinstance(value, ast.Constant) and value.value is False)}
+    assert len(said) > 5
+    assert not wrong, f"{wrong}: allow_pickle is for files of strangers too; leave it False"
+
+
 def test_no_absolute_path_of_a_machine() -> None:
     absolute = re.compile(r"(?<![\w.:/>*-])(?:/(?:home|Users|root|work|opt|mnt|tmp)/|[A-Z]:\\Users)[\w.]")
     folders = [ROOT / name for name in (*PACKAGES, "tests", "benchmarks", "docs", ".ci")]

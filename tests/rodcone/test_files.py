@@ -108,6 +108,7 @@ CASES = {  # a value, the same as another processor may have it, and one that is
     "sign of nothing": (0.0, -0.0, 1e-300),
     "dataclass": (Curve(np.array([0.3])), Curve(np.array([0.1 * 3])), Curve(np.array([0.31]))),
     "nested": ({"a": [0.3, "x"]}, {"a": (0.1 * 3, "x")}, {"a": [0.3, "y"]}),
+    "order of a mapping": ({"a": 1, "b": 2}, {"b": 2, "a": 1}, {"a": 2, "b": 1}),
     "table in text": ("1.0,0.3", "1.0,0.30000000000000004", "1.0,0.31"),
     "text": ("0.3 m, wide", "0.3 m, wide", "0.30000000000000004 m, wide"),
     "not finite": ([np.inf, 0.3], [np.inf, 0.1 * 3], [-np.inf, 0.3]),

@@ -494,6 +494,16 @@ def test_a_metered_channel_is_open_for_a_millionth_of_the_time_at_least():
         assert reading.time_share == pytest.approx(wanted, rel=1e-9)
 
 
+@pytest.mark.parametrize("exposure_s", [0.25, 4.0])
+def test_a_metered_channels_time_leaves_room_for_the_dark_current_of_the_whole_time(exposure_s):
+    """White of 80 000 e- and 10 000 e- of dark current a second: both are in the well until the channel closes."""
+    sensor = with_channel_readings(low_noise(), [ChannelReading("W", metered=True)])
+    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=10_000.0))
+    (reading,) = resolve(sensor, np.full((8, 8), 80_000.0), exposure_s, "W")
+    collected = (80_000.0 + 10_000.0 * exposure_s) * reading.time_share
+    assert 0.8 * 15_000 * 2 ** (-1 / 16) < collected <= 0.8 * 15_000 * (1 + 1e-9)
+
+
 @pytest.mark.parametrize("gain", [1.0, 2.0])
 def test_a_metered_channel_fills_the_converters_range_at_the_cameras_gain(gain):
     sensor = with_channel_readings(replace(low_noise(), gain=gain), [ChannelReading("W", metered=True)])

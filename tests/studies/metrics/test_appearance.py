@@ -1,5 +1,6 @@
 """PSNR, SSIM and CIEDE2000 against published values, and against the papers' equations written out plainly."""
 
+from dataclasses import asdict
 from itertools import product
 
 import numpy as np
@@ -14,6 +15,7 @@ from rodcone.colour_spaces import WHITE_AT, encode_srgb, luminance_of_srgb
 from studies.metrics.appearance import appearance, picture_quality, psnr_db, pu21_encode, pu21_psnr_db, true_picture
 from studies.metrics.confidence import half_width
 from studies.metrics.flip import flip
+from studies.metrics.metric import METRICS
 from studies.metrics.s_cielab import SPREADS, XYZ_TO_OPPONENT, eye_xyz, s_cielab
 from studies.metrics.target_figures import WHITE_PATCH, daylight_delta_e, daylight_srgb, pair_delta_e, true_pair_delta_e
 
@@ -99,6 +101,19 @@ def test_each_figure_is_its_own_module_s() -> None:
     assert found.pu21_psnr_db == pytest.approx(pu21_psnr_db(*luminances), rel=1e-12)
     assert 0 < found.flip_mean < 1
     assert found.s_cielab_median < found.s_cielab_p95
+
+
+def test_each_metric_says_whether_less_noise_raises_it() -> None:
+    """Of pictures alike but for ten times the noise; of targets sharpness and ratio are to rise, the error to fall."""
+    noise, truth = np.random.default_rng(4).normal(0, 0.02, TRUTH.shape), true_picture(TRUTH)
+    found = []
+    for linear in (TRUTH + noise, TRUTH + 10 * noise):
+        encoded = encode_srgb(linear)
+        found.append(asdict(picture_quality(encoded, truth.encoded)) | asdict(appearance(linear, truth, 40.0)))
+    clean, noisy = found
+    rises = {name: clean[name] > noisy[name] for name in clean}
+    rises |= {"mtf50_cy_per_px": True, "chart_delta_e_mean": False, "patch_snr_db": True}
+    assert {metric.key: metric.higher for metric in METRICS} == rises
 
 
 def test_absolute_luminance_counts_for_pu21_alone_and_an_error_above_white_too() -> None:

@@ -2,7 +2,10 @@
 
 import numpy as np
 import pytest
+from scipy.optimize import brentq
+from skimage.color import deltaE_ciede2000, lab2rgb
 
+from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
 from studies.metrics.blemishes import Blemishes, count_blemishes
 
@@ -59,6 +62,39 @@ def test_dots_are_counted_on_even_surfaces_alone(truth):
     assert counts.dots == 4 * 4
     picture[14:30:4, 3:16:4] = 0.53  # CIEDE2000 of 3
     assert count_blemishes(picture, truth).dots == 0
+
+
+def beside(lab, distance, axis):
+    """The colour that lies a CIEDE2000 from another along an axis of CIELAB."""
+
+    def moved(step):
+        return np.array(lab) + step * np.eye(3)[axis]
+
+    return moved(brentq(lambda step: deltaE_ciede2000(moved(step), np.array(lab)) - distance, 0.0, 80.0))
+
+
+@pytest.mark.parametrize("part", [0.97, 1.03])
+def test_each_limit_is_kept_within_three_per_cent(part):
+    """CIEDE2000 of 20 to the truth and of 10 to the median, an even surface's 1 and a dot's 5; light 0.5, hole 0.2."""
+    grey, over = (50.0, 0.0, 0.0), part > 1
+    cast = beside(grey, 22.0, 1)
+    flat = np.full((16, 16, 3), lab2rgb(np.array(grey)))
+
+    def counts(lab, surface=grey):
+        picture = np.full((16, 16, 3), lab2rgb(np.array(surface)))
+        picture[8, 8] = lab2rgb(lab)
+        return count_blemishes(picture, flat)
+
+    assert counts(beside(grey, 20.0 * part, 1)).spots == over
+    assert counts(beside(cast, 10.0 * part, 1), cast).spots == over
+    assert counts(beside(grey, 5.0 * part, 0)).dots == over
+    halves = flat.copy()
+    halves[:, 8:] = lab2rgb(beside(grey, 1.0 * part, 1))
+    assert count_blemishes(halves, halves).even == 16 * 16 - 4 * 16 * over
+    lights, dark = (np.full((16, 16, 3), encode_srgb(np.array(value))) for value in (0.5 * part, 0.0))
+    assert count_blemishes(dark, lights).holes == 256 * over
+    lights, dark = (np.full((16, 16, 3), encode_srgb(np.array(value))) for value in (0.8, 0.8 * 0.2 * part))
+    assert count_blemishes(dark, lights).holes == 256 * (not over)
 
 
 def test_a_picture_with_nan_is_refused(truth):

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from refusal import refusal
 from scipy.integrate import quad
+from scipy.special import gammainc
 from scipy.stats import binom
 
 import rodcone as public
@@ -25,7 +26,7 @@ from studies.score.noise_figures import light_for, ratio_at
 from studies.score.output_speeds import decoded, output_speeds
 from studies.score.over_light import over_light
 from studies.score.score import GROUPS, definitions, score
-from studies.score.sharpness import edge_coverage
+from studies.score.sharpness import acutance, edge_coverage
 
 EXPOSURE_S = 0.033
 
@@ -276,6 +277,19 @@ def test_an_edges_coverage_is_the_area_right_of_its_line() -> None:
         x, y = column - (side - 1) / 2, row - (side - 1) / 2
         area, _ = quad(lambda at, x=x, y=y: np.clip(x + 0.5 + slope * (y + at), 0.0, 1.0), -0.5, 0.5, limit=200)
         assert coverage[row, column] == pytest.approx(area, abs=1e-6)
+
+
+def test_the_acutance_of_a_transfer_that_falls_exponentially_is_a_ratio_of_gamma_functions() -> None:
+    """IEEE 1858: v^0.8 exp(-0.2 v), of which exp(-a v) leaves (0.2 / (0.2 + a))^1.8, each up to V of Nyquist.
+
+    V is half of the pixels per degree: 3840 pixels over 0.7 m, seen from 0.7 m. P is the regularised gamma function.
+    """
+    pixels_per_degree = 3840 / 0.7 * 0.7 * pi / 180
+    nyquist, frequency = pixels_per_degree / 2, np.linspace(0.0, 1.0, 4001)
+    for fall in (0.02, 0.1, 0.5):
+        share = (0.2 / (0.2 + fall)) ** 1.8 * gammainc(1.8, (0.2 + fall) * nyquist) / gammainc(1.8, 0.2 * nyquist)
+        found = acutance(frequency, np.exp(-fall * frequency * pixels_per_degree))
+        assert found == pytest.approx(share, rel=2e-3)
 
 
 def test_the_mtf_of_a_perfect_lens_is_the_pixels_own() -> None:

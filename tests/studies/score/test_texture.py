@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from refusal import refusal
 from scipy.integrate import quad
+from scipy.stats import ttest_1samp
 
 import rodcone as public
 from rodcone.colour_spaces import SRGB_TO_XYZ
@@ -16,7 +17,7 @@ from scenes.dead_leaves import autocovariance, draw_leaves
 from studies.metrics.s_cielab import eye_xyz
 from studies.photograph.snr import snr
 from studies.score.developed import developed_figures
-from studies.score.figure import measured
+from studies.score.figure import REPEATS, Definition, Merit, measured
 from studies.score.information import information
 from studies.score.score import definitions, score
 from studies.score.texture_response import texture_response
@@ -70,6 +71,28 @@ def test_information_of_a_perfect_transfer_is_shannon_s_by_hand() -> None:
     inside, _ = quad(lambda f: 9 * np.sinc(3 * f) ** 2, -0.5, 0.5)
     assert 10 ** (ratio_db / 10) == pytest.approx(800.0**2 * inside**2 / 400, rel=1e-3)
     assert capacity == pytest.approx(np.pi / 4 * np.log2(1 + 800.0**2 / 12 / 400), rel=1e-5)
+
+
+def test_information_of_a_transfer_that_falls_counts_its_square() -> None:
+    """M = exp(-a f^2), whose square falls apart into both axes; integrals by SciPy's quadrature."""
+    frequency, fall, noise_e2 = np.linspace(0.0, 1.0, 2001), 4.0, 400.0
+    quanta, ratio_db, capacity = information(frequency, np.exp(-fall * frequency**2), 900.0, 100.0, noise_e2)
+    assert quanta == pytest.approx((500.0 * np.exp(-fall / 16)) ** 2 / noise_e2, rel=1e-5)
+    inside, _ = quad(lambda f: 9 * np.sinc(3 * f) ** 2 * np.exp(-2 * fall * f**2), -0.5, 0.5)
+    assert 10 ** (ratio_db / 10) == pytest.approx(800.0**2 * inside**2 / noise_e2, rel=1e-3)
+    signal_e2 = 800.0**2 / 12
+    around, _ = quad(lambda f: 2 * np.pi * f * np.log2(1 + signal_e2 * np.exp(-2 * fall * f**2) / noise_e2), 0, 0.5)
+    assert capacity == pytest.approx(around, rel=1e-4)
+
+
+def test_a_figures_interval_is_students_of_its_repeats() -> None:
+    """As SciPy's t test has it, of the same draws."""
+    drawn: list[float] = []
+    merit = Merit("a.b", "a figure", "1", "a standard", "anywhere", 5.0)
+    (told,) = measured(Definition((merit,), lambda rng: drawn.append(rng.normal(5.0, 2.0)) or [drawn[-1]]), seed=3)
+    interval = ttest_1samp(drawn, 0.0).confidence_interval(0.95)
+    assert len(set(drawn)) == len(drawn) == REPEATS
+    assert (told.measured, told.low, told.high) == pytest.approx((np.mean(drawn), interval.low, interval.high))
 
 
 def test_visual_noise_is_that_of_colour_science_s_cieluv() -> None:

@@ -50,6 +50,15 @@ def test_versions_are_those_that_the_modules_tell_themselves() -> None:
         assert found["llvm"] == "none"
 
 
+def test_a_row_tells_the_same_versions_in_whichever_order_a_users_own_are_given() -> None:
+    """Text that differs would make a cell anew, and a report over both would be refused as mixed."""
+    own = {"zeta": "1", "alpha": "2"}
+    orders = own, dict(sorted(own.items()))
+    told = [provenance.provenance("scalar_rgb", "bayer", False, given, True).versions for given in orders]
+    assert told[0] == told[1]
+    assert json.loads(told[0]) == versions("bayer") | own
+
+
 def kernels_in(work: Callable[[], Row]) -> tuple[Row, int]:
     """Kernels that Dr.Jit launches meanwhile, by its own history."""
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
