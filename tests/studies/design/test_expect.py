@@ -26,6 +26,7 @@ from sensor.readings.resolve import chip_readings, resolve
 from sensor.response import behind_filters
 from studies.design.expect import (
     MIDDLE,
+    _lab_root,
     drawn_pixels,
     expect,
     lens_of,
@@ -115,6 +116,14 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
     for white_e in green_e:
         gains = [10 * np.log10(error(BAYER.cfa, white_e) / error(RGBW.cfa, white_e)) for error in (ours, theirs)]
         assert abs(gains[0] - gains[1]) < 0.15
+
+
+def test_the_root_of_lab_is_cie_15_s_by_the_other_notation() -> None:
+    """t / (3 d^2) + 4 / 29 up to d^3, d = 6 / 29; no light reads as black, nor does less than none."""
+    relative, d = np.array([-0.1, 0.0, 1e-4, 0.004, 0.0088, 0.0089, 0.2, 1.0]), 6 / 29
+    light = np.maximum(relative, 0.0)
+    by_hand = np.where(light > d**3, np.cbrt(light), light / (3 * d**2) + 4 / 29)
+    assert_allclose(_lab_root(relative), by_hand, rtol=1e-9)
 
 
 def test_slopes_of_srgb_and_lab_are_those_of_the_nearest_line_over_a_component() -> None:
