@@ -6,12 +6,14 @@ from math import ceil, hypot
 from numbers import Real
 from typing import Annotated, Any
 
+import numpy as np
 from numpy.typing import NDArray
 
 from render.spectrum import LONGEST_NM, SHORTEST_NM, VISIBLE_NM
 from rodcone.display import brief
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_keys, require_kind, require_range, require_whole
+from rodcone.types import Floats
 from sensor.cfa import RGBW, Tile, block_sums, channels, check_covers, check_tile, quad, unit_channel
 from sensor.curves import Responses, rgbw
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
@@ -112,7 +114,7 @@ class SensorConfig:
     row_time_us : float
         Time from the start of one row's exposure to that of the next [us]: rows roll from the first to the last, where
         it is negative from the last to the first; 0 exposes all rows together. Lamps that flicker show it
-        (`sensor.flicker.rows`).
+        (`sensor.flicker.rows`), and so does a hand that shakes (`sensor.shake`).
     """
 
     pixel: PixelConfig
@@ -164,11 +166,6 @@ class SensorConfig:
             raise InputError(
                 f"shake_um: {self.lens.shake_um:g} for a camera that reads some charge after a part of the time, which "
                 "the hand would blur less; allowed: 0; leave the shake out, or give every reading the whole time"
-            )
-        if self.lens.shake_um and self.row_time_us:
-            raise InputError(
-                f"shake_um: {self.lens.shake_um:g} with row_time_us {self.row_time_us:g}, whose rows the hand would "
-                "move apart; allowed: one of them; leave the other out"
             )
         if self.chip.readings and self.pixel != pixel_of_readings(self.pixel, self.chip.readings):
             raise InputError(
@@ -300,6 +297,17 @@ def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
             f"size: {' x '.join(map(str, shape))} pixels with binning {sensor.chip.binning.way!r}; allowed: even "
             f"height and width; give {even}"
         )
+
+
+def row_starts_s(sensor: SensorConfig, rows: int) -> Floats:
+    """When the exposure of each row of the raw image starts [s], after that of the first one; shape (rows,)."""
+    order = np.arange(rows) if sensor.row_time_us >= 0 else np.arange(rows)[::-1]
+    return np.asarray(order * (abs(sensor.row_time_us) * 1e-6))
+
+
+def frame_interval_s(sensor: SensorConfig, rows: int, exposure_s: float) -> float:
+    """Time from one frame of a burst to the next [s]: the exposure, or the readout of all rows if it takes longer."""
+    return max(exposure_s, rows * abs(sensor.row_time_us) * 1e-6)
 
 
 def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: str = MERGED) -> SensorConfig:

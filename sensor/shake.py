@@ -9,8 +9,12 @@ Cybernetics 78 (1998), describe measured hand tremor. An axis of the image, of v
 f0 is 4 Hz, as accelerometers on hand-held cameras measured (Japanese Journal of Ergonomics 31 (6), 399, 1995). Ours are
 zeta, a broad resonance, and s: at the speed that this gives, the photographers' longest time by hand, 1 s over the
 focal length in mm on film of 35 mm, draws a point out to that film's circle of confusion, 30 um.
+
+Of a sensor whose rows roll each row sees the part of the path within its own exposure, so that upright lines lean and
+bend, and the picture is stretched and squeezed.
 """
 
+import os
 from collections.abc import Mapping
 from dataclasses import replace
 from math import pi, sqrt
@@ -21,7 +25,8 @@ import scipy
 from numpy.typing import NDArray
 
 from rodcone.errors import require_name
-from sensor.config import LensConfig, SensorConfig
+from rodcone.types import Floats
+from sensor.config import LensConfig, SensorConfig, check_frame, row_starts_s
 from sensor.random import NoiseTerm, draw_key, normals
 
 RESONANCE_HZ, DAMPING = 4.0, 0.5
@@ -70,9 +75,18 @@ def path(exposure_s: float, key: int) -> NDArray[np.float64]:
 
     A draw depends on key, axis and time step alone. The exposure's own mean is the framing, and no blur.
     """
-    count = int(np.clip(np.ceil(exposure_s / STEP_S), *STEPS))
+    count = _step_count(exposure_s)
+    return _walk(exposure_s / count, count, key)
+
+
+def _step_count(time_s: float) -> int:
+    return int(np.clip(np.ceil(time_s / STEP_S), *STEPS))
+
+
+def _walk(step_s: float, count: int, key: int) -> NDArray[np.float64]:
+    """`count` places of the image, `step_s` apart, about their mean, shape (axis, time); s is 1."""
     # Place and speed / (2 pi f0), both of variance 1, taken on exactly: z' = A z + B n with B B^T = 1 - A A^T.
-    turn = np.exp(POLE_PER_S * exposure_s / count)
+    turn = np.exp(POLE_PER_S * step_s)
     advance = turn.real * np.eye(2) + turn.imag / sqrt(1 - DAMPING**2) * np.array([[DAMPING, 1.0], [-1.0, -DAMPING]])
     values, vectors = np.linalg.eigh(np.eye(2) - advance @ advance.T)
     push = vectors * np.sqrt(np.maximum(values, 0.0))
@@ -85,30 +99,111 @@ def path(exposure_s: float, key: int) -> NDArray[np.float64]:
     return np.asarray(places - places.mean(axis=1, keepdims=True))
 
 
+def rolling_path(starts_s: Floats, exposure_s: float, key: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Return the path from the first row's exposure to the last one's end, and each row's shares of it.
+
+    Parameters
+    ----------
+    starts_s : (row,) float64
+        When each row's exposure starts [s].
+    exposure_s : float
+        Of a row, above 0 [s].
+    key : int
+
+    Returns
+    -------
+    places : (axis, time) float64
+        As `path` gives them; the mean over all rows' time is the framing.
+    shares : (row, time) float64
+        Of `row_shares`.
+    """
+    whole_s = float(np.max(starts_s)) + exposure_s
+    count = _step_count(whole_s)
+    step_s = whole_s / count
+    return _walk(step_s, count + 1, key), row_shares(starts_s, exposure_s, step_s, count + 1)
+
+
+def row_shares(starts_s: Floats, exposure_s: float, step_s: float, count: int) -> NDArray[np.float64]:
+    """Weight of each place of a path in the mean over a row's exposure, shape (row, time); a row's sum is 1.
+
+    Between two of the `count` places, `step_s` apart, the image goes over from the one to the other in a straight line.
+    """
+
+    def until(time_s: Floats) -> Floats:
+        # integral of the tent about each place, whose height is 1 and whose half width 1 step
+        steps = np.clip(time_s[:, None] / step_s - np.arange(count), -1.0, 1.0)
+        return np.asarray(0.5 + steps - steps * np.abs(steps) / 2)
+
+    starts_s = np.asarray(starts_s, dtype=np.float64)
+    return (until(starts_s + exposure_s) - until(starts_s)) * (step_s / exposure_s)
+
+
+def moved_by_rows(electrons: NDArray[np.float64], places_px: Floats, shares: Floats) -> NDArray[np.float64]:
+    """Return what each row collects of an image that moves, shape (h, w, channel).
+
+    Parameters
+    ----------
+    electrons : (h, w, channel) float64
+        Of a still camera.
+    places_px : (2, time) float64
+        How far the image lies down and to the right.
+    shares : (h, time) float64
+        Of each place in a row's exposure.
+
+    Notes
+    -----
+    A row's sum over places is taken in the spectrum along it, so that each place costs a transform along the columns.
+    The picture goes on as its mirror image. Undershoot becomes 0, and each channel keeps the sum it had before that,
+    which isn't the still picture's: a lamp that moves with the rolling rows is seen by more of them.
+    """
+    height, width, channels = electrons.shape
+    threads = os.cpu_count() or 1
+    down, across = scipy.fft.fftfreq(2 * height)[:, None], scipy.fft.rfftfreq(2 * width)
+    result = np.empty_like(electrons)
+    for channel in range(channels):
+        mirrored = np.pad(electrons[..., channel], ((0, height), (0, width)), "symmetric")
+        still = scipy.fft.rfft2(mirrored, workers=threads)
+        rows = np.zeros((height, across.size), np.complex128)
+        for (y, x), share in zip(np.transpose(places_px), np.transpose(shares), strict=True):
+            moved = scipy.fft.ifft(still * np.exp(-2j * pi * down * y), axis=0, overwrite_x=True, workers=threads)
+            rows += share[:, None] * moved[:height] * np.exp(-2j * pi * across * x)
+        light = scipy.fft.irfft(rows, n=2 * width, axis=1, workers=threads)[:, :width]
+        kept = np.maximum(light, 0.0)
+        result[..., channel] = kept * (max(light.sum(), 0.0) / (kept.sum() or 1.0))
+    return result
+
+
 def shaken(
     electrons: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
     """Electrons behind every filter, shape (h, w, channel), as the moving image leaves them.
 
     The transfer function of the path multiplies the picture's, which goes on as its mirror image. Undershoot becomes 0,
-    and each channel keeps its sum.
+    and each channel keeps its sum. Rows that roll see a part of the path each (`moved_by_rows`).
 
     Parameters
     ----------
     electrons : (h, w, channel) float64
         Of a still camera, as `sensor.response.channel_electrons`.
     sensor : SensorConfig
-        Its lens's `shake_um` is the standard deviation of the image's place; 0 draws nothing.
+        Its lens's `shake_um` is the standard deviation of the image's place; 0 draws nothing. Its `row_time_us` parts
+        the starts of the rows.
     exposure_s : float
     rng : numpy.random.Generator
         Gives one key for the path.
     """
     if not sensor.lens.shake_um:
         return electrons
-    places = path(exposure_s, draw_key(rng)) * (sensor.lens.shake_um / sensor.site_pitch_um)
+    key, scale_px = draw_key(rng), sensor.lens.shake_um / sensor.site_pitch_um
     if exposure_s == 0:
         return electrons
     height, width = electrons.shape[:2]
+    if sensor.row_time_us:
+        check_frame(sensor, (height, width))
+        starts_s = np.repeat(row_starts_s(sensor, height // sensor.sites), sensor.sites)
+        walked, shares = rolling_path(starts_s, exposure_s, key)
+        return moved_by_rows(electrons, walked * scale_px, shares)
+    places = path(exposure_s, key) * scale_px
     count = places.shape[1]
     frequencies = scipy.fft.fftfreq(2 * height), scipy.fft.rfftfreq(2 * width)
     down, across = (np.exp(-2j * pi * np.outer(place, f)) for place, f in zip(places, frequencies, strict=True))

@@ -5,9 +5,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from sensor.capture import expose
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, frame_interval_s
 from sensor.device import Device
-from sensor.flicker.rows import flickering, frame_interval_s
+from sensor.flicker.rows import flickering
 from sensor.flicker.waveform import Waveform
 from sensor.optics import SpectralIrradiance
 from sensor.raw import RawImage

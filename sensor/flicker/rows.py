@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from rodcone.errors import InputError
 from rodcone.types import Floats, Mosaic
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, row_starts_s
 from sensor.flicker.waveform import Waveform
 
 
@@ -30,17 +30,6 @@ def check_flicker(sensor: SensorConfig) -> None:
             f"flicker: with shake_um {sensor.lens.shake_um:g}, whose blur would follow the lamp's light; allowed: 0; "
             "leave one of them out"
         )
-
-
-def row_starts_s(sensor: SensorConfig, rows: int) -> Floats:
-    """When the exposure of each row of the raw image starts [s], after that of the first one; shape (rows,)."""
-    order = np.arange(rows) if sensor.row_time_us >= 0 else np.arange(rows)[::-1]
-    return np.asarray(order * (abs(sensor.row_time_us) * 1e-6))
-
-
-def frame_interval_s(sensor: SensorConfig, rows: int, exposure_s: float) -> float:
-    """Time from one frame of a burst to the next [s]: the exposure, or the readout of all rows if it takes longer."""
-    return max(exposure_s, rows * abs(sensor.row_time_us) * 1e-6)
 
 
 def row_weights(waveform: Waveform, sensor: SensorConfig, rows: int, exposure_s: float, start_s: float = 0.0) -> Floats:

@@ -126,7 +126,7 @@ class Order:
         pwm@1000Hz:0.25 (lit for a quarter of each period), or a CSV of one period. Levels are means over time.
     row_time : str, optional
         Time from one row's exposure to the next's, such as 15us; the sensor's own by default, which is 0 unless its
-        file states row_time_us. Lamps that flicker make bands where it isn't 0.
+        file states row_time_us. Where it isn't 0 lamps that flicker make bands, and a hand's shake leans upright lines.
     seed : int
         Seed of the render, the chip and the exposure.
     trust_scene : bool

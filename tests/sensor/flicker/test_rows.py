@@ -7,17 +7,10 @@ import pytest
 from refusal import refusal
 
 from render.radiance import SpectralRadiance
-from sensor.config import LensConfig
+from sensor.config import frame_interval_s, row_starts_s
 from sensor.device import draw_device
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
-from sensor.flicker.rows import (
-    check_flicker,
-    flickering,
-    frame_interval_s,
-    row_starts_s,
-    row_weights,
-    steady_exposure_s,
-)
+from sensor.flicker.rows import check_flicker, flickering, row_weights, steady_exposure_s
 from sensor.flicker.waveform import Waveform, pwm
 from sensor.optics import form_image
 from sensor.photodiodes import binned
@@ -125,5 +118,4 @@ def test_cameras_that_flicker_is_not_modelled_for_are_refused():
     shaky = replace(low_noise(), lens=held_lens(low_noise().lens, "hand"))
     refusal(check_flicker, shaky, match="flicker: with shake_um")
     check_flicker(preset("dual_gain"))  # two gains of one charge see the same light
-    refusal(replace, ROLLING, lens=LensConfig(2.8, shake_um=3.0), match="shake_um: 3 with row_time_us 100")
     refusal(replace, ROLLING, row_time_us=1e6, match="row_time_us: 1000000.0")

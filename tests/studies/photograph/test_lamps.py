@@ -93,4 +93,4 @@ def test_orders_are_refused_before_a_render():
     refusal(check, Order("night_street", row_time="15"), match="row_time: '15' is not a time.*15ms")
     shaken = Order("night_street", flicker=("fluorescent@100Hz",), shake="hand")
     refusal(check, shaken, match="flicker: with shake_um")
-    refusal(check, Order("night_street", row_time="15us", shake="hand"), match="shake_um: .* row_time_us 15")
+    check(Order("night_street", row_time="15us", shake="hand"))
