@@ -75,6 +75,31 @@ def camera(fov_deg: float, origin: Point, target: Point, size: tuple[int, int] |
     return view | ({"film": {"type": "hdrfilm", "height": size[0], "width": size[1]}} if size else {})
 
 
+def thin_lens(camera: Mapping[str, Any], pupil_m: float, focus_m: float) -> dict[str, Any]:
+    """Return a camera with depth of field in place of a pinhole: the same view, sharp at one distance.
+
+    Parameters
+    ----------
+    camera : mapping
+        Of Mitsuba's type ``perspective`` or ``thinlens``, whose lens is then left out.
+    pupil_m, focus_m : float
+        Diameter of its pupil, and the distance of focus, in the scene's unit of length.
+
+    Raises
+    ------
+    InputError
+        For an orthographic camera, and one whose axis isn't in the middle of its picture.
+    """
+    if camera.get("type") not in ("perspective", "thinlens"):
+        raise InputError(
+            f"focus: the scene's camera is {camera.get('type')!r}; allowed: perspective, thinlens; leave the focus out"
+        )
+    if any(camera.get(f"principal_point_offset_{axis}") for axis in "xy"):
+        raise InputError("focus: the scene's camera has a principal_point_offset; allowed: none; leave the focus out")
+    kept = {name: value for name, value in camera.items() if not name.startswith("principal_point_offset")}
+    return kept | {"type": "thinlens", "aperture_radius": pupil_m / 2, "focus_distance": focus_m}
+
+
 def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
     """Angle of view across a picture of a Mitsuba camera.
 

@@ -38,6 +38,7 @@ from sensor.raw_files.raw_file import check_ending
 from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
+from studies.photograph.focus import in_focus
 from studies.photograph.lamps import flicker_of, lamp_parts
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.cost import PictureCost
@@ -127,6 +128,11 @@ class Order:
     row_time : str, optional
         Time from one row's exposure to the next's, such as 15us; the sensor's own by default, which is 0 unless its
         file states row_time_us. Where it isn't 0 lamps that flicker make bands, and a hand's shake leans upright lines.
+    focus_m : float, optional
+        Distance of focus in metres: the scene is rendered through a thin lens of the sensor's f-number, a render for
+        each f-number; by default all of it is sharp. A picture from a file has no depth.
+    focal_length_mm : float, optional
+        Of that lens; by default that of a sensor as wide as the picture's pixels, which for few of them is short.
     seed : int
         Seed of the render, the chip and the exposure.
     trust_scene : bool
@@ -165,6 +171,8 @@ class Order:
     shake: str | None = None
     flicker: tuple[str, ...] = ()
     row_time: str | None = None
+    focus_m: Annotated[float | None, (1e-3, 1e6, "give metres")] = None
+    focal_length_mm: Annotated[float | None, (1e-3, 1e5, "give millimetres")] = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     define: tuple[str, ...] = ()
@@ -327,7 +335,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         "relative_mc_error": radiance.relative_mc_error,
         "relative_level_error": radiance.relative_level_error,
         "saturated": saturated,
-        "left_out": list(left_out(sensor, samples)),
+        "left_out": [x for x in left_out(sensor, samples) if order.focus_m is None or not x.startswith("defocus: a")],
     }
     return Taken(paths, facts, tuple(notes))
 
@@ -411,6 +419,7 @@ def check(order: Order) -> Checked:
     InputError
         For what can't be photographed.
     """
+    # The camera.
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
     if order.row_time is not None:
@@ -431,8 +440,24 @@ def check(order: Order) -> Checked:
             f"exposure: {order.exposure!r} looks at W, which {sensor.channels} lacks; allowed: a mosaic with W; "
             f"give {AUTO}, or a time such as 20ms"
         )
+    if order.focus_m is None and order.focal_length_mm is not None:
+        raise InputError(
+            f"focal_length_mm: {order.focal_length_mm:g} without a distance of focus; allowed: both; give --focus-m"
+        )
+    # A stored picture.
     if is_radiance_file(order.source):
-        scene_options = ("trust_scene", "define", "chart", "extend", "size", "height", "width", "spp", "render")
+        scene_options = (
+            "trust_scene",
+            "define",
+            "chart",
+            "extend",
+            "size",
+            "height",
+            "width",
+            "spp",
+            "render",
+            "focus_m",
+        )
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
         require_absent(place, **{name: getattr(order, name) for name in scene_options})
         if len(order.light) > 1 or "=" in "".join(order.light):
@@ -444,19 +469,24 @@ def check(order: Order) -> Checked:
         pixels, bands, groups = extent_of(order.source)
         cost = PictureCost((1, pixels), bands, groups, 0, _AFTER_S)
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
+    # A scene, rendered or there already.
     opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
     flicker = flicker_of(order.flicker, opened.scene.groups)
     # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
     samples = samples_a_side(str(order.source), [sensor])
-    ready = _ready(order, opened, spectra) if samples == 1 else None
+    ready = _ready(order, opened, spectra) if samples == 1 and order.focus_m is None else None
     size = ready.size if ready else _size(order, opened)
     check_frame(sensor, size)
+    through = ""
+    if order.focus_m is not None:
+        scene, through = in_focus(opened.scene, sensor, size, order.focus_m, order.focal_length_mm)
+        opened = replace(opened, scene=scene)
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
     spp = 0 if ready else order.spp or _SPP
     rendered = (samples * size[0], samples * size[1])
-    cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S)
+    cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S, through=through)
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker)
 
 

@@ -46,6 +46,8 @@ class PictureCost:
     denoised : bool
     max_seconds : float, optional
         Time of the render, at most.
+    through : str
+        The lens that the scene is rendered through, in words; none for a pinhole.
     """
 
     size: tuple[int, int]
@@ -55,6 +57,7 @@ class PictureCost:
     after_s: float
     denoised: bool = False
     max_seconds: float | None = None
+    through: str = ""
 
     @property
     def pixels(self) -> int:
@@ -95,6 +98,7 @@ class PictureCost:
         if self.spp and self.spp > 1:
             halves.insert(0, f"with half the samples {duration(self._fewer().seconds)}")
         pixels = f"{height} x {width} pixels" if height > 1 else f"{self.pixels / 1e6:.2g} million pixels"
+        light += f", {self.through}" if self.through else ""
         return f"{time}, {_gigabytes(self.memory)}: {pixels}{light}; {', '.join(halves)}"
 
     def _fewer(self) -> "PictureCost":

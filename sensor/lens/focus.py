@@ -1,0 +1,64 @@
+"""Depth of field of a thin lens: what the disc on the sensor measures of a point that is out of focus.
+
+A lens of the focal length f, focused at the distance s, forms its image at v = f s / (s - f) behind it. Of a point at
+the distance d its pupil of the diameter f / N draws a disc of the diameter
+
+    c = f^2 / N |d - s| / (d (s - f)),
+
+the circle of confusion. Distances are those along the line of sight, from the lens.
+"""
+
+from math import radians, tan
+
+from rodcone.errors import InputError
+
+
+def focal_length_of_view_mm(width_mm: float, view_deg: float, focus_m: float) -> float:
+    """Focal length [mm] of a lens that gives a sensor of this width an angle of view while it is focused at a distance.
+
+    Parameters
+    ----------
+    width_mm : float
+        Of the sensor.
+    view_deg : float
+        Across that width.
+    focus_m : float
+    """
+    behind_mm = width_mm / 2 / tan(radians(view_deg / 2))
+    return 1 / (1 / behind_mm + 1 / (focus_m * 1e3))
+
+
+def pupil_mm(f_number: float, focal_length_mm: float, focus_m: float) -> float:
+    """Diameter of a lens's pupil [mm].
+
+    Raises
+    ------
+    InputError
+        For a distance within the focal length.
+    """
+    if focus_m * 1e3 <= focal_length_mm:
+        raise InputError(
+            f"focus_m: {focus_m:g} m with a focal length of {focal_length_mm:g} mm; allowed: a distance beyond it; "
+            "focus farther away"
+        )
+    return focal_length_mm / f_number
+
+
+def circle_of_confusion_um(f_number: float, focal_length_mm: float, focus_m: float, distance_m: float) -> float:
+    """Diameter of the disc on the sensor that a point at a distance becomes [um]: a lens's `defocus_um` for it.
+
+    Parameters
+    ----------
+    f_number, focal_length_mm : float
+    focus_m : float
+        Distance at which the lens is focused.
+    distance_m : float
+        Of the point, above 0.
+
+    Raises
+    ------
+    InputError
+        For a distance of focus within the focal length.
+    """
+    behind = focal_length_mm / (focus_m * 1e3 - focal_length_mm)  # image over object, in focus
+    return 1e3 * pupil_mm(f_number, focal_length_mm, focus_m) * behind * abs(distance_m - focus_m) / distance_m

@@ -1,0 +1,42 @@
+"""Depth of field of a scene that is rendered: the camera's f-number, and the distance of focus asked for."""
+
+from dataclasses import replace
+
+from render.geometry import horizontal_view_deg, thin_lens
+from render.scene import Scene
+from sensor.config import SensorConfig
+from sensor.lens.focus import focal_length_of_view_mm, pupil_mm
+
+
+def in_focus(
+    scene: Scene, sensor: SensorConfig, size: tuple[int, int], focus_m: float, focal_length_mm: float | None = None
+) -> tuple[Scene, str]:
+    """Scene as a lens sees it that is focused at a distance, and the lens in words.
+
+    A render of it is one of this f-number alone, and is kept apart from others.
+
+    Parameters
+    ----------
+    scene : Scene
+        Its lengths are in metres.
+    sensor : SensorConfig
+        Its lens's f-number and its pixels.
+    size : (int, int)
+        Of the picture, in photodiodes.
+    focus_m : float
+    focal_length_mm : float, optional
+        Left out, that of a sensor as wide as the picture's pixels; few pixels then see a lens of a small pupil.
+
+    Raises
+    ------
+    InputError
+        For a camera without perspective, and a distance within the focal length.
+    """
+    camera, f_number = scene.geometry["sensor"], sensor.lens.f_number
+    thin_lens(camera, 1.0, focus_m)  # refuses a camera that has no angle of view
+    view_deg = horizontal_view_deg(camera, size)
+    if focal_length_mm is None:
+        focal_length_mm = focal_length_of_view_mm(size[1] * sensor.site_pitch_um * 1e-3, view_deg, focus_m)
+    pupil_m = pupil_mm(f_number, focal_length_mm, focus_m) * 1e-3
+    seen = replace(scene, geometry={**scene.geometry, "sensor": thin_lens(camera, pupil_m, focus_m)})
+    return seen, f"through f/{f_number:g}, {focal_length_mm:.3g} mm, focused at {focus_m:g} m, a render of its own"
