@@ -9,7 +9,8 @@ from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, auto_exposure_s, exposure_of_electrons_s
 from sensor.kernel.kernel import expected_electrons_single, read_frame
-from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, spreads
+from sensor.lens.illumination import darkens, falloff
+from sensor.optics import SpectralIrradiance, camera_equation, form_image, spreads
 from sensor.raw import RawImage
 from sensor.readout import read_out
 from sensor.response import behind_filters, channel_electrons, electrons_per_irradiance, imaged_electrons
@@ -83,12 +84,13 @@ def photograph_radiance(
     if channels_e is not None:
         scale = exposure_s / metered_s
         return expose_channels(channels_e * scale if scale != 1 else channels_e, sensor, exposure_s, device, rng, exact)
+    view_deg = radiance.horizontal_view_deg if isinstance(radiance, SpectralRadiance) else None
     # A lens that only scales light forms no image: its factors go to the weights and to the electrons.
     weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, exposure_s, radiance.light)
     weights = weights * camera_equation(sensor.lens) if scaled else weights
     expected_e = expected_electrons_single(radiance.values, weights, sensor)
-    if scaled and sensor.lens.horizontal_view_deg:
-        expected_e *= falloff(sensor.lens, (height, width)).astype(expected_e.dtype)
+    if scaled and darkens(sensor.lens):
+        expected_e *= falloff(sensor.lens, (height, width), view_deg).astype(expected_e.dtype)
     return expose(expected_e, sensor, exposure_s, device, rng, exact=exact)
 
 

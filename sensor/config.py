@@ -36,6 +36,12 @@ class LensConfig:
         The last as its absolute value; 0 for a far scene.
     horizontal_view_deg : float
         Angle of view across the whole picture: light falls off with the fourth power of the cosine off the axis.
+    falloff_power : float
+        Power of that cosine, 4 for a thin lens; the angle of view is then that of the scene's own camera where
+        `horizontal_view_deg` is 0. 0, the default, lets light fall off by a stated angle of view alone.
+    vignetting, vignetting_from : float
+        Share of the light that a rim takes from the picture's corners, and the image height from which on it cuts the
+        pupil, 0 in the middle and 1 in the corners (`sensor.lens.illumination`).
     diffraction : float
         Width of the point image over that of an ideal circular aperture: 1 for a lens without faults.
     defocus_um : float
@@ -58,6 +64,9 @@ class LensConfig:
     transmittance: Annotated[float, (0.0, 1.0, "give a fraction")] = 1.0
     magnification: Annotated[float, (0.0, 1e4, "give its absolute value, 0 for a far scene")] = 0.0
     horizontal_view_deg: Annotated[float, (0.0, 175.0, "give degrees, 0 for no falloff")] = 0.0
+    falloff_power: Annotated[float, (0.0, 8.0, "give the power of the cosine, 4 for a thin lens")] = 0.0
+    vignetting: Annotated[float, (0.0, 0.99, "give the share of light lost in the corners, 0 for none")] = 0.0
+    vignetting_from: Annotated[float, (0.0, 0.95, "give an image height, 0 in the middle and 1 in the corners")] = 0.5
     diffraction: Annotated[float, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = 0.0
     defocus_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for none")] = 0.0
     veiling_glare: Annotated[float, (0.0, 1.0, "give a fraction, 0 for none")] = 0.0

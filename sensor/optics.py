@@ -24,6 +24,7 @@ from rodcone.errors import InputError, require_whole
 from rodcone.types import Floats
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency, limit_per_um, sampled_otf
+from sensor.lens.illumination import darkens, falloff
 from sensor.lens.scatter import scatterer, scatters
 from sensor.shake import SHAKES, blur_variance
 
@@ -92,20 +93,13 @@ def camera_equation(lens: LensConfig) -> float:
     return pi * lens.transmittance / (1 + 4 * lens.f_number**2 * (1 + lens.magnification) ** 2)
 
 
-def falloff(lens: LensConfig, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Irradiance of each pixel over that on the axis: cos^4 of its angle, shape `shape`."""
-    tangent = tan(radians(lens.horizontal_view_deg / 2)) / (shape[1] / 2)
-    rows, columns = ((np.arange(size) - (size - 1) / 2) * tangent for size in shape)
-    return np.asarray((1.0 + rows[:, None] ** 2 + columns**2) ** -2)
-
-
 def spreads(lens: LensConfig) -> bool:
     """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
     return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0 or scatters(lens)
 
 
 def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pixel: int = 1) -> SpectralIrradiance:
-    """Image a scene onto the sensor: camera equation, cos^4, diffraction and defocus, scatter, veiling glare.
+    """Image a scene onto the sensor: camera equation, falloff, diffraction and defocus, scatter, veiling glare.
 
     Parameters
     ----------
@@ -127,7 +121,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Raises
     ------
     InputError
-        Where the samples don't make whole pixels; for a lens that scatters and an angle of view that isn't known.
+        Where the samples don't make whole pixels; for a lens that scatters, or falls off by a power, and an angle of
+        view that isn't known.
 
     Examples
     --------
@@ -142,8 +137,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     values_type = radiance.values.dtype.type
     if samples == 1 and not spreads(lens):
         values = radiance.values * values_type(camera_equation(lens))
-        if lens.horizontal_view_deg:
-            values *= falloff(lens, radiance.shape)[..., None].astype(values.dtype)
+        if darkens(lens):
+            values *= falloff(lens, radiance.shape, radiance.horizontal_view_deg)[..., None].astype(values.dtype)
     else:
         imaged = _imager(radiance, sensor, samples, np.float64)
         planes = np.empty((radiance.wavelength_nm.size, *shape), values_type)
@@ -219,12 +214,13 @@ def _imager(
     A sum's value doesn't depend on the number of threads.
     """
     pixels, lens, (height, width) = pixel_shape(radiance, samples), sensor.lens, radiance.shape
+    view = radiance.horizontal_view_deg
     threads = os.cpu_count() or 1
-    per_radiance: NDArray[Any] = (camera_equation(lens) * falloff(lens, radiance.shape)).astype(real)
+    per_radiance: NDArray[Any] = (camera_equation(lens) * falloff(lens, radiance.shape, view)).astype(real)
     otf = None
     if lens.diffraction or lens.defocus_um:
         otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1, real=real)
-    scattered = scatterer(lens, pixels, radiance.horizontal_view_deg) if scatters(lens) else None
+    scattered = scatterer(lens, pixels, view) if scatters(lens) else None
     step = max(_AT_ONCE // width, 1)
     strips = [slice(first, first + step) for first in range(0, height, step)]
 
@@ -276,7 +272,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
             f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist"
             f"{_edge_words(sensor)}; {least_samples(sensor)} samples a pixel don't"
         )
-    if not lens.horizontal_view_deg:
+    if not lens.horizontal_view_deg and not lens.falloff_power:
         corner = (1 + (tan(radians(VIEW_DEG / 2)) * DIAGONAL) ** 2) ** -2
         lines.append(
             f"cos^4 falloff: a picture of 4:3, {VIEW_DEG:g} degrees wide, would lose {1 - corner:.0%} in its corners"

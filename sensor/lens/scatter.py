@@ -24,9 +24,9 @@ from math import cos, log, pi, radians, sin, tan
 import numpy as np
 import scipy
 
-from rodcone.errors import InputError
 from rodcone.types import Floats, Plane
 from sensor.config import LensConfig
+from sensor.lens.illumination import view_deg
 
 EYE_FROM_DEG = 0.1  # the equation's least angle: within it the eye's light counts as not scattered
 # Squares along each side of a pixel, over which the veil is averaged: of the lamp's own pixel, and out to a distance.
@@ -73,23 +73,6 @@ def scattered_share(lens: LensConfig) -> float:
     return float(sum(scipy.integrate.quad(per_degree, *part)[0] for part in parts))
 
 
-def view_deg(lens: LensConfig, of_scene: float | None) -> float:
-    """Angle of view across the picture: the lens's own, or that of the scene's camera.
-
-    Raises
-    ------
-    InputError
-        Where neither is known.
-    """
-    view = lens.horizontal_view_deg or of_scene
-    if not view:
-        raise InputError(
-            "scatter: the picture states no angle of view; allowed: a scene with a perspective camera, or a lens with "
-            "its own; give horizontal_view_deg"
-        )
-    return view
-
-
 def scatterer(lens: LensConfig, shape: tuple[int, int], horizontal_view_deg: float | None) -> Callable[[Plane], Plane]:
     """Function that gives the light behind a lens that scatters, of light that an ideal one would give.
 
@@ -106,7 +89,7 @@ def scatterer(lens: LensConfig, shape: tuple[int, int], horizontal_view_deg: flo
     InputError
         Where the angle of view isn't known.
     """
-    (height, width), step = shape, tan(radians(view_deg(lens, horizontal_view_deg) / 2)) / (shape[1] / 2)
+    (height, width), step = shape, tan(radians(view_deg(lens, horizontal_view_deg, "scatter") / 2)) / (shape[1] / 2)
     sides = [scipy.fft.next_fast_len(2 * side - 1, real=True) for side in shape]
     down, across = (np.arange(side) - side * (np.arange(side) >= of) for side, of in zip(sides, shape, strict=True))
     transfer = scipy.fft.rfft2(_veil_by_pixel(down, across, step, lens))

@@ -5,7 +5,7 @@ level and exposure are factors on these, as in a sweep, whose frames are those o
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
@@ -24,6 +24,7 @@ from sensor.capture import expose
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, amplified, at_level_s, best_exposure, exposure_of_electrons_s
+from sensor.lens.illumination import framed
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
 from sensor.raw import RawImage
@@ -232,6 +233,7 @@ def development_of(exposed: Exposure, controls: Controls, memo: Memo) -> Develop
     options = options_of(controls)
     if controls.white_balance == AS_SHOT:
         options["balance"] = neutral
+    sensor = replace(sensor, lens=framed(sensor.lens, exposed.transport.horizontal_view_deg))
     return partial(develop_to_scale, raw, processor, colours, sensor, neutral, exposed.white_cd_m2, **options)
 
 

@@ -31,7 +31,8 @@ from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
-from sensor.optics import camera_equation, falloff, form_image, pixel_shape
+from sensor.lens.illumination import darkens, falloff
+from sensor.optics import camera_equation, form_image, pixel_shape
 from sensor.photodiodes import Gain
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -210,7 +211,7 @@ def develop_to_scale(
     picture = processor.develop(raw, colours, neutral=neutral, **options)
     unit_e = float(neutral[sensor.channels.index(processor.unit or sensor.unit_channel)])
     linear = picture.rgb / (unit_e * white_cd_m2)
-    if sensor.lens.horizontal_view_deg:
+    if darkens(sensor.lens):
         linear = linear / falloff(sensor.lens, linear.shape[:2])[..., None]
     return linear, picture
 

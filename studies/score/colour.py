@@ -18,6 +18,7 @@ from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import form_image
 from sensor.response import electrons_per_irradiance, expected_electrons, mixing_of
 from studies.metrics.truth import Light, named_light
@@ -60,10 +61,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     # What the camera and the standard observer see of the patches, without noise.
     known = named_light(light)
     plain = replace(
-        sensor,
-        lens=replace(
-            sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0
-        ),
+        sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0)
     )
     matrix = calibrate(plain, known.lamp).to_srgb
     named = color_checker_reflectances()

@@ -23,6 +23,7 @@ from sensor.capture import expose
 from sensor.cfa import OWN
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import form_image, least_samples
 from sensor.presets import vary
 from sensor.response import expected_electrons
@@ -56,7 +57,7 @@ def developed_figures(
     require_libraries(processor)
     software = processor_of(processor)
     camera = sensor if software.mosaic == OWN else vary(sensor, software.mosaic)
-    camera = replace(camera, lens=replace(camera.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0))
+    camera = replace(camera, lens=replace(camera.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0))
     bands = bands_of(light)
     colours, neutral = colour_fit(camera, software, bands), neutral_electrons(camera, bands, exposure_s)
     fields = [even_field(camera, bands, exposure_s, name) for name in camera.channels]

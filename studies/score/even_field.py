@@ -11,6 +11,7 @@ from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import Device, draw_device
+from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import camera_equation, form_image
 from sensor.raw import RawImage
 from sensor.readings.noise import collected_share
@@ -92,9 +93,7 @@ class EvenField:
 
 def even_field(sensor: SensorConfig, light: Light, exposure_s: float, channel: str) -> EvenField:
     """Put an even neutral field before a camera."""
-    plain = replace(
-        sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, scatter=0.0, eye_age_years=0.0)
-    )
+    plain = replace(sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, scatter=0.0, eye_age_years=0.0))
     tile_rows, tile_columns = (side * plain.sites for side in (len(plain.cfa), len(plain.cfa[0])))
     radiance = SpectralRadiance(
         np.broadcast_to(light.spectrum, (tile_rows, tile_columns, light.spectrum.size)).copy(),

@@ -11,6 +11,7 @@ from sensor.capture import expose
 from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.device import draw_device
+from sensor.lens.illumination import EVEN_LIGHT, NATURAL_POWER, pupil_share
 from sensor.lens.scatter import scatters
 from sensor.optics import form_image
 from sensor.response import expected_electrons
@@ -50,9 +51,7 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
     )
     if merit.missing:
         return Definition((merit,), not_measured)
-    plain = replace(
-        sensor, lens=replace(sensor.lens, horizontal_view_deg=0.0, shake_um=0.0, diffraction=0.0, defocus_um=0.0)
-    )
+    plain = replace(sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, diffraction=0.0, defocus_um=0.0))
     bands, side = bands_of(light), SIDE_PX * sensor.sites
     start, stop = (at * sensor.sites for at in ((SIDE_PX - PATCH_PX) // 2, (SIDE_PX + PATCH_PX) // 2))
     reflectance = np.ones((side, side))
@@ -82,22 +81,28 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
 def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the light in the corners over that in the middle, of a lens that states its angle of view.
 
-    At the tangent t of the angle off the axis it is cos^4 = 1 / (1 + t^2)^2.
+    At the tangent t of the angle off the axis natural falloff is cos^4 = 1 / (1 + t^2)^2,
+    and what a rim takes multiplies it.
     """
     lens, (height, width) = sensor.lens, VIEW_PX
-    across = tan(radians(lens.horizontal_view_deg / 2))
+    across, half_diagonal = tan(radians(lens.horizontal_view_deg / 2)), np.hypot(*VIEW_PX) / 2
     tangents = ((np.arange(side) - (side - 1) / 2) * 2 * across / width for side in VIEW_PX)
-    cos4 = (1 + np.add.outer(*(tangent**2 for tangent in tangents))) ** -2
+    power = lens.falloff_power or NATURAL_POWER
+    light_share = (1 + np.add.outer(*(tangent**2 for tangent in tangents))) ** (-power / 2)
+    if lens.vignetting:
+        places = (np.arange(side) - (side - 1) / 2 for side in VIEW_PX)
+        light_share *= pupil_share(np.hypot.outer(*places) / half_diagonal, lens)
     merit = Merit(
         "lens.corner_illumination",
         "relative illumination of the corners",
         "1",
         "like ISO 17957 (shading): corners over the middle",
         f"{channel}, raw, an even field of 4:3, {lens.horizontal_view_deg:g} degrees wide, {light}, corners of "
-        f"{100 * CORNER_PX / width:.1f} % of the width; natural falloff, no mechanical vignetting",
-        _corners_over_middle(cos4),
+        f"{100 * CORNER_PX / width:.1f} % of the width; natural falloff, "
+        f"{'a rim that cuts the pupil' if lens.vignetting else 'no mechanical vignetting'}",
+        _corners_over_middle(light_share),
     )
-    if not lens.horizontal_view_deg:
+    if not lens.horizontal_view_deg and (lens.falloff_power or not lens.vignetting):
         missing = "the lens states no angle of view; state horizontal_view_deg in [lens]"
         return Definition((replace(merit, computed=nan, missing=missing),), not_measured)
     plain = replace(

@@ -13,6 +13,7 @@ from sensor.capture import expose
 from sensor.config import SensorConfig, with_tile
 from sensor.device import draw_device
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency
+from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import form_image, least_samples
 from sensor.readings.noise import collected_share
 from sensor.readings.resolve import at_channel, chip_readings, several
@@ -104,10 +105,7 @@ def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
     """Return the camera whose every pixel is the channel's, with a lens that an even part of the picture sees."""
     plain = with_tile(sensor, (channel,), sensor.responses)
     return replace(
-        plain,
-        lens=replace(
-            plain.lens, horizontal_view_deg=0.0, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0
-        ),
+        plain, lens=replace(plain.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0)
     )
 
 

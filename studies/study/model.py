@@ -43,6 +43,8 @@ class LensTerms:
         Share of the light.
     horizontal_view_deg : float, optional
         Angle of view for cos^4.
+    falloff_power, vignetting : float, optional
+        Falloff by the angle of view of the scene's own camera, and what a rim takes from the corners.
     scatter : float, optional
         Share of the light in the wings of glare.
     shake : str, optional
@@ -52,6 +54,8 @@ class LensTerms:
     diffraction: Annotated[float | None, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = None
     veiling_glare: Annotated[float | None, (0.0, 1.0, "give a fraction, 0 for none")] = None
     horizontal_view_deg: Annotated[float | None, (0.0, 175.0, "give degrees, 0 for none")] = None
+    falloff_power: Annotated[float | None, (0.0, 8.0, "give the power of the cosine, 4 for a thin lens")] = None
+    vignetting: Annotated[float | None, (0.0, 0.99, "give the share of light lost in the corners, 0 for none")] = None
     scatter: Annotated[float | None, (0.0, 0.99, "give a fraction, 0 for none")] = None
     shake: str | None = None
 
@@ -87,7 +91,7 @@ def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: s
     It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that
     their pictures can be compared.
     """
-    none = {"diffraction": 0.0, "veiling_glare": 0.0, "horizontal_view_deg": 0.0, "defocus_um": 0.0}
-    bare = replace(preset.lens, **none, scatter=0.0, eye_age_years=0.0)
+    none = {"diffraction": 0.0, "veiling_glare": 0.0, "horizontal_view_deg": 0.0, "falloff_power": 0.0}
+    bare = replace(preset.lens, **none, vignetting=0.0, defocus_um=0.0, scatter=0.0, eye_age_years=0.0)
     plain = replace(preset, lens=bare)
     return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S, channel=channel)

@@ -12,6 +12,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of, user_file
 from render.bands.error import WideBandsWarning
+from render.geometry import horizontal_view_deg
 from render.transport import Transport
 from rodcone.digests import digest_bytes, digest_inputs
 from rodcone.jit import backend
@@ -20,6 +21,7 @@ from sensor.burst import merged_sensor
 from sensor.config import LensConfig, SensorConfig
 from sensor.flicker.rows import steady_exposure_s
 from sensor.flicker.waveform import waveform
+from sensor.lens.illumination import framed
 from sensor.presets import preset, vary
 from studies.budget.ledger import Plan
 from studies.metrics.truth import light_in_bands
@@ -142,12 +144,13 @@ def _request(job: Job, opened: OpenedScene) -> str:
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
     """The preset and the sensor as modelled of each frame: levels, exposures and seeds share it."""
     sensors = {}
+    view_deg = None if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     for condition in conditions(job.study, opened.choice):
         unmodelled, lens = preset(condition.sensor), job.plan.images[condition].lens
         for mosaic in study_mosaics(job.study):
             sensors[condition.spectrum, condition.sensor, lens, mosaic] = (
                 unmodelled,
-                replace(vary(unmodelled, mosaic), lens=lens),
+                replace(vary(unmodelled, mosaic), lens=framed(lens, view_deg)),
             )
     return sensors
 

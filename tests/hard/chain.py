@@ -23,7 +23,8 @@ from sensor.capture import photograph_radiance
 from sensor.cfa import Tile, channels
 from sensor.device import draw_device
 from sensor.kernel.kernel import expected_electrons_single
-from sensor.optics import camera_equation, falloff, form_image, spreads
+from sensor.lens.illumination import darkens, falloff
+from sensor.optics import camera_equation, form_image, spreads
 from sensor.presets import low_noise
 from sensor.raw import RawImage
 from sensor.response import electrons_per_irradiance, expected_electrons
@@ -66,8 +67,8 @@ def expected(situation: Situation) -> Image:
         electrons = expected_electrons_single(form_image(radiance, sensor, samples).values, weights, sensor)
     else:
         electrons = expected_electrons_single(radiance.values, weights * camera_equation(sensor.lens), sensor)
-        if sensor.lens.horizontal_view_deg:
-            electrons *= falloff(sensor.lens, radiance.shape).astype(electrons.dtype)
+        if darkens(sensor.lens):
+            electrons *= falloff(sensor.lens, radiance.shape, radiance.horizontal_view_deg).astype(electrons.dtype)
     return np.minimum(np.asarray(electrons, dtype=np.float64), MOST_E)
 
 

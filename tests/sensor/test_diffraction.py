@@ -13,7 +13,8 @@ from scipy.special import j0, j1
 from render.radiance import SpectralRadiance
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, limit_per_um, sampled_otf
-from sensor.optics import camera_equation, falloff, form_image
+from sensor.lens.illumination import falloff
+from sensor.optics import camera_equation, form_image
 from sensor.pixel import PixelConfig
 
 PIXEL = PixelConfig(pitch_um=2.2, fill_factor=0.9, full_well_e=15_000.0, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)

@@ -12,7 +12,8 @@ from render.radiance import SpectralRadiance
 from rodcone.errors import InputError
 from sensor.config import LensConfig, SensorConfig
 from sensor.diffraction import diffraction_otf
-from sensor.optics import SpectralIrradiance, camera_equation, falloff, form_image, least_samples, left_out, mtf50_error
+from sensor.lens.illumination import falloff
+from sensor.optics import SpectralIrradiance, camera_equation, form_image, least_samples, left_out, mtf50_error
 from sensor.pixel import PixelConfig
 from sensor.presets import preset, preset_names
 from studies.metrics.mtf import edge_response

@@ -18,7 +18,8 @@ from render.spectrum import Spectrum, emission_lines_nm, fine_bands, flat
 from render.transport import Transport
 from rodcone.jit import backend
 from sensor.kernel.kernel import expected_electrons_single
-from sensor.optics import camera_equation, falloff, form_image
+from sensor.lens.illumination import falloff
+from sensor.optics import camera_equation, form_image
 from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
