@@ -1,7 +1,7 @@
 """Gain and speed of a camera: the saturation-based speed, and the gain that a study or a command asks for."""
 
 from render.illuminants import illuminant
-from render.spectrum import fine_bands
+from render.spectrum import VISIBLE_NM, fine_bands
 from rodcone.errors import InputError
 from sensor.cfa import OWN
 from sensor.config import MOST_GAIN, SensorConfig
@@ -19,12 +19,13 @@ def iso_speed(sensor: SensorConfig) -> float | None:
     """Saturation-based speed of green under D65; None without G, where it collects nothing, and beyond what files hold.
 
     Of the exposure in which green's mean reads the converter's top; no half stop of headroom is taken off. It is in
-    proportion to the gain.
+    proportion to the gain. D65's table ends at 780 nm: a camera whose window opens further sees it dark from there on.
     """
     if "G" not in sensor.channels:
         return None
-    d65 = illuminant("D65")
-    neutral = neutral_electrons(sensor, light_in_bands(d65, *fine_bands([d65])), 1.0)
+    d65, (low, high) = illuminant("D65"), sensor.window_nm
+    bands = fine_bands([d65], (min(VISIBLE_NM[0], low), max(VISIBLE_NM[1], high)))
+    neutral = neutral_electrons(sensor, light_in_bands(d65, *bands), 1.0)
     electrons_per_cd_m2 = float(neutral[sensor.channels.index("G")])
     if electrons_per_cd_m2 <= 0:
         return None

@@ -1,5 +1,7 @@
 """Speeds and gains as studies and commands write them."""
 
+from dataclasses import replace
+
 import pytest
 from loop import loop
 from refusal import refusal
@@ -17,6 +19,11 @@ def test_a_speed_is_in_proportion_to_the_gain() -> None:
         assert iso_speed(with_gain(low_noise(), gain)) == pytest.approx(gain * base, rel=1e-12)
     assert gain_for_iso(low_noise(), 8 * base) == pytest.approx(8.0)
     assert gain_for_iso(low_noise(), 51.0) == 1.0  # as it is told, in whole numbers
+
+
+def test_infrared_that_d65_lacks_leaves_the_speed() -> None:
+    whole = replace(low_noise(), window_nm=(380.0, 1000.0))
+    assert iso_speed(whole) == pytest.approx(iso_speed(low_noise()), rel=1e-9)
 
 
 def test_texts_of_gains_and_speeds() -> None:
