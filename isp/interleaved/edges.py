@@ -58,8 +58,9 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
 
         F = P + max(0, 1 - e^4 / (1 + chi_0^2)) (E - P).
 
-    Where E_W is brighter or darker than all P_W of the window, by d, d m / m_W / max(1, chi^2) is taken off E before:
-    else noise makes dark pixels beside bright things. For a colour that noise hides that of the surroundings stands,
+    Where E_W is brighter or darker than all P_W of the window, by d, d m / max(1, chi^2) over m_W, (nu_W N_W)^(1/2) at
+    least, is taken off E before: else noise makes dark pixels beside bright things. For a colour that noise hides that
+    of the surroundings stands,
 
         F_c -= min(1, 5 / sum_c <D_c^2> / (nu_c N_c)) (A_c - r_c A_W),    A = P + max(0, 1 - e) (F - P),
 
@@ -180,7 +181,8 @@ def _sharpen(
     of_white = window[:, :, 3]
     within = np.clip(estimate[..., 3], of_white.min(axis=(2, 3)), of_white.max(axis=(2, 3)))
     beyond = (within - estimate[..., 3]) / np.maximum(squares.mean(axis=2), 1.0)
-    estimate = estimate + (beyond / np.maximum(light[..., 3], TINY))[..., None] * light
+    seen = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
+    estimate = estimate + (beyond / seen)[..., None] * light
 
     # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)

@@ -84,7 +84,8 @@ def sharpen_frame(
     light, noise = larger(mean, 0.0), larger(shot * larger(mean, 0.0) + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
-    tint = _tint_of_like_places(mean, far, shot, dark, dr.sqrt(nu[3] * noise[3]))
+    faint = dr.sqrt(nu[3] * noise[3])
+    tint = _tint_of_like_places(mean, far, shot, dark, faint)
     apart = variance + tint * (tint * variance[3] - 2.0 * covariance[3]) + dr.square(mean - tint * mean[3])
     hidden = HIDDEN / larger(dr.sum(apart / (nu * noise)), HIDDEN)
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
@@ -109,7 +110,7 @@ def sharpen_frame(
     chi_squared = sum(squares[1:], squares[0]) / 9.0
     of_white = [values[3] for values in window]
     within = larger(dr.minimum(estimate[3], reduce(larger, of_white)), reduce(dr.minimum, of_white))
-    estimate += (within - estimate[3]) / larger(chi_squared, 1.0) * light / larger(light[3], TINY)
+    estimate += (within - estimate[3]) / larger(chi_squared, 1.0) * light / larger(light[3], faint)
 
     # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
     chi_squared_near = sum((float(w) * x for w, x in zip(NEAR, squares, strict=True)), 0.0)
