@@ -115,6 +115,7 @@ def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
     return {"illuminance_lux" if unit == "lux" else "luminance_cd_m2": value}
 
 
+_SMOOTH = "its light is taken to be smooth within bands, and of a lamp with lines bands of 20 nm lose up to 6 %"
 LIGHT = "D65"  # what sRGB takes for white, where nothing tells the light of the picture
 
 
@@ -135,7 +136,7 @@ def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum
 
 def default_white(path: str | Path) -> AdoptedWhite:
     """Light of a picture file that nothing tells, D65; reference light tells its lamps when it is opened."""
-    use = "it is lit by" if is_reflectance(path) else "its colours are judged under"
+    use = "it is lit by" if is_reflectance(path) else f"{_SMOOTH}; its colours are judged under"
     note = f"{Path(path).name}: {use} {LIGHT}; give another light where that isn't so"
     return AdoptedWhite(illuminant(LIGHT), () if is_reference(path) else (note,))
 
