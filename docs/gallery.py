@@ -41,6 +41,7 @@ SHOWN = {
     "slanted_edge": "--level 200cd/m2",
     "still_life": "--level 500lux",
     "still_life_outdoor": "",
+    "walker": "--exposure 50ms",
 }
 CROP_PX = 112
 CROP = slice(212, 212 + CROP_PX), slice(190, 190 + CROP_PX)  # star, chart and gold ball of still_life at 512 pixels

@@ -69,6 +69,7 @@ from studies.metrics.compare import measure as measure
 from studies.photograph.clock import Clock
 from studies.photograph.develop import develop as develop
 from studies.photograph.develop import develop_file as develop_file
+from studies.photograph.moments import time_average as time_average
 from studies.photograph.shot import Order as Order
 from studies.photograph.shot import take as take
 from studies.photograph.snr import LightForSnr
@@ -132,6 +133,7 @@ __all__ = [
     "matte",
     "measure",
     "merged_raw",
+    "moments_s",
     "mosaics",
     "panel",
     "plan",
@@ -153,6 +155,7 @@ __all__ = [
     "snr",
     "sweep",
     "take",
+    "time_average",
     "to_world",
     "waveform",
     "with_channel_readings",
@@ -235,6 +238,7 @@ def finish(
 def flicker_figures(waveform: Waveform | str, exposure_s: _Seconds, tolerance: float = ...) -> FlickerFigures: ...
 def form_image(radiance: SpectralRadiance, sensor: _Sensor, samples_per_pixel: int = 1) -> SpectralIrradiance: ...
 def light_for_snr(ratio: float, sensor: _Sensor, light: str, exposure_s: _Seconds) -> list[LightForSnr]: ...
+def moments_s(exposure_s: _Seconds, count: int) -> Floats: ...
 def panel(pose: ArrayLike, width_m: Metres, height_m: Metres, bsdf: Node, **more: Node) -> Node: ...
 def plan(study: _Study, *, cache: str | Path | None = None, step: Step | None = None) -> Plan: ...
 def reference_picture(radiance: SpectralRadiance, light: _Light | None = None) -> ReferencePicture: ...

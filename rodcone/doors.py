@@ -7,7 +7,7 @@ which are imported when they are needed, because imports run downwards only.
 """
 
 import sys
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import cache, wraps
 from importlib import import_module
 from importlib.util import find_spec
@@ -172,6 +172,17 @@ def _each(kind: Check, least: int = 0) -> Check:
     return check
 
 
+def _each_in_turn(kind: Check) -> Check:
+    """Check for a list or a generator, of which `kind` takes each when its turn comes."""
+
+    def check(name: str, value: Any) -> Any:
+        if not isinstance(value, list | tuple | Iterator):
+            raise InputError(f"{name}: {_shown(value)} is not allowed; give a list or a generator")
+        return (kind(f"{name}[{place}]", one) for place, one in enumerate(value))
+
+    return check
+
+
 def _as_it_is(_: str, value: Any) -> Any:
     """Take any argument."""
     return value
@@ -222,6 +233,7 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
             _value("sensor.pixel:ChannelReading", "give rodcone.ChannelReading(...)")
         ),
         "frames": _each(_value("sensor.raw:RawImage", "give what capture or read_raw gives"), least=1),
+        "transports": _each_in_turn(_value("render.transport:Transport", "give what render gave")),
         "cells": _each(_value("studies.sweep.cells:Cell", "give what sweep gives its runner")),
         "matte.reflectance": _value("render.spectrum:Spectrum", "give rodcone.grey(0.5) or rodcone.Spectrum(...)"),
         "spectra": _spectra,

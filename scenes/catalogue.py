@@ -2,6 +2,7 @@
 
 import inspect
 import re
+from collections.abc import Callable
 from importlib import import_module
 from typing import Any
 
@@ -25,8 +26,10 @@ _NAMES = (
     "slanted_edge",
     "still_life",
     "still_life_outdoor",
+    "walker",
 )
 DRAWN = ("diorama", "generated")  # from a number, in hexadecimal after a dash
+_DRAWN = re.compile(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})")
 
 
 def scene_names() -> tuple[str, ...]:
@@ -57,12 +60,29 @@ def load(name: str, **options: Any) -> Scene:
     InputError
         For an unknown name or option; the nearest allowed one is named.
     """
-    if drawn := re.fullmatch(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})", name):
-        name = drawn[1]
+    drawn = _DRAWN.fullmatch(name)
+    if drawn:
         options = {**options, "seed": int(drawn[2], 16)}
+    require_keys(f"scene {drawn[1] if drawn else name}: option", options, scene_options(name))
+    scene: Scene = _builder(name)(**options)
+    return scene
+
+
+def scene_options(name: str) -> tuple[str, ...]:
+    """Names of what `load` takes beside the name.
+
+    Raises
+    ------
+    InputError
+        For an unknown name.
+    """
+    return tuple(inspect.signature(_builder(name)).parameters)
+
+
+def _builder(name: str) -> Callable[..., Scene]:
+    drawn = _DRAWN.fullmatch(name)
+    name = drawn[1] if drawn else name
     if name not in _NAMES:
         raise unknown("scene", name, _NAMES)
-    builder = getattr(import_module(f"scenes.{name}"), name)
-    require_keys(f"scene {name}: option", options, inspect.signature(builder).parameters)
-    scene: Scene = builder(**options)
-    return scene
+    builder: Callable[..., Scene] = getattr(import_module(f"scenes.{name}"), name)
+    return builder

@@ -14,7 +14,7 @@ from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
-from render.scene import film_size
+from render.scene import Scene, film_size
 from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
 from render.transport import Transport
 from render.user_scene.scene_parts import SceneFile
@@ -40,6 +40,7 @@ from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.focus import in_focus
 from studies.photograph.lamps import flicker_of, lamp_parts
+from studies.photograph.moments import moments_s, time_average
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.cost import PictureCost
 from studies.study.gain import at_gain, gain_text
@@ -63,8 +64,9 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
-# Second part of the seed: the chip's patterns, this exposure's noise, and when it starts by the lamps' clock.
-_DEVICE, _FRAME, _START = 0, 1, 2
+# Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
+# of the light at its later times.
+_DEVICE, _FRAME, _START, _MOMENT = 0, 1, 2, 3
 _ALL_ROWS = (
     "flicker: all rows are exposed together, so that the lamps brighten or darken the whole frame; for bands state the "
     "time from row to row, such as --row-time 15us"
@@ -133,6 +135,9 @@ class Order:
         each f-number; by default all of it is sharp. A picture from a file has no depth.
     focal_length_mm : float, optional
         Of that lens; by default that of a sensor as wide as the picture's pixels, which for few of them is short.
+    moments : int, optional
+        Times, spread evenly over the exposure, at which a scene that moves is rendered: walker, or a .xml with a
+        parameter $time_s. Each costs a render of its own, and the exposure must be a time. By default nothing moves.
     seed : int
         Seed of the render, the chip and the exposure.
     trust_scene : bool
@@ -173,6 +178,7 @@ class Order:
     row_time: str | None = None
     focus_m: Annotated[float | None, (1e-3, 1e6, "give metres")] = None
     focal_length_mm: Annotated[float | None, (1e-3, 1e5, "give millimetres")] = None
+    moments: Annotated[int | None, (1, 256, "give times within the exposure")] = None
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     trust_scene: bool = False
     define: tuple[str, ...] = ()
@@ -202,6 +208,8 @@ class Checked:
     sensor : SensorConfig
     opened : SceneFile or None
         None for a stored radiance.
+    moving : tuple of Scene
+        The scene at each time of the exposure; empty where it stands still.
     exposure_s : float or None
         None by a rule.
     ready : Ready or None
@@ -221,6 +229,7 @@ class Checked:
     samples: int
     cost: PictureCost
     flicker: Mapping[str, Waveform]
+    moving: tuple[Scene, ...] = ()
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
@@ -281,7 +290,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         if ready:
             transport, notes = ready.transport, [*notes, ready.line]
         else:
-            transport = _rendered(order, opened, spectra, step, kept=kept, samples=checked.samples)
+            transport = _rendered(checked, opened, spectra, step, kept)
             notes += filter(None, [compile_note(transport.compile_s)])
 
     # The exposure.
@@ -372,23 +381,34 @@ def _exposure(checked: Checked, per_second_e: NDArray[np.float64]) -> tuple[floa
 
 
 def _rendered(
-    order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, *, kept: Path, samples: int
+    checked: Checked, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, kept: Path
 ) -> Transport:
-    """Light of a scene, rendered here."""
+    """Light of a scene, rendered here; of one that moves the mean over the exposure, by paths of their own each."""
+    order, samples = checked.order, checked.samples
     height, width = _size(order, opened)
     if step:
         step(render_words(np.inf), 0.0)
     bands = _bands(opened, spectra)
-    return render(
-        opened.scene,
-        (samples * height, samples * width),
-        wavelength_nm=bands[0],
-        width_nm=bands[1],
-        spp=order.spp or _SPP,
-        seed=order.seed,
-        cache=kept,
-        progress=None if step is None else lambda share, error: step(render_words(error), 0.9 * share),
-    )
+    scenes = checked.moving or (opened.scene,)
+
+    def at(number: int, scene: Scene) -> Transport:
+        first = number / len(scenes)
+        seed = np.random.default_rng([order.seed, _MOMENT, number]).integers(2**31) if number else order.seed
+        return render(
+            scene,
+            (samples * height, samples * width),
+            wavelength_nm=bands[0],
+            width_nm=bands[1],
+            spp=order.spp or _SPP,
+            seed=int(seed),
+            cache=kept,
+            progress=None
+            if step is None
+            else lambda share, error: step(render_words(error), 0.9 * (first + share / len(scenes))),
+        )
+
+    transports = (at(number, scene) for number, scene in enumerate(scenes))
+    return time_average(transports) if checked.moving else next(transports)
 
 
 def _bands(opened: SceneFile, spectra: Mapping[str, Spectrum]) -> tuple[Floats, Floats]:
@@ -457,6 +477,7 @@ def check(order: Order) -> Checked:
             "spp",
             "render",
             "focus_m",
+            "moments",
         )
         place = f"for {str(order.source)!r}, a stored picture; allowed: with a scene that is rendered"
         require_absent(place, **{name: getattr(order, name) for name in scene_options})
@@ -470,24 +491,48 @@ def check(order: Order) -> Checked:
         cost = PictureCost((1, pixels), bands, groups, 0, _AFTER_S)
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     # A scene, rendered or there already.
-    opened = open_scene(str(order.source), order.trust_scene, order.extend, chart=order.chart, define=order.define)
+    opened, moving = _opened(order, exposure_s)
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
     flicker = flicker_of(order.flicker, opened.scene.groups)
     # A scene that measures sharpness takes samples within a pixel, which light that is there already hasn't.
     samples = samples_a_side(str(order.source), [sensor])
-    ready = _ready(order, opened, spectra) if samples == 1 and order.focus_m is None else None
+    ready = _ready(order, opened, spectra) if samples == 1 and order.focus_m is None and not moving else None
     size = ready.size if ready else _size(order, opened)
     check_frame(sensor, size)
     through = ""
     if order.focus_m is not None:
-        scene, through = in_focus(opened.scene, sensor, size, order.focus_m, order.focal_length_mm)
+        lens = order.focus_m, order.focal_length_mm
+        scene, through = in_focus(opened.scene, sensor, size, *lens)
         opened = replace(opened, scene=scene)
+        moving = tuple(in_focus(each, sensor, size, *lens)[0] for each in moving)
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
-    spp = 0 if ready else order.spp or _SPP
+    spp = 0 if ready else (order.spp or _SPP) * max(len(moving), 1)
     rendered = (samples * size[0], samples * size[1])
     cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _AFTER_S, through=through)
-    return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker)
+    return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving)
+
+
+def _opened(order: Order, exposure_s: float | None) -> tuple[SceneFile, tuple[Scene, ...]]:
+    """Open the scene, as it is at the middle of the exposure if it moves, and at each of its times."""
+
+    def at(time_s: float | None) -> SceneFile:
+        source = str(order.source)
+        return open_scene(
+            source, order.trust_scene, order.extend, chart=order.chart, define=order.define, time_s=time_s
+        )
+
+    if order.moments is None:
+        return at(None), ()
+    if exposure_s is None:
+        raise InputError(
+            f"exposure: {order.exposure!r} beside moments = {order.moments}; allowed: a time, such as 100ms, because a "
+            "rule needs the light that the exposure itself blurs; give --exposure"
+        )
+    if order.frames > 1:
+        raise InputError(f"frames: {order.frames} beside moments = {order.moments}; allowed: 1; leave one of them out")
+    moving = tuple(at(float(time_s)).scene for time_s in moments_s(exposure_s, order.moments))
+    return at(exposure_s / 2), moving
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

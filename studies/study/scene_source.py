@@ -22,7 +22,7 @@ from render.transport import Transport
 from render.user_scene.scene_file import load_scene_file
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_range, require_whole
-from scenes.catalogue import load
+from scenes.catalogue import load, scene_names, scene_options
 from studies.study.levels import parse_level
 
 _OTHER_FILES = {
@@ -31,6 +31,8 @@ _OTHER_FILES = {
     REFERENCE: "reference light, for rodcone capture and explore; a study has render.reference = true",
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
+
+_TIME = "time_s"  # what a scene that moves is asked by
 
 _UPSAMPLED = {
     SURFACES: "reflectance of measured surfaces that looks like it (Otsu et al. 2018)",
@@ -45,6 +47,7 @@ def open_scene(
     light: str | None = None,
     chart: str | None = None,
     define: Sequence[str] = (),
+    time_s: float | None = None,
 ) -> SceneFile:
     """Scene, the size of its film and notes.
 
@@ -58,22 +61,32 @@ def open_scene(
         Options of a catalogue scene's builder: its light, and a file of reflectances for color_checker's patches.
     define : sequence of str
         ``NAME=VALUE`` of a scene file's $parameters.
+    time_s : float, optional
+        Of a scene that moves: its builder's option, or a scene file's parameter $time_s.
 
     Raises
     ------
     InputError
-        For an unknown name, a scene file that isn't allowed, `trust` for a catalogue scene, or `light` or `chart` for a
-        file.
+        For an unknown name, a time of a scene that doesn't move, a scene file that isn't allowed, `trust` for a
+        catalogue scene, or `light` or `chart` for a file.
     """
     if Path(source).suffix.lower() == ".xml":
         require_absent(f"for {source}, a file that has its own", light=light, chart=chart)
+        define = (*define, *(() if time_s is None else (f"{_TIME}={time_s!r}",)))
         return load_scene_file(source, trust=trust, extend=extend, define=defined(define))
     require_absent(f"for {source!r}; allowed: with an .xml scene", trust_scene=trust, define=tuple(define))
     if suffix := Path(source).suffix.lower():
         what = _OTHER_FILES.get(suffix, f"no file that is a scene ({suffix})")
         files = (".xml",) if suffix in ENDINGS else (".xml", *ENDINGS)
         raise InputError(f"scene: {source!r} is {what}; allowed: {', '.join(files)}, or a name of rodcone list scenes")
-    options = {name: value for name, value in (("light", light), ("chart", chart)) if value is not None}
+    given = (("light", light), ("chart", chart), (_TIME, time_s))
+    if time_s is not None and _TIME not in scene_options(source):
+        moving = [name for name in scene_names() if _TIME in scene_options(name)]
+        raise InputError(
+            f"moments: scene {source} doesn't move; allowed: {', '.join(moving)}, or a .xml scene with a parameter "
+            f"${_TIME}; leave --moments out"
+        )
+    options = {name: value for name, value in given if value is not None}
     scene = load(source, **options)
     return SceneFile(replace(scene, extend=extend), scene.size, ())
 

@@ -56,6 +56,8 @@ RIGHT: dict[str, Any] = {
     "balance": np.ones(3),
     "pixel": SENSOR.pixel,
     "with_channel_readings.readings": [public.ChannelReading("W", time_share=0.5)],
+    "transports": [TRANSPORT, TRANSPORT],
+    "count": 2,
     "readings": [public.Reading(1.5, 1.0, 1e4), public.Reading(1.5, 1.0, 1e4, time_share=0.1)],
     "name": "D65",
     "load.name": "flat_field",

@@ -24,7 +24,7 @@ LIT_BY_NAME = (
 
 
 def test_names_are_the_scenes_in_order():
-    others = ("diorama", "furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor")
+    others = ("diorama", "furnace", "generated", "lit_and_shadowed", "night_street", "still_life_outdoor", "walker")
     assert scene_names() == tuple(sorted((*LIT_BY_NAME, *others)))
 
 

@@ -1,0 +1,98 @@
+"""Light of a scene that moves: the mean over times, its errors, and the blur of an edge in closed form."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from builders import transport_of
+from refusal import refusal
+
+import rodcone as public
+from render.engine import render
+from render.error_estimates import Halves
+from render.geometry import camera, translate
+from render.illuminants import illuminant
+from render.scene import LightGroup, Scene
+from rodcone.digests import digest_inputs
+from scenes.catalogue import load
+from scenes.materials import matte, panel
+from scenes.reflectances import grey
+from studies.photograph.moments import moments_s, time_average
+
+NM, WIDTH = np.array([500.0, 600.0]), np.array([20.0, 20.0])
+GROUPS = {"lamp": LightGroup((), illuminant("A"))}
+
+
+def light_of(seed, **changes):
+    values = np.random.default_rng(seed).uniform(0.5, 1.5, (1, 2, 4, 6)).astype(np.float32)
+    halves = Halves(values, np.float32(0.1) * values[::-1])
+    made = {"light": halves, "variance": values**2, "seconds": 2.0, "relative_mc_error": 0.1, **changes}
+    return transport_of(values, GROUPS, NM, WIDTH, irradiance=np.full((1, 2), seed + 1.0), **made)
+
+
+def test_the_times_of_an_exposure_are_the_middles_of_its_parts():
+    assert moments_s(0.1, 4) == pytest.approx([0.0125, 0.0375, 0.0625, 0.0875])
+    refusal(moments_s, 0.1, 0, match="count: 0")
+
+
+def test_the_light_is_the_mean_and_its_variance_the_mean_variance_over_the_times():
+    each = [light_of(seed) for seed in range(3)]
+    made = time_average(iter(each))
+    for part in ("mean", "difference"):
+        expected = np.mean([getattr(x.light, part) for x in each], axis=0)
+        assert getattr(made.light, part) == pytest.approx(expected, rel=1e-6)
+    assert made.variance == pytest.approx(np.mean([x.variance for x in each], axis=0) / 3, rel=1e-6)
+    assert (made.spp, made.seconds) == (3 * 64, 6.0)
+    assert made.relative_mc_error == pytest.approx(0.1 / 3**0.5)
+    assert made.irradiance == pytest.approx(np.full((1, 2), 2.0))
+    means = np.mean([x.relight(powers={"lamp": 7.0}).luminance() for x in each], axis=0)
+    assert made.relight(powers={"lamp": 7.0}).luminance() == pytest.approx(means, rel=1e-6)
+    assert made.level(powers={"lamp": 7.0}).value == pytest.approx(means.mean(), rel=1e-6)
+
+
+def test_one_time_is_its_own_light():
+    one = light_of(5)
+    assert np.array_equal(time_average([one]).radiance, one.radiance)
+    assert np.array_equal(time_average([one]).counts, one.counts)
+
+
+def test_light_that_is_not_of_one_scene_is_refused():
+    refusal(time_average, [], match="transports: none given")
+    refusal(public.time_average, [3], match=r"transports\[0\]: an int is none")
+    refusal(public.time_average, 3, match="give a list or a generator")
+    other = replace(light_of(1), wavelength_nm=NM + 1)
+    refusal(time_average, [light_of(0), other], match=r"transports\[1\].*render all alike")
+
+
+def white_half(time_s):
+    """A glowing sheet 4 m wide whose right edge passes a camera at 1 m/s, 1 m in view on 32 pixels."""
+    view = camera(2 * np.degrees(np.arctan(0.5 / 8 / 10.0)), (0, 0, 10.0), (0, 0, 0))  # of the 4 rows
+    sheet = panel(translate(time_s - 2.0 - 0.25, 0, 0), 4.0, 4.0, matte(grey(0.5)), emitter={"type": "area"})
+    lights = {"sheet": LightGroup(("sheet/emitter",), illuminant("E"))}
+    return Scene("sheet", {"type": "scene", "sensor": view, "sheet": sheet}, lights)
+
+
+@pytest.mark.thorough
+def test_a_moving_edge_is_blurred_into_a_ramp_as_long_as_its_way():
+    """Closed form: the share of the exposure for which the sheet has passed a place, over the pixel's width."""
+    exposure_s, count = 0.5, 8
+    made = time_average(
+        render(white_half(float(time_s)), (4, 32), wavelength_nm=NM, width_nm=WIDTH, spp=64, seed=seed)
+        for seed, time_s in enumerate(moments_s(exposure_s, count))
+    )
+    profile = made.radiance[0].mean(axis=(0, 1)) / made.radiance.max()
+    edges = np.linspace(-0.5, 0.5, 33)
+    # The edge starts at -0.25 m and moves to 0.25 m: each step is one pixel's width.
+    passed = np.clip((0.25 - (edges[:-1] + edges[1:]) / 2) / exposure_s, 0.0, 1.0)
+    assert np.abs(profile - passed).max() < 0.5 / count + 0.01
+    assert profile.mean() == pytest.approx(passed.mean(), abs=0.003)
+
+
+def test_the_walker_moves_and_the_street_stays():
+    early, late = load("walker"), load("walker", time_s=0.5)
+    nodes = early.geometry
+    moved = {key for key in nodes if digest_inputs([nodes[key]]) != digest_inputs([late.geometry[key]])}
+    assert moved == {key for key in early.geometry if key.startswith("walker_")}
+    street = load("night_street").geometry
+    assert digest_inputs([{key: early.geometry[key] for key in street}]) == digest_inputs([street])
+    assert late.geometry["walker_head"]["center"][0] - early.geometry["walker_head"]["center"][0] == pytest.approx(0.7)
