@@ -17,7 +17,7 @@ from sensor.config import SensorConfig
 from sensor.emva1288.characterise import FigureOfMerit
 from studies.metrics.mtf import edge_response
 from studies.metrics.truth import named_light, neutral_electrons
-from studies.photograph.snr import electrons_at_snr
+from studies.photograph.snr import electrons_at_snr, snr
 from studies.score import figure as figure_module
 from studies.score import score as score_module
 from studies.score.contrast import accuracy, reading_distribution
@@ -122,6 +122,20 @@ def test_print_figures_are_their_formulas_by_hand() -> None:
     assert computed(sensor, "print.portrait") == pytest.approx(np.log2(2 * np.sqrt(tops_e)).sum(), abs=0.05)
     speed = computed(sensor, "iso_12232.saturation_speed") * 0.18 * well_e / 1000
     assert computed(sensor, "print.sports") == pytest.approx(speed, rel=0.01)
+
+
+@pytest.mark.parametrize("name", ["dual_gain", "split_pixel"])
+def test_colours_of_several_readings_have_the_noise_of_the_merge(name: str) -> None:
+    """The integral of 1 / noise up to 90 % of the range by a fine sum; noise is the signal over its ratio."""
+    sensor, light = public.preset(name), named_light("D65")
+    means = neutral_electrons(sensor, light, EXPOSURE_S)
+    field = even_field(sensor, light, EXPOSURE_S, "G")
+    bits = 0.0
+    for top_e in (0.9 * field.headroom_e * means / means[:3].max())[:3]:
+        edges_e = np.linspace(0.0, top_e**0.5, 4001) ** 2
+        middles_e = (edges_e[1:] + edges_e[:-1]) / 2
+        bits += np.log2(np.sum(np.diff(edges_e) * snr(middles_e, sensor, EXPOSURE_S, "G") / middles_e))
+    assert computed(sensor, "print.portrait") == pytest.approx(bits, abs=0.03)
 
 
 def test_flare_is_the_share_that_scatters_by_hand() -> None:

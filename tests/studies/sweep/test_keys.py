@@ -27,8 +27,8 @@ from studies.sweep import frames as frames_module
 from studies.sweep import prepare as prepare_module
 from studies.sweep.cells import RenderRecord, cell_key, device_stream, exposure_stream, render_text, shake_stream
 from studies.sweep.database import open_results
-from studies.sweep.frames import frame_key
-from studies.sweep.prepare import Job, scene_cells
+from studies.sweep.frames import frame_key, load_frame
+from studies.sweep.prepare import FRAMES, Job, scene_cells
 
 CONDITION = Condition(SceneChoice("still_life"), "D65", "25cd/m2", "10ms", "low_noise")
 
@@ -224,6 +224,13 @@ def test_a_frame_that_is_read_back_is_the_frame_that_was_made(tmp_path: Path) ->
     assert frame.auto_s == pytest.approx(auto_exposure_s(image, frame.sensor, 1e6), rel=1e-3)
     assert frame.auto_w_s == pytest.approx(auto_exposure_s(image, frame.sensor, 1e6, channel="W"), rel=1e-3)
     assert frame.auto_w_s < 0.8 * frame.auto_s
+    for name in ("truth", "electrons", "errors"):  # one that is damaged alone
+        path = getattr(frame, name)
+        content = path.read_bytes()
+        path.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+        assert load_frame(tmp_path / FRAMES, frame.key, frame.sensor) is None, name
+        path.write_bytes(content)
+    assert load_frame(tmp_path / FRAMES, frame.key, frame.sensor) is not None
 
 
 def replace_diffraction(sensor: Any) -> Any:
