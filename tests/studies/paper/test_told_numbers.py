@@ -37,7 +37,7 @@ from studies.paper import (
 )
 from studies.paper import paper as paper_module
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, with_default, within
-from studies.paper.figure2 import bright_cd_m2, signal_ratios, snr_gains
+from studies.paper.figure2 import SNR_EXPOSURE_S, bright_cd_m2, signal_ratios, snr_claims, snr_gains
 from studies.paper.numbers import measured_snr_db, number_claims, range_spans
 from studies.paper.paper import Paper, as_csv, as_json, write
 from studies.paper.pixel_size import gain_db, half_snr_db
@@ -552,6 +552,26 @@ def test_figure_4_compares_patches_at_both_levels_and_draws_the_first(monkeypatc
     assert "25 cd/m²" in figure.caption
     assert [asks[1:] for asks in called["view"]] == [("slanted_edge", level) for level in patches.LEVELS.values()]
     assert {time for _, _, time in called["exposures"]} == {"20ms"}
+
+
+def test_the_notes_of_claims_state_the_settings_that_their_numbers_have() -> None:
+    """Times in ms of Figure 4's frames ("20ms"), 1a's ("66ms"), 1b's, 2's and the early designs'; light; patches."""
+    one = {"as any": 1.0}
+    edge, halves = patches.claims_4(one)[0].note, pixel_size.claims_1a(one, one)[0].note
+    assert "W's patches of 5 × 5" in edge and " 20 ms;" in edge and "x 4 pixels from the edge" in edge
+    assert "z 8 from x" in edge
+    dark, lit = pixel_size.DARK_CD_M2, pixel_size.LIT_CD_M2
+    assert f"Halves of {dark:g} and {lit:g} cd/m², one exposure of 66 ms," in halves
+    large, *_ = pixel_size.claims_1b(1.0, one, np.ones(2))
+    assert f" {1000 * pixel_size.EXPOSURE_S:g} ms " in large.note and f" {pixel_size.LUMINANCE_CD_M2:g} cd/m²" in large.note
+    for claim in snr_claims({}, {}, {}):
+        assert f" {1000 * SNR_EXPOSURE_S:g} ms, f/2.8, D65" in claim.note
+    lost = early.claims_early({early.GINDELE: one}, one, one, {})[2]
+    assert f"D65, {1000 * early.EXPOSURE_S:g} ms:" in lost.note
+    swap = white_beside_bayer.claims_6({}, {}, {})[3]
+    assert swap.note.endswith(f"with it, {white_beside_bayer.DARKEST}.")
+    for claim in patches.filter_claims({1: one, 5: one}):
+        assert f"of {patches.FRAME_SIDE} × {patches.FRAME_SIDE} pixels" in claim.note
 
 
 def test_an_edge_is_at_the_middle_of_dark_and_bright() -> None:
