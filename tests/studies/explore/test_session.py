@@ -414,6 +414,27 @@ def test_a_slow_processors_result_is_shown_where_its_stand_in_was(monkeypatch: p
     assert len(begun) == 1
 
 
+def test_a_slow_processor_that_is_cancelled_ends_and_does_not_begin_again(monkeypatch: pytest.MonkeyPatch) -> None:
+    begun, ended, there = [], [], threading.Event()
+
+    def begin(name: str, *_: Any) -> Callable[[], None]:
+        begun.append(name)
+        there.set()
+        return lambda: ended.append(name)
+
+    monkeypatch.setattr("studies.explore.session.begin", begin)
+    session = Session(of_transport(small_transport()))
+    page = connected(session)
+    page.ask(session, "show", 1, cameras=[{}])
+    assert there.wait(30)
+    page.ask(session, "hello", 2)  # answered once the beginning is over
+    page.ask(session, "cancel", 3)
+    waits, before = session._left_to_do(), list(ended)
+    session.close()
+    assert begun == before == [Controls().processor]
+    assert waits is None
+
+
 def test_a_connection_that_was_taken_over_is_not_listened_to(session):
     old, new = Page(), Page()
     session.connect(old.send)
