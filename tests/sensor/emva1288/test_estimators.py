@@ -113,6 +113,27 @@ def test_dsnu_and_prnu_are_spatial_spreads_with_the_dark_s_taken_off():
     assert emva.prnu(dark, stack(420 + offset, 0.0))[0] == pytest.approx(0.0, abs=1e-6)
 
 
+def test_each_spreads_error_is_its_scatter_over_chips():
+    """Of 400 chips a standard deviation is off by 3.5 %; the errors told are within a seventh of it, 4 of its own."""
+    rng = np.random.default_rng(3)
+    told = {name: [] for name in ("dark noise", "DSNU", "PRNU", "column offsets", "column gains")}
+    for _ in range(400):
+        by_pixel, by_column = rng.normal(0.0, 1.0, (2, *SHAPE)), rng.normal(0.0, 1.0, (2, 1, SHAPE[1]))
+        dark_dn, response = 2.0 * by_pixel[0] + by_column[0], 1 + 0.02 * by_pixel[1] + 0.01 * by_column[1]
+        freedom = 15 * SHAPE[0] * SHAPE[1]
+        dark = stack(20.0 + dark_dn + rng.normal(0.0, 0.5, SHAPE), 4.0 * rng.chisquare(freedom) / freedom)
+        bright = stack(20.0 + dark_dn + 400.0 * response + rng.normal(0.0, 2.0, SHAPE), 64.0)
+        exact = (GAIN[0], 0.0)
+        told["dark noise"].append(emva.dark_noise(dark, exact))
+        told["DSNU"].append(emva.dsnu(dark, exact))
+        told["PRNU"].append(emva.prnu(dark, bright))
+        told["column offsets"].append(emva.column_offset(dark, exact))
+        told["column gains"].append(emva.column_gain(dark, bright))
+    for name, estimates in told.items():
+        values, errors = np.transpose(estimates)
+        assert np.sqrt(np.mean(errors**2)) == pytest.approx(values.std(), rel=1 / 7), name
+
+
 def test_columns_that_are_alike_are_not_said_to_differ():
     """40 chips: beyond two errors is one figure in 700, and was one in six."""
     rng = np.random.default_rng(1)
