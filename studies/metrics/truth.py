@@ -1,6 +1,7 @@
 """The noise-free picture that others are measured against, and the known scale between the two."""
 
 from dataclasses import dataclass
+from math import ceil
 
 import numpy as np
 from numpy.typing import NDArray
@@ -46,10 +47,18 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
     )
 
 
-def named_light(name: str) -> Light:
-    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm."""
-    nm: Floats = np.arange(VISIBLE_NM[0] + 0.5, VISIBLE_NM[1])
+def named_light(name: str, window_nm: tuple[float, float] = VISIBLE_NM) -> Light:
+    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm and a camera's window; dark beyond its table."""
+    first_nm, last_nm = lit_range(window_nm, 1.0)
+    nm: Floats = np.arange(first_nm + 0.5, last_nm)
     return light_in_bands(illuminant(name), nm, np.ones_like(nm))
+
+
+def lit_range(window_nm: tuple[float, float], step_nm: float) -> tuple[float, float]:
+    """Return 380-780 nm, made longer by whole steps until a camera's window is inside."""
+    low, high = VISIBLE_NM
+    below, above = (max(ceil(beyond / step_nm), 0) * step_nm for beyond in (low - window_nm[0], window_nm[1] - high))
+    return low - below, high + above
 
 
 def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:

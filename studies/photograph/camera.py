@@ -39,10 +39,11 @@ from sensor.raw import RawImage
 from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance, imaged_electrons, mixing_of
 from sensor.shake import held_lens
-from studies.metrics.truth import GREY, Light, light_in_bands, neutral_electrons
+from studies.metrics.truth import GREY, Light, light_in_bands, lit_range, neutral_electrons
 from studies.study.gain import at_gain, gain_text, iso_speed
 
 LEAST_COLOUR = 1e-5  # of the signals, in the weaker of two directions: less is the rounding of a light of a line or two
+BAND_NM = 10.0  # of calibration
 GREY_COLOUR = 0.01  # of the channels' own differences, under a light that shows no colours
 
 
@@ -82,13 +83,13 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
     )
 
 
-def _in_bands(spectrum: Spectrum) -> Light:
-    return light_in_bands(spectrum, *fine_bands([spectrum]))
+def _in_bands(spectrum: Spectrum, window_nm: tuple[float, float]) -> Light:
+    return light_in_bands(spectrum, *fine_bands([spectrum], lit_range(window_nm, BAND_NM)))
 
 
 def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Floats, Floats]:
     """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
-    light = _in_bands(spectrum)
+    light = _in_bands(spectrum, sensor.window_nm)
     nm, width = light.wavelength_nm, light.width_nm
     behind_filters_e, mixing = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp), mixing_of(sensor)
     electrons = mixing @ behind_filters_e
@@ -98,7 +99,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     collected = electrons @ light.spectrum
     if not np.all(collected > 0):
         raise InputError(
-            f"responses: {names[int(np.argmin(collected))]} collects nothing under the light, 380-780 nm; "
+            f"responses: {names[int(np.argmin(collected))]} collects nothing under the light; "
             "allowed: a channel that sees light; give another curve, or colours under a broad light, such as D65"
         )
     surfaces = np.array([reflectance.band_average(nm, width) for _, reflectance in color_checker_reflectances()])

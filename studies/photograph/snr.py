@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi
+from math import inf, pi
 from typing import Annotated
 
 import numpy as np
@@ -84,18 +84,19 @@ def light_for_snr(
     >>> [row.channel for row in found]
     ['R', 'G', 'B', 'W']
     """
-    of = channel_e(sensor, named_light(light), 1.0, exposure_s)
+    of = channel_e(sensor, named_light(light, sensor.window_nm), 1.0, exposure_s)
     names = sensor.channels
     electrons = [electrons_at_snr(ratio, sensor, exposure_s, name) for name in names]
+    needed = [e / per_cd_m2 if per_cd_m2 > 0 else inf for e, per_cd_m2 in zip(electrons, of.tolist(), strict=True)]
     return [
-        LightForSnr(channel, e, e / per_cd_m2, e / per_cd_m2 * pi / GREY)
-        for channel, e, per_cd_m2 in zip(names, electrons, of.tolist(), strict=True)
+        LightForSnr(channel, e, cd_m2, cd_m2 * pi / GREY)
+        for channel, e, cd_m2 in zip(names, electrons, needed, strict=True)
     ]
 
 
 def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, Floats]:
     """SNR of each channel's pixel over light; NaN where its well is full."""
-    of = channel_e(sensor, named_light(light), 1.0, exposure_s)
+    of = channel_e(sensor, named_light(light, sensor.window_nm), 1.0, exposure_s)
     electrons = dict(zip(sensor.channels, of[:, None] * luminance_cd_m2, strict=True))
     ratios = {}
     for name, e in electrons.items():

@@ -12,6 +12,7 @@ from skimage.color import deltaE_cie76, deltaE_ciede2000, xyz2lab
 from render.radiance import SpectralRadiance
 from render.spectrum import tristimulus
 from rodcone.colour_spaces import SRGB_TO_XYZ, adapt_to_d65
+from rodcone.errors import InputError, one_line
 from rodcone.types import Floats
 from scenes.reflectances import color_checker_reflectances, held
 from sensor.capture import expose
@@ -59,11 +60,14 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
         missing = f"the mosaic has {', '.join(sensor.channels)} alone, which tells no colours"
         return Definition(tuple(replace(x, missing=missing) for x in (INDEX, DIFFERENCE)), not_measured)
     # What the camera and the standard observer see of the patches, without noise.
-    known = named_light(light)
+    known = named_light(light, sensor.window_nm)
     plain = replace(
         sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0, scatter=0.0, eye_age_years=0.0)
     )
-    matrix = calibrate(plain, known.lamp).to_srgb
+    try:
+        matrix = calibrate(plain, known.lamp).to_srgb
+    except InputError as error:  # a channel that the light doesn't reach, or three that are alike in the window
+        return Definition(tuple(replace(x, missing=one_line(error)) for x in (INDEX, DIFFERENCE)), not_measured)
     named = color_checker_reflectances()
     surfaces = np.array([held(x).band_average(known.wavelength_nm, known.width_nm) for _, x in named])
     standard_lab = true_lab(surfaces, known)

@@ -34,7 +34,7 @@ LUX = (0.1, 1.0, 10.0, 100.0)  # on an 18 % grey card that has the pair's mean l
 
 def contrast_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
     """Define the accuracy at each light."""
-    field = even_field(sensor, named_light(light), exposure_s, channel)
+    field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, channel)
     for lux in LUX:
         mean = lux * GREY / pi
         merit = Merit(

@@ -58,7 +58,7 @@ def developed_figures(
     software = processor_of(processor)
     camera = sensor if software.mosaic == OWN else vary(sensor, software.mosaic)
     camera = replace(camera, lens=replace(camera.lens, **EVEN_LIGHT, shake_um=0.0, veiling_glare=0.0))
-    bands = bands_of(light)
+    bands = bands_of(light, sensor.window_nm)
     colours, neutral = colour_fit(camera, software, bands), neutral_electrons(camera, bands, exposure_s)
     fields = [even_field(camera, bands, exposure_s, name) for name in camera.channels]
     white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)

@@ -52,7 +52,7 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
     if merit.missing:
         return Definition((merit,), not_measured)
     plain = replace(sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, diffraction=0.0, defocus_um=0.0))
-    bands, side = bands_of(light), SIDE_PX * sensor.sites
+    bands, side = bands_of(light, sensor.window_nm), SIDE_PX * sensor.sites
     start, stop = (at * sensor.sites for at in ((SIDE_PX - PATCH_PX) // 2, (SIDE_PX + PATCH_PX) // 2))
     reflectance = np.ones((side, side))
     reflectance[start:stop, start:stop] = 0.0
@@ -109,7 +109,7 @@ def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, cha
         sensor, lens=replace(lens, shake_um=0.0, diffraction=0.0, defocus_um=0.0, veiling_glare=0.0, scatter=0.0)
     )
     plain = replace(plain, lens=replace(plain.lens, eye_age_years=0.0))
-    bands = bands_of(light)
+    bands = bands_of(light, sensor.window_nm)
     even = np.ones((height * sensor.sites, width * sensor.sites, 1)) * bands.spectrum
     radiance = SpectralRadiance(even, bands.wavelength_nm, width_nm=bands.width_nm, light=bands.lamp)
     field_e = expected_electrons(form_image(radiance, plain), plain, exposure_s)

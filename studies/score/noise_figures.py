@@ -37,7 +37,7 @@ Named = tuple[Merit, Callable[[float], float]]  # a figure before it is computed
 
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
     """Define the figures of one channel's samples under a light and an exposure time."""
-    field = even_field(sensor, named_light(light), exposure_s, channel)
+    field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, channel)
     words = field_words(field, light)
     at_saturation = field.headroom_e / field.electrons_per_cd_m2
     yield _conversion(field, light)
@@ -206,7 +206,7 @@ def _snr1s(sensor: SensorConfig, channel: str) -> Definition:
     """Define Sony's SNR1s: the illuminance of 18 % grey in which the signal equals its temporal noise."""
     lamp, exposure_s, f_number = SNR1S
     seen = replace(sensor, lens=replace(sensor.lens, f_number=f_number, magnification=0.0))
-    field = even_field(seen, named_light(lamp), exposure_s, channel)
+    field = even_field(seen, named_light(lamp, sensor.window_nm), exposure_s, channel)
 
     def measure(rng: np.random.Generator) -> list[float]:
         chip = field.draw_chip(rng)

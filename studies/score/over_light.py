@@ -40,7 +40,7 @@ def over_light(
     sensor: SensorConfig, light: str, exposure_s: float, seed: int, lux: Sequence[float] = LUX
 ) -> list[AtLight]:
     """Compute and measure a camera's unit channel over light."""
-    field = even_field(sensor, named_light(light), exposure_s, sensor.unit_channel)
+    field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, sensor.unit_channel)
     rows = []
     for number, each in enumerate(lux):
         luminance, rng = each * GREY / pi, np.random.default_rng((seed, number))

@@ -152,7 +152,8 @@ def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) ->
 
 
 def _colours(field: EvenField) -> Sequence[str]:
-    return field.sensor.channels[:3] if len(field.sensor.channels) >= 3 else ()
+    """Return the three channels that tell colours; none of a camera whose third the light doesn't reach."""
+    return field.sensor.channels[:3] if len(field.means_e) >= 3 and np.all(field.means_e[:3] > 0) else ()
 
 
 def _white_cd_m2(field: EvenField) -> float:

@@ -16,6 +16,7 @@ from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit, measured
 from studies.score.flare import corner_illumination, flare
 from studies.score.flicker import flicker
+from studies.score.light_reach import EVERYWHERE, unlit, with_reach, without_light
 from studies.score.noise_figures import field_words, noise_figures
 from studies.score.output_speeds import output_speeds
 from studies.score.print_figures import print_figures
@@ -44,6 +45,7 @@ GROUPS = (
     "emva_1288",
     "developed",
 )
+Processing = tuple[str, bool]  # a processor, and the consent to run it where it is a file
 NORMAL_95 = 1.959964  # standard errors on either side, of an interval of 95 %
 
 
@@ -106,11 +108,9 @@ def score(
         raise InputError("only: 'developed' without a processor; allowed beside one; name it, as --processor ple")
     wanted = [
         definition
-        for definition in definitions(sensor, light, exposure_s, only)
+        for definition in definitions(sensor, light, exposure_s, only, (processor, trust_code) if processor else None)
         if any(_wanted(merit.name, only) for merit in definition.merits)
     ]
-    if processor is not None and _group_wanted("developed", only):
-        wanted += developed_figures(sensor, light, exposure_s, processor, trust_code=trust_code)
     # Its measurement.
     found: list[Merit] = []
     with progress_bar(step) as tell:
@@ -132,12 +132,34 @@ def _group_wanted(group: str, only: Sequence[str]) -> bool:
     return not only or any(one.partition(".")[0] == group for one in only)
 
 
-def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Sequence[str]) -> Iterator[Definition]:
-    """Define the figures of the groups that are asked for, EMVA's excepted; each is computed and not yet measured."""
+def definitions(
+    sensor: SensorConfig, light: str, exposure_s: float, only: Sequence[str], processor: Processing | None = None
+) -> Iterator[Definition]:
+    """Define the figures of the groups that are asked for, EMVA's excepted; each is computed and not yet measured.
+
+    Raises
+    ------
+    InputError
+        For a camera that no light of the program reaches.
+    """
+    if only and all(name.partition(".")[0] == "emva_1288" for name in only):
+        return
+    if not (reason := unlit(sensor, light)):
+        yield from (with_reach(each, sensor, light) for each in _lit(sensor, light, exposure_s, only, processor))
+    elif dark := unlit(sensor, EVERYWHERE):
+        raise InputError(f"light: {dark}, nor do other lights go on; allowed: --only emva_1288, which needs none")
+    else:
+        reason += "; measure under a light that goes on, such as 3000K"
+        yield from without_light(_lit(sensor, EVERYWHERE, exposure_s, only, processor), reason)
+
+
+def _lit(
+    sensor: SensorConfig, light: str, exposure_s: float, only: Sequence[str], processor: Processing | None
+) -> Iterator[Definition]:
     channel = sensor.unit_channel
     if any(_group_wanted(group, only) for group in ("oecf", "iso_12232", "snr10", "snr1s", "iso_15739")):
         yield from noise_figures(sensor, light, exposure_s, channel)
-    field = even_field(sensor, named_light(light), exposure_s, channel)
+    field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, channel)
     if _group_wanted("iso_12232", only):
         yield from output_speeds(field, field_words(field, light))
     if _group_wanted("print", only):
@@ -158,6 +180,8 @@ def definitions(sensor: SensorConfig, light: str, exposure_s: float, only: Seque
         yield flicker(field, light)
     if any(_group_wanted(group, only) for group in ("iso_17321", "color_checker")):
         yield colour_figures(sensor, light, exposure_s)
+    if processor is not None and _group_wanted("developed", only):
+        yield from developed_figures(sensor, light, exposure_s, processor[0], trust_code=processor[1])
 
 
 def _emva(sensor: SensorConfig, exposure_s: float, seed: int) -> list[Merit]:

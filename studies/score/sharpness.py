@@ -7,7 +7,6 @@ from scipy.signal import fftconvolve
 
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM
 from rodcone.types import Floats
 from sensor.capture import expose
 from sensor.config import SensorConfig, with_tile
@@ -20,7 +19,7 @@ from sensor.readings.resolve import at_channel, chip_readings, several
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.metrics.mtf import EdgeResponse, edge_response
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
-from studies.metrics.truth import Light, light_in_bands
+from studies.metrics.truth import Light, light_in_bands, lit_range
 from studies.photograph.snr import snr
 from studies.score.figure import Definition, Merit, without_noise_bias
 from studies.score.information import information, information_merits
@@ -42,7 +41,7 @@ def sharpness(sensor: SensorConfig, light: str, exposure_s: float, channel: str)
     """Define the figures of an edge that one channel sees at every pixel."""
     # The camera, and the edge in closed form.
     seen = every_pixel(sensor, channel)
-    bands = bands_of(light)
+    bands = bands_of(light, sensor.window_nm)
     edge_e = _edge_electrons(seen, bands, exposure_s)
     angle = np.radians(ANGLE_DEG)
     along, down = GRID * np.cos(angle), GRID * np.sin(angle)
@@ -109,9 +108,10 @@ def every_pixel(sensor: SensorConfig, channel: str) -> SensorConfig:
     )
 
 
-def bands_of(light: str) -> Light:
-    """Return a named illuminant of 1 cd/m^2 in the bands of pictures."""
-    centres = np.arange(VISIBLE_NM[0] + BAND_NM / 2, VISIBLE_NM[1], BAND_NM)
+def bands_of(light: str, window_nm: tuple[float, float]) -> Light:
+    """Return a named illuminant of 1 cd/m^2 in the bands of pictures, as far as a camera's window opens."""
+    first_nm, last_nm = lit_range(window_nm, BAND_NM)
+    centres = np.arange(first_nm + BAND_NM / 2, last_nm, BAND_NM)
     return light_in_bands(illuminant(light), centres, np.full(centres.size, BAND_NM))
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from skimage.color.colorconv import xyz2luv
 
 from rodcone.colour_spaces import SRGB_TO_XYZ
+from rodcone.errors import InputError, one_line
 from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.readings.noise import merged_variances
@@ -51,9 +52,12 @@ def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Def
     )
     if len(names) < 3:
         return Definition((replace(merit, missing="the mosaic tells no colours"),), not_measured)
-    known = named_light(light)
+    known = named_light(light, sensor.window_nm)
+    try:
+        matrix = calibrate(sensor, known.lamp).to_srgb
+    except InputError as error:  # as of `colour_figures`
+        return Definition((replace(merit, missing=one_line(error)),), not_measured)
     fields = [even_field(every_pixel(sensor, name), known, exposure_s, name) for name in names]
-    matrix = calibrate(sensor, known.lamp).to_srgb
     white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
     whites_e = np.array([white_cd_m2 * field.electrons_per_cd_m2 for field in fields])
 
