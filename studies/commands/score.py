@@ -77,7 +77,7 @@ def score(
     seed
         Seed of the chips and frames.
     out
-        File to write as well: a sheet (.html; it prints on one page, of two sensors on two), or a table (.csv).
+        File to write as well: a sheet (.html; of one sensor or two it prints on one page), or a table (.csv).
     json
         Print one JSON object: a list of figures for each sensor.
     """
@@ -107,13 +107,15 @@ def score(
                 sensor, light, exposure, names, seed, processor=processor, trust_code=trust_code, step=step
             )
     if out is not None and out.suffix.lower() == ".html":
-        curves = {name: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}
+        short = _short(list(cameras))
+        curves = {short[name]: over_light(sensor, light, exposure, seed) for name, sensor in cameras.items()}
         lens = "; ".join(
-            f"{name} at f/{sensor.lens.f_number:g}" + (f", gain {sensor.gain:g}" if sensor.gain != 1 else "")
+            f"{short[name]} at f/{sensor.lens.f_number:g}" + (f", gain {sensor.gain:g}" if sensor.gain != 1 else "")
             for name, sensor in cameras.items()
         )
         set_up = f"Under {light}, {exposure * 1e3:.4g} ms, unless a row says otherwise: {lens}."
-        write_files({out: score_page(found, curves, set_up, metadata.version("rodcone"))})
+        named = {short[name]: of for name, of in found.items()}
+        write_files({out: score_page(named, curves, set_up, metadata.version("rodcone"))})
     elif out is not None:
         rows = [{"sensor": name} | asdict(one) for name, of in found.items() for one in of]
         write_files({out: csv_text(list(rows[0]) if rows else ["sensor"], [list(row.values()) for row in rows])})
@@ -139,6 +141,12 @@ def _print_merits(name: str, merits: Sequence[Merit]) -> None:
         if not one.missing
     ]
     print_table(HEAD, rows, words=2)
+
+
+def _short(names: Sequence[str]) -> dict[str, str]:
+    """Name each camera by its file without folder and ending, where that tells them apart."""
+    short = [Path(name).stem for name in names]
+    return dict(zip(names, short if len(set(short)) == len(names) else names, strict=True))
 
 
 def _with_lens(sensor: SensorConfig, f_number: float | None, diffraction: float | None) -> SensorConfig:

@@ -1,4 +1,4 @@
-"""A sheet of cameras' figures of merit, to be printed: one page for one camera, two for two."""
+"""A sheet of cameras' figures of merit, to be printed: one page for one camera or two."""
 
 from collections.abc import Mapping, Sequence
 from itertools import groupby
@@ -11,6 +11,7 @@ from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_t
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
+MOST_ON_A_PAGE = 2  # cameras; of more, each row's conditions stand below it
 PLAIN = 1000.0  # from which on a figure has no decimals
 
 
@@ -18,15 +19,15 @@ def score_page(
     scores: Mapping[str, Sequence[Merit]], curves: Mapping[str, Sequence[AtLight]], set_up: str, version: str
 ) -> str:
     """Write the sheet: a row for each figure, its closed form and its measurement for each camera."""
-    rows: dict[str, dict[str, Merit]] = {}
+    rows: dict[str, dict[str, Merit]] = {one.name: {} for found in scores.values() for one in found}
     missing: dict[str, list[str]] = {}
     for camera, found in scores.items():
         for one in found:
             if one.missing:
                 missing.setdefault(f"{one.title}: {one.missing}", []).append(camera)
             else:
-                rows.setdefault(one.name, {})[camera] = one
-    lines = [(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values()]
+                rows[one.name][camera] = one
+    lines = [(next(iter(of.values())), [of.get(camera) for camera in scores]) for of in rows.values() if of]
     return write_out(
         "score.html.j2",
         cameras=list(scores),
@@ -34,6 +35,10 @@ def score_page(
         chart=svg_address(curves_svg(curves)),
         missing=[(reason, of if len(scores) > 1 else []) for reason, of in missing.items()],
         number=number_text,
+        few=len(scores) <= MOST_ON_A_PAGE,
+        two=len(scores) == MOST_ON_A_PAGE,
+        half=half_text,
+        standards=list(dict.fromkeys(row.standard for row, _ in lines)),
         set_up=set_up,
         version=version,
     )
@@ -44,6 +49,12 @@ def number_text(value: float) -> str:
     if not isfinite(value):
         return "—"
     return f"{value:.4g}" if abs(value) < PLAIN else f"{value:.0f}"
+
+
+def half_text(merit: Merit) -> str:
+    """Write half of an interval's width to two digits, without an exponent where it is large."""
+    half = (merit.high - merit.low) / 2
+    return f"{half:.2g}" if half < 100 else f"{half:.0f}"
 
 
 @rc_context(STYLE)
