@@ -31,6 +31,7 @@ from studies.metrics.mtf import edge_response
 from studies.metrics.truth import GREY, neutral_electrons
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.score.colour import true_lab
+from studies.score.developed_range import picture_range
 from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit
 from studies.score.sharpness import acutance, bands_of, edge_reflectance, grey_radiance
@@ -39,7 +40,9 @@ from studies.score.texture_response import texture_response
 from studies.score.visual_noise import STANDARD, WHITE_SHARE, visual_noise
 
 EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and what is left off around
+RANGE_PX = 48  # side of bright even pictures, whose mean alone counts
 ACROSS = 5  # patches
+RANGE = "like ISO 15739:2023, 6.4: brightest value within 1 % of proportion over the dark's temporal noise by its slope"
 
 
 def developed_figures(
@@ -64,15 +67,34 @@ def developed_figures(
     white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
     samples = max(least_samples(camera), LEAST_SAMPLES)
 
+    cells = camera.sites * samples
     lit = replace(bands, spectrum=bands.spectrum * white_cd_m2)
+
+    def expected_e(reflectance: Floats) -> Floats:
+        return expected_electrons(form_image(grey_radiance(reflectance, lit), camera, samples), camera, exposure_s)
 
     def photograph(reflectance: Floats, rng: np.random.Generator) -> NDArray[np.float64]:
         """Develop a frame of reflectances, (h, w) of grey or (h, w, band): linear sRGB, a perfect white is 1."""
-        image = form_image(grey_radiance(reflectance, lit), camera, samples)
-        light_e = expected_electrons(image, camera, exposure_s)
-        raw = expose(light_e, camera, exposure_s, draw_device(camera, light_e.shape, rng), rng)
+        return developed(expected_e(reflectance), rng, rng)
+
+    def developed(light_e: Floats, chip: np.random.Generator, rng: np.random.Generator) -> NDArray[np.float64]:
+        raw = expose(light_e, camera, exposure_s, draw_device(camera, light_e.shape, chip), rng)
         linear, _ = develop_to_scale(raw, software, colours, camera, neutral, white_cd_m2, balance=neutral)
         return linear
+
+    unit = fields[camera.channels.index(camera.unit_channel)]
+    dark = unit.temporal_dark_e / unit.electrons_per_cd_m2 / white_cd_m2
+    even_e = unit.frame_e * white_cd_m2
+
+    def measure_range(rng: np.random.Generator) -> list[float]:
+        seed = int(rng.integers(2**63))
+
+        def shoot(level: float, frame: int) -> Plane:
+            side = EDGE_PX if level < 0.1 else RANGE_PX
+            chip, light = (np.random.default_rng((seed, number)) for number in (0, frame + 1))
+            return luminance_of_srgb(_inner(developed(level * even_e[:side, :side], chip, light)))
+
+        return [picture_range(shoot, dark)]
 
     # Noise, sharpness, texture, colour.
     words = (
@@ -80,7 +102,6 @@ def developed_figures(
         "well; no closed form"
     )
     name = partial(_merit, words)
-    cells = camera.sites * samples
     yield Definition(
         (
             name(
@@ -90,6 +111,7 @@ def developed_figures(
         ),
         lambda rng: _noise(_inner(photograph(np.full((EDGE_PX * cells,) * 2, GREY), rng))),
     )
+    yield Definition((name("dynamic_range", "developed: dynamic range", "dB", RANGE),), measure_range)
     e_sfr = "ISO 12233:2017, annex D (e-SFR)"
     edge = edge_reflectance(EDGE_PX * cells)
     yield Definition(

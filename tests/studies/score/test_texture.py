@@ -17,6 +17,7 @@ from scenes.dead_leaves import autocovariance, draw_leaves
 from studies.metrics.s_cielab import eye_xyz
 from studies.photograph.snr import snr
 from studies.score.developed import developed_figures
+from studies.score.developed_range import picture_range
 from studies.score.figure import REPEATS, Definition, Merit, measured
 from studies.score.information import information
 from studies.score.score import definitions, score
@@ -127,6 +128,24 @@ def test_visual_noise_with_stripes_of_rows_is_what_frames_show() -> None:
     assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
 
 
+def test_the_range_of_pictures_is_their_top_over_their_noise() -> None:
+    """A straight picture to 1.6 in noise of 0.01: 44.08 dB; 25 000 pixels spread it by 0.06 dB."""
+
+    def shoot(level: float, frame: int) -> np.ndarray:
+        return np.minimum(level + 0.01 * np.random.default_rng(frame).standard_normal((160, 160)), 1.6)
+
+    found_db = picture_range(shoot, 0.01)
+    assert found_db == pytest.approx(20 * np.log10(1.6 / 0.01), abs=0.3)
+    # What is below black is cut: noise's half has the deviation (1/2 - 1/(2 pi))^1/2, and three of it rise by 2.6.
+    cut = picture_range(lambda level, frame: np.maximum(shoot(level, frame), 0.0), 0.01)
+    rise = (3.0004 - 1 / sqrt(2 * np.pi)) / 3
+    assert cut - found_db == pytest.approx(-20 * np.log10(sqrt(0.5 - 0.5 / np.pi) / rise), abs=0.2)
+    # Half the noise is left: 6 dB more; twice the exposure changes nothing.
+    rest = picture_range(lambda level, frame: shoot(level, frame) / 2 + min(level, 1.6) / 2, 0.01)
+    assert rest - found_db == pytest.approx(6.02, abs=0.1)
+    assert picture_range(lambda level, frame: 2 * shoot(level, frame), 0.01) == pytest.approx(found_db, abs=0.02)
+
+
 AS_READ = """
 import numpy as np
 
@@ -148,8 +167,9 @@ def test_one_measurement_of_a_developed_picture_is_near_the_pixels_own_closed_fo
     assert found["snr_18"] == pytest.approx(ratio_db, abs=0.4)
     noise = np.random.default_rng(4).normal(0, 0.18 / 10 ** (ratio_db / 20), (80, 80, 1))
     assert found["visual_noise"] == pytest.approx(visual_noise(np.repeat(0.18 + noise, 3, axis=2)), rel=0.15)
-    closed = list(definitions(sensor, "D65", 0.01, ["iso_12233", "iso_19567"]))
+    closed = list(definitions(sensor, "D65", 0.01, ["iso_12233", "iso_15739", "iso_19567"]))
     computed = {merit.name.split(".")[1]: merit.computed for one in closed for merit in one.merits}
+    assert found["dynamic_range"] == pytest.approx(computed["dynamic_range"], abs=0.3)  # dB; the noise spreads by 0.1
     for name in (
         "mtf50",
         "mtf_half_nyquist",
