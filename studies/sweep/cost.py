@@ -26,6 +26,7 @@ from studies.sweep.provenance import versions
 _SHARED_S = 7e-7  # a pixel and band of each image that cells share
 _READ_S = 3e-7  # a pixel and band of a picture file
 _PILOT_S = 6.0  # a scene's pilot render and the effects that a plan weighs on it
+_PICTURE_PILOT_S = 1.1  # of a picture file, which has nothing to render and is made smaller: by a resume of two
 _LIVE_SPP = 64  # samples of the render that is compared with a reference
 _CELL_S = 5e-6, 0.03  # a pixel's capture, metrics and files, and a cell of any size
 _FRAME_S = 5e-7, 0.02  # the same of a raw frame and its truth
@@ -183,7 +184,8 @@ def _seconds(
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
         seconds += pixels * part.bands * (_SHARED_S * images + _READ_S * (part.spp == 0))
-        seconds += cells / len(parts) * (each / at_once + of_cell_s) + _PILOT_S * planned
+        seconds += cells / len(parts) * (each / at_once + of_cell_s)
+        seconds += planned * (_PILOT_S if part.spp else _PICTURE_PILOT_S)
     return lights + pace() * seconds
 
 
