@@ -95,6 +95,26 @@ def test_each_channel_clips_at_its_own_well() -> None:
     np.testing.assert_allclose(moments.mean_e[white], 15_000.0)
 
 
+@pytest.mark.parametrize("bend", [0.0, 0.1, -0.1])
+@pytest.mark.parametrize("gain", [1.0, 4.0])
+def test_the_slope_is_how_the_mean_grows_with_light(bend: float, gain: float) -> None:
+    """By differences of 2 e-, from black at 0 to over the well; that noise grows as well adds 0.4 / (2 x 20 e-)."""
+    sensor = replace(camera(gain, response_bend=bend, read_noise_e=20.0), black_level_dn=0)
+    light_e = np.array([[0.0, 3.0, 10.0, 300.0], [1400.0, 1500.0, 1600.0, 3000.0], [5800.0, 5950.0, 6000.0, 6100.0]])
+    readings = resolve(sensor, light_e, TIME_S)
+    at, above, under = (frame_moments(light_e + off, readings) for off in (0.0, 1.0, -1.0))
+    assert at.slope == pytest.approx((above.mean_e - under.mean_e) / 2, abs=0.02)
+
+
+def test_a_merge_has_the_light_s_mean_its_own_variance_and_a_slope_of_1() -> None:
+    light_e = np.array([[10.0, 100.0], [1000.0, 5000.0]])
+    readings = resolve(preset("dual_gain"), light_e, TIME_S)
+    moments = frame_moments(light_e, readings)
+    assert np.array_equal(moments.mean_e, light_e)
+    assert np.array_equal(moments.variance_e2, noise_variance(light_e, preset("dual_gain"), TIME_S))
+    assert (moments.slope == 1).all()
+
+
 def test_where_nothing_clips_all_variances_are_the_same_and_beside_the_well_light_is_told_worse() -> None:
     sensor = camera()
     for light_e, least in ((50.0, 1.0), (3000.0, 1.0), (0.985 * WELL_E, 1.02), (0.999 * WELL_E, 1.2)):

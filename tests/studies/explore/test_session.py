@@ -309,6 +309,27 @@ def test_a_burst_ends_for_a_newer_picture(session, interrupted):
     assert [each["number"] for each in page.headers] == [2]
 
 
+def test_a_burst_ends_where_its_page_was_closed_and_not_where_another_was(session, interrupted):
+    page, goes_on, there = connected(session), [], threading.Event()
+
+    def closed() -> None:
+        try:
+            for left in (Page(), page):
+                session.disconnect(left.send)
+                session._check()
+                goes_on.append(left is page)
+        finally:
+            there.set()
+
+    frames = interrupted(closed)
+    session.take(message("show", 1, **BURST), page.send)
+    assert there.wait(30)
+    assert goes_on == [False]
+    connected(session).ask(session, "show", 2)
+    assert len(frames) == 3 + 1
+    assert page.headers == [{"kind": "taken over"}]
+
+
 @pytest.mark.parametrize("kind", ["dng", "histogram"])
 def test_a_file_or_a_figure_lets_a_picture_go_first(session, interrupted, kind):
     page = connected(session)
