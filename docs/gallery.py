@@ -27,6 +27,7 @@ QUALITY = 80  # of the pictures, as WebP counts it
 # What each scene is photographed with: its light, and the exposure where the rule's would be longer than its 66 ms.
 SHOWN = {
     "color_checker": "--level 500lux",
+    "contrast_patches": "--level 200cd/m2",
     "cornell_box": "--level 300lux",
     "dead_leaves": "--level 200cd/m2",
     "diorama": "--level 200cd/m2",

@@ -12,6 +12,7 @@ from rodcone.errors import require_keys, unknown
 # Each is built by the function of its name in the module of its name.
 _NAMES = (
     "color_checker",
+    "contrast_patches",
     "cornell_box",
     "dead_leaves",
     "diorama",

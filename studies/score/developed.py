@@ -7,7 +7,7 @@ are what the camera gives before a processor.
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import partial
-from math import log10, nan
+from math import log10, nan, pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,6 +31,8 @@ from studies.metrics.mtf import edge_response
 from studies.metrics.truth import GREY, neutral_electrons
 from studies.photograph.camera import colour_fit, develop_to_scale
 from studies.score.colour import true_lab
+from studies.score.contrast import CONTRAST, LUX
+from studies.score.contrast_chart import pair_accuracy
 from studies.score.developed_range import picture_range
 from studies.score.even_field import even_field
 from studies.score.figure import Definition, Merit
@@ -41,7 +43,10 @@ from studies.score.visual_noise import STANDARD, WHITE_SHARE, visual_noise
 
 EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and what is left off around
 RANGE_PX = 48  # side of bright even pictures, whose mean alone counts
+BRIGHT_SIDE = slice(BORDER_PX, EDGE_PX // 2 - BORDER_PX)  # columns of two patches that make a picture
+DARK_SIDE = slice(EDGE_PX // 2 + BORDER_PX, EDGE_PX - BORDER_PX)
 ACROSS = 5  # patches
+ACCURACY = "IEEE 2020-2024 (there CTA, before CDP), all pairs of pixels of two patches of one picture"
 RANGE = "like ISO 15739:2023, 6.4: brightest value within 1 % of proportion over the dark's temporal noise by its slope"
 
 
@@ -96,6 +101,13 @@ def developed_figures(
 
         return [picture_range(shoot, dark)]
 
+    def accuracy_at(lux: float, rng: np.random.Generator) -> float:
+        light_e = (lux * GREY / pi / white_cd_m2) * even_e[:EDGE_PX, :EDGE_PX]
+        sides = np.repeat([1 + CONTRAST, 1 - CONTRAST], EDGE_PX // 2)
+        luminance = luminance_of_srgb(developed(light_e * sides, rng, rng))
+        bright, dark = (luminance[BORDER_PX:-BORDER_PX, columns] for columns in (BRIGHT_SIDE, DARK_SIDE))
+        return pair_accuracy(bright, dark)
+
     # Noise, sharpness, texture, colour.
     words = (
         f"{processor}, {light}, {exposure_s * 1e3:.4g} ms, balanced as shot, white at {100 * WHITE_SHARE:.0f} % of the "
@@ -125,6 +137,13 @@ def developed_figures(
     yield Definition(
         texture_merits("developed", "developed: texture ", f"{words}, disks of 1 to 24 pixels", [nan] * 3),
         lambda rng: _texture(lambda chart: photograph(chart, rng), draw_leaves(SIDE_PX, cells, rng)),
+    )
+    yield Definition(
+        tuple(
+            name(f"cta_{lux:g}_lux", f"developed: contrast transfer accuracy at {lux:g} lux", "1", ACCURACY)
+            for lux in LUX
+        ),
+        lambda rng: [accuracy_at(lux, rng) for lux in LUX],
     )
     surfaces = np.array(
         [held(x).band_average(bands.wavelength_nm, bands.width_nm) for _, x in color_checker_reflectances()]

@@ -18,8 +18,8 @@ BANDS_NM = np.arange(405.0, 780.0, 50.0)
 
 
 LIT_BY_NAME = (
-    *("color_checker", "cornell_box", "dead_leaves", "flat_field", "metamers", "oecf", "siemens_star"),
-    *("slanted_edge", "still_life"),
+    *("color_checker", "contrast_patches", "cornell_box", "dead_leaves", "flat_field", "metamers", "oecf"),
+    *("siemens_star", "slanted_edge", "still_life"),
 )
 
 

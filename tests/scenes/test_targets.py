@@ -17,6 +17,7 @@ from render.geometry import look_at, to_world
 from render.spectrum import Spectrum, luminance
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalogue import load
+from scenes.contrast_patches import pairs
 from scenes.cornell_box import paint
 from scenes.dead_leaves import chart
 from scenes.oecf import grey_scale
@@ -76,6 +77,17 @@ def test_the_grey_scale_s_patches_have_the_cube_root_steps_of_the_standard():
         assert picture[int(row), int(column)] == pytest.approx(reflectance, abs=bound)
     assert picture[24, 24] == pytest.approx(0.18, abs=bound)
     assert grey_scale(12, 1000.0)[0] / grey_scale(12, 1000.0)[-1] == pytest.approx(1000.0)
+
+
+def test_the_contrast_patches_have_the_reflectances_of_their_pairs():
+    """In the middle of each patch; 64 pixels, each patch 9 wide."""
+    made = render(load("contrast_patches"), (64, 64), wavelength_nm=BANDS_NM, spp=16, seed=7)
+    picture = made.radiance[0].mean(axis=0, dtype=np.float64)
+    for pair in pairs():
+        for column, sign in ((pair.bright_column, 1), (pair.dark_column, -1)):
+            seen = picture[int(pair.row * 64), int(column * 64)]
+            assert seen == pytest.approx(pair.mean * (1 + sign * pair.contrast), rel=1e-3)  # the sky is even
+    assert picture[1, 1] == pytest.approx(0.18, rel=1e-3)
 
 
 def test_dead_leaves_are_the_chart_that_their_seed_draws():

@@ -167,8 +167,10 @@ def test_one_measurement_of_a_developed_picture_is_near_the_pixels_own_closed_fo
     assert found["snr_18"] == pytest.approx(ratio_db, abs=0.4)
     noise = np.random.default_rng(4).normal(0, 0.18 / 10 ** (ratio_db / 20), (80, 80, 1))
     assert found["visual_noise"] == pytest.approx(visual_noise(np.repeat(0.18 + noise, 3, axis=2)), rel=0.15)
-    closed = list(definitions(sensor, "D65", 0.01, ["iso_12233", "iso_15739", "iso_19567"]))
-    computed = {merit.name.split(".")[1]: merit.computed for one in closed for merit in one.merits}
+    closed = list(definitions(sensor, "D65", 0.01, ["iso_12233", "iso_15739", "iso_19567", "ieee_2020"]))
+    computed = {merit.name.partition(".")[2]: merit.computed for one in closed for merit in one.merits}
+    for lux in ("0.1", "1", "10", "100"):  # pairs of 2560 pixels a patch spread by less than a hundredth
+        assert found[f"cta_{lux}_lux"] == pytest.approx(computed[f"cta_{lux}_lux"], abs=0.03)
     assert found["dynamic_range"] == pytest.approx(computed["dynamic_range"], abs=0.3)  # dB; the noise spreads by 0.1
     for name in (
         "mtf50",
