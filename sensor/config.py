@@ -1,6 +1,6 @@
 """What a camera is: its chip, lens, mosaic, responses, converter. Set a term to 0 to switch it off."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
 from math import ceil, hypot
 from numbers import Real
@@ -58,6 +58,10 @@ class LensConfig:
         The pigmentation is 0 for black eyes, 0.5 for brown, 1 for blue, 1.2 for very light ones.
     shake_um : float
         Standard deviation of the image's place on the sensor along each axis, by the hand (`sensor.shake`).
+    table : str
+        Lens by data (`sensor.lens.table`): a shipped one's name, or its TOML file. It gives point spread, relative
+        illumination, distortion and lateral colour. With wavefronts its diffraction is that of `f_number`, with kernels
+        none beside them, whatever `diffraction` says.
     """
 
     f_number: Annotated[float, (0.1, 1e4, "give focal length over aperture")]
@@ -76,6 +80,7 @@ class LensConfig:
     eye_age_years: Annotated[float, (0.0, 120.0, "give years, 0 for a lens")] = 0.0
     eye_pigmentation: Annotated[float, (0.0, 1.2, "give 0 for black eyes to 1.2 for very light ones")] = 0.5
     shake_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for a camera that stands still")] = 0.0
+    table: str = ""
 
     __repr__ = brief
 
@@ -291,6 +296,12 @@ class SensorConfig:
     def read_noise_e(self) -> float:
         """Standard deviation of the temporal noise of reading, before and after the amplifier [e-]."""
         return hypot(self.pixel.read_noise_e, self.converter_noise_e)
+
+
+def without_terms(lens: LensConfig, terms: Iterable[str]) -> LensConfig:
+    """Return the lens with some of its numbers 0, by their names."""
+    none: dict[str, Any] = dict.fromkeys(terms, 0.0)
+    return replace(lens, **none)
 
 
 def check_frame(sensor: SensorConfig, shape: tuple[int, ...]) -> None:

@@ -14,6 +14,7 @@ from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
+from sensor.lens.table import read_lens, table_of
 from sensor.photodiodes import binned
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
@@ -40,7 +41,7 @@ def read_sensor(path: str | Path, cfa: str | Sequence[str] | None = None) -> Sen
         (fields of `ChannelReading`), and ``[responses]``: ``csv``, its ``range_nm``, its ``quantum_efficiency``
         ("included", "relative", a number, or a table), its ``unit`` ("per_photon" by default, or "per_watt") and
         ``ir_cut`` (nm, or a table). The tables are files of curves (`rodcone.curve_file.read_columns`), whose names are
-        relative to the TOML's folder.
+        relative to the TOML's folder, as is the ``table`` of a lens by data.
     cfa : str or sequence of str, optional
         Mosaic to use in place of the file's.
 
@@ -135,7 +136,7 @@ _FIX = (
 
 
 def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorConfig:
-    table = structured(_with_a_whole_pixel(content), SensorTable, _CONVERTER, _FIX)
+    table = structured(_with_its_lens(_with_a_whole_pixel(content), folder), SensorTable, _CONVERTER, _FIX)
     tile = tile_of(table.cfa) if cfa is None else cfa
     if table.responses is not None:
         responses = _responses(table.responses, folder)
@@ -145,6 +146,8 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
     # Of another mosaic than the file's own, a channel that only that one has falls away.
     fallen = set(channels(tile_of(table.cfa))) - set(channels(tile)) if table.channels else set()
     apart = tuple(x for x in table.channels if x.channel not in fallen)
+    if table.lens.table:
+        table_of(table.lens)
     sensor = SensorConfig(
         pixel_of_readings(table.pixel, table.readings) if table.readings else table.pixel,
         table.lens,
@@ -154,6 +157,15 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
         **{name: value for name in _SETTINGS if (value := getattr(table, name)) is not None},
     )
     return binned(sensor, table.binning) if table.binning else sensor
+
+
+def _with_its_lens(content: dict[str, Any], folder: Path) -> dict[str, Any]:
+    """Content whose lens by data is found from the file's own folder, and gives the f-number where none is stated."""
+    lens = content.get("lens")
+    if not isinstance(lens, dict) or not isinstance(lens.get("table"), str) or not lens["table"]:
+        return content
+    name = str(folder / lens["table"]) if lens["table"].endswith(".toml") else lens["table"]
+    return content | {"lens": {"f_number": read_lens(name).f_number} | lens | {"table": name}}
 
 
 def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:

@@ -9,7 +9,7 @@ transformed bands and transforms the few sums back, in single precision where no
 import os
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, inf, isnan, pi, radians, tan
 from typing import Any
 
@@ -25,7 +25,9 @@ from rodcone.types import Floats
 from sensor.config import LONGEST_S, LensConfig, SensorConfig
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency, limit_per_um, sampled_otf
 from sensor.lens.illumination import darkens, falloff
+from sensor.lens.patches import mover, spreader
 from sensor.lens.scatter import scatterer, scatters
+from sensor.lens.table import Kernels, table_of
 from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
@@ -95,7 +97,8 @@ def camera_equation(lens: LensConfig) -> float:
 
 def spreads(lens: LensConfig) -> bool:
     """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
-    return lens.diffraction > 0 or lens.defocus_um > 0 or lens.veiling_glare > 0 or scatters(lens)
+    blurs = lens.diffraction > 0 or lens.defocus_um > 0 or bool(lens.table)
+    return blurs or lens.veiling_glare > 0 or scatters(lens)
 
 
 def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pixel: int = 1) -> SpectralIrradiance:
@@ -213,28 +216,40 @@ def _imager(
 
     A sum's value doesn't depend on the number of threads.
     """
+    # What the lens does.
     pixels, lens, (height, width) = pixel_shape(radiance, samples), sensor.lens, radiance.shape
-    view = radiance.horizontal_view_deg
+    view, step_um = radiance.horizontal_view_deg, sensor.site_pitch_um / samples
     threads = os.cpu_count() or 1
+    moved, spread = None, None
+    if lens.table:
+        table, real = table_of(lens), np.float64
+        lens = replace(lens, diffraction=0.0 if isinstance(table.point_spread, Kernels) else 1.0)
+        moved = mover(table, radiance.shape, step_um)
+        if table.point_spread is not None:
+            spread = spreader(table, radiance.shape, step_um, samples > 1, threads)
     per_radiance: NDArray[Any] = (camera_equation(lens) * falloff(lens, radiance.shape, view)).astype(real)
     otf = None
     if lens.diffraction or lens.defocus_um:
-        otf = sampled_otf(radiance.shape, sensor.site_pitch_um / samples, lens, folded=samples > 1, real=real)
+        otf = sampled_otf(radiance.shape, step_um, lens, folded=samples > 1, real=real)
     scattered = scatterer(lens, pixels, view) if scatters(lens) else None
     step = max(_AT_ONCE // width, 1)
     strips = [slice(first, first + step) for first in range(0, height, step)]
 
+    # Its parts, and the whole.
     def add(rows: slice, sums: NDArray[Any], weights: NDArray[Any], light: NDArray[Any], nm: float) -> None:
         part = light[rows] if otf is None else light[rows] * otf(nm, rows)
         for plane, weight in zip(sums, weights, strict=True):
             plane[rows] += weight * part
 
-    def behind_lens(plane: NDArray[Any]) -> NDArray[np.float64]:
+    def behind_lens(plane: NDArray[Any], beside: NDArray[Any] | float) -> NDArray[np.float64]:
         if otf is not None:
             plane = scipy.fft.idctn(plane, type=2, overwrite_x=True, workers=threads)
-            if plane.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
-                total, plane = plane.sum(dtype=np.float64), np.maximum(plane, 0)
-                plane *= real(total / plane.sum(dtype=np.float64) if total > 0 else 0.0)
+        if spread is not None:
+            plane += beside
+        blurred = otf is not None or spread is not None
+        if blurred and plane.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
+            total, plane = plane.sum(dtype=np.float64), np.maximum(plane, 0)
+            plane *= real(total / plane.sum(dtype=np.float64) if total > 0 else 0.0)
         light = plane.astype(np.float64)
         if samples > 1:
             light = light.reshape(pixels[0], samples, pixels[1], samples).mean(axis=(1, 3))
@@ -245,14 +260,18 @@ def _imager(
 
     def imaged(weights: Floats) -> NDArray[np.float64]:
         sums = np.zeros((len(weights), height, width), real)
+        beside = np.zeros(sums.shape if spread is not None else len(weights))
         with ThreadPoolExecutor(threads) as pool:
             for band in np.flatnonzero(weights.any(axis=0)):
-                light = radiance.values[..., band] * per_radiance
+                nm, light = float(radiance.wavelength_nm[band]), radiance.values[..., band]
+                light = (light if moved is None else moved(light.astype(np.float64), nm)) * per_radiance
+                if spread is not None:
+                    beside += weights[:, band, None, None] * spread(light, nm)
                 if otf is not None:
                     light = scipy.fft.dctn(light, type=2, overwrite_x=True, workers=threads)
-                of_band = weights[:, band].astype(real), light, float(radiance.wavelength_nm[band])
+                of_band = weights[:, band].astype(real), light, nm
                 list(pool.map(lambda rows, of_band=of_band: add(rows, sums, *of_band), strips))
-        return np.stack([behind_lens(plane) for plane in sums])
+        return np.stack([behind_lens(*planes) for planes in zip(sums, beside, strict=True)])
 
     return imaged
 
@@ -264,7 +283,7 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
     """
     lens, nyquist = sensor.lens, np.array(0.5 / sensor.site_pitch_um)
     lines = []
-    if not lens.diffraction:
+    if not lens.diffraction and not lens.table:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
         lines.append(f"diffraction: {_at_nyquist(float(diffraction_otf(nyquist, WAVELENGTH_NM, ideal)))}")
     if samples_per_pixel == 1 and (loss := loss_within_pixels(sensor)) >= _LEAST_LOSS:
@@ -272,14 +291,14 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
             f"detail finer than a pixel: not knowing it lowers the MTF by up to {loss:.3f} below Nyquist"
             f"{_edge_words(sensor)}; {least_samples(sensor)} samples a pixel don't"
         )
-    if not lens.horizontal_view_deg and not lens.falloff_power:
+    if not lens.horizontal_view_deg and not lens.falloff_power and not lens.table:
         corner = (1 + (tan(radians(VIEW_DEG / 2)) * DIAGONAL) ** 2) ** -2
         lines.append(
             f"cos^4 falloff: a picture of 4:3, {VIEW_DEG:g} degrees wide, would lose {1 - corner:.0%} in its corners"
         )
     if not lens.veiling_glare and not scatters(lens):
         lines.append("veiling glare: each per cent would add 1 % of the picture's mean irradiance to every pixel")
-    if not lens.defocus_um:
+    if not lens.defocus_um and not lens.table:
         disc = float(defocus_otf(nyquist, sensor.site_pitch_um))
         lines.append(f"defocus: a disc as wide as a pixel: {_at_nyquist(disc)}")
     elif lens.diffraction and lens.defocus_um < AIRY_DIAMETER / limit_per_um(WAVELENGTH_NM, lens):
@@ -290,7 +309,8 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
             f"camera shake: in the hand the image would move by {moved_um:.1f} um in {LONGEST_S * 1e3:g} ms (standard "
             "deviation along each axis)"
         )
-    return (*lines, "aberrations, distortion, flare, polarisation: not modelled, their cost isn't estimated")
+    rest = "flare" if lens.table else "aberrations, distortion, flare"
+    return (*lines, f"{rest}, polarisation: not modelled, their cost isn't estimated")
 
 
 def loss_within_pixels(sensor: SensorConfig) -> float:

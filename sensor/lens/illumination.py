@@ -1,6 +1,6 @@
 """Relative illumination: how light falls off from the middle of a picture to its corners.
 
-Two causes multiply:
+Two causes multiply, and a third that a lens by data states (`sensor.lens.table`):
 
 - natural falloff, a power of the cosine of the angle off the axis: 4 for a thin lens with its stop in it;
 - mechanical vignetting, a rim that cuts the pupil off the axis. Seen from a place at the image height h, 1 in the
@@ -14,6 +14,7 @@ from dataclasses import replace
 from functools import lru_cache
 from math import radians, tan
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
 import scipy
@@ -22,10 +23,11 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.config import LensConfig
+from sensor.lens.table import table_of
 
-# Terms of a lens that lights the whole picture evenly.
-EVEN_LIGHT: Mapping[str, float] = MappingProxyType(
-    {"horizontal_view_deg": 0.0, "falloff_power": 0.0, "vignetting": 0.0}
+# Terms of a lens that lights the whole picture evenly, and is the same everywhere in it.
+EVEN_LIGHT: Mapping[str, Any] = MappingProxyType(
+    {"horizontal_view_deg": 0.0, "falloff_power": 0.0, "vignetting": 0.0, "table": ""}
 )
 NATURAL_POWER = 4.0  # of a lens that states its angle of view alone
 
@@ -56,6 +58,8 @@ def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
 
 def darkens(lens: LensConfig) -> bool:
     """Whether the lens gives the corners less light than the middle."""
+    if lens.table and table_of(lens).darkens():
+        return True
     return lens.horizontal_view_deg > 0 or lens.falloff_power > 0 or lens.vignetting > 0
 
 
@@ -86,8 +90,11 @@ def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = N
     tangent = tan(radians(view / 2)) / half_width
     rows, columns = (place * tangent for place in places)
     light = np.asarray((1.0 + rows[:, None] ** 2 + columns**2) ** -((lens.falloff_power or NATURAL_POWER) / 2))
+    height = np.hypot(places[0][:, None], places[1]) / np.hypot(shape[0] / 2, half_width)
     if lens.vignetting:
-        light *= pupil_share(np.hypot(places[0][:, None], places[1]) / np.hypot(shape[0] / 2, half_width), lens)
+        light *= pupil_share(height, lens)
+    if lens.table:
+        light *= table_of(lens).illumination(height)
     return light
 
 

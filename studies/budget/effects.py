@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from render.radiance import SpectralRadiance
 from render.transport import Transport
-from sensor.config import LensConfig, SensorConfig
+from sensor.config import LensConfig, SensorConfig, without_terms
 from sensor.kernel.poisson import LARGEST_ERROR
 from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import shaken
@@ -99,11 +99,11 @@ def find_effects(
         For the draws of Monte Carlo noise.
     """
     halves = transport.relight_halves(luminance_cd_m2=1.0)
-    bare = replace(sensor, lens=replace(lens, **dict.fromkeys(IMAGING_TERMS.values(), 0.0)))
+    bare = replace(sensor, lens=without_terms(lens, IMAGING_TERMS.values()))
     full = _electrons(halves, replace(sensor, lens=lens))
     plain = _electrons(halves, bare)
     without = {
-        name: _electrons(halves, replace(sensor, lens=replace(lens, **{field: 0.0}))) - full
+        name: _electrons(halves, replace(sensor, lens=without_terms(lens, [field]))) - full
         for name, field in IMAGING_TERMS.items()
         if getattr(lens, field)
     }

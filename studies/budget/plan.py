@@ -6,6 +6,7 @@ from pathlib import Path
 
 from rodcone.errors import InputError
 from rodcone.progress import Step
+from sensor.config import without_terms
 from sensor.presets import preset
 from studies.budget.bands import possible_counts, wide_bands
 from studies.budget.effects import KERNEL, LENS_TERMS
@@ -84,8 +85,8 @@ def _chosen_models(choice: Choice, pilot: Pilot, study: Study) -> Plan:
     images = {}
     for condition, left_out in choice.left_out.items():
         lens = full_lens(study, preset(condition.sensor).lens, pilot.opened)
-        without = {field: 0.0 for name, field in LENS_TERMS.items() if name in left_out}
-        images[condition] = ImageModel(replace(lens, **without), exact=KERNEL not in left_out)
+        without = [field for name, field in LENS_TERMS.items() if name in left_out]
+        images[condition] = ImageModel(without_terms(lens, without), exact=KERNEL not in left_out)
     fine = pilot.transport.wavelength_nm, pilot.transport.width_nm
     bands = wide_bands(*fine, pilot.groups[choice.count])
     return Plan(renders={pilot.opened.choice: in_bands(bands, choice.spp, study.render.denoise)}, images=images)

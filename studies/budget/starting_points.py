@@ -4,10 +4,9 @@
 everything.
 """
 
-from dataclasses import replace
-
 from render.illuminants import illuminant
 from render.spectrum import fine_bands
+from sensor.config import without_terms
 from sensor.presets import preset
 from studies.budget.bands import band_groups, wide_bands
 from studies.budget.effects import LENS_TERMS
@@ -37,7 +36,7 @@ def fast_plan(study: Study) -> Plan:
             spp = min(FAST_SPP, most_spp(study, opened.choice))
             renders[opened.choice] = in_bands(bands, spp, study.render.denoise)
         for condition in conditions(study, opened.choice):
-            without_effects = replace(preset(condition.sensor).lens, **dict.fromkeys(LENS_TERMS.values(), 0.0))
+            without_effects = without_terms(preset(condition.sensor).lens, LENS_TERMS.values())
             images[condition] = ImageModel(study.lens.on(without_effects), exact=False)
     return Plan(renders=renders, images=images)
 

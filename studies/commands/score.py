@@ -153,6 +153,8 @@ def _with_lens(sensor: SensorConfig, f_number: float | None, diffraction: float 
     lens = sensor.lens
     lens = lens if f_number is None else replace(lens, f_number=f_number)
     lens = lens if diffraction is None else replace(lens, diffraction=diffraction)
+    if lens.table:
+        say(f"lens {lens.table!r}: its table is left out, because figures are of a part of the picture that is even")
     return replace(sensor, lens=lens)
 
 

@@ -302,9 +302,10 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
         raise InputError(
             f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
         )
+    terms: Mapping[str, Any] = controls.lens
     camera = replace(
         base,
-        lens=replace(base.lens, **controls.lens),
+        lens=replace(base.lens, **terms),
         pixel=replace(base.pixel, **controls.pixel),
         bits=base.bits if controls.bits is None else controls.bits,
     )

@@ -31,6 +31,7 @@ from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, war
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
+from sensor.lens.table import with_lens
 from sensor.optics import form_image, left_out
 from sensor.presets import preset
 from sensor.raw import RawImage
@@ -130,6 +131,9 @@ class Order:
     row_time : str, optional
         Time from one row's exposure to the next's, such as 15us; the sensor's own by default, which is 0 unless its
         file states row_time_us. Where it isn't 0 lamps that flicker make bands, and a hand's shake leans upright lines.
+    lens : str, optional
+        Lens by data in place of the sensor's: cooke_triplet, double_gauss, or a TOML file. Its point spread by image
+        height, falloff, distortion and lateral colour then count; the sensor's own lens by default.
     focus_m : float, optional
         Distance of focus in metres: the scene is rendered through a thin lens of the sensor's f-number, a render for
         each f-number; by default all of it is sharp. A picture from a file has no depth.
@@ -176,6 +180,7 @@ class Order:
     shake: str | None = None
     flicker: tuple[str, ...] = ()
     row_time: str | None = None
+    lens: str | None = None
     focus_m: Annotated[float | None, (1e-3, 1e6, "give metres")] = None
     focal_length_mm: Annotated[float | None, (1e-3, 1e5, "give millimetres")] = None
     moments: Annotated[int | None, (1, 256, "give times within the exposure")] = None
@@ -441,6 +446,8 @@ def check(order: Order) -> Checked:
     """
     # The camera.
     sensor = at_gain(preset(order.sensor, order.cfa), gain_text(order.gain, order.iso))
+    if order.lens is not None:
+        sensor = with_lens(sensor, order.lens)
     sensor = replace(sensor, lens=held_lens(sensor.lens, order.shake))
     if order.row_time is not None:
         sensor = replace(sensor, row_time_us=parse_time(order.row_time, "row_time") * 1e6)

@@ -6,7 +6,7 @@ from typing import Annotated
 
 from render.radiance import SpectralRadiance
 from rodcone.types import Floats
-from sensor.config import LensConfig, SensorConfig
+from sensor.config import LensConfig, SensorConfig, without_terms
 from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image, least_samples
 from sensor.shake import held_lens
@@ -91,7 +91,8 @@ def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: s
     It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that
     their pictures can be compared.
     """
-    none = {"diffraction": 0.0, "veiling_glare": 0.0, "horizontal_view_deg": 0.0, "falloff_power": 0.0}
-    bare = replace(preset.lens, **none, vignetting=0.0, defocus_um=0.0, scatter=0.0, eye_age_years=0.0)
+    glare = "veiling_glare", "scatter", "eye_age_years"
+    blur_and_falloff = "diffraction", "defocus_um", "horizontal_view_deg", "falloff_power", "vignetting"
+    bare = replace(without_terms(preset.lens, glare + blur_and_falloff), table="")
     plain = replace(preset, lens=bare)
     return auto_exposure_s(form_image(radiance, plain), plain, _DARK_S, channel=channel)
