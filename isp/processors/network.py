@@ -15,12 +15,12 @@ from functools import cache, partial
 from zipfile import ZipFile
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from isp.colour.noise_gains import measured
 from isp.processors.bayer_denoised import picture_demosaicked_first
 from isp.processors.catalogue import Processor
+from isp.processors.convolution import convolve
 from isp.processors.demosaic import require_bayer
 from isp.processors.sub_images import EXTRA as BM3D
 from isp.processors.sub_images import bm3d
@@ -43,7 +43,6 @@ REACH = 32  # pixels that a value depends on along one axis: fifteen 3x3 filters
 WHITE = 0.999  # share of a frame's samples under what the network is given as 1
 MOST_BYTES = 1 << 24  # of a wheel: demosaicnet's has 3.7 MB
 _LEAST = 1e-6  # units of noise, to divide by
-_BLOCK = 1 << 20  # floats of the left matrix of a product: 4 MB, so that it stays near the processor
 NAMES = ("bayer_net", "bayer_net_bm3d")
 SOURCE = "Gharbi, Chaurasia, Paris & Durand 2016, learned"
 Weights = Mapping[str, NDArray[np.float32]]
@@ -150,20 +149,4 @@ def demosaic(mosaic: Mosaic, cfa: Tile, weights: Weights) -> Image:
 
 
 def _convolve(values: NDArray[np.float32], weights: Weights, layer: str, step: int = 1) -> NDArray[np.float32]:
-    """Correlate (h, w, in) with a layer's filters, only where they fit in.
-
-    A block of rows is one matrix product: each row of the left matrix holds what one filter position sees.
-    """
-    filters = weights[f"{layer}.weight"].transpose(2, 3, 1, 0)
-    side, _, seen, out = filters.shape
-    matrix, bias = np.ascontiguousarray(filters.reshape(side * side * seen, out)), weights[f"{layer}.bias"]
-    windows = sliding_window_view(values, (side, side), axis=(0, 1))[::step, ::step].transpose(0, 1, 3, 4, 2)
-    high, wide = windows.shape[:2]
-    found = np.empty((high, wide, out), np.float32)
-    rows = max(1, _BLOCK // (wide * len(matrix)))
-    for top in range(0, high, rows):
-        block = windows[top : top + rows]
-        np.add(
-            (block.reshape(-1, len(matrix)) @ matrix).reshape(*block.shape[:2], out), bias, out=found[top : top + rows]
-        )
-    return found
+    return convolve(values, weights[f"{layer}.weight"], weights[f"{layer}.bias"], step)

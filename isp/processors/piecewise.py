@@ -9,6 +9,7 @@ patch in units of its noise, light as a factor, coarser scales, and full samples
 
 import warnings
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -23,7 +24,7 @@ from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
 from rodcone.errors import InputError
-from rodcone.types import Floats
+from rodcone.types import Floats, Image
 from sensor.cfa import RGBW, Tile, channels, is_rgbw
 from sensor.raw import RawImage
 
@@ -87,6 +88,29 @@ def takes(tile: Tile) -> bool:
 
 
 def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
+    return develop_planes(raw, colours, balance, prior).picture
+
+
+@dataclass(frozen=True)
+class PiecewisePicture:
+    """A picture, and the planes that it was made of.
+
+    Attributes
+    ----------
+    picture : Picture
+    planes : (h, w, channel) float64
+        Of every channel at every pixel [e-].
+    gains : (channel,) float64
+        White balance.
+    """
+
+    picture: Picture
+    planes: Image
+    gains: Floats
+
+
+def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> PiecewisePicture:
+    """Develop a raw image as `picture_ple`, whose tile the caller has checked."""
     names, unit = raw.channels, raw.unit_channel
     index = [LETTERS.index(name) for name in names]
     prior = _as_it_reads(raw, prior, balance.neutral)
@@ -112,7 +136,7 @@ def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: 
         rgb = clip_highlights(raw, planes[..., :used] * gains[:used], gains) @ matrix.T
     else:
         rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, gains), colours, noise)
-    return Picture(rgb, sources)
+    return PiecewisePicture(Picture(rgb, sources), planes, gains)
 
 
 def _as_it_reads(raw: RawImage, prior: Prior, neutral: Floats | None) -> Prior:

@@ -1,0 +1,197 @@
+r"""Frames to train the network of `isp.processors.corrected` on: pictures that judge nothing, developed by `ple`.
+
+    python benchmarks/net_frames.py out/net --groups 40        (a group: one camera and lamp, both mosaics)
+
+A frame holds what the network sees, and its target: exact R, G and B of the picture by the camera's own matrix, as
+encoded sRGB over the picture's white. So the network isn't taught colours, which a matrix has to choose.
+
+Pictures are drawn, leaves and gratings of drawn reflectances, or photographs that `ple`'s prior was trained on, whose
+colours become surfaces' spectra; those without colour get two drawn surfaces at their ends. Read noise is 0.7 to 6 e-,
+pitch 0.8 to 3 um, light 0.02 to 1000 cd/m^2, the lens sharp to soft; lamps are those of `draw_illuminant`. `HELD` is a
+photograph left out to validate on.
+"""
+
+import argparse
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.ndimage import gaussian_filter
+from skimage import data
+
+from isp.colour.white_balance import WhiteBalance
+from isp.ple.prior import own_prior
+from isp.processors.catalogue import PROCESSORS
+from isp.processors.corrected import correction_inputs
+from isp.processors.piecewise import develop_planes
+from render.illuminants import illuminant
+from render.radiance_files.surface_spectra import surface_reflectances
+from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, photons_per_joule
+from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
+from rodcone.types import Floats
+from sensor.capture import expose_channels
+from sensor.config import SensorConfig
+from sensor.device import draw_device
+from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
+from sensor.presets import low_noise, vary
+from studies.metrics.truth import named_light, neutral_electrons
+from studies.photograph.camera import colour_fit
+from studies.training.pictures import NM, PHOTOGRAPHS, KnownLight, dead_leaves, draw_illuminant, draw_surface, gratings
+
+HELD = "coffee"
+CROP = 128  # pixels of a frame
+READ_NOISE_E, PITCH_UM, LUMINANCE_CD_M2 = (0.7, 6.0), (0.8, 3.0), (0.02, 1000.0)
+LONGEST_S = 0.066
+LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
+# Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
+KINDS = ("leaves", "photograph", "gratings", "photograph", "leaves", "photograph", "leaves", "photograph")
+HELD_KINDS = ("leaves", HELD, "gratings", HELD)
+HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)
+NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
+MOSAICS = ("rgbw", "bayer")
+DRAWN = {"leaves": dead_leaves, "gratings": gratings}
+LIGHTER = (1.0, 1.0, 1.5)  # factors on the exposure, so that W is full too
+TRUTH_LETTERS = "RGBW"
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What the network sees (h, w, 8), what it should give (h, w, 3), and what it was made of; half precision."""
+
+    seen: NDArray[np.float16]
+    target: NDArray[np.float16]
+    kind: str
+    lamp: str
+    level_cd_m2: float
+
+
+def draw_camera(rng: np.random.Generator) -> SensorConfig:
+    """Draw a camera about `low_noise`: its pixel's size, well and noise."""
+    sensor = low_noise()
+    pitch, read_noise = (float(np.exp(rng.uniform(*np.log(ends)))) for ends in (PITCH_UM, READ_NOISE_E))
+    pixel = replace(
+        sensor.pixel,
+        pitch_um=pitch,
+        read_noise_e=read_noise,
+        dsnu_e=read_noise * rng.uniform(0.0, 0.7),
+        prnu=rng.uniform(0.003, 0.012),
+        full_well_e=3000.0 * pitch**1.5,
+    )
+    return replace(sensor, pixel=pixel)
+
+
+def collected(sensor: SensorConfig, lamp: str, nm: Floats) -> Floats:
+    """Share of each of R, G, B and W that comes from each band of a white surface, shape (4, band)."""
+    width = band_widths(nm)
+    photons = illuminant(lamp).band_average(nm, width) * photons_per_joule(nm) * width
+    electrons = sensor.responses.band_average(tuple(TRUTH_LETTERS), nm, width) * photons
+    return np.asarray(electrons / electrons.sum(axis=1, keepdims=True))
+
+
+def draw_signals(
+    rng: np.random.Generator, sensor: SensorConfig, lamp: str, kind: str, drawn: dict[str, Floats]
+) -> Floats:
+    """Draw a picture as signals of R, G, B and W over those of white, shape (CROP, CROP, 4)."""
+    if kind in DRAWN:
+        if kind not in drawn:
+            drawn[kind] = DRAWN[kind](rng, KnownLight(collected(sensor, lamp, NM)))
+        picture = drawn[kind]
+    else:
+        name = HELD if kind == HELD else str(rng.choice([name for name in PHOTOGRAPHS if name != HELD]))
+        picture = photograph_signals(rng, sensor, lamp, name)
+    top, left = (int(rng.integers(length - CROP + 1)) for length in picture.shape[:2])
+    picture = np.rot90(picture[top : top + CROP, left : left + CROP], rng.integers(4))
+    return np.maximum(gaussian_filter(picture, (*[rng.uniform(0.0, 0.6)] * 2, 0)), 1e-4)
+
+
+def photograph_signals(rng: np.random.Generator, sensor: SensorConfig, lamp: str, name: str) -> Floats:
+    """Photograph at a part of its size, as signals of R, G, B and W, with a brightness and tint of its own."""
+    encoded = getattr(data, name)() / 255.0
+    most = min(min(encoded.shape[:2]) // CROP, 3)
+    step = int(rng.integers(min(2, most), most + 1))
+    linear = decode_srgb(encoded)
+    height, width = (size // step for size in linear.shape[:2])
+    linear = linear[: height * step, : width * step].reshape(height, step, width, step, -1).mean(axis=(1, 3))
+    if linear.shape[-1] == 1:
+        share = linear / linear.max()
+        ends = [draw_surface(rng) for _ in range(2)]
+        return np.asarray((share * ends[0] + (1 - share) * ends[1]) @ collected(sensor, lamp, NM).T)
+    if rng.random() < 0.3:
+        linear = linear[..., rng.permutation(3)]
+    linear = np.clip(linear * np.exp(rng.normal(0.0, 0.15, 3)), 0.0, 1.0)
+    return np.asarray(surface_reflectances(linear)[0] @ collected(sensor, lamp, DEFAULT_WAVELENGTH_NM).T)
+
+
+def take(
+    rng: np.random.Generator, camera: SensorConfig, lamp: str, kind: str, signals: Floats, level_cd_m2: float
+) -> list[Frame]:
+    """Photograph a picture by both mosaics at one light."""
+    frames, light = [], named_light(lamp)
+    factor = float(rng.choice(LIGHTER))
+    for mosaic in MOSAICS:
+        processor = PROCESSORS[f"ple_{mosaic}"]
+        sensor = vary(camera, mosaic)
+        neutral = neutral_electrons(sensor, light, 1.0)
+        of_channels = signals[..., [TRUTH_LETTERS.index(name) for name in sensor.channels]]
+        green = sensor.channels.index("G")
+        per_second_e = of_channels * neutral * (level_cd_m2 / of_channels[..., green].mean())
+        exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, per_second_e, sensor, LONGEST_S)
+        exposure_s = min(exposure_s * (factor if mosaic == "rgbw" else 1.0), LONGEST_S)
+        device = draw_device(sensor, (CROP, CROP), rng)
+        raw = expose_channels(per_second_e * exposure_s, sensor, exposure_s, device, rng, exact=True)
+        colours = colour_fit(sensor, processor, light)
+        developed = develop_planes(raw, colours, WhiteBalance.of(raw, neutral, neutral), own_prior())
+        white = white_of(developed.picture.rgb)
+        exact = (per_second_e * exposure_s * developed.gains)[..., [sensor.channels.index(name) for name in "RGB"]]
+        frames.append(
+            Frame(
+                seen=correction_inputs(raw, developed, white).astype(np.float16),
+                target=encode_srgb(exact @ colours.matrix().T / white).astype(np.float16),
+                kind=kind,
+                lamp=lamp,
+                level_cd_m2=level_cd_m2,
+            )
+        )
+    return frames
+
+
+def draw_group(folder: Path, index: int, held: bool) -> None:
+    """Draw a group's frames by one camera and lamp, and write both mosaics' files."""
+    rng = np.random.default_rng([64, index, int(held)])
+    camera = low_noise() if held else draw_camera(rng)
+    lamp = str(rng.choice(LAMPS)) if rng.random() < 0.5 or held else draw_illuminant(rng)
+    middle = rng.uniform(*np.log(LUMINANCE_CD_M2))
+    kinds = HELD_KINDS if held else KINDS
+    levels = HELD_CD_M2 if held else np.exp(middle + rng.uniform(-np.log(NEAR), np.log(NEAR), len(kinds)))
+    drawn: dict[str, Floats] = {}
+    found = [
+        take(rng, camera, lamp, kind, draw_signals(rng, camera, lamp, kind, drawn), float(level))
+        for kind, level in zip(kinds, levels, strict=True)
+    ]
+    for mosaic, frames in zip(MOSAICS, zip(*found, strict=True), strict=True):
+        arrays = {name: np.array([getattr(frame, name) for frame in frames]) for name in Frame.__dataclass_fields__}
+        np.savez(folder / f"{'held' if held else 'train'}_{mosaic}_{index:04}.part.npz", **arrays)
+    for mosaic in MOSAICS:  # a file is whole, or isn't there
+        part = folder / f"{'held' if held else 'train'}_{mosaic}_{index:04}.part.npz"
+        part.rename(part.with_name(part.name.replace(".part", "")))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--groups", type=int, default=100, help="of eight pictures")
+    parser.add_argument("--first", type=int, default=0)
+    parser.add_argument("--held", type=int, default=0, help="groups to validate on")
+    given = parser.parse_args()
+    given.folder.mkdir(parents=True, exist_ok=True)
+    work = [(index, True) for index in range(given.held)]
+    work += [(index, False) for index in range(given.first, given.first + given.groups)]
+    for index, held in work:
+        if not (given.folder / f"{'held' if held else 'train'}_bayer_{index:04}.npz").exists():
+            draw_group(given.folder, index, held)
+            print(f"group {index}{', held' if held else ''}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

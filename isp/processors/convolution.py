@@ -1,0 +1,42 @@
+"""Filters of learned networks, on arrays in memory: each block of rows is one matrix product."""
+
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+
+from rodcone.types import Singles
+
+_BLOCK = 1 << 20  # floats of the left matrix of a product: 4 MB, so that it stays near the processor
+
+
+def convolve(
+    values: Singles,
+    filters: Singles,
+    bias: Singles,
+    step: int = 1,
+    run: Callable[[Callable[[int], None], Iterable[int]], Iterable[Any]] = map,
+) -> Singles:
+    """Correlate (h, w, in) with a layer's filters (out, in, side, side), only where they fit in.
+
+    Each row of a product's left matrix holds what one filter position sees. `run` is ``map``, or that of a pool of
+    threads; the blocks, and so the result, don't depend on it.
+    """
+    filters = filters.transpose(2, 3, 1, 0)
+    side, _, seen, out = filters.shape
+    matrix = np.ascontiguousarray(filters.reshape(side * side * seen, out))
+    windows = sliding_window_view(values, (side, side), axis=(0, 1))[::step, ::step].transpose(0, 1, 3, 4, 2)
+    high, wide = windows.shape[:2]
+    found = np.empty((high, wide, out), np.float32)
+    rows = max(1, _BLOCK // (wide * len(matrix)))
+
+    def fill(top: int) -> None:
+        block = windows[top : top + rows]
+        np.add(
+            (block.reshape(-1, len(matrix)) @ matrix).reshape(*block.shape[:2], out), bias, out=found[top : top + rows]
+        )
+
+    for _ in run(fill, range(0, high, rows)):
+        pass
+    return found

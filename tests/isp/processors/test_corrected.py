@@ -1,0 +1,164 @@
+"""A picture corrected by a network: its layers beside plain sums, each phase of a tile, and what is left as it is."""
+
+import numpy as np
+import pytest
+from builders import BAYER_PHASES, RGBW_PHASES, raw_image
+from refusal import refusal
+from scipy.signal import correlate
+
+from isp.colour.colour_fit import ColourFit
+from isp.colour.white_balance import WhiteBalance
+from isp.picture import Picture
+from isp.processors import corrected
+from isp.processors.piecewise import PiecewisePicture
+from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
+from sensor.cfa import channels, mask
+
+TRANSPOSED = [("RB", "GW"), ("GW", "RB"), ("BR", "WG"), ("WG", "BR")]
+SHAPES = {
+    "first": (7, 36, 3),
+    "fine1": (7, 7, 3),
+    "fine2": (7, 7, 3),
+    "half1": (5, 7, 3),
+    "half2": (5, 5, 3),
+    "quarter1": (6, 5, 3),
+    "quarter2": (6, 6, 3),
+    "quarter3": (6, 6, 3),
+    "quarter4": (5, 6, 1),
+    "up1": (5, 5, 3),
+    "up2": (5, 5, 3),
+    "up3": (7, 5, 1),
+    "last1": (7, 7, 3),
+    "last2": (7, 7, 3),
+    "residual": (12, 7, 3),
+}
+
+
+def random_network(seed=3):
+    rng, weights = np.random.default_rng(seed), {}
+    for name, (out, seen, side) in SHAPES.items():
+        spread = (2 / (seen * side**2)) ** 0.5
+        weights[f"{name}.weight"] = rng.normal(0.0, spread, (out, seen, side, side)).astype(np.float32)
+        weights[f"{name}.bias"] = rng.normal(0.0, 0.1, out).astype(np.float32)
+    return weights
+
+
+def developed(tile, shape=(20, 30), seed=5):
+    """Raw image of noise about a picture of chance, and what is taken for `ple`'s."""
+    rng = np.random.default_rng(seed)
+    planes = rng.uniform(50.0, 2000.0, (*shape, len(channels(tile))))
+    at_site = np.zeros(shape)
+    for index, name in enumerate(channels(tile)):
+        at = mask(tile, name, shape)
+        at_site[at] = planes[..., index][at]
+    raw = raw_image(np.rint(at_site + rng.normal(0.0, 20.0, shape)) + 100, tile)
+    picture = Picture(planes[..., :3] @ np.array([[1.5, -0.3, -0.2], [-0.2, 1.4, -0.2], [0.1, -0.6, 1.5]]).T, {})
+    return raw, PiecewisePicture(picture, planes, np.linspace(0.5, 2.0, planes.shape[-1]))
+
+
+def by_sums(values, weights, name, step):
+    """Layer by correlations of whole planes in double precision, zeros beyond the frame."""
+    filters = weights[f"{name}.weight"].astype(np.float64)
+    edge = filters.shape[-1] // 2
+    wide = np.pad(values, [(edge, edge), (edge, edge), (0, 0)])
+    planes = [
+        sum(correlate(wide[..., i], one[i], "valid", "direct") for i in range(len(one))) + bias
+        for one, bias in zip(filters, weights[f"{name}.bias"], strict=True)
+    ]
+    return np.stack(planes, axis=-1)[::step, ::step]
+
+
+def test_the_network_is_what_plain_sums_give() -> None:
+    weights, rng = random_network(), np.random.default_rng(4)
+    packed = rng.normal(0.0, 1.0, (12, 16, 36)).astype(np.float32)
+
+    def through(values, *names):
+        for name in names:
+            values = by_sums(np.maximum(values, 0.1 * values), weights, name, corrected.STEPS[name])
+        return values
+
+    def doubled(values):
+        return np.kron(values, np.ones((2, 2, 1)))
+
+    fine = by_sums(packed, weights, "first", 1)
+    fine = fine + through(fine, "fine1", "fine2")
+    half = through(fine, "half1", "half2")
+    half = half + doubled(through(half, "quarter1", "quarter2", "quarter3", "quarter4"))
+    fine = fine + doubled(through(half, "up1", "up2", "up3"))
+    expected = through(fine + through(fine, "last1", "last2"), "residual")
+    found = corrected.residual(packed, weights)
+    assert np.abs(expected).max() > 1
+    assert found == pytest.approx(expected, abs=1e-5 * np.abs(expected).max())
+
+
+def test_a_network_without_a_residual_leaves_the_picture_to_the_bit() -> None:
+    weights = random_network()
+    weights |= {name: np.zeros_like(weights[name]) for name in ("residual.weight", "residual.bias")}
+    for tile in (RGBW_PHASES[0], BAYER_PHASES[0]):
+        raw, made = developed(tile)
+        assert np.array_equal(corrected.corrected(raw, made, weights).rgb, made.picture.rgb)
+
+
+def test_the_network_sees_every_tile_as_one_that_begins_with_red_and_then_green(monkeypatch) -> None:
+    """A residual that is a tenth of the picture it is given: each pixel's own, whatever the phase and the size."""
+    seen = []
+
+    def tenth(packed, weights):
+        seen.append(packed)
+        return 0.1 * packed[..., :12]
+
+    monkeypatch.setattr(corrected, "residual", tenth)
+    for tile in [*RGBW_PHASES, *TRANSPOSED, *BAYER_PHASES]:
+        raw, made = developed(tile, (21, 30))
+        white = white_of(made.picture.rgb)
+        change = 0.1 * encode_srgb(made.picture.rgb / white)
+        found = corrected.corrected(raw, made, {}).rgb
+        assert found == pytest.approx(corrected.added(made.picture.rgb, change, white), rel=1e-5, abs=1e-3), tile
+        of_white = seen[-1][..., 32:].mean(axis=(0, 1))
+        assert of_white.tolist() == [0, 0, 0, 1 if "W" in "".join(tile) else 0], tile
+        assert not np.any(np.array(seen[-1].shape[:2]) % 4)
+
+
+def test_what_the_network_sees_is_the_sample_in_units_of_its_noise() -> None:
+    raw, made = developed(RGBW_PHASES[0])
+    white = 1000.0
+    seen = corrected.correction_inputs(raw, made, white)
+    at = mask(raw.cfa, "W", raw.shape)
+    expected_e, gain = made.planes[at][:, 3], made.gains[3]
+    noise_e = np.sqrt(expected_e + raw.dark_noise_e**2 + (raw.prnu * expected_e) ** 2)
+    misfit = np.clip((raw.electrons[at] - expected_e) / noise_e, -5, 5) / 3
+    assert seen[at][:, 5] == pytest.approx(misfit, abs=1e-4)
+    # The noise is that of the encoded value, to first order.
+    step = 1e-4
+    linear = expected_e * gain / white
+    kept = linear < 0.99
+    slope = (encode_srgb(linear + step) - encode_srgb(linear)) / step
+    assert seen[at][kept, 4] == pytest.approx(np.minimum(noise_e * gain / white * slope, 1)[kept], rel=1e-3)
+    assert seen[at][:, 3] == pytest.approx(encode_srgb(raw.electrons[at] * gain / white), abs=1e-6)
+
+
+def test_a_change_of_encoded_values_is_added_to_light() -> None:
+    rgb = np.array([[[-5.0, 20.0, 150.0]]])  # white is 100
+    assert np.array_equal(corrected.added(rgb, np.zeros((1, 1, 3)), 100.0), rgb)
+    up = corrected.added(rgb, np.full((1, 1, 3), 0.1), 100.0)[0, 0]
+    assert up == pytest.approx(
+        [100 * decode_srgb(np.array(0.1)), 100 * decode_srgb(encode_srgb(np.array(0.2)) + 0.1), 150]
+    )
+    down = corrected.added(rgb, np.full((1, 1, 3), -0.1), 100.0)[0, 0]
+    assert down[0] == -5.0, "what is under black stays"
+    assert down[2] == pytest.approx(50 + 100 * decode_srgb(np.array(0.9))), "the excess over white stays"
+
+
+def test_pixels_of_a_tile_go_side_by_side_and_back() -> None:
+    pixels = np.arange(4 * 6 * 5, dtype=np.float32).reshape(4, 6, 5)
+    packed = corrected.pack(pixels)
+    assert packed.shape == (2, 3, 20)
+    assert packed[1, 2, 4:8].tolist() == pixels[2:4, 4:6, 1].ravel().tolist()
+    assert np.array_equal(corrected.unpack(packed), pixels)
+
+
+def test_white_beside_red_is_refused() -> None:
+    raw = raw_image(np.full((16, 16), 500), ("RW", "BG"))
+    fit = ColourFit.of(np.eye(3))
+    for tile in (raw, raw_image(np.full((16, 16), 500), ("RG", "WB"))):
+        refusal(corrected.picture_corrected_rgbw, tile, fit, balance=WhiteBalance(), match="W diagonal to R")
