@@ -4,15 +4,16 @@ r"""Judge the network of `isp.processors.corrected` on pictures that it never sa
     python benchmarks/judge_net.py out/wheels --control out/net/control.npz -o out/judged
 
 Pictures are the photographs of docs/white_pixel.md and those of `training_pictures` (leaves, gratings and patches of
-other reflectances), by `low_noise` behind both mosaics, exposed by `auto:information`, white balance as shot. It writes
-judged.csv, one line a picture, light, mosaic and seed: PSNR [dB] of encoded sRGB against the scene's own colours, and
-the amplitude of a 2x2 pattern on even patches [encoded]; and sheets of pictures at three times their size.
+other reflectances), by `low_noise` behind both mosaics, exposed by `auto:information`, white balance as shot, without
+diffraction. It writes judged.csv, one line a picture, light, mosaic and seed: PSNR [dB] of encoded sRGB against the
+scene's own colours, and against exact R, G and B by the camera's matrix, where colours count for nothing; and the
+amplitude of a 2x2 pattern on even patches [encoded]. And it writes sheets of pictures at three times their size.
 """
 
 import argparse
 import io
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
@@ -50,6 +51,7 @@ from studies.photograph.camera import colour_fit
 
 MOSAICS, LEVELS_CD_M2, LONGEST_S = ("rgbw", "bayer"), (0.05, 0.5, 5.0, 100.0), 0.066
 DRAWN, DRAWN_SEED = 12, 20261129  # two of each kind under D65, A and LED-B3, a seed that nothing is chosen by
+EXACT = "exact"
 PATCHES = 5  # fields a side of a picture of even patches
 ENLARGED = 3
 
@@ -99,6 +101,7 @@ def develop(
 ) -> dict[str, NDArray[np.float64]]:
     """Photograph a picture and develop it by each processor, encoded at the scale of the truth."""
     sensor = low_noise(mosaic)
+    sensor = replace(sensor, lens=replace(sensor.lens, diffraction=0.0))
     per_second_e = imaged_electrons(one.radiance, sensor, 1.0) * level
     exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, per_second_e, sensor, LONGEST_S)
     rng = np.random.default_rng([seed, round(1000 * level)])
@@ -115,7 +118,10 @@ def develop(
         learned = network_processor("bayer_net", wheel)
         pictures["bayer_net"] = learned.develop(raw, colour_fit(sensor, learned, one.light), balance=balance)
     scale = neutral[sensor.channels.index("G")] * one.white_cd_m2 * level
-    return {name: encode_srgb(picture.rgb / scale) for name, picture in pictures.items()}
+    order = [sensor.channels.index(name) for name in "RGB"]
+    exact = (per_second_e * exposure_s / neutral)[..., order] @ colours.matrix().T / (one.white_cd_m2 * level)
+    shown = {name: picture.rgb / scale for name, picture in pictures.items()} | {EXACT: exact}
+    return {name: encode_srgb(linear) for name, linear in shown.items()}
 
 
 def by_one_pixel(raw: RawImage, made: PiecewisePicture, control: Path) -> Picture:
@@ -162,7 +168,11 @@ def main() -> None:
         for mosaic, level, seed in product(MOSAICS, LEVELS_CD_M2, range(given.seeds)):
             found = develop(one, level, mosaic, seed, content, given.control)
             is_even = one.name.startswith("patches")
-            cells = [f"{psnr(found[name], one.truth):.3f}" if name in found else "" for name in given_names]
+            cells = [
+                f"{psnr(found[name], right):.3f}" if name in found else ""
+                for right in (one.truth, found[EXACT])
+                for name in given_names
+            ]
             cells += [f"{pattern(found[name]):.5f}" if is_even else "" for name in ("ple", "net")]
             rows.append([one.name, mosaic, f"{level:g}", str(seed), *cells])
             print(*rows[-1], flush=True)
@@ -171,7 +181,8 @@ def main() -> None:
                 sheet = sheet.repeat(ENLARGED, axis=0).repeat(ENLARGED, axis=1)
                 shown = Image.fromarray(np.rint(255 * np.clip(sheet, 0, 1)).astype(np.uint8))
                 shown.save(given.out / f"{one.name.replace(' ', '_')}_{mosaic}_{level:g}.png")
-    head = ["picture", "mosaic", "cd_m2", "seed", *given_names, "pattern_ple", "pattern_net"]
+    beside_exact = [f"{name}_beside_exact" for name in given_names]
+    head = ["picture", "mosaic", "cd_m2", "seed", *given_names, *beside_exact, "pattern_ple", "pattern_net"]
     write_files({given.out / "judged.csv": csv_text(head, rows)})
 
 

@@ -45,7 +45,7 @@ READ_NOISE_E, PITCH_UM, LUMINANCE_CD_M2 = (0.7, 6.0), (0.8, 3.0), (0.02, 1000.0)
 LONGEST_S = 0.066
 LAMPS = ("D65", "D65", "A", "LED-B3")  # half of the groups, the others' are drawn
 # Of a group's pictures in turn; those of a kind that is drawn are parts of one picture.
-KINDS = ("leaves", "photograph", "gratings", "photograph", "leaves", "photograph", "leaves", "photograph")
+KINDS = ("photograph",) * 6 + ("gratings", "leaves")
 HELD_KINDS = ("leaves", HELD, "gratings", HELD)
 HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)
 NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
