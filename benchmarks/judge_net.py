@@ -1,4 +1,4 @@
-r"""Judge the network of `isp.processors.corrected` on pictures that it never saw, beside `ple`, the control and others.
+r"""Judge the network of `corrected_ple` on pictures that it never saw, beside `ple`, the control and others.
 
     pip download --no-deps -d out/wheels scikit-learn demosaicnet
     python benchmarks/judge_net.py out/wheels --control out/net/control.npz -o out/judged
@@ -20,6 +20,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
+from corrected_ple import added, corrected, correction_inputs, own_weights
 from numpy.typing import NDArray
 from PIL import Image
 from training_pictures import training_pictures
@@ -29,7 +30,6 @@ from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.prior import own_prior
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.corrected import added, corrected, correction_inputs, own_weights
 from isp.processors.network import network_processor
 from isp.processors.piecewise import PiecewisePicture, develop_planes
 from render.illuminants import illuminant

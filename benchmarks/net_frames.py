@@ -1,4 +1,4 @@
-r"""Frames to train the network of `isp.processors.corrected` on: pictures that judge nothing, developed by `ple`.
+r"""Frames to train the network of `corrected_ple` on: pictures that judge nothing, developed by `ple`.
 
     python benchmarks/net_frames.py out/net --groups 40        (a group: one camera and lamp, both mosaics)
 
@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from corrected_ple import correction_inputs
 from numpy.typing import NDArray
 from scipy.ndimage import gaussian_filter
 from skimage import data
@@ -23,7 +24,6 @@ from skimage import data
 from isp.colour.white_balance import WhiteBalance
 from isp.ple.prior import own_prior
 from isp.processors.catalogue import PROCESSORS
-from isp.processors.corrected import correction_inputs
 from isp.processors.piecewise import develop_planes
 from render.illuminants import illuminant
 from render.radiance_files.surface_spectra import surface_reflectances

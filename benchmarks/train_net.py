@@ -1,9 +1,9 @@
-r"""Train the network of `isp.processors.corrected` on both mosaics at once (needs torch, for this alone).
+r"""Train the network of `corrected_ple` on both mosaics at once (needs torch, for this alone).
 
     pip install rodcone[train-net]
     python benchmarks/net_frames.py out/net --groups 40 --held 3
     python benchmarks/train_net.py out/net --steps 8000             (--control: the network that sees one pixel)
-    python benchmarks/train_net.py out/net --write "Trained on ..."  (into the package, in half precision)
+    python benchmarks/train_net.py out/net --write "Trained on ..."  (network.npz)
 
 Half of each batch is RGBW, half Bayer, of the same pictures. It resumes where it was stopped; ``--steps`` may change
 then. Each line of the log is JSON: steps, processor seconds, and the gain over `ple` [dB of encoded sRGB against the
@@ -22,11 +22,10 @@ from typing import Any
 
 import numpy as np
 import torch
+from corrected_ple import INPUTS, LEAK, STEPS, pack, unpack
 from numpy.typing import NDArray
 from torch import Tensor, nn
 from torch.nn import functional
-
-from isp.processors.corrected import INPUTS, LEAK, STEPS, WEIGHTS, pack, unpack
 
 SEED, BATCH, SIDE, RATE, WARM = 0, 6, 64, 1e-3, 300
 LEAST_MSE, LEAST_STEP_MSE = 1e-5, 1e-5  # 50 dB: beyond it a crop counts no more
@@ -39,7 +38,7 @@ NAMES = ("network", "control")
 
 
 class Network(nn.Module):
-    """The layers of `isp.processors.corrected.residual`."""
+    """The layers of `corrected_ple.residual`."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -237,12 +236,11 @@ def train(folder: Path, steps: int, control: bool, every: int) -> None:
 
 
 def write_weights(folder: Path, card: str, control: bool) -> None:
-    """Write a training's mean weights in half precision, into the package; a control's beside the training."""
+    """Write a training's mean weights in half precision, beside it."""
     run = Run(folder / f"{NAMES[control]}.pt", control)
     weights = {name: value.numpy().astype(np.float16) for name, value in run.mean.state_dict().items()}
     facts = f"{card} {run.step} steps, {run.seconds / 3600:.2f} processor hours, seed {SEED}."
-    path = folder / f"{NAMES[control]}.npz" if control else WEIGHTS
-    np.savez_compressed(path, **weights, **{CARD: np.array(facts)})
+    np.savez_compressed(folder / f"{NAMES[control]}.npz", **weights, **{CARD: np.array(facts)})
 
 
 def main() -> None:

@@ -1,12 +1,16 @@
-"""Piecewise linear estimation, corrected by a small learned network, the same for RGBW and Bayer.
+r"""Piecewise linear estimation, corrected by a small learned network, the same for RGBW and Bayer: a trial.
+
+    rodcone develop shot.dng --isp benchmarks/corrected_ple.py:ple_rgbw_net --trust-code      (or :ple_bayer_net)
 
 The network sees `ple`'s picture, the mosaic and its noise, and adds a residual to the picture's encoded sRGB. It is a
 U-net (O. Ronneberger, P. Fischer, T. Brox, MICCAI 2015) over tiles of 2x2 pixels. Everything is relative to the
-picture's white and in standard deviations of the noise, so that one set of weights serves any sensor and light. It was
+picture's white and in standard deviations of the noise, so that one set of weights serves any sensor and light. It is
 trained to give what exact planes of R, G and B become by the camera's own matrix: it changes what the mosaic and the
-noise hid, and leaves the choice of colours to the matrix (benchmarks/train_net.py).
+noise hid, and leaves the choice of colours to the matrix. `train_net.py` writes the weights, which the package doesn't
+bring: docs/decisions/0061 says why. `CORRECTED_PLE` names their file, out/net/network.npz where it is left out.
 """
 
+import os
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
@@ -21,6 +25,7 @@ from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.prior import own_prior
+from isp.processors.catalogue import Processor
 from isp.processors.convolution import convolve
 from isp.processors.demosaic import require_bayer
 from isp.processors.piecewise import PiecewisePicture, develop_planes
@@ -36,7 +41,7 @@ TILES = 8  # pixels: both sides of a frame are brought to a multiple of it
 MOST_MISFIT = 5.0  # standard deviations by which a sample may lie beside the picture
 MISFIT_UNIT = 3.0  # standard deviations that are a misfit of 1
 LEAST_NOISE_E = 1e-3
-WEIGHTS = Path(__file__).with_name("corrected.npz")
+WEIGHTS = Path(os.environ.get("CORRECTED_PLE", "out/net/network.npz"))
 # Names of the layers, with what each takes from the one before: a step of 2 goes to half the size.
 STEPS = MappingProxyType(
     {
@@ -78,7 +83,7 @@ def picture_corrected_bayer(raw: RawImage, colours: ColourFit, *, balance: White
 
 @cache
 def own_weights() -> Weights:
-    """Weights that the package brings for both mosaics, in half precision on disk."""
+    """Weights for both mosaics, in half precision on disk."""
     with np.load(WEIGHTS) as file:
         return MappingProxyType({name: file[name].astype(np.float32) for name in file.files if name != "card"})
 
@@ -197,3 +202,8 @@ def _white_diagonal(tile: Tile) -> bool:
 def _green_below(tile: Tile) -> bool:
     """Whether G follows R in the column and not in the row."""
     return not any(set(row) == {"R", "G"} for row in tile)
+
+
+_SOURCE = "ple, corrected by a small network of the project's own"
+ple_rgbw_net = Processor("rgbw", picture_corrected_rgbw, _SOURCE)
+ple_bayer_net = Processor("bayer", picture_corrected_bayer, _SOURCE)

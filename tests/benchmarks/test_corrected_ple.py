@@ -1,5 +1,6 @@
 """A picture corrected by a network: its layers beside plain sums, each phase of a tile, and what is left as it is."""
 
+import corrected_ple as corrected
 import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, raw_image
@@ -9,7 +10,6 @@ from scipy.signal import correlate
 from isp.colour.colour_fit import ColourFit
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
-from isp.processors import corrected
 from isp.processors.piecewise import PiecewisePicture
 from rodcone.colour_spaces import decode_srgb, encode_srgb, white_of
 from sensor.cfa import channels, mask
