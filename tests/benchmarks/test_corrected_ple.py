@@ -60,7 +60,7 @@ def by_sums(values, weights, name, step):
     """Layer by correlations of whole planes in double precision, zeros beyond the frame."""
     filters = weights[f"{name}.weight"].astype(np.float64)
     edge = filters.shape[-1] // 2
-    wide = np.pad(values, [(edge, edge), (edge, edge), (0, 0)])
+    wide = np.pad(values.astype(np.float64), [(edge, edge), (edge, edge), (0, 0)])
     planes = [
         sum(correlate(wide[..., i], one[i], "valid", "direct") for i in range(len(one))) + bias
         for one, bias in zip(filters, weights[f"{name}.bias"], strict=True)
