@@ -73,7 +73,7 @@ def score(
     trust_code
         Run the Python file that --processor names; it may do all that you may.
     sweep
-        Print the signal-to-noise ratio and the accuracy of contrast over light instead.
+        Print the signal-to-noise ratio, the accuracy of contrast and visual noise over light instead.
     seed
         Seed of the chips and frames.
     out
@@ -170,5 +170,5 @@ def _print_sweep(
     if json:
         print_json({name: [asdict(row) for row in of] for name, of in curves.items()})
         return
-    head = ("sensor", "lux", "SNR [dB]", "measured", "contrast accuracy", "measured")
+    head = ("sensor", "lux", "SNR [dB]", "measured", "contrast accuracy", "measured", "visual noise", "measured")
     print_table(head, [[str(row["sensor"]), *(number_text(x) for x in list(row.values())[1:])] for row in rows])

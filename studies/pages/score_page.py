@@ -12,6 +12,7 @@ from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
 MOST_ON_A_PAGE = 2  # cameras; of more, each row's conditions stand below it
+MOST_VISUAL_NOISE = 10.0  # that is drawn
 PLAIN = 1000.0  # from which on a figure has no decimals
 
 
@@ -59,20 +60,22 @@ def half_text(merit: Merit) -> str:
 
 @rc_context(STYLE)
 def curves_svg(curves: Mapping[str, Sequence[AtLight]]) -> str:
-    """Draw ratio and accuracy over light: lines are closed forms, dots are simulated frames."""
-    figure = blank(2 * CHART[0], CHART[1])
-    left, right = figure.subplots(1, 2)
+    """Draw ratio, accuracy and visual noise over light: lines are closed forms, dots are simulated frames."""
+    figure = blank(3 * CHART[0], CHART[1])
+    left, middle, right = figure.subplots(1, 3)
     for (camera, rows), colour in zip(curves.items(), COLOURS, strict=False):
         lux = [row.lux for row in rows]
         for axes, computed, measured in (
             (left, [row.snr_db for row in rows], [row.measured_snr_db for row in rows]),
-            (right, [row.accuracy for row in rows], [row.measured_accuracy for row in rows]),
+            (middle, [row.accuracy for row in rows], [row.measured_accuracy for row in rows]),
+            (right, [row.visual_noise for row in rows], [row.measured_visual_noise for row in rows]),
         ):
             axes.semilogx(lux, computed, color=colour, label=camera)
             axes.semilogx(lux, measured, color=colour, marker="o", markersize=3, linestyle="")
     left.set(title="SNR of a pixel [dB]", xlabel="lux on an 18 % grey card", ylim=(-20, None))
-    right.set(title="contrast transfer accuracy", xlabel="lux on an 18 % grey card", ylim=(0, 1.02))
-    for axes in (left, right):
+    middle.set(title="contrast transfer accuracy", xlabel="lux on an 18 % grey card", ylim=(0, 1.02))
+    right.set(title="visual noise of 18 % grey", xlabel="lux on an 18 % grey card", ylim=(0, MOST_VISUAL_NOISE))
+    for axes in (left, middle, right):
         plain_ticks(axes)
     left.legend(fontsize=8, frameon=False)
     return svg_text(figure)

@@ -1,4 +1,4 @@
-"""The signal-to-noise ratio and the accuracy of contrast over light, in closed form beside simulated frames."""
+"""Signal-to-noise ratio, accuracy of contrast and visual noise over light, in closed form beside simulated frames."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -6,12 +6,16 @@ from math import log10, nan, pi
 
 import numpy as np
 
+from rodcone.errors import InputError
+from rodcone.types import Floats
 from sensor.config import SensorConfig
 from studies.metrics.truth import GREY, named_light
 from studies.photograph.snr import snr
 from studies.score.contrast import accuracy, accuracy_on_frames
-from studies.score.even_field import even_field
+from studies.score.even_field import EvenField, even_field
+from studies.score.visual_noise import colour_fields, expected_noise, measured_noise
 
+LEAST_RATIO = 3.0  # of the noisiest channel, from which on the closed form of visual noise holds
 LUX: tuple[float, ...] = tuple(float(f"{10 ** (step / 3):.3g}") for step in range(-6, 13))  # 0.01 to 10 000
 
 
@@ -27,6 +31,9 @@ class AtLight:
         Ratio of a pixel's samples of the card, in closed form and on one simulated frame; nan where the well is full.
     accuracy, measured_accuracy : float
         Contrast transfer accuracy (`studies.score.contrast`).
+    visual_noise, measured_visual_noise : float
+        Of the card beside a perfect white (`studies.score.visual_noise`); nan where a well is full, of a camera that
+        tells no colours, and in closed form where the grey's ratio is below `LEAST_RATIO`.
     """
 
     lux: float
@@ -34,6 +41,8 @@ class AtLight:
     measured_snr_db: float
     accuracy: float
     measured_accuracy: float
+    visual_noise: float = nan
+    measured_visual_noise: float = nan
 
 
 def over_light(
@@ -41,6 +50,7 @@ def over_light(
 ) -> list[AtLight]:
     """Compute and measure a camera's unit channel over light."""
     field = even_field(sensor, named_light(light, sensor.window_nm), exposure_s, sensor.unit_channel)
+    colours = _colours(sensor, light, exposure_s)
     rows = []
     for number, each in enumerate(lux):
         luminance, rng = each * GREY / pi, np.random.default_rng((seed, number))
@@ -50,8 +60,32 @@ def over_light(
         ratios = [float(expected[0]), float(samples.mean() / max(samples.std(ddof=1), 1e-9))]
         snr_db, measured_db = (_db(ratio) if electrons < field.headroom_e else nan for ratio in ratios)
         told = accuracy(field, luminance), accuracy_on_frames(field, luminance, rng)
-        rows.append(AtLight(each, snr_db, measured_db, *told))
+        seen = _visual_noise(*colours, each / pi, rng) if colours else (nan, nan)
+        rows.append(AtLight(each, snr_db, measured_db, *told, *seen))
     return rows
+
+
+def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[EvenField], Floats] | None:
+    """Return what visual noise is measured on; None of a camera that tells no colours in the light."""
+    try:
+        return colour_fields(sensor, light, exposure_s) if len(sensor.channels) >= 3 else None
+    except InputError:
+        return None
+
+
+def _visual_noise(
+    fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator
+) -> tuple[float, float]:
+    """Return visual noise in closed form and on frames."""
+    electrons = [GREY * white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
+    if any(e >= field.headroom_e for e, field in zip(electrons, fields, strict=True)):
+        return nan, nan
+    ratio = min(
+        float(snr(np.array([e]), field.sensor, field.exposure_s, field.channel)[0])
+        for e, field in zip(electrons, fields, strict=True)
+    )
+    expected = expected_noise(fields, matrix, white_cd_m2) if ratio >= LEAST_RATIO else nan
+    return expected, measured_noise(fields, matrix, white_cd_m2, rng)
 
 
 def _db(ratio: float) -> float:

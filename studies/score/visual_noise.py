@@ -5,6 +5,7 @@ deviations of CIELUV are added, V = s(L*) + 0.852 s(u*) + 0.323 s(v*). The blur 
 standard's is based; its own table of sensitivities, and the CIELAB form of 2023, were not at hand.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 from math import nan
 
@@ -52,29 +53,45 @@ def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Def
     )
     if len(names) < 3:
         return Definition((replace(merit, missing="the mosaic tells no colours"),), not_measured)
-    known = named_light(light, sensor.window_nm)
     try:
-        matrix = calibrate(sensor, known.lamp).to_srgb
+        fields, matrix = colour_fields(sensor, light, exposure_s)
     except InputError as error:  # as of `colour_figures`
         return Definition((replace(merit, missing=one_line(error)),), not_measured)
-    fields = [even_field(every_pixel(sensor, name), known, exposure_s, name) for name in names]
     white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
-    whites_e = np.array([white_cd_m2 * field.electrons_per_cd_m2 for field in fields])
-
-    def measure(rng: np.random.Generator) -> list[float]:
-        planes = [
-            field.samples_e(field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)).reshape(SIDE_PX, SIDE_PX)
-            for field in fields
-        ]
-        return [visual_noise(np.stack(planes, axis=-1) / whites_e @ matrix.T)]
-
-    variances = np.array(
-        [
-            _variances(field, GREY * white_e) / white_e**2
-            for field, white_e in zip(fields, whites_e.tolist(), strict=True)
-        ]
+    return Definition(
+        (replace(merit, computed=expected_noise(fields, matrix, white_cd_m2)),),
+        lambda rng: [measured_noise(fields, matrix, white_cd_m2, rng)],
     )
-    return Definition((replace(merit, computed=_expected(variances, matrix)),), measure)
+
+
+def colour_fields(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[EvenField], Floats]:
+    """Return even fields of the three channels, each at every pixel, and the matrix that takes them to sRGB.
+
+    Raises
+    ------
+    InputError
+        For channels that the light doesn't reach, or that are alike.
+    """
+    known = named_light(light, sensor.window_nm)
+    matrix = calibrate(sensor, known.lamp).to_srgb
+    return [even_field(every_pixel(sensor, name), known, exposure_s, name) for name in sensor.channels[:3]], matrix
+
+
+def measured_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator) -> float:
+    """Measure the visual noise of 18 % grey on frames of the channels; the luminance is shown as white."""
+    planes = [
+        field.samples_e(field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)).reshape(SIDE_PX, SIDE_PX)
+        / (white_cd_m2 * field.electrons_per_cd_m2)
+        for field in fields
+    ]
+    return visual_noise(np.stack(planes, axis=-1) @ matrix.T)
+
+
+def expected_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float) -> float:
+    """Compute the same in closed form, of noise that is small beside the grey."""
+    whites_e = [white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
+    by_channel = [_variances(field, GREY * e) / e**2 for field, e in zip(fields, whites_e, strict=True)]
+    return _expected(np.array(by_channel), matrix)
 
 
 def _variances(field: EvenField, electrons: float) -> Floats:

@@ -97,7 +97,7 @@ MERITS = [
     Merit("a.two", "second", "dB", "ISO 2", "dim", 10.0, measured=12.0, low=11.0, high=13.0),
     Merit("a.three", "third", "lux", "ISO 3", "dark", 5.0, measured=6.0),
 ]
-CURVE = [AtLight(0.5, -3.25, -3.5, 0.125, 0.0625), AtLight(20.0, 31.5, 30.25, 0.75, 0.875)]
+CURVE = [AtLight(0.5, -3.25, -3.5, 0.125, 0.0625, 8.5, 9.5), AtLight(20.0, 31.5, 30.25, 0.75, 0.875, 2.5, 2.25)]
 
 
 def test_score_asks_for_the_lens_and_light_that_are_typed_and_tells_each_figure(
@@ -153,8 +153,8 @@ def test_score_asks_for_the_lens_and_light_that_are_typed_and_tells_each_figure(
     ]
     _, *table = lines_of(printed(*words, "--sweep"))
     assert table[:2] == [
-        ["low_noise", "0.5", "-3.25", "-3.5", "0.125", "0.0625"],
-        ["low_noise", "20", "31.5", "30.25", "0.75", "0.875"],
+        ["low_noise", "0.5", "-3.25", "-3.5", "0.125", "0.0625", "8.5", "9.5"],
+        ["low_noise", "20", "31.5", "30.25", "0.75", "0.875", "2.5", "2.25"],
     ]
 
 

@@ -20,9 +20,10 @@ from studies.score.developed import developed_figures
 from studies.score.developed_range import picture_range
 from studies.score.figure import REPEATS, Definition, Merit, measured
 from studies.score.information import information
+from studies.score.over_light import over_light
 from studies.score.score import definitions, score
 from studies.score.texture_response import texture_response
-from studies.score.visual_noise import raw_visual_noise, visual_noise
+from studies.score.visual_noise import colour_fields, raw_visual_noise, visual_noise
 
 
 @pytest.mark.thorough
@@ -126,6 +127,25 @@ def test_visual_noise_with_stripes_of_rows_is_what_frames_show() -> None:
     (plain,) = raw_visual_noise(loud, "D65", 0.033).merits
     assert merit.computed > 1.2 * plain.computed
     assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
+
+
+def test_visual_noise_over_light_is_the_row_s_where_the_white_is_the_same_and_frames_show_it() -> None:
+    """At ten times the light noise is less by 10^1/2 where shot noise is all; 16 384 pixels spread it by 2 %."""
+    sensor = public.low_noise("bayer")
+    (row,) = raw_visual_noise(sensor, "D65", 0.01).merits
+    fields, _ = colour_fields(sensor, "D65", 0.01)
+    white_cd_m2 = min(0.7 * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
+    lux = white_cd_m2 * np.pi
+    at, dimmer, dark, full = over_light(sensor, "D65", 0.01, 0, lux=[lux, lux / 10, lux / 1e5, 10 * lux])
+    assert at.visual_noise == pytest.approx(row.computed, rel=1e-6)
+    assert 2.4 < dimmer.visual_noise / at.visual_noise < sqrt(10)  # PRNU is there, read noise isn't much
+    for one in (at, dimmer):
+        assert one.measured_visual_noise == pytest.approx(one.visual_noise, rel=0.08)
+    assert np.isnan(dark.visual_noise)
+    assert dark.measured_visual_noise > 20
+    assert np.isnan([full.visual_noise, full.measured_visual_noise]).all()
+    (grey,) = over_light(public.low_noise("mono"), "D65", 0.01, 0, lux=[lux])
+    assert np.isnan([grey.visual_noise, grey.measured_visual_noise]).all()
 
 
 def test_the_range_of_pictures_is_their_top_over_their_noise() -> None:
