@@ -76,9 +76,9 @@ def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[
 def _visual_noise(
     fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return visual noise in closed form and on frames."""
+    """Return visual noise in closed form and on frames; none in the dark and of a full channel."""
     electrons = [GREY * white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
-    if any(e >= field.headroom_e for e, field in zip(electrons, fields, strict=True)):
+    if white_cd_m2 <= 0 or any(e >= field.headroom_e for e, field in zip(electrons, fields, strict=True)):
         return nan, nan
     ratio = min(
         float(snr(np.array([e]), field.sensor, field.exposure_s, field.channel)[0])

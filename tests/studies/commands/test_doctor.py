@@ -142,5 +142,5 @@ def test_the_extras_are_those_of_the_project_and_what_they_bring() -> None:
     project = tomllib.loads((HOME / "pyproject.toml").read_text("utf-8"))["project"]["optional-dependencies"]
     named = {name: [re.split("[<>=~]", text)[0] for text in texts] for name, texts in project.items()}
     assert {name: list(brought) for name, (_, brought) in doctor.EXTRAS.items()} == {
-        name: brought for name, brought in named.items() if name not in ("docs", "bench", "test", "dev")
+        name: brought for name, brought in named.items() if name not in ("docs", "bench", "train-net", "test", "dev")
     }
