@@ -42,12 +42,13 @@ QUICK := -m "not thorough and not slow"
 test: lint
 	@$(PARALLEL) $(QUICK) --assert=plain || { $(BIN)/python -m pytest $(QUICK) --last-failed --lfnf=none; exit 1; }
 
+# In CI TESTS=thorough leaves out what `make test` has run.
+TESTS := not slow
 test-all: $(VENV)/installed-dev
-	@$(PARALLEL) -m "not slow"
+	@$(PARALLEL) -m "$(TESTS)"
 
 # As test-all; in CI TESTS="not thorough and not slow" has it run what `make test` does.
 CPU := all
-TESTS := not slow
 test-any-cpu: $(VENV)/installed-dev
 	@$(BIN)/python tests/any_cpu/configurations.py --cpu "$(CPU)" -q -n auto --maxprocesses 8 --dist worksteal -m "$(TESTS)"
 
