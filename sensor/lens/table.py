@@ -112,10 +112,6 @@ class LensTable:
         """Whether the lens gives some heights less light than the middle."""
         return bool((self.relative_illumination != 1).any())
 
-    def moves(self) -> bool:
-        """Whether the lens moves light from the place that an ideal one gives it."""
-        return bool(self.distortion.any() or self.lateral_um.any())
-
     def landing(self, height: Floats, wavelength_nm: float, half_diagonal_um: float) -> Floats:
         """Image height at which light of an ideal image height lands."""
         lateral = self._lateral(wavelength_nm)
