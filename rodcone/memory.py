@@ -61,7 +61,14 @@ class Limit:
 
 
 def memory(
-    pixels: int, bands: int, groups: int, workers: int = 0, *, spp: float | None = None, denoised: bool = False
+    pixels: int,
+    bands: int,
+    groups: int,
+    workers: int = 0,
+    *,
+    spp: float | None = None,
+    denoised: bool = False,
+    held: int = 0,
 ) -> Memory:
     """Memory that a render of so many light groups needs, or what comes after it where that needs more.
 
@@ -75,6 +82,8 @@ def memory(
         Samples per pixel of the render, at most; 0 where the light is there already; left out, many.
     denoised : bool
         Whether the render is denoised.
+    held : int
+        Other renders of this size whose light is held meanwhile.
     """
     plane = 4.0 * pixels * bands  # of float32, all bands
     per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
@@ -90,6 +99,7 @@ def memory(
     # Looking at what was drawn, and developing it: the render is let go of before the first cell
     viewing = _VIEWER_BYTES + (_TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS) * plane
     rendering = max(drawing * (groups > 0 and spp != 0), viewing) + of_denoiser
+    rendering += held * _TRANSPORT_ARRAYS * groups * plane
     worker = _WORKER_BYTES + _CELL_BYTES * pixels
     if workers <= 1:
         peak_bytes = max(rendering, workers * worker)

@@ -1,8 +1,9 @@
 """Light of a scene that moves while it is exposed: the mean of its light at several times."""
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cache
+from math import hypot
 from typing import Any
 
 import numpy as np
@@ -67,65 +68,58 @@ def time_average(transports: Iterable[Transport]) -> Transport:
     >>> rodcone.time_average(moving).spp  # doctest: +SKIP
     2.0
     """
-    # Running means, so that the light of one time is held beside them.
-    first: Transport | None = None
-    means: list[Any] = []
-    told: list[_Told] = []
-    for number, each in enumerate(transports):
-        if first is None:
-            first, means = each, [np.array(planes) for planes in _planes(each)]
-        _require_alike(f"transports[{number}]", first, each)
-        for index, planes in enumerate(_planes(each)):
-            means[index] += (planes - means[index]) / means[index].dtype.type(number + 1)
-        told.append(_Told(each.scene_means, each.relative_mc_error, each.seconds, each.compile_s, each.meter))
-    if first is None:
+    mean: Transport | None = None
+    meters: list[Callable[[], Irradiance] | None] = []
+    for each in transports:
+        _require_alike(f"transports[{len(meters)}]", mean or each, each)
+        meters.append(each.meter)
+        mean = each if mean is None else _with(mean, each, len(meters))
+        del each  # lets go of its light before the next is rendered
+    if mean is None:
         raise InputError("transports: none given; allowed: one or more; give those of the times of an exposure")
-    # What the mean over k times is, from the means of what each is.
-    count = len(told)
-    light, difference, variance, counts, coverage, coverage_difference, *rest = means
-    variance /= variance.dtype.type(count)
-    covariance = rest.pop() / np.float32(count) if first.shared else None
+    if len(meters) == 1:
+        return mean
+    return replace(mean, meter=None if meters[0] is None else _meter([x for x in meters if x is not None]))
+
+
+def _with(mean: Transport, each: Transport, count: int) -> Transport:
+    """Mean over `count` times, of the mean over all but the last and the last.
+
+    m + (x - m) / k; of independent errors the variance is ((k - 1)^2 v_m + v_x) / k^2.
+    """
+
+    def mixed(first: Any, last: Any) -> Any:
+        return first + (last - first) / np.asarray(first).dtype.type(count)
+
+    def of_errors(first: Any, last: Any) -> Any:
+        real = np.asarray(first).dtype.type
+        return first * real((1 - 1 / count) ** 2) + last * real(1 / count**2)
+
+    def halves(first: Halves, last: Halves) -> Halves:
+        return Halves(mixed(first.mean, last.mean), mixed(first.difference, last.difference))
+
+    variance, means, last = of_errors(mean.variance, each.variance), mean.scene_means, each.scene_means
+    shared = None
+    if mean.shared is not None and each.shared is not None:
+        covariance = of_errors(_covariance(mean.shared, mean), _covariance(each.shared, each))
+        shared = _correlated(mean.shared.groups, covariance, variance)
     return replace(
-        first,
-        light=Halves(light, difference),
+        mean,
+        light=halves(mean.light, each.light),
         variance=variance,
-        counts=np.rint(counts * count).astype(np.uint32),
-        coverage=Halves(coverage, coverage_difference),
-        seen=tuple(Halves(mean, half) for mean, half in zip(rest[::2], rest[1::2], strict=True)),
-        shared=None if covariance is None or first.shared is None else _shared(first.shared, covariance, variance),
+        counts=mean.counts + each.counts,
+        coverage=halves(mean.coverage, each.coverage),
+        seen=tuple(halves(*pair) for pair in zip(mean.seen, each.seen, strict=True)),
+        shared=shared,
         scene_means=SceneMeans(
-            np.mean([x.scene_means.radiance for x in told], axis=0),
-            float(np.mean([x.scene_means.uncovered for x in told])),
-            np.mean([x.scene_means.covariance for x in told], axis=0) / count,
+            mixed(means.radiance, last.radiance),
+            means.uncovered + (last.uncovered - means.uncovered) / count,
+            of_errors(means.covariance, last.covariance),
         ),
-        seconds=sum(x.seconds for x in told),
-        compile_s=sum(x.compile_s for x in told),
-        relative_mc_error=float(np.sqrt(np.mean([x.relative_mc_error**2 for x in told]) / count)),
-        meter=None if first.meter is None else _meter([x.meter for x in told if x.meter is not None]),
+        seconds=mean.seconds + each.seconds,
+        compile_s=mean.compile_s + each.compile_s,
+        relative_mc_error=hypot((count - 1) * mean.relative_mc_error, each.relative_mc_error) / count,
     )
-
-
-@dataclass(frozen=True)
-class _Told:
-    """What a transport tells beside its planes."""
-
-    scene_means: SceneMeans
-    relative_mc_error: float
-    seconds: float
-    compile_s: float
-    meter: Callable[[], Irradiance] | None
-
-
-def _planes(transport: Transport) -> list[Any]:
-    """All planes of a transport: light, variance, counts, coverage, what is seen, and the covariance of two groups."""
-    halves = (transport.coverage, *transport.seen)
-    light, counts = transport.light, transport.counts.astype(np.float64)
-    planes: list[Any] = [light.mean, light.difference, transport.variance, counts]
-    planes += [part for half in halves for part in (half.mean, half.difference)]
-    if transport.shared is not None:
-        a, b = transport.shared.groups
-        planes += [transport.shared.correlation * np.sqrt(transport.variance[a] * transport.variance[b])]
-    return planes
 
 
 def _require_alike(name: str, first: Transport, other: Transport) -> None:
@@ -147,13 +141,16 @@ def _require_alike(name: str, first: Transport, other: Transport) -> None:
         )
 
 
-def _shared(first: SharedPaths, covariance: Planes, variance: Planes) -> SharedPaths:
-    """Correlation of two groups' errors, from their covariance and variance."""
-    a, b = first.groups
+def _covariance(shared: SharedPaths, transport: Transport) -> Planes:
+    """Covariance of the errors of two groups that share their paths."""
+    a, b = shared.groups
+    return np.asarray(shared.correlation * np.sqrt(transport.variance[a] * transport.variance[b]))
+
+
+def _correlated(groups: tuple[int, int], covariance: Planes, variance: Planes) -> SharedPaths:
+    a, b = groups
     deviations = np.sqrt(variance[a] * variance[b])
-    return SharedPaths(
-        first.groups, np.divide(covariance, deviations, out=np.zeros_like(covariance), where=deviations > 0)
-    )
+    return SharedPaths(groups, np.divide(covariance, deviations, out=np.zeros_like(covariance), where=deviations > 0))
 
 
 def _meter(meters: Sequence[Callable[[], Irradiance]]) -> Callable[[], Irradiance]:

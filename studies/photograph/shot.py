@@ -65,7 +65,7 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
-_TABLE_S = 3e-6  # the same of a lens by data, whose places have images of their own: 1.8e-6 at 1 Mpx, 4.3e-6 at 512 px
+_TABLE_S = 1.6e-6  # the same of a lens by data, whose places have images of their own: by 512 px
 # Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
 # of the light at its later times.
 _DEVICE, _FRAME, _START, _MOMENT = 0, 1, 2, 3
@@ -515,9 +515,11 @@ def check(order: Order) -> Checked:
         opened = replace(opened, scene=scene)
         moving = tuple(in_focus(each, sensor, size, *lens)[0] for each in moving)
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
-    spp = 0 if ready else (order.spp or _SPP) * max(len(moving), 1)
+    spp, times = 0 if ready else order.spp or _SPP, max(len(moving), 1)
     rendered = (samples * size[0], samples * size[1])
-    cost = PictureCost(rendered, centres.size, len(opened.scene.groups), spp, _after_s(sensor), through=through)
+    cost = PictureCost(
+        rendered, centres.size, len(opened.scene.groups), spp, _after_s(sensor), through=through, times=times
+    )
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving)
 
 

@@ -25,6 +25,9 @@ _COMPILE_S = 0.3  # a band, where no kernel is kept on disk
 PILOT_SPP = 32  # samples per pixel of the pilot that goes before a long render
 # A fixed piece of work on the machine of these numbers: 2.2 times less than on one with AVX2, as `make test` is.
 _WORK_S = 8.8e-3
+# A render of the same scene at another time, which is loaded and traced anew, and its light in each pixel, band and
+# group, which is kept and averaged.
+_ANOTHER_S = 0.8, 1.2e-7
 KERNELS = Path.home() / ".drjit"
 
 
@@ -48,6 +51,8 @@ class PictureCost:
         Time of the render, at most.
     through : str
         The lens that the scene is rendered through, in words; none for a pinhole.
+    times : int
+        Renders of so many samples each, of a scene that moves, whose mean is taken.
     """
 
     size: tuple[int, int]
@@ -58,6 +63,7 @@ class PictureCost:
     denoised: bool = False
     max_seconds: float | None = None
     through: str = ""
+    times: int = 1
 
     @property
     def pixels(self) -> int:
@@ -68,20 +74,22 @@ class PictureCost:
     def memory(self) -> Memory:
         """Memory at the peak."""
         groups = self.groups if self.spp != 0 else 1
-        return memory(self.pixels, self.bands, groups, spp=self.spp, denoised=self.denoised)
+        mean = int(self.times > 1)  # the light of the times that went before
+        return memory(self.pixels, self.bands, groups, spp=self.spp, denoised=self.denoised, held=mean)
 
     @property
     def seconds(self) -> float:
         """Time on this machine's cores, if they are idle; of a render until an error, for 64 samples."""
         spp = PILOT_FROM if self.spp is None else self.spp
         render = render_seconds(self.pixels, self.bands, self.groups, spp) * (1.5 if self.denoised else 1.0)
-        render = min(render, self.max_seconds or render)
+        another = _ANOTHER_S[0] + _ANOTHER_S[1] * self.pixels * self.bands * self.groups
+        render = self.times * min(render, self.max_seconds or render) + (self.times - 1) * pace() * another
         compiled = _COMPILE_S * self.bands if spp and not kernels_kept() else 0.0
         return pace() * (START_S + compiled + self.after_s * self.pixels * self.bands) + render
 
     def facts(self) -> dict[str, Any]:
         """What ``--dry-run --json`` prints."""
-        values = {"size": list(self.size), "bands": self.bands, "samples_per_pixel": self.spp}
+        values = {"size": list(self.size), "bands": self.bands, "samples_per_pixel": self.spp, "times": self.times}
         half = {"half_samples_seconds": self._fewer().seconds, "half_size_seconds": self._smaller().seconds}
         return values | {"seconds": self.seconds, "bytes": self.memory.total} | half
 
@@ -89,6 +97,7 @@ class PictureCost:
         """One line: time, memory and samples, and what half of it would take."""
         height, width = self.size
         samples = f", {self.spp:g} samples per pixel" if self.spp else ""
+        samples += f" at each of {self.times} times" if self.times > 1 else ""
         light = ", its light is there already" if self.spp == 0 else f"{samples}, {self.bands} bands"
         time = f"about {duration(self.seconds)}"
         if self.spp is None:

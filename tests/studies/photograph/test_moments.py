@@ -9,6 +9,7 @@ from refusal import refusal
 
 from sensor.raw_files.raw_file import read_raw
 from studies.photograph.shot import Order, check, take
+from studies.study.cost import pace, render_seconds
 from studies.study.scene_source import open_scene
 
 MOVING = """<scene version="3.0.0">
@@ -39,9 +40,14 @@ def test_the_scene_stands_at_the_middles_of_equal_parts_of_the_exposure() -> Non
 
 
 def test_each_time_costs_a_render() -> None:
-    still = check(Order("walker", exposure="0.4s", size=32, spp=16))
+    still, moving = (check(Order("walker", exposure="0.4s", size=32, spp=1600, moments=k)) for k in (None, 8))
     assert still.moving == ()
-    assert check(Order("walker", exposure="0.4s", size=32, spp=16, moments=8)).cost == replace(still.cost, spp=8 * 16)
+    assert moving.cost == replace(still.cost, times=8)
+    lit = 32 * 32 * moving.cost.bands * 4
+    render_s = render_seconds(32 * 32, moving.cost.bands, 4, 1600)
+    assert moving.cost.seconds - still.cost.seconds == pytest.approx(7 * (render_s + pace() * (0.8 + 1.2e-7 * lit)))
+    assert moving.cost.memory.total - still.cost.memory.total == 3 * 4 * lit
+    assert "1600 samples per pixel at each of 8 times" in moving.cost.words()
 
 
 def test_a_scene_file_moves_by_its_parameter(scene_file: Path) -> None:

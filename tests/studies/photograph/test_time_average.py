@@ -88,6 +88,21 @@ def test_a_moving_edge_is_blurred_into_a_ramp_as_long_as_its_way():
     assert profile.mean() == pytest.approx(passed.mean(), abs=0.003)
 
 
+@pytest.mark.thorough
+def test_the_stated_variance_is_the_scatter_of_averages_of_other_seeds():
+    """24 means of three renders: sums over 64 pixels, whose ratio scatters by some 10 % (a forgotten 1 / k: by 3)."""
+    size, scene = (8, 8), load("cornell_box")
+    seeds = np.arange(72).reshape(24, 3)
+    made = [
+        time_average(render(scene, size, wavelength_nm=NM, width_nm=WIDTH, spp=8, seed=int(seed)) for seed in three)
+        for three in seeds
+    ]
+    scatter = np.var([x.radiance for x in made], axis=0, ddof=1).sum()
+    stated = np.mean([x.variance for x in made], axis=0).sum()
+    assert scatter == pytest.approx(stated, rel=0.35)
+    assert {x.spp for x in made} == {24.0}
+
+
 def test_the_walker_moves_and_the_street_stays():
     early, late = load("walker"), load("walker", time_s=0.5)
     nodes = early.geometry
