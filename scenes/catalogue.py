@@ -61,12 +61,11 @@ def load(name: str, **options: Any) -> Scene:
     InputError
         For an unknown name or option; the nearest allowed one is named.
     """
-    drawn = _DRAWN.fullmatch(name)
-    if drawn:
+    builder = _builder(name)
+    if drawn := _DRAWN.fullmatch(name):
         options = {**options, "seed": int(drawn[2], 16)}
-    require_keys(f"scene {drawn[1] if drawn else name}: option", options, scene_options(name))
-    scene: Scene = _builder(name)(**options)
-    return scene
+    require_keys(f"scene {builder.__name__}: option", options, scene_options(name))
+    return builder(**options)
 
 
 def scene_options(name: str) -> tuple[str, ...]:
@@ -81,8 +80,8 @@ def scene_options(name: str) -> tuple[str, ...]:
 
 
 def _builder(name: str) -> Callable[..., Scene]:
-    drawn = _DRAWN.fullmatch(name)
-    name = drawn[1] if drawn else name
+    if drawn := _DRAWN.fullmatch(name):
+        name = drawn[1]
     if name not in _NAMES:
         raise unknown("scene", name, _NAMES)
     builder: Callable[..., Scene] = getattr(import_module(f"scenes.{name}"), name)

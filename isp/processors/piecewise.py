@@ -58,7 +58,7 @@ def picture_ple_rgbw(
             f"raw: mosaic {raw.cfa} is not R, G, B and W in 2x2; allowed here: {RGBW} in any order; use ple_bayer for "
             "Bayer, ple for any mosaic"
         )
-    return _developed(raw, colours, balance, prior or own_prior())
+    return develop_planes(raw, colours, balance, prior or own_prior()).picture
 
 
 def picture_ple_bayer(
@@ -66,7 +66,7 @@ def picture_ple_bayer(
 ) -> Picture:
     """Develop a Bayer raw image; as `picture_ple_rgbw`."""
     require_bayer(raw.cfa)
-    return _developed(raw, colours, balance, prior or own_prior())
+    return develop_planes(raw, colours, balance, prior or own_prior()).picture
 
 
 def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
@@ -79,16 +79,12 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
             f"raw: mosaic {raw.cfa} of {raw.shape} pixels; allowed here: R, G, B and W in a tile of 1, 2 or 4 pixels a "
             "side, on 2x2 pixels or more; use any_mosaic"
         )
-    return _developed(raw, colours, balance, prior or own_prior())
+    return develop_planes(raw, colours, balance, prior or own_prior()).picture
 
 
 def takes(tile: Tile) -> bool:
     """Whether `picture_ple` develops a tile: of R, G, B and W, 1, 2 or 4 pixels high and wide."""
     return {len(tile), len(tile[0])} <= set(SIDES) and set(channels(tile)) <= set(LETTERS)
-
-
-def _developed(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> Picture:
-    return develop_planes(raw, colours, balance, prior).picture
 
 
 @dataclass(frozen=True)
