@@ -1,10 +1,11 @@
 """How far electrons of chart patches are from a fine integral, by products of band averages and by weights of bands.
 
 Run ``python benchmarks/bands.py``. For each illuminant and bands of 10 and 20 nm it prints the largest relative error
-over 24 patches and R, G, B and W: of means times means, of the weights with the lamp known and unknown
-(`render.band_weights`); the error that `Transport.band_error` states beside the one found (largest channel, RMS over
-patches), with the lamp known and for a file of radiance alone; and by how much the weights turn up the noise of bands
-whose relative errors are alike and independent, in even light and of the patch where it is most.
+over 24 patches and R, G, B and W: of means times means, of the weights with the lamp known, and of a file of true band
+means with its lamp unknown and named (`render.band_weights`, `render.bands.known_lamp`); the error that
+`Transport.band_error` states beside the one found (largest channel, RMS over patches), with the lamp known and for a
+file of radiance alone; and by how much the weights turn up the noise of bands whose relative errors are alike and
+independent, in even light, of the patch where it is most, and of that of a file whose lamp is named.
 
 ``--render SCENE`` prints how much the weights turn up the noise that a render really has in each channel: its bands
 share their paths.
@@ -15,10 +16,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from render.band_weights import transport_of_light
 from render.bands.error import curve_error
+from render.bands.known_lamp import over_lamp
 from render.bands.mixed_light import band_light
 from render.engine import render
 from render.illuminants import illuminant, illuminant_names
+from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import Spectrum, even_bands, photons_per_joule
 from rodcone.types import Floats, Planes
@@ -44,7 +48,8 @@ def table(count: int) -> None:
     plain = sensor.responses.band_average(sensor.channels, nm, width) * photons_per_joule(nm) * width * area_m2
     curves_by_name = sensor.responses.curves
     print(f"\n{width[0]:g} nm: largest error, %; RMS, %, stated and found; noise, times")
-    print("             means      known      unknown    known: stated found   file: stated found   even   patch")
+    print("             means      known   file: unknown named    known: stated found   file: stated found", end="")
+    print("   even   patch   named")
     for name in illuminant_names():
         if name == "sodium_low":
             continue  # lines of 0.1 nm: the fine sum would need more points
@@ -53,6 +58,7 @@ def table(count: int) -> None:
         exact = light @ responses.T * (STEP_NM * area_m2)
         averages = np.array([Spectrum(NM, row).band_average(nm, width) for row in light])
         emission = lamp.band_average(nm, width)
+        made = named(averages, nm, width, lamp)
         known, unknown = (electrons_per_irradiance(sensor, nm, width, 1.0, x) for x in (lamp, None))
         errors = [
             values @ weights.T / exact - 1
@@ -60,6 +66,7 @@ def table(count: int) -> None:
                 (surface_means * emission, plain),
                 (surface_means * emission, known),
                 (averages, unknown),
+                (averages, made),
             )
         ]
         planes = surface_means.T.reshape(1, count, 4, 6)
@@ -70,10 +77,21 @@ def table(count: int) -> None:
         ]
         noise = (relative_noise(known * emission) / relative_noise(plain * emission)).max()
         of_patches = [relative_noise(row * known) / relative_noise(row * plain) for row in surface_means * emission]
+        of_named = max((relative_noise(row * made) / relative_noise(row * plain)).max() for row in averages)
         largest = "   ".join(f"{100 * np.abs(error).max():8.2f}" for error in errors)
-        found = [np.sqrt(np.mean(error**2, axis=0)).max() for error in errors[1:]]
+        found = [np.sqrt(np.mean(error**2, axis=0)).max() for error in errors[1:3]]
         pairs = "   ".join(f"{100 * a:7.3f} {100 * b:7.3f}" for a, b in zip(told, found, strict=True))
-        print(f"{name:12} {largest}   {pairs}   {noise:7.3f} {np.max(of_patches):7.3f}")
+        print(f"{name:12} {largest}   {pairs}   {noise:7.3f} {np.max(of_patches):7.3f} {of_named:7.3f}")
+
+
+def named(averages: Floats, nm: Floats, width: Floats, lamp: Spectrum) -> Floats:
+    """Weights of a file's band means in each channel's electrons where its lamp is named, shape (channel, band)."""
+    file = SpectralRadiance(averages[None], nm, width_nm=width)
+    finer = over_lamp(file, lamp)
+    assert finer is not None
+    of_finer = electrons_per_irradiance(low_noise(), finer.wavelength_nm, finer.widths_nm, 1.0, lamp)
+    emission = lamp.band_average(finer.wavelength_nm, finer.widths_nm)
+    return (of_finer * emission) @ transport_of_light(nm, width, lamp, finer.wavelength_nm, finer.widths_nm)
 
 
 def stated(

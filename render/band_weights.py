@@ -35,6 +35,7 @@ LEAST_LIGHT = 1e-6  # share of the brightest band's light, below which a band is
 _TOUCH, _AS_WIDE = 0.02, 1.5  # neighbouring bands: largest gap over their width, and largest ratio of their widths
 _LEAST_NEGATIVE = 1e-9  # share of the largest weight that a negative weight may have by rounding
 MOST_NOISE = 1.05  # largest noise of weights, over that of products of averages
+_MEASURED = 3e-4  # error of a file's band means, in shares of the brightest band's
 _RIDGES = (1e-8, 10.0)  # smallest and largest ridge tried, in units of T's variance
 _HALVINGS = 12  # steps of the search between them, which finds a ridge within 0.5 %
 
@@ -207,6 +208,41 @@ def transport_weights(
     weights = np.zeros((len(values), wavelength_nm.size))
     weights[:, known.known] = found
     return weights, known.expected_error(values, found)
+
+
+def transport_of_light(
+    wavelength_nm: Floats, width_nm: Floats, light: LampSpectrum, finer_nm: Floats, finer_width_nm: Floats
+) -> Floats:
+    """Return the weights by which true band means of light give T's means in finer bands, shape (finer band, band).
+
+    A renderer's or a spectrometer's value is the mean of the product S T in a band, so that it tells of T most where
+    the lamp has its lines. T in the finer bands is what the Gaussian process expects of it, with these means known; its
+    own mean may be anything (universal kriging).
+
+    Parameters
+    ----------
+    wavelength_nm, width_nm : (band,) float64
+        Of the light that is known. A band that the lamp leaves dark tells nothing.
+    light : Spectrum
+        The lamp.
+    finer_nm, finer_width_nm : (finer band,) float64
+    """
+    points = points_of(np.zeros(0), wavelength_nm, width_nm, light)
+    lit = np.flatnonzero(points.lit)
+    shares = np.zeros((lit.size, points.nm.size))  # of each point in the mean over its band, weighted by the lamp
+    row = np.searchsorted(lit, points.band).clip(max=lit.size - 1)
+    at = np.flatnonzero(lit[row] == points.band)
+    shares[row[at], at] = (points.light * points.step_nm / width_nm[points.band])[at]
+    among = shares @ _matern(points.nm[:, None] - points.nm) @ shares.T
+    trusted = among + np.diag((_MEASURED * points.mean.max() / points.mean[lit]) ** 2)
+    towards = _means(shares @ _matern(points.nm[:, None] - _nodes(finer_nm, finer_width_nm))).T
+    factor = scipy.linalg.cho_factor(trusted)
+    known = scipy.linalg.cho_solve(factor, towards.T).T
+    even = scipy.linalg.cho_solve(factor, np.ones(lit.size))
+    known += np.outer(1.0 - known.sum(axis=1), even / even.sum())
+    result = np.zeros((finer_nm.size, wavelength_nm.size))
+    result[:, lit] = known / points.mean[lit]
+    return result
 
 
 @dataclass(frozen=True)

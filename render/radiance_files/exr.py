@@ -20,6 +20,7 @@ import numpy as np
 import OpenEXR
 from numpy.typing import NDArray
 
+from render.illuminants import unit_luminance
 from render.radiance import SpectralRadiance
 from render.radiance_files.file_checks import (
     MOST_EXPANSION,
@@ -28,7 +29,7 @@ from render.radiance_files.file_checks import (
     require_file,
     require_reflectances,
 )
-from render.spectrum import band_widths, tristimulus
+from render.spectrum import Spectrum, band_widths, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.errors import InputError, in_place, one_line, read_errors, require_range
 from rodcone.file_keys import require_known
@@ -39,6 +40,7 @@ VERSION = "1.0"
 LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values are spectral: per nm
 TRUE_UNITS = "W.m^-2.sr^-1.nm^-1"
 UNITS, OWN_UNITS, BANDS = "emissiveUnits", "rodconeUnits", "rodconeBands_nm"
+LAMP = "rodconeLamp"  # nm:value, up to a factor; linear between, 0 outside
 _MEASUREMENT = ("lensTransmission", "cameraResponse")  # of the camera that took the picture, which rodcone doesn't undo
 _SPECTRAL = re.compile(r"(S[0-3]|T)\.([0-9]*,?[0-9]*(?:[Ee][+-]?[0-9]+)?)(\w{,2}(?:m|Hz)(?:\..*)?)")
 
@@ -87,9 +89,9 @@ def _to_nm(name: str, match: re.Match[str]) -> float:
     return nm
 
 
-def write_bands(wavelength_nm: Floats, width_nm: Floats) -> str:
-    """Centres and widths as text that reads back to the same float64."""
-    return ";".join(f"{c!r}:{w!r}" for c, w in zip(wavelength_nm.tolist(), width_nm.tolist(), strict=True))
+def write_pairs(first: Floats, second: Floats) -> str:
+    """Pairs of numbers, such as centres and widths of bands, as text that reads back to the same float64."""
+    return ";".join(f"{a!r}:{b!r}" for a, b in zip(first.tolist(), second.tolist(), strict=True))
 
 
 def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tuple[Floats, Floats]:
@@ -121,11 +123,29 @@ def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tupl
 def _parsed(text: str) -> tuple[Floats, Floats] | None:
     """Centres and widths from text, None where it isn't that."""
     try:
-        pairs = np.array([[float(part) for part in pair.split(":")] for pair in text.split(";")])
-        centres, widths = pairs.T
+        centres, widths = _pairs(text)
         return centres, band_widths(centres, widths)
     except ValueError:  # InputError is one
         return None
+
+
+def _pairs(text: str) -> tuple[Floats, Floats]:
+    first, second = np.array([[float(part) for part in pair.split(":")] for pair in text.split(";")]).T
+    return first, second
+
+
+def _lamp(header: Mapping[str, Any]) -> Spectrum | None:
+    """Lamp that the header states, None where it states none; a `UserWarning` tells of text that is no spectrum."""
+    if LAMP not in header:
+        return None
+    try:
+        lamp = Spectrum(*_pairs(str(header[LAMP])))
+    except ValueError:
+        lamp = None
+    if lamp is None or not lamp.values.any():
+        warnings.warn(f"the attribute {LAMP} is no spectrum and is left aside", stacklevel=3)
+        return None
+    return lamp
 
 
 def check_units(header: Mapping[str, Any], channels: Iterable[str]) -> None:
@@ -157,7 +177,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     """Write radiance as a spectral OpenEXR file; it appears whole or not at all.
 
     Channels are float32 with lossless PIZ compression; there are no half floats, since absolute radiance at night is
-    under their least number. float32 radiance, band centres and widths read back bit by bit.
+    under their least number. float32 radiance, band centres, widths and the lamp read back bit by bit.
 
     Parameters
     ----------
@@ -181,6 +201,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     if len(set(names)) < len(names):
         raise InputError(f"{path}: band centres less than 1e-6 nm apart have no names of their own; merge those bands")
     preview, white_cd_m2 = _preview(radiance)
+    lamp = radiance.light  # an even one says nothing: light of colours of its own has it too
     channels = {name: np.ascontiguousarray(radiance.values[:, :, k], np.float32) for k, name in enumerate(names)}
     channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
     header = {
@@ -189,11 +210,14 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
         "spectralLayoutVersion": VERSION,
         UNITS: LAYOUT_UNITS,
         OWN_UNITS: TRUE_UNITS,
-        BANDS: write_bands(radiance.wavelength_nm, radiance.widths_nm),
+        BANDS: write_pairs(radiance.wavelength_nm, radiance.widths_nm),
         ERROR: repr(float(radiance.relative_mc_error)),
         "whiteLuminance": white_cd_m2,
         PREVIEW: PREVIEW_TEXT,
         **({SCENE: scene} if scene else {}),
+        **(
+            {LAMP: write_pairs(lamp.wavelength_nm, lamp.values)} if lamp is not None and np.ptp(lamp.values) > 0 else {}
+        ),
     }
     path.parent.mkdir(parents=True, exist_ok=True)
     with replacing(path) as (place,):
@@ -223,6 +247,22 @@ def exr_holds_reflectance(path: str | Path) -> bool:
     with in_place(str(path)), _damage():
         header = _part(Path(path), header_only=True).header
         return spectral_channels(channel.name for channel in header["channels"])[0]
+
+
+def read_exr_lamp(path: str | Path) -> Spectrum | None:
+    """Return the lamp behind a file of radiance, scaled to 1 cd/m^2; None where it states none.
+
+    Raises
+    ------
+    InputError
+        As `read_exr` for a file that is no OpenEXR.
+    """
+    require_file(Path(path))
+    with in_place(str(path)), _damage():
+        header = _part(Path(path), header_only=True).header
+        reflectance, _ = spectral_channels(channel.name for channel in header["channels"])
+        lamp = None if reflectance else _lamp(header)
+    return None if lamp is None else unit_luminance(lamp)
 
 
 def read_exr(path: str | Path) -> SpectralRadiance:
@@ -265,7 +305,8 @@ def read_exr(path: str | Path) -> SpectralRadiance:
         values = np.moveaxis(planes, 0, -1)
         if reflectance:
             require_reflectances(values)
-        return SpectralRadiance(values, wavelength_nm=centres, relative_mc_error=error, width_nm=widths)
+        lamp = None if reflectance else _lamp(header)
+        return SpectralRadiance(values, wavelength_nm=centres, relative_mc_error=error, width_nm=widths, light=lamp)
 
 
 def _damage() -> AbstractContextManager[None]:

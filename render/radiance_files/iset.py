@@ -95,8 +95,17 @@ def _lamp(numbers: Numbers, path: str | Path) -> Spectrum | None:
         if nm.size and values.size == nm.size and values.any():
             with in_place(f"{path}: illuminant"):
                 per_joule = photons_per_joule(nm) if values_key.endswith("photons") else 1.0
-                return unit_luminance(Spectrum(nm, values / per_joule))
+                return unit_luminance(_to_edges(Spectrum(nm, values / per_joule)))
     return None
+
+
+def _to_edges(lamp: Spectrum) -> Spectrum:
+    """Illuminant whose end samples hold to the edges of the bands that they stand for."""
+    nm = lamp.wavelength_nm
+    if nm.size == 1:
+        return lamp
+    ends = nm[0] - (nm[1] - nm[0]) / 2, nm[-1] + (nm[-1] - nm[-2]) / 2
+    return Spectrum(np.array([ends[0], *nm, ends[1]]), np.array([lamp.values[0], *lamp.values, lamp.values[-1]]))
 
 
 def _view_deg(numbers: Numbers, path: str | Path) -> float | None:

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from render.bands.known_lamp import over_lamp
 from render.error_estimates import Halves
 from render.illuminants import illuminant
 from render.level import SceneMeans
@@ -12,7 +13,7 @@ from render.radiance import SpectralRadiance
 from render.radiance_files import cube, photo
 from render.radiance_files.cube import REFLECTANCE, cube_holds, description, read_cube
 from render.radiance_files.envi import data_file
-from render.radiance_files.exr import exr_holds_reflectance, read_exr
+from render.radiance_files.exr import exr_holds_reflectance, read_exr, read_exr_lamp
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.reference import open_reference
 from render.scene import LightGroup
@@ -83,7 +84,7 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
     return sum(pixels), bands[0], groups[0]
 
 
-def load_radiance(path: str | Path, light: str = "D65", spectra: str = photo.SURFACES) -> SpectralRadiance:
+def load_radiance(path: str | Path, light: str | None = None, spectra: str = photo.SURFACES) -> SpectralRadiance:
     """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube, a photograph, reference light (``.npz``).
 
     Parameters
@@ -92,8 +93,10 @@ def load_radiance(path: str | Path, light: str = "D65", spectra: str = photo.SUR
         Beside a cube (``.npy``, ENVI's ``.hdr``, a plain ``.mat``) lies its description
         (`render.radiance_files.cube.read_cube`); a photograph's (``.jpg``, ``.png``) spectra are upsampled from its
         colours (`render.radiance_files.photo.read_photo`).
-    light : str
-        Illuminant of reflectances, of which 1 has 100 cd/m^2.
+    light : str, optional
+        Illuminant of reflectances, of which 1 has 100 cd/m^2; left out, D65. Of a file of radiance that states no lamp,
+        the lamp that it was taken under: the light is followed to this lamp's lines, in bands of at most 10 nm. It
+        takes the place of the illuminant that an ISETCam scene holds.
     spectra : str
         Of a photograph's colours, ``surfaces`` or ``srgb_basis``, as `read_photo` takes it.
 
@@ -102,34 +105,51 @@ def load_radiance(path: str | Path, light: str = "D65", spectra: str = photo.SUR
     InputError
         For another ending, and as `read_exr`, `read_iset_scene`, `read_cube` and `read_photo`.
     """
-    lit = is_reflectance(path) or is_reference(path)
-    return load_picture(path, illuminant(light), spectra).relight() if lit else _read(path)
+    if light is None and not (is_reflectance(path) or is_reference(path)):
+        return _read(path)
+    return load_picture(path, illuminant(light or "D65"), spectra, named=light is not None).relight()
 
 
-def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACES, *, relit: bool = False) -> Transport:
+def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACES, *, named: bool = False) -> Transport:
     """Read a file as `load_radiance` does, as light transport: reflectances can be lit by another light afterwards.
 
     Parameters
     ----------
     light : Spectrum
-        Of 1 cd/m^2; for reflectances, and for radiance that is `relit`. Reference light has lights of its own.
+        Of 1 cd/m^2; for reflectances, and for radiance where it is `named`. Reference light has lights of its own.
     spectra : str
         As of `load_radiance`.
-    relit : bool
-        Whether the light takes the place of the lamp that a file of radiance states.
+    named : bool
+        Whether a person named the light: it is then the lamp behind radiance that states none, and takes the place of
+        the illuminant of an ISETCam scene.
+
+    Warns
+    -----
+    OtherLampWarning
+        Where the lamp leaves bands dark in which there is light. The light is then taken as smooth.
     """
     if is_reference(path):
         return open_reference(path).transport
     is_photo = Path(path).suffix.lower() in photo.EXTENSIONS
     radiance = photo.read_photo(path, spectra) if is_photo else _read(path)
-    transport = as_transport(radiance.relight(light) if relit else radiance)
-    if not is_reflectance(path):
-        return transport
-    return replace(transport, groups={"light": LightGroup((), light, WHITE_CD_M2)})
+    if is_reflectance(path):
+        return _lit(radiance, light, WHITE_CD_M2)
+    if named and radiance.light is not None and is_iset(path):
+        radiance = radiance.relight(light)
+    lamp = radiance.light or (light if named else None)
+    transport = None if lamp is None else over_lamp(radiance, lamp)
+    return as_transport(radiance) if lamp is None or transport is None else _lit(transport, lamp, 1.0)
+
+
+def _lit(transport: SpectralRadiance, lamp: Spectrum, power: float) -> Transport:
+    """Light transport of one lamp from reflectances, or from radiance over the lamp, in the place of radiance."""
+    return replace(as_transport(transport), groups={"light": LightGroup((), lamp, power)})
 
 
 def stored_illuminant(path: str | Path) -> Spectrum | None:
-    """Illuminant that a picture file holds, at 1 cd/m^2: an ISETCam scene may; None where there is none."""
+    """Lamp that a picture file holds, at 1 cd/m^2: rodcone's own and an ISETCam scene may; None where there is none."""
+    if Path(path).suffix.lower() == ".exr":
+        return read_exr_lamp(path)
     return read_iset_illuminant(path) if is_iset(path) else None
 
 

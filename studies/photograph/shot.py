@@ -274,7 +274,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         light_name = order.light[0] if order.light else None
         light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
         white = file_white(order.source, light_of_file)
-        white = white if light_name else replace(white, relit=False)  # a white balance relights nothing
+        white = white if light_name else replace(white, named=False)  # a white balance names no lamp
         transport, notes = open_radiance_file(order.source, white)
         light = white.spectrum
         if is_reference(order.source):

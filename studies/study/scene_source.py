@@ -11,6 +11,7 @@ from render.radiance_files.photo import EXTENSIONS, SRGB_BASIS, SURFACES
 from render.radiance_files.radiance_source import (
     ENDINGS,
     REFERENCE,
+    is_iset,
     is_reference,
     is_reflectance,
     load_picture,
@@ -128,17 +129,20 @@ def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
     return {"illuminance_lux" if unit == "lux" else "luminance_cd_m2": value}
 
 
-_SMOOTH = "its light is taken to be smooth within bands, and of a lamp with lines bands of 20 nm lose up to 6 %"
+_SMOOTH = (
+    "its light is taken to be smooth within bands; of a lamp with lines bands of 20 nm lose up to 6 % so, which naming "
+    "it as the light mends"
+)
 LIGHT = "D65"  # what sRGB takes for white, where nothing tells the light of the picture
 
 
 @dataclass(frozen=True)
 class AdoptedWhite:
-    """Light that colours are judged under, what had to be assumed for it, and whether it replaces the file's own."""
+    """Light that colours are judged under, what had to be assumed for it, and whether a person named it."""
 
     spectrum: Spectrum
     notes: tuple[str, ...] = ()
-    relit: bool = False
+    named: bool = False
 
 
 def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum:
@@ -157,7 +161,7 @@ def default_white(path: str | Path) -> AdoptedWhite:
 def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
     """Return the light under which a picture file is seen: `light` if it is given, else the file's own, else D65.
 
-    A given light replaces the illuminant that an ISETCam scene holds.
+    A given light replaces the illuminant that an ISETCam scene holds, and is the lamp behind a file that states none.
 
     Raises
     ------
@@ -168,7 +172,7 @@ def file_white(path: str | Path, light: str | None) -> AdoptedWhite:
     stored = stored_illuminant(path)
     if given is not None:
         note = f"{Path(path).name}: lit by {light} in place of the illuminant that it holds"
-        return AdoptedWhite(given) if stored is None else AdoptedWhite(given, (note,), relit=True)
+        return AdoptedWhite(given, (note,) if stored is not None and is_iset(path) else (), named=True)
     if stored is None:
         return default_white(path)
     return AdoptedWhite(stored, (f"{Path(path).name}: its colours are judged under the illuminant that it holds",))
@@ -199,7 +203,7 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite, spectra: str = SUR
     """
     with warnings.catch_warnings(record=True) as file_warnings:
         warnings.simplefilter("always")
-        transport = load_picture(path, white.spectrum, spectra, relit=white.relit)
+        transport = load_picture(path, white.spectrum, spectra, named=white.named)
     name = Path(path).name
     for side in transport.counts.shape:
         require_range(f"{name}: side", side, 16, 4096, "a picture needs so many pixels a side; crop or scale it")

@@ -5,11 +5,13 @@ import pytest
 from builders import transport_of
 from loop import loop
 
-from render.band_weights import band_weights
+from render.band_weights import band_weights, transport_of_light
 from render.bands.error import curve_error
+from render.bands.known_lamp import over_lamp
 from render.bands.mixed_light import band_light
 from render.engine import render
 from render.illuminants import illuminant, illuminant_names
+from render.radiance import SpectralRadiance
 from render.scene import LightGroup
 from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, even_bands, line_spectrum, observer, tristimulus
 from scenes.catalogue import load
@@ -57,6 +59,34 @@ def test_xyz_of_light_that_is_known_by_its_bands_alone_is_the_smooth_ones(name, 
     exact = LUMINOUS_EFFICACY_LM_W * np.einsum("px,cx->pc", REFLECTANCES[:6] * lamp.values, observer(FINE_NM)) * STEP_NM
     made = tristimulus(light, nm, width)
     assert np.abs(made / exact - 1)[:, :2].max() < most
+
+
+@loop(("name", "most"), list(MOST.items()))
+def test_electrons_of_a_file_of_true_band_means_are_those_of_a_fine_integral_once_its_lamp_is_named(name, most):
+    nm, width = even_bands((380.0, 780.0), 20)
+    made = over_lamp(SpectralRadiance(true_means(name, nm, width), nm, width_nm=width), illuminant(name))
+    lit = transport_of(np.moveaxis(made.values, -1, 0)[None], {"x": LightGroup(("x",), illuminant(name))},
+                       made.wavelength_nm, made.widths_nm).relight()  # fmt: skip
+    weights = electrons_per_irradiance(SENSOR, lit.wavelength_nm, lit.widths_nm, 1.0, lit.light)
+    exact = np.einsum("px,cx,x->pc", REFLECTANCES, PHOTONS, fine(name), optimize=True)
+    ratio = lit.values[0] @ weights.T / exact
+    assert np.abs(ratio / np.median(ratio) - 1).max() < most / 2
+    # Noise of bands whose relative errors are alike and independent, over that of products of averages.
+    emission = illuminant(name).band_average(lit.wavelength_nm, lit.widths_nm)
+    of_file = (weights * emission) @ transport_of_light(nm, width, illuminant(name), lit.wavelength_nm, lit.widths_nm)
+    plain = SENSOR.responses.band_average(SENSOR.channels, nm, width) * nm
+    for row in true_means(name, nm, width)[0]:
+        assert (relative_noise(row * of_file) / relative_noise(row * plain)).max() < 1.055
+
+
+def true_means(name, nm, width):
+    lamp = fine(name)
+    edges = np.searchsorted(FINE_NM, nm - width / 2)
+    return np.add.reduceat(REFLECTANCES * lamp, edges, axis=1)[None] * STEP_NM / width
+
+
+def relative_noise(terms):
+    return np.linalg.norm(terms, axis=1) / terms.sum(axis=1)
 
 
 @loop(("lamps", "most"), [(("D65", "A"), 2e-3), (("A", "LED-B3"), 2e-3), (("F2", "LED-RGB1"), 6e-3),

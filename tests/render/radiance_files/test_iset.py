@@ -91,7 +91,10 @@ def test_illuminant_is_energy_at_1_cd_m2_or_none(form: str, stored: dict[str, An
         assert light is None
         return
     assert light is not None
-    assert light.values / light.values[0] == pytest.approx(NM / NM[0])  # energy in proportion to wavelength
+    inside = slice(1, -1)
+    assert light.values[inside] / light.values[1] == pytest.approx(NM / NM[0])  # energy in proportion to wavelength
+    assert light.wavelength_nm[[0, -1]].tolist() == [395.0, 705.0]  # end samples hold to the edges of their bands
+    assert light.values[[0, -1]].tolist() == light.values[[1, -2]].tolist()
     nm = np.arange(360.5, 830.0)
     assert luminance(light.band_average(nm, 0 * nm + 1), nm, 0 * nm + 1) == pytest.approx(1.0)
 
@@ -326,7 +329,7 @@ def test_the_illuminant_that_a_scene_holds_is_exchanged_and_its_view_is_read(tmp
     inner = slice(1, -1)  # half of the outermost bands lies beyond the file's illuminant
     assert lit.values[0, 0, inner] == pytest.approx(expected[inner], rel=4e-3)  # straight lines between 10 nm
     assert lit.luminance() == pytest.approx(scene.luminance(), rel=5e-3)
-    assert load_picture(path, other, relit=True).relight().values == pytest.approx(lit.values, rel=1e-6)
+    assert load_picture(path, other, named=True).relight().values == pytest.approx(lit.values, rel=1e-6)
     refusal(replace(scene, light=None).relight, other, match="it isn't known which lamp is behind these values")
 
 

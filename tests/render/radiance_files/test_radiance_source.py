@@ -1,5 +1,6 @@
 """A picture file where a scene would stand: the same radiance out, levels as a scene's, no plane for lux."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +10,8 @@ from loop import loop
 from PIL import Image
 from refusal import refusal
 
+from render.bands.known_lamp import OtherLampWarning
+from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.radiance_files.exr import write_exr
 from render.radiance_files.photo import MOST_SIDE, read_photo
@@ -17,10 +20,12 @@ from render.radiance_files.radiance_source import (
     extent_of,
     is_radiance_file,
     is_reflectance,
+    load_picture,
     load_radiance,
+    stored_illuminant,
 )
 from render.radiance_files.surface_spectra import srgb_basis
-from render.spectrum import DEFAULT_WAVELENGTH_NM, Spectrum, tristimulus
+from render.spectrum import DEFAULT_WAVELENGTH_NM, LUMINOUS_EFFICACY_LM_W, Spectrum, observer, tristimulus
 from rodcone.colour_spaces import D65_XY, decode_srgb, xyz_from_xy, xyz_to_srgb
 
 NM = np.array([350.0, 450.0, 589.3, 1200.0])
@@ -135,3 +140,61 @@ def test_what_is_no_photograph_is_refused_in_one_line(tmp_path: Path) -> None:
         ("absent.png", "no such file"),
     ):
         refusal(read_photo, tmp_path / name, match=words)
+
+
+# The lamp behind a file of radiance: stated by the file, or named by who opens it.
+
+BANDS_NM = np.arange(390.0, 780.0, 20.0)
+SURFACES = 0.2 + 0.6 * np.random.default_rng(2).random((3, 4, 1)) * np.linspace(0.3, 1.0, BANDS_NM.size)
+
+
+def under_f11() -> SpectralRadiance:
+    return SpectralRadiance(SURFACES * illuminant("F11").band_average(BANDS_NM, np.full(20, 20.0)), BANDS_NM)
+
+
+def test_a_picture_that_states_its_lamp_reads_back_as_it_was_lit(tmp_path: Path) -> None:
+    lit = replace(under_f11(), light=illuminant("F11"))
+    write_exr(lit, tmp_path / "a.exr")
+    again = load_radiance(tmp_path / "a.exr")
+    assert again.light is not None
+    assert np.array_equal(again.light.values, illuminant("F11").values)
+    relit = load_picture(tmp_path / "a.exr", illuminant("D65")).relight()
+    assert relit.values == pytest.approx(lit.values, rel=1e-6)
+    assert relit.luminance() == pytest.approx(lit.luminance(), rel=1e-6)
+    stored = stored_illuminant(tmp_path / "a.exr")
+    assert stored is not None
+    assert stored.values == pytest.approx(illuminant("F11").values, rel=1e-3)
+
+
+@pytest.mark.parametrize("lamp", ["sodium_low", "F11"])
+def test_a_named_lamp_of_lines_gives_the_eye_the_light_that_its_lines_hold(tmp_path: Path, lamp: str) -> None:
+    """True band means of a ramp of reflectance under the lamp, against the sum over the lamp's own points."""
+    light = illuminant(lamp)
+    nm = np.unique(np.concatenate([np.arange(380.0, 780.0, 0.05), light.wavelength_nm]))
+    nm = nm[(nm >= 380.0) & (nm <= 780.0)]
+    surface = np.interp(nm, [380.0, 780.0], [0.1, 0.9]) * np.interp(nm, light.wavelength_nm, light.values, 0.0, 0.0)
+    means = Spectrum(nm, surface).band_average(BANDS_NM, np.full(20, 20.0))
+    write_exr(SpectralRadiance(np.broadcast_to(means, (2, 2, 20)), BANDS_NM), tmp_path / "a.exr")
+    exact = LUMINOUS_EFFICACY_LM_W * np.trapezoid(surface * observer(nm), nm)
+    made = load_radiance(tmp_path / "a.exr", lamp)
+    assert made.widths_nm.max() == 10.0
+    xyz = tristimulus(made.values, made.wavelength_nm, made.widths_nm, made.light)[0, 0]
+    assert xyz[:2] == pytest.approx(exact[:2], rel=2e-3)
+    smooth = load_radiance(tmp_path / "a.exr")
+    assert tristimulus(smooth.values, smooth.wavelength_nm, smooth.widths_nm)[0, 0, 0] != pytest.approx(exact[0], 5e-3)
+
+
+def test_a_lamp_that_is_dark_where_the_file_holds_light_is_not_taken_for_its_lamp(tmp_path: Path) -> None:
+    write_exr(under_f11(), tmp_path / "a.exr")
+    with pytest.warns(OtherLampWarning, match=r"nothing at \d+ nm, where the picture holds \d+\.\d% of its light"):
+        made = load_radiance(tmp_path / "a.exr", "sodium_low")
+    assert np.array_equal(made.values, under_f11().values.astype(np.float32))
+
+
+def test_an_attribute_that_is_no_lamp_is_left_aside_and_told(tmp_path: Path) -> None:
+    write_exr(replace(under_f11(), light=illuminant("F11")), tmp_path / "a.exr")
+    data = (tmp_path / "a.exr").read_bytes()
+    at = data.index(b"rodconeLamp")
+    (tmp_path / "a.exr").write_bytes(data[: at + 30] + data[at + 30 : at + 60].replace(b":", b"?") + data[at + 60 :])
+    with pytest.warns(UserWarning, match="rodconeLamp is no spectrum"):
+        assert load_radiance(tmp_path / "a.exr").light is None

@@ -98,13 +98,13 @@ def test_what_a_scene_cannot_do_is_told_when_it_is_opened(tmp_path: Path) -> Non
     refusal(open_choice, sky, replace(study, spectra=("own", "A")), match="colours of their own")
 
 
-def test_colours_are_set_to_the_scenes_light_or_the_one_that_is_put_in_its_place() -> None:
+def test_colours_are_set_to_the_scenes_light_or_the_one_that_is_put_in_its_place(tmp_path: Path) -> None:
     opened = open_choice(SceneChoice("color_checker", "A"), STUDY)
     assert opened.scene is not None
     own = next(iter(opened.scene.groups.values())).spectrum
     assert white_spectrum(opened, OWN) is own
     assert white_spectrum(opened, "D65") is illuminant("D65")
-    file = replace(opened, scene=None, choice=SceneChoice("x.exr", "A"))
+    file = replace(opened, scene=None, choice=SceneChoice(str(ramp(tmp_path / "x.exr")), "A"))
     assert white_spectrum(file, OWN) is illuminant("A")
 
 
