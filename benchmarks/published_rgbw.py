@@ -4,9 +4,9 @@
 
 Liu, Shah and Wandell ("ISETHDR", arXiv 2408.12048; IEEE Sensors Journal 2025) simulate the AR0132AT with an RGB and
 with an RGBW mosaic in ISETCam: the ColorChecker under D65, f/4, pixels of 3 um, 1/60 s, a mean illuminance of 0.01 to
-10 lux on the sensor. Each picture is scaled to its own brightest value, and the colour difference (CIE 1994) to that of a
-camera without noise is averaged over all pixels. They develop RGB by adaptive Laplacian interpolation, and both mosaics
-by a trained network (Restormer).
+10 lux on the sensor. Each picture is scaled to its own brightest value, and the colour difference (CIE 1994) to that of
+a camera without noise is averaged over all pixels. They develop RGB by adaptive Laplacian interpolation, and both
+mosaics by a trained network (Restormer).
 
 ISETCAM is a folder with ISETCam's ``data/`` (https://github.com/ISET/isetcam), from which
 ``sensor/colorfilters/auto/ar0132atRGBW.mat`` is read. The chip's other numbers stand in ISETCam's
