@@ -12,9 +12,13 @@ mosaic's sharpest channel g and stays: a colour gets d_c = b_c - (x_c / x_g) b_g
 (James & Stein 1961), chi^2 the mean over the colours of d_c^2 over its variance s_c^2. The estimate is seldom wrong
 by more than half of a colour's light x_c, which is therefore the prior deviation of its bias, and d_c counts by
 Wiener's share (x_c / 2)^2 / ((x_c / 2)^2 + s_c^2): samples that know a region's light worse than that add noise alone.
+It is added as a share of the colour's light, so that a region's shadows keep their share.
 
-A cell in which the residuals of a channel differ from each other by more than noise holds a lamp or an edge, and no
-even surface. It gives no residuals to other cells and nothing is added to it.
+What 16 pixels around tell too little of, a wider region may tell, such as that a whole picture is red. The same is
+therefore done three times, the widest first: with cells of 16, of 8 and of 4 pixels, each with what is left.
+
+A cell of 4x4 pixels in which the residuals of a channel differ from each other by more than noise holds a lamp or an
+edge, and no even surface. It gives no residuals to any cell and nothing is added to it.
 """
 
 from concurrent.futures import ThreadPoolExecutor
@@ -31,10 +35,12 @@ from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
 CELL = 4  # side of a cell [pixels]; no tile is larger
+TOGETHER_CELLS = (4, 2, 1)  # cells in a row and in a column that are taken as one, in turn
 REACH = 4  # cells on each side whose residuals count
 SURE = 1.5  # chi^2 up to which nothing is added; 1 would bring hues a little nearer, but coloured clouds into black
 LIKELY_BIAS = 0.5  # standard deviation of the bias that a colour's estimate is expected to have [share of its light]
 ALIKE = 1.0  # standard deviation of the weight over the difference of two cells' estimates [units of a sample's noise]
+LEAST_ALIKE = 0.05  # sum of weights below which the wider cells around a cell count for less
 TOGETHER = 16  # rows of cells that are worked on together
 LAMP_SIGMAS = 6.0  # root of a cell's summed squared residuals, above which it holds no even surface
 _LEAST = np.float32(1e-12)
@@ -67,34 +73,75 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     def variance_of(light: Singles) -> Singles:
         return np.asarray(shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
 
-    residuals = np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0))
-    n, r = _sums(sites), _sums(residuals)
-    of_cell = _sums(np.ones(raw.shape, np.float32))[..., None]
-    mean, x = _sums(planes) / of_cell, _sums(stable) / of_cell
-    light = np.maximum(mean, 0.0)
+    samples = np.where(sites, raw.electrons.astype(np.float32)[..., None], np.float32(0))
+    of_cell, n, in_samples = _sums(np.ones(raw.shape, np.float32))[..., None], _sums(sites), _sums(samples)
+    residuals = np.where(sites, samples - planes, np.float32(0))
+    r = _sums(residuals)
     # Where residuals spread more than noise makes them, there is no even surface.
     spread = _sums(residuals * residuals) - r**2 / np.maximum(n, 1.0)
-    surface = np.all(spread < LAMP_SIGMAS**2 * variance_of(light), axis=-1, keepdims=True)
-    n, r = n * surface, r * surface
-    variance = n * variance_of(light)
+    of_light = variance_of(np.maximum(_sums(planes) / of_cell, 0.0))
+    surface = np.all(spread < LAMP_SIGMAS**2 * of_light, axis=-1, keepdims=True)
+    n *= surface
+    in_noise = _sums(stable)
+    for together in TOGETHER_CELLS:
+        pixels, light, x = (_sums(values, together) for values in (of_cell, _sums(planes), in_noise))
+        r = in_samples - _sums(np.where(sites, planes, np.float32(0)))
+        light = np.maximum(light / pixels, 0.0)
+        count = _sums(n, together)
+        sums = [_sums(r * surface, together), count, count * variance_of(light)]
+        wide = x / pixels
+        share = _biases(wide, sums, light, guide, colours) / (light + _LEAST)
+        share = _to_cells(share, wide, in_noise / of_cell, together) * surface
+        for c in colours:
+            by_pixel = np.repeat(np.repeat(share[..., c], CELL, axis=0), CELL, axis=1)
+            if together == 1:  # linear between cells' centres, as those of wider ones are by `_to_cells`
+                by_pixel = uniform_filter(by_pixel, 2 * CELL - 1)
+            planes[..., c] += by_pixel[: raw.shape[0], : raw.shape[1]] * np.maximum(planes[..., c], 0.0)
 
+
+def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singles:
+    """Shares of cells from those of wider ones: linear between their centres, weighted by how alike they are in x.
+
+    A cell that is like none of the wide ones around it, as beside an edge, gets next to nothing.
+    """
+    if together == 1:
+        return share
+    height, width = x.shape[:2]
+    around = [np.pad(values, ((1, 1), (1, 1), (0, 0)), mode="edge") for values in (share, wide)]
+    total, weights = np.zeros_like(x), np.zeros_like(x[..., :1])
+    place = (np.arange(max(height, width)) % together + 0.5) / together - 0.5  # within a wide cell, from its centre
+    for dy, dx in np.ndindex(3, 3):
+        rows, columns = (
+            np.repeat(np.arange(step, step + count), together)[:length]
+            for step, count, length in ((dy, share.shape[0], height), (dx, share.shape[1], width))
+        )
+        tents = (
+            np.maximum(0.0, 1.0 - np.abs(place[:length] - (step - 1))).astype(np.float32)
+            for step, length in ((dy, height), (dx, width))
+        )
+        share_there, x_there = (values[np.ix_(rows, columns)] for values in around)
+        difference = x_there - x
+        alike = np.exp(np.vecdot(difference, difference) * np.float32(-0.5 / ALIKE**2))
+        w = (np.outer(*tents) * alike)[..., None]
+        total += w * share_there
+        weights += w
+    return np.asarray(total / np.maximum(weights, LEAST_ALIKE))
+
+
+def _biases(x: Singles, sums: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
+    """`_bias` of all cells, strips of rows at a time; parameters as of it, without `REACH` cells around."""
     sides = ((REACH, REACH), (REACH, REACH), (0, 0))
-    wide = [np.pad(values, sides, mode="symmetric") for values in (x, r, n, variance)]
-    bias = np.empty_like(mean)
+    wide = [np.pad(values, sides) for values in (x, *sums)]  # nothing is known beyond the picture
+    bias = np.empty_like(light)
 
     def strip(first: int) -> None:
         rows = slice(first, first + TOGETHER)
-        bias[rows] = _bias(
-            x[rows], [values[first : first + TOGETHER + 2 * REACH] for values in wide], light[rows], guide, colours
-        )
+        around = [values[first : first + TOGETHER + 2 * REACH] for values in wide]
+        bias[rows] = _bias(x[rows], around, light[rows], guide, colours)
 
     with ThreadPoolExecutor(cpu_count()) as threads:
-        list(threads.map(strip, range(0, len(mean), TOGETHER)))
-    bias *= surface
-    for c in colours:
-        by_pixel = np.repeat(np.repeat(bias[..., c], CELL, axis=0), CELL, axis=1)
-        added = uniform_filter(by_pixel, 2 * CELL - 1)[: raw.shape[0], : raw.shape[1]]
-        planes[..., c] = np.maximum(planes[..., c] + added, np.minimum(planes[..., c], 0.0))  # no light is the least
+        list(threads.map(strip, range(0, len(light), TOGETHER)))
+    return bias
 
 
 def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
@@ -136,9 +183,9 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
     return np.asarray(result, np.float32)
 
 
-def _sums(values: NDArray[Any]) -> Singles:
-    """Sums over cells; those at the far edges may have fewer pixels."""
+def _sums(values: NDArray[Any], side: int = CELL) -> Singles:
+    """Sums over `side` x `side` values; those at the far edges may be over fewer."""
     height, width = values.shape[:2]
-    filled = np.pad(values, ((0, -height % CELL), (0, -width % CELL), *((0, 0),) * (values.ndim - 2)))
-    cells = filled.reshape(len(filled) // CELL, CELL, filled.shape[1] // CELL, CELL, *values.shape[2:])
+    filled = np.pad(values, ((0, -height % side), (0, -width % side), *((0, 0),) * (values.ndim - 2)))
+    cells = filled.reshape(len(filled) // side, side, filled.shape[1] // side, side, *values.shape[2:])
     return np.asarray(cells.sum(axis=(1, 3), dtype=np.float32))
