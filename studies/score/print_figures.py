@@ -6,6 +6,7 @@ states no number of pixels. None of them is the houses' own score.
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from itertools import pairwise
 from math import isfinite, log2, log10, nan, pi
 
 import numpy as np
@@ -13,7 +14,8 @@ import numpy as np
 from rodcone.types import Floats
 from sensor.config import MOST_GAIN
 from sensor.photodiodes import with_gain
-from sensor.readings.noise import merged_variance
+from sensor.raw import RawImage
+from sensor.readings.noise import merged_variance, seams
 from sensor.readings.resolve import several
 from studies.photograph.snr import electrons_at_snr, snr
 from studies.score.even_field import EvenField
@@ -24,8 +26,7 @@ from studies.study.gain import ISO_SATURATION_LUX_S
 GREY_SHARE = 0.18  # of saturation, at which the low-light speed takes its ratio
 LEAST_DB, LEAST_STOPS, LEAST_BITS = 30.0, 9.0, 18.0  # of the low-light speed
 WHITE_SHARE = 0.9  # of saturation, up to which colours are counted: beyond, noise is clipped
-NODES, WEIGHTS = (x / 2 for x in np.polynomial.legendre.leggauss(10))  # of levels u^2, u from 0 to 1
-LEVELS = (NODES + 0.5) ** 2
+NODES = (10, 4)  # of the first step of levels, and of each beyond a seam of the readings, where noise is smooth
 LADDER = (0.9, 0.95, 1.0, 1.05, 1.1)  # of the gain that the closed form gives
 CONFUSION_UM, PDR_RATIO = 22.0, 20.0  # circle on a sensor of 36 x 24 mm, and the ratio in it
 
@@ -178,14 +179,20 @@ def _noise_e(field: EvenField, luminance_cd_m2: float) -> float:
 
 
 def _measured_bits(field: EvenField, rng: np.random.Generator) -> float:
-    white_cd_m2 = _white_cd_m2(field)
-    frames = {level: field.shoot(level * white_cd_m2, field.draw_chip(rng), rng) for level in LEVELS.tolist()}
+    frames: dict[float, RawImage] = {}
 
     def noise_e(one: EvenField, luminance_cd_m2: float) -> float:
-        nearest = min(frames, key=lambda level: abs(level * white_cd_m2 - luminance_cd_m2))
-        return float(one.samples_e(frames[nearest]).std(ddof=1))
+        if luminance_cd_m2 not in frames:
+            frames[luminance_cd_m2] = field.shoot(luminance_cd_m2, field.draw_chip(rng), rng)
+        return float(one.samples_e(frames[luminance_cd_m2]).std(ddof=1))
 
     return _bits_of(field, noise_e)
+
+
+def _steps(field: EvenField, top_e: float) -> Floats:
+    """Return the ends of the steps of u from 0 to 1 between which noise has no jump: the merge's seams are such."""
+    handovers_e = seams(field.readings).handover_e[:-1] if several(field.readings) else np.empty(0)
+    return np.unique([0.0, *np.sqrt(np.clip(handovers_e / top_e, 0.0, 1.0)), 1.0])
 
 
 def _bits_of(field: EvenField, noise_e: Callable[[EvenField, float], float]) -> float:
@@ -194,7 +201,11 @@ def _bits_of(field: EvenField, noise_e: Callable[[EvenField, float], float]) -> 
     white_cd_m2, bits = _white_cd_m2(field), 0.0
     for name in _colours(field):
         one = replace(field, channel=name)
-        noise: Floats = np.array([noise_e(one, level * white_cd_m2) for level in LEVELS.tolist()])
-        top_e = white_cd_m2 * one.electrons_per_cd_m2
-        bits += log2(float(WEIGHTS @ (2 * top_e * np.sqrt(LEVELS) / noise)))
+        top_e, total = white_cd_m2 * one.electrons_per_cd_m2, 0.0
+        for number, (start, end) in enumerate(pairwise(_steps(one, top_e).tolist())):
+            nodes, weights = np.polynomial.legendre.leggauss(NODES[min(number, 1)])
+            places = (start + end) / 2 + (end - start) / 2 * nodes
+            noise: Floats = np.array([noise_e(one, u**2 * white_cd_m2) for u in places.tolist()])
+            total += (end - start) / 2 * float(weights @ (2 * top_e * places / noise))
+        bits += log2(total)
     return bits

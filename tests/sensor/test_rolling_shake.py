@@ -11,7 +11,7 @@ from sensor.cfa import quad
 from sensor.photodiodes import binned
 from sensor.presets import preset
 from sensor.random import draw_key
-from sensor.shake import DAMPING, RESONANCE_HZ, moved_by_rows, path, rolling_path, row_shares, shaken
+from sensor.shake import moved_by_rows, path, rolling_path, row_shares, shaken
 
 HEIGHT, WIDTH = 40, 96
 
@@ -106,8 +106,7 @@ def test_rows_apart_differ_by_the_spectrum_s_share(apart_s):
     exposure_s = 0.01
 
     def spectrum(f):
-        broad = (2 * DAMPING * RESONANCE_HZ * f) ** 2
-        return 4 * DAMPING * RESONANCE_HZ**3 / np.pi / ((RESONANCE_HZ**2 - f**2) ** 2 + broad)
+        return 4 * 0.5 * 4**3 / np.pi / ((4**2 - f**2) ** 2 + (2 * 0.5 * 4 * f) ** 2)  # 4 Hz, damped by half
 
     expected = sum(
         scipy.integrate.quad(

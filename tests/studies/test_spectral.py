@@ -142,3 +142,8 @@ def test_a_camera_is_calibrated_with_the_infrared_that_it_sees() -> None:
     beyond = np.mean([each.values[-1] for _, each in color_checker_reflectances()])
     mixed = (1 - share) * seen.mean[white] + share * beyond
     assert fit.mean[white] == pytest.approx(mixed, rel=2e-3)
+
+
+def test_bands_that_a_plan_may_choose_end_at_forty_or_at_all_of_a_wider_range() -> None:
+    counts = (4, 8, 12, 16, 20, 28, 40)
+    assert [possible_counts(np.full(size, 10.0)) for size in (17, 30, 40, 41)] == [counts] * 3 + [(*counts, 41)]

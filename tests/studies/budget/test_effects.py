@@ -2,6 +2,7 @@
 
 from dataclasses import fields, replace
 from itertools import combinations, product
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -414,3 +415,17 @@ def test_errors_of_merged_bands_rise_and_fall_together() -> None:
     variance = np.where(np.arange(40) % 2, 9.0, 1.0)[None, :, None, None] * np.ones((1, 1, *SIZE))
     merged = merge_transport(replace(made, variance=variance.astype(np.float32)), band_groups(WIDTH_NM, 20))
     assert np.allclose(merged.variance, 4.0)
+
+
+def test_a_picture_files_pilot_has_no_noise_and_a_renders_is_scaled_to_the_whole_picture() -> None:
+    """A level's relative variance falls with pixels and samples: of one sample over the whole picture."""
+    from studies.budget.pilot import _pilot_noise
+
+    assert _pilot_noise(SimpleNamespace(rendered=False), None) == PilotNoise(0, 1, 0.0)
+    lit = SimpleNamespace(
+        spp=96.0, coverage=SimpleNamespace(mean=np.ones((6, 8))), level=lambda: SimpleNamespace(relative_error=0.02)
+    )
+    pilot = SimpleNamespace(rendered=True, opened=SimpleNamespace(size=(60, 40)))
+    assert _pilot_noise(pilot, lit) == PilotNoise(96.0, 48.0, pytest.approx(0.02**2 * 96 * 48 / 2400))
+    lit.level = lambda: SimpleNamespace(relative_error=None)
+    assert _pilot_noise(pilot, lit).level == 0.0

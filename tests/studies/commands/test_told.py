@@ -36,7 +36,6 @@ from studies.design.expect import ExpectedError
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 from studies.score.sharpness import edge_coverage
-from studies.study.render_noise import MARGIN
 from studies.study.study_file import read_study
 
 
@@ -261,7 +260,7 @@ def test_reference_asks_for_samples_by_the_share_so_far_and_certifies_each_step(
     )
     assert code == 0
     steps = [asked["max_spp"] for _, asked in renders]
-    assert steps == [512, int(min(1024, 512 * MARGIN * (worst / 512) / until + 1))]
+    assert steps == [512, int(min(1024, 512 * 1.05 * (worst / 512) / until + 1))]
     (size, first), (_, second) = renders
     assert size == (32, 32)
     assert (first["resume"], second["resume"]) == (None, kept[0][1])
@@ -274,7 +273,7 @@ def test_reference_asks_for_samples_by_the_share_so_far_and_certifies_each_step(
         assert sorted(shares.values()) == pytest.approx(sorted(600.0 / spp / x for x in luminances))
         assert (facts["relative_mc_error"], facts["halves"]) == (3 / spp, {"chance": 0.25})
         assert facts["command"] == "rodcone reference flat_field --size 32"
-    left_s = 128 * (MARGIN * (worst / 512) / until - 1)
+    left_s = 128 * (1.05 * (worst / 512) / until - 1)
     told = [line for line in err.splitlines() if "samples a pixel" in line]
     assert told == [
         f"rodcone: 512 samples a pixel: {worst / 512:.3g} of the sensor's variance in 95 % of pixels; about "

@@ -659,3 +659,15 @@ def test_the_frozen_list_is_counted_from_37_without_two() -> None:
     counted = {x.source for x in SetOrder(generated=32, seed=37).drawn_scenes}
     too_noisy = {"generated-aaee6ca8b349", "generated-05288180474c"}
     assert sorted(x.source for x in read_study("benchmark").scenes) == sorted(counted - too_noisy)
+
+
+def test_a_shard_that_could_run_code_is_refused(tmp_path: Path) -> None:
+    """Arrays of Python's objects are pickled: whoever opens one runs what it says."""
+    path, array = tmp_path / "train-000000.tar", BytesIO()
+    np.save(array, np.array([{"an": "object"}], dtype=object), allow_pickle=True)
+    with tarfile.open(path, "w") as tar:
+        for name, content in (("0.raw.npy", array.getvalue()), ("0.json", b"{}")):
+            member = tarfile.TarInfo(name)
+            member.size = len(content)
+            tar.addfile(member, BytesIO(content))
+    assert "it is no whole shard" in refusal(lambda: list(read_shard(path)))

@@ -666,3 +666,17 @@ def test_bad_input_is_refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
         ("still_life --port 70000", "port: 70000"), ("still_life --port -1", "port: -1"),
     )  # fmt: skip
     check_refusals("explore", rows, tmp_path)
+
+
+def test_memory_is_given_back_once_in_so_many_turns(monkeypatch: pytest.MonkeyPatch) -> None:
+    turns: list[int] = []
+    session = Session(of_transport(small_transport()))
+    monkeypatch.setattr("studies.explore.session.TRIM_AFTER", 3)
+    monkeypatch.setattr("studies.explore.session.release_memory", lambda: turns.append(session._turns))
+    page, first = connected(session), session._turns
+    for number in range(8):
+        page.ask(session, "show", number)
+    last = session._turns
+    session.close()
+    assert turns == [turn for turn in range(first + 1, last + 1) if turn % 3 == 0]
+    assert len(turns) >= 2

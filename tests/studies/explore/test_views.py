@@ -212,3 +212,20 @@ def test_the_histogram_holds_the_deepest_well_of_the_channels():
     assert deepest > 1.5 * raw.full_well_e
     assert histogram(raw)["edges_e"][-1] == pytest.approx(1.05 * deepest)
     assert histogram(raw)["edges_e"][0] == 0.5
+
+
+def test_every_letter_has_its_colour_in_the_mosaic():
+    """Cyan, magenta, yellow and white are two or three of the primaries; full wells, so that nothing dims them."""
+    shot = photograph(small_transport(), Controls())
+    raw = shot.exposed.raw
+    full = np.full(raw.shape, raw.black_dn + raw.full_well_e / raw.gain_e_per_dn)
+    for cfa in (("CM", "YW"), ("YC", "MM")):
+        shown = VIEWS["raw"](replace(shot, exposed=replace(shot.exposed, raw=replace(raw, cfa=cfa, dn=full))))
+        tints = {"C": (0, 255, 255), "M": (255, 0, 255), "Y": (255, 255, 0), "W": (255, 255, 255)}
+        assert shown[:2, :2].tolist() == [[list(tints[name]) for name in line] for line in cfa]
+
+
+def test_a_pixel_without_light_is_as_dark_as_0_db():
+    shot = photograph(small_transport(), Controls())
+    dark = replace(shot, exposed=replace(shot.exposed, expected_e=np.zeros_like(shot.exposed.expected_e)))
+    assert (VIEWS["snr"](dark) == np.rint(255 * np.array(colormaps["viridis"](0.0)[:3]))).all()

@@ -711,3 +711,15 @@ def test_a_range_read_out_is_off_by_what_its_ends_are_off_by(monkeypatch: pytest
     ratio = pixel.full_well_e / lit_e[:3].max() / (least_e / lit_e[3])
     assert computed == pytest.approx(20 * np.log10(ratio), abs=0.01)
     assert measured == pytest.approx(computed + 20 * np.log10(1.05 / 2), abs=0.01)
+
+
+def test_the_two_limits_of_the_filter_are_of_single_pixels_and_of_5_x_5(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each reading's largest difference, under the claim of its patch."""
+    from studies.paper import patches
+
+    readings = tuple(patches.READINGS)
+    monkeypatch.setattr(patches, "difference", lambda name, patch: 1e-3 * patch * (1 + readings.index(name)))
+    pixels, windows = patches.section_3_1()
+    for claim, patch in ((pixels, 1), (windows, 5)):
+        told = {check.condition: check.value for check in claim.checks}
+        assert told == {f"{x}, {patch} × {patch}": pytest.approx(1e-3 * patch * at) for at, x in enumerate(readings, 1)}

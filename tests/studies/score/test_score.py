@@ -124,18 +124,22 @@ def test_print_figures_are_their_formulas_by_hand() -> None:
     assert computed(sensor, "print.sports") == pytest.approx(speed, rel=0.01)
 
 
-@pytest.mark.parametrize("name", ["dual_gain", "split_pixel"])
+@pytest.mark.parametrize("name", ["dual_gain", "split_pixel", "staggered"])
 def test_colours_of_several_readings_have_the_noise_of_the_merge(name: str) -> None:
-    """The integral of 1 / noise up to 90 % of the range by a fine sum; noise is the signal over its ratio."""
+    """The integral of 1 / noise up to 90 % of the range by a fine sum; noise is the signal over its ratio.
+
+    The merge's noise jumps where a reading is left out: ten nodes over all levels told `staggered` 0.06 bits too few.
+    """
     sensor, light = public.preset(name), named_light("D65")
-    means = neutral_electrons(sensor, light, EXPOSURE_S)
-    field = even_field(sensor, light, EXPOSURE_S, "G")
+    means = dict(zip(sensor.channels, neutral_electrons(sensor, light, EXPOSURE_S).tolist(), strict=True))
+    headrooms_e = {x: even_field(sensor, light, EXPOSURE_S, x).headroom_e for x in sensor.channels[:3]}
+    white_cd_m2 = min(0.9 * headroom_e / means[x] for x, headroom_e in headrooms_e.items())
     bits = 0.0
-    for top_e in (0.9 * field.headroom_e * means / means[:3].max())[:3]:
-        edges_e = np.linspace(0.0, top_e**0.5, 4001) ** 2
+    for channel in headrooms_e:
+        edges_e = np.linspace(0.0, (white_cd_m2 * means[channel]) ** 0.5, 4001) ** 2
         middles_e = (edges_e[1:] + edges_e[:-1]) / 2
-        bits += np.log2(np.sum(np.diff(edges_e) * snr(middles_e, sensor, EXPOSURE_S, "G") / middles_e))
-    assert computed(sensor, "print.portrait") == pytest.approx(bits, abs=0.03)
+        bits += np.log2(np.sum(np.diff(edges_e) * snr(middles_e, sensor, EXPOSURE_S, channel) / middles_e))
+    assert computed(sensor, "print.portrait") == pytest.approx(bits, abs=0.01)
 
 
 def test_flare_is_the_share_that_scatters_by_hand() -> None:
