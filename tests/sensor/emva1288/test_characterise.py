@@ -10,6 +10,7 @@ from refusal import refusal
 
 from sensor.cfa import MOSAICS
 from sensor.config import LensConfig, SensorConfig
+from sensor.emva1288 import estimators as emva
 from sensor.emva1288.characterise import ExposurePlan, characterise, configured, measure_camera, plan_for
 from sensor.emva1288.photon_transfer import light_bench
 from sensor.photodiodes import binned
@@ -54,6 +55,15 @@ def test_every_term_is_found_where_it_was_put():
     bright = np.argmin(np.abs(found.transfer.light_e - 6000.0))
     expected = found.transfer.light_e[bright] / np.sqrt(found.transfer.light_e[bright] + 4.0**2 + 4.8)
     assert found.snr[bright] == pytest.approx(expected, rel=0.05)
+
+
+def test_a_dark_frames_electrons_are_added_to_the_well(monkeypatch):
+    """400 and 2 % of 4000 e-/s in 50 ms: 24 e- that the dark frame takes from the full one's mean."""
+    told = []
+    well = emva.well
+    monkeypatch.setattr(emva, "well", lambda *given: told.append(given[4]) or well(*given))
+    characterise(SENSOR, (64, 96), seed=2, exposure_s=0.05)
+    assert told == [pytest.approx(24.0, rel=0.1)]  # 6144 pixels tell the share of the hot ones to 9 %, of 4 e-
 
 
 def test_configured_values_follow_the_exposure_time():

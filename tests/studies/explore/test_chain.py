@@ -362,3 +362,12 @@ def test_a_transports_python_says_that_it_was_given():
     (state,) = of_transport(small_transport()).states(never_cancel)
     assert state.code == GIVEN
     assert "transport = ..." in python_of(state.code, Controls())
+
+
+def test_the_python_is_laid_out_as_a_file_is():
+    """Imports, sorted as they come, an empty line, the code without empty lines, and one at the end."""
+    render = "import numpy as np\n\nfrom pathlib import Path\n\nbands = 3\n\ntransport = ...\n"
+    assert python_of(render, Controls(seed=3), "raw") == (
+        "import numpy as np\nfrom pathlib import Path\nimport rodcone\n\nbands = 3\ntransport = ...\n"
+        "picture = rodcone.explorer_view(\n    transport,\n    'raw',\n    seed=3,\n)  # (h, w, 3) uint8\n"
+    )

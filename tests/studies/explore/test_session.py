@@ -3,6 +3,7 @@
 import json
 import pickle
 import threading
+import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
@@ -680,3 +681,19 @@ def test_memory_is_given_back_once_in_so_many_turns(monkeypatch: pytest.MonkeyPa
     session.close()
     assert turns == [turn for turn in range(first + 1, last + 1) if turn % 3 == 0]
     assert len(turns) >= 2
+
+
+def test_an_answer_brings_eight_notes_at_most(session: Session, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In the order of their words, each once."""
+
+    def noted(message: dict[str, Any]) -> tuple[dict[str, Any], list[bytes]]:
+        for number in range(12, 2, -1):
+            for _ in range(2):
+                warnings.warn(f"note {number:02}", stacklevel=1)
+        return {}, []
+
+    page = connected(session)
+    monkeypatch.setattr(session, "_answer", noted)
+    assert page.ask(session, "histogram", 1, cameras=[QUICK])["notes"] == [
+        f"note {number:02}" for number in range(3, 11)
+    ]

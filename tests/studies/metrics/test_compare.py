@@ -11,7 +11,7 @@ from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from studies.metrics.appearance import appearance
 from studies.metrics.appearance import picture_quality as quality_of
-from studies.metrics.compare import ReferencePicture, measure, reference_picture
+from studies.metrics.compare import ReferencePicture, _brightness, measure, reference_picture
 from studies.photograph.camera import capture
 from studies.photograph.develop import develop
 
@@ -98,3 +98,18 @@ def test_a_picture_is_seen_at_the_references_own_luminance() -> None:
     for reference, told in zip((dark, bright), found, strict=True):
         seen = appearance(other * factor, reference.truth, reference.white_cd_m2)
         assert told == pytest.approx(seen.pu21_psnr_db, abs=0.05)
+
+
+def test_the_brightness_is_that_at_which_white_takes_as_much_from_both() -> None:
+    """Halves of 0.5 and 4, of which white leaves 1; of 0.25 and 0.9: twice that is 0.5 and, clipped, 1.
+
+    By the means alone it would be 1.3 times. Cells at the edge are smaller and count by their pixels: in the last 4 of
+    20 columns a cell of 0.1 and of 0.05 takes the factor with it.
+    """
+    reference, picture = np.full((16, 16), 0.5), np.full((16, 16), 0.25)
+    reference[:8], picture[:8] = 4.0, 0.9
+    assert _brightness(picture, reference) == pytest.approx(2.0)
+    assert _brightness(reference / 5.0, reference / 4.0) == pytest.approx(1.25)
+    wider, dimmer = (np.pad(x, ((0, 0), (0, 4)), constant_values=y) for x, y in ((reference, 0.1), (picture, 0.04)))
+    # 8 columns of (1 + 0.5) / 2 each and 4 of 0.1: 8 (1 + 0.25 k) + 4 (0.04 k) = 8 x 1.5 + 4 x 0.1
+    assert _brightness(dimmer, wider) == pytest.approx((8 * 1.5 + 4 * 0.1 - 8) / (8 * 0.25 + 4 * 0.04))

@@ -413,6 +413,16 @@ def test_the_measured_response_is_near_its_closed_form_and_says_what_was_photogr
     assert rows["oecf.gamma"].computed == pytest.approx(1.0, abs=1e-12)
 
 
+def test_what_a_chip_reads_in_the_dark_moves_no_response(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hot pixels raise each patch by 330 electrons, the darkest from 100: a dark frame takes it off the gamma."""
+    monkeypatch.setattr(figure_module, "REPEATS", 2)
+    sensor = shot_noise_camera(hot_pixel_share=0.1, hot_pixel_dark_current_e_per_s=1e5)
+    rows = score(sensor, only=["oecf"])
+    assert len(rows) == 2
+    for row in rows:
+        assert row.measured == pytest.approx(row.computed, rel=0.03), row.name
+
+
 @pytest.mark.thorough
 def test_a_bent_response_has_the_gamma_of_its_parabola() -> None:
     """e (1.1 - 0.1 e / well) on patches from 0.65 to 65 %: less than 1, and frames show it; 12 standard errors."""

@@ -50,6 +50,16 @@ def test_versions_are_those_that_the_modules_tell_themselves() -> None:
         assert found["llvm"] == "none"
 
 
+def test_a_processors_own_libraries_are_among_its_versions(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(provenance, "libraries", lambda name: {"bayer": ("pytest", "ruff")}.get(name, ()))
+    provenance.versions.cache_clear()
+    own = {name: metadata.version(name) for name in ("pytest", "ruff")}
+    assert versions("bayer") == versions() | own
+    assert not own.keys() & versions().keys()
+    assert versions("ple_rgbw") == versions()
+    provenance.versions.cache_clear()
+
+
 def test_a_row_tells_the_same_versions_in_whichever_order_a_users_own_are_given() -> None:
     """Text that differs would make a cell anew, and a report over both would be refused as mixed."""
     own = {"zeta": "1", "alpha": "2"}
