@@ -62,6 +62,9 @@ class LensConfig:
         Lens by data (`sensor.lens.table`): a shipped one's name, or its TOML file. It gives point spread, relative
         illumination, distortion and lateral colour. With wavefronts its diffraction is that of `f_number`, with kernels
         none beside them, whatever `diffraction` says.
+    table_digest : str
+        Hash of that file's content where it is one's own (`sensor.lens.table.terms_of`), so that stored results of
+        another content aren't taken for this one's. Whoever reads the file states it.
     """
 
     f_number: Annotated[float, (0.1, 1e4, "give focal length over aperture")]
@@ -81,6 +84,7 @@ class LensConfig:
     eye_pigmentation: Annotated[float, (0.0, 1.2, "give 0 for black eyes to 1.2 for very light ones")] = 0.5
     shake_um: Annotated[float, (0.0, 1e6, "give micrometres, 0 for a camera that stands still")] = 0.0
     table: str = ""
+    table_digest: str = ""
 
     __repr__ = brief
 
@@ -90,6 +94,11 @@ class LensConfig:
             raise InputError(
                 f"scatter: {self.scatter:g} beside eye_age_years {self.eye_age_years:g}; allowed: a lens's wings or an "
                 "eye's; leave one out"
+            )
+        if self.table_digest and not self.table:
+            raise InputError(
+                f"table_digest: {self.table_digest!r} without a table; allowed: what a table's reader states; leave it "
+                "out"
             )
 
 

@@ -14,7 +14,7 @@ from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
-from sensor.lens.table import read_lens, table_of
+from sensor.lens.table import table_of, terms_of
 from sensor.photodiodes import binned
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
@@ -165,7 +165,8 @@ def _with_its_lens(content: dict[str, Any], folder: Path) -> dict[str, Any]:
     if not isinstance(lens, dict) or not isinstance(lens.get("table"), str) or not lens["table"]:
         return content
     name = str(folder / lens["table"]) if lens["table"].endswith(".toml") else lens["table"]
-    return content | {"lens": {"f_number": read_lens(name).f_number} | lens | {"table": name}}
+    own = terms_of(name)
+    return content | {"lens": {"f_number": own.pop("f_number")} | lens | own}
 
 
 def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:

@@ -27,6 +27,7 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
+from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, in_place, read_errors, require_name, require_range
 from rodcone.files import read_bounded
 from rodcone.toml_file import read_toml, strict_converter, structured
@@ -94,6 +95,8 @@ class LensTable:
         How much farther out than the undispersed image a wavelength lands.
     point_spread : Wavefronts, Kernels or None
         None for a lens that spreads light as an ideal one.
+    digest : str
+        Hash of the files that it was read from.
     """
 
     f_number: float
@@ -103,6 +106,7 @@ class LensTable:
     distortion: Floats
     lateral_um: Floats
     point_spread: Wavefronts | Kernels | None = None
+    digest: str = ""
 
     def illumination(self, height: Floats) -> Floats:
         """Irradiance at image heights over that on the axis."""
@@ -200,7 +204,22 @@ def with_lens(sensor: SensorConfig, table: str) -> SensorConfig:
     InputError
         As `read_lens`.
     """
-    return replace(sensor, lens=replace(sensor.lens, table=table, f_number=read_lens(table).f_number))
+    return replace(sensor, lens=replace(sensor.lens, **terms_of(table)))
+
+
+def terms_of(table: str) -> dict[str, Any]:
+    """Fields of `LensConfig` that a lens by data gives: itself, its f-number, and the hash of a file's content.
+
+    A shipped lens has no hash: its content belongs to the version of rodcone.
+
+    Raises
+    ------
+    InputError
+        As `read_lens`.
+    """
+    read = read_lens(table)
+    digest_of_own = read.digest if table.endswith(".toml") else ""
+    return {"table": table, "table_digest": digest_of_own, "f_number": read.f_number}
 
 
 def table_of(lens: LensConfig) -> LensTable:
@@ -209,9 +228,15 @@ def table_of(lens: LensConfig) -> LensTable:
     Raises
     ------
     InputError
-        As `read_lens`, and for another f-number than the table's, or defocus.
+        As `read_lens`, and for another f-number than the table's, defocus, or files that have changed since the lens
+        was made.
     """
     table = read_lens(lens.table)
+    if lens.table_digest and lens.table_digest != table.digest:
+        raise InputError(
+            f"lens file {lens.table!r}: it, or its point spread, has changed since the camera was made; allowed: one "
+            "content for all of a camera's pictures; make the camera anew"
+        )
     if lens.f_number != table.f_number:
         raise InputError(
             f"f_number: {lens.f_number:g} with the lens {lens.table!r}; allowed: {table.f_number:g}, where its table "
@@ -238,17 +263,34 @@ def read_lens(lens: str) -> LensTable:
         For a file that can't be read, or what no lens has: negative energy, gaps, nodes that don't rise.
     """
     path = lens_file(lens)
-    with read_errors(f"lens file: {str(path)!r} can't be read", _FIX):
-        stamp = path.stat()
-    return _read(path, (stamp.st_mtime_ns, stamp.st_size))
+    given, spread = _given(path, _stamp(path)), None
+    if given.point_spread:
+        spread = path.parent / given.point_spread
+        with in_place(f"lens file {str(path)!r}"):
+            return _read(path, given, spread, _stamp(spread, "point_spread", "give a CSV beside the lens's file"))
+    return _read(path, given, None, None)
+
+
+def _stamp(path: Path, what: str = "lens file", fix: str = _FIX) -> tuple[int, int]:
+    """When a file was changed, and its size."""
+    with read_errors(f"{what}: {str(path)!r} can't be read", fix):
+        status = path.stat()
+    return status.st_mtime_ns, status.st_size
 
 
 @lru_cache(maxsize=16)
-def _read(path: Path, _stamp: tuple[int, int]) -> LensTable:
+def _given(path: Path, _of_file: tuple[int, int]) -> _File:
     with read_errors(f"lens file: {str(path)!r} can't be read", _FIX):
         content = read_toml(path)
     with in_place(f"lens file {str(path)!r}"):
-        return _table(structured(content, _File, _CONVERTER, _FIX), path.parent)
+        return structured(content, _File, _CONVERTER, _FIX)
+
+
+@lru_cache(maxsize=16)
+def _read(path: Path, given: _File, spread: Path | None, _of_spread: tuple[int, int] | None) -> LensTable:
+    with in_place(f"lens file {str(path)!r}"):
+        table = _table(given, path.parent)
+    return replace(table, digest=digest([digest_file(file) for file in (path, spread) if file]))
 
 
 def _table(given: _File, folder: Path) -> LensTable:

@@ -120,7 +120,9 @@ def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
 
 def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
     """Return the reference's lens: the study's, else the sensor's own, else a good lens in the scene."""
-    view = 0.0 if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
+    view = 0.0
+    if opened.scene is not None and not (study.lens.table or lens.table):  # a table has its own falloff
+        view = horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     whole = replace(
         lens,
         diffraction=lens.diffraction or 1.0,  # for an ideal aperture
@@ -139,9 +141,10 @@ def scaled_effects_of(pilot: Pilot, study: Study) -> Iterator[ScaledEffects]:
         noise = _pilot_noise(pilot, lit)
         radiance = lit.relight(luminance_cd_m2=1.0)
         for name in study.sensors:
-            auto_s = unit_exposure_s(radiance, preset(name).undivided)
+            camera_alone = study.lens.behind(preset(name))
+            auto_s = unit_exposure_s(radiance, camera_alone.undivided)
             for mosaic in study_mosaics(study):
-                sensor = vary(preset(name), mosaic).undivided  # because a pilot is coarser anyway
+                sensor = vary(camera_alone, mosaic).undivided  # because a pilot is coarser anyway
                 lens = full_lens(study, sensor.lens, pilot.opened)
                 sensor = replace(sensor, lens=lens)
                 of_any_time = find_effects(lit, sensor, lens, pilot.groups, rng)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, Literal, get_type_hints
 
 from rodcone.files import check_place, require_ending, write_files
-from sensor.config import SensorConfig
+from sensor.config import LensConfig, SensorConfig
 from sensor.config_file import SensorTable
 from sensor.pixel import BINNINGS, MERGED, SWITCHED
 from studies.study.json_schema import DIALECT, schema_of
@@ -54,6 +54,7 @@ def sensor_schema() -> dict[str, Any]:
     named = (*levels, "gain", "converter_noise_dn", "gain_limit", "row_time_us")
     known: dict[Any, Mapping[str, Any]] = {
         (SensorTable, "cfa"): _MOSAIC,
+        (LensConfig, "table_digest"): {},  # which the reader of the file states
         (SensorTable, "binning"): {"enum": list(BINNINGS)},
         (SensorTable, "readout"): {"enum": [MERGED, SWITCHED]},
     }

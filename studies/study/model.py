@@ -2,12 +2,13 @@
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Annotated
+from typing import Annotated, Any
 
 from render.radiance import SpectralRadiance
 from rodcone.types import Floats
 from sensor.config import LensConfig, SensorConfig, without_terms
 from sensor.exposure import auto_exposure_s
+from sensor.lens.table import terms_of, with_lens
 from sensor.optics import form_image, least_samples
 from sensor.shake import held_lens
 from studies.metrics.target_figures import EDGE
@@ -49,6 +50,8 @@ class LensTerms:
         Share of the light in the wings of glare.
     shake : str, optional
         ``hand``: cameras are held in the hand (`sensor.shake`).
+    table : str, optional
+        Lens by data (`sensor.lens.table`) in front of all sensors, at its own f-number: a shipped one or a file.
     """
 
     diffraction: Annotated[float | None, (0.0, 100.0, "give 1 for an ideal lens, 0 for none")] = None
@@ -58,11 +61,17 @@ class LensTerms:
     vignetting: Annotated[float | None, (0.0, 0.99, "give the share of light lost in the corners, 0 for none")] = None
     scatter: Annotated[float | None, (0.0, 0.99, "give a fraction, 0 for none")] = None
     shake: str | None = None
+    table: str | None = None
 
     def on(self, lens: LensConfig) -> LensConfig:
         """Return a lens with the terms that are stated."""
         terms = {name: value for name, value in vars(self).items() if value is not None and name != "shake"}
-        return held_lens(replace(lens, **terms), self.shake)
+        of_table: dict[str, Any] = {} if self.table is None else terms_of(self.table)
+        return held_lens(replace(lens, **(terms | of_table)), self.shake)
+
+    def behind(self, sensor: SensorConfig) -> SensorConfig:
+        """Return the camera behind the study's lens by data, whose f-number its exposures go by."""
+        return sensor if self.table is None else with_lens(sensor, self.table)
 
 
 @dataclass(frozen=True)

@@ -27,6 +27,7 @@ from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
 from sensor.flicker.rows import check_flicker
 from sensor.flicker.waveform import waveform
+from sensor.lens.table import table_of
 from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
@@ -366,6 +367,9 @@ def _check_cameras(study: Study) -> None:
         waveform(study.flicker)
     for name in study.sensors:
         sensor = preset(name)
+        if study.lens.table:
+            with in_place("lens.table"):
+                table_of(study.lens.on(sensor.lens))
         if study.flicker:
             with in_place(f"sensor {label(name)}"):
                 check_flicker(replace(sensor, lens=study.lens.on(sensor.lens)))

@@ -62,6 +62,8 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
         content["trust_code"] = trust_code
         for axis in ("scenes", "sensors", "spectra", "processors", "compare", "flicker"):
             content |= {axis: _beside(content[axis], Path(path).parent)} if axis in content else {}
+        if isinstance(lens := content.get("lens"), dict) and "table" in lens:
+            content["lens"] = lens | {"table": _beside(lens["table"], Path(path).parent)}
         return structured(content, Study, _CONVERTER, "see rodcone new study")
     except InputError as error:
         words = str(error)

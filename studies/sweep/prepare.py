@@ -146,7 +146,8 @@ def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
     sensors = {}
     view_deg = None if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     for condition in conditions(job.study, opened.choice):
-        unmodelled, lens = preset(condition.sensor), job.plan.images[condition].lens
+        unmodelled = job.study.lens.behind(preset(condition.sensor))
+        lens = job.plan.images[condition].lens
         for mosaic in study_mosaics(job.study):
             sensors[condition.spectrum, condition.sensor, lens, mosaic] = (
                 unmodelled,

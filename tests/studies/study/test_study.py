@@ -6,10 +6,11 @@ from pathlib import Path
 import pytest
 from refusal import refusal
 
-from sensor.presets import preset_file
-from studies.budget.starting_points import plan_from_settings
+from sensor.presets import low_noise, preset_file
+from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import open_all
+from studies.study.model import LensTerms
 from studies.study.study import SceneChoice, Study, conditions, study_mosaics
 from studies.study.study_file import read_study
 
@@ -243,3 +244,29 @@ def test_lamps_and_charts_are_files_beside_the_study(tmp_path: Path) -> None:
     refusal(
         read_study, written(tmp_path), ['spectra=["absent.csv"]'], match=r"illuminant: '.*absent.csv' can't be read"
     )
+
+
+def test_a_lens_by_data_stands_in_front_of_all_sensors_at_its_own_f_number(tmp_path: Path) -> None:
+    study = replace(STUDY, lens=LensTerms(table="double_gauss", veiling_glare=0.02), sensors=("low_noise", "dual_gain"))
+    lenses = {image.lens for image in plan_from_settings(study).images.values()}
+    stated = ("double_gauss", 2.0, 0.02)
+    assert {(lens.table, round(lens.f_number, 3), lens.veiling_glare) for lens in lenses} == {stated}
+    assert study.lens.behind(low_noise()).lens.f_number == pytest.approx(2.0, abs=1e-3)
+    assert STUDY.lens.behind(low_noise()) == low_noise()
+    # Its falloff is its own: the scene's camera adds none.
+    whole = {image.lens.horizontal_view_deg for image in reference_plan(study).images.values()}
+    assert whole == {0.0}
+    assert min(image.lens.horizontal_view_deg for image in reference_plan(STUDY).images.values()) > 0
+    (tmp_path / "mine.toml").write_text("f_number = 4.0\nfield = [0.0, 1.0]\n")
+    path = written(tmp_path, TEXT + '\n[lens]\ntable = "mine.toml"\n')
+    assert read_study(path).lens.table == str(tmp_path / "mine.toml")
+
+
+def test_a_lens_that_no_camera_can_have_is_refused(tmp_path: Path) -> None:
+    refusal(replace, STUDY, lens=LensTerms(table="cook_triplet"), match="lens.table: .*cook_triplet.* is unknown")
+    refusal(replace, STUDY, lens=LensTerms(table=str(tmp_path / "no.toml")), match="lens.table: .*can't be read")
+    blurred = tmp_path / "blurred.toml"
+    text = preset_file("low_noise").read_text("utf-8")
+    blurred.write_text(text.replace("[lens]", "[lens]\ndefocus_um = 3.0"), "utf-8")
+    words = "defocus_um: 3 with the lens 'cooke_triplet'"
+    refusal(replace, STUDY, lens=LensTerms(table="cooke_triplet"), sensors=(str(blurred),), match=words)

@@ -14,13 +14,15 @@ from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
 from sensor.exposure import auto_exposure_s
 from sensor.flicker.waveform import Waveform
+from sensor.lens.table import terms_of
 from sensor.optics import form_image
-from sensor.presets import low_noise, preset
+from sensor.presets import low_noise, preset, preset_file
 from sensor.response import expected_electrons
 from studies.dataset import sample as sample_module
 from studies.metrics.truth import light_in_bands, shown_white_cd_m2
 from studies.photograph.camera import colour_fit
 from studies.study.lit_scene import open_all, under
+from studies.study.model import LensTerms
 from studies.study.render_facts import RenderFacts, render_facts
 from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
@@ -73,6 +75,32 @@ def test_the_request_for_a_render_changes_with_each_of_its_inputs_alone(monkeypa
         monkeypatch.setattr(prepare_module, name, lambda: "another")
         found.append(request())
     assert len(set(found)) == len(found)
+
+
+def test_a_frames_key_changes_with_a_lens_s_files_alone(tmp_path: Path) -> None:
+    """Of a lens that the study names, and of one that a sensor's file does; a shipped one's is in the version."""
+    table, spread, own = (tmp_path / name for name in ("mine.toml", "mine.csv", "camera.toml"))
+    table.write_text('f_number = 4.0\nfield = [0.0, 1.0]\npoint_spread = "mine.csv"\n')
+    spread.write_text("field,wavelength_nm,Z4\n0,550,10\n1,550,20\n")
+    text = preset_file("low_noise").read_text("utf-8")
+    own.write_text(text[: text.index("[lens]")] + '[lens]\ntable = "mine.toml"\n')
+    study = SAMPLE.small_study(tmp_path)
+
+    def keys() -> list[str]:
+        terms, opened = LensTerms(table=str(table)), SimpleNamespace(identity="b")
+        cameras = (terms.behind(low_noise()), replace(low_noise(), lens=terms.on(low_noise().lens)), preset(own))
+        assert {camera.lens.f_number for camera in cameras} == {4.0}
+        return [frame_key("a", opened, "D65", study, camera, camera) for camera in cameras]  # type: ignore[arg-type]
+
+    found = [keys()]
+    assert keys() == found[0]
+    spread.write_text("field,wavelength_nm,Z4\n0,550,10\n1,550,21\n")
+    found.append(keys())
+    table.write_text(table.read_text() + "relative_illumination = [1.0, 0.9]\n")
+    found.append(keys())
+    for of_one_camera in zip(*found, strict=True):
+        assert len(set(of_one_camera)) == 3
+    assert terms_of("cooke_triplet")["table_digest"] == ""
 
 
 def test_every_field_of_a_sensor_is_in_a_frames_key(tmp_path: Path) -> None:
