@@ -81,6 +81,9 @@ def random_controls(rng: random.Random) -> Controls:
         seed=rng.randrange(50),
         exposure_number=rng.randrange(50),
         frames=rng.choice([1, 1, 1, 3]),
+        flicker_depth=rng.choice([0.0, 0.0, 0.6]),
+        flicker_hz=rng.choice([100.0, 120.0]),
+        row_time_us=rng.choice([None, 0.0, 250.0, -250.0]),
         **camera,
     )
     return replace(made, shot_noise=made.seed % 5 > 0)

@@ -21,9 +21,11 @@ from rodcone.errors import require_keys
 from rodcone.types import Image
 from sensor.burst import merged_raw
 from sensor.capture import expose
-from sensor.config import SensorConfig
+from sensor.config import SensorConfig, frame_interval_s
 from sensor.device import Device, draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, amplified, at_level_s, best_exposure, exposure_of_electrons_s
+from sensor.flicker.photograph import frame_starts_s
+from sensor.flicker.rows import flickering, steady_exposure_s
 from sensor.lens.illumination import framed
 from sensor.optics import SpectralIrradiance, form_image
 from sensor.presets import preset, vary
@@ -31,7 +33,7 @@ from sensor.raw import RawImage
 from sensor.readout import draw_mean_frame, read_out
 from sensor.response import behind_filters, channel_electrons
 from sensor.shake import shaken
-from studies.explore.controls import TIME, Controls, Lamp, camera_of, lit_transport, only_group, options_of
+from studies.explore.controls import TIME, Controls, Lamp, camera_of, lamps_of, lit_transport, only_group, options_of
 from studies.explore.memo import Memo
 from studies.metrics.truth import Light, neutral_electrons, true_srgb, white_of_pixels
 from studies.photograph.camera import colour_fit, develop_to_scale
@@ -39,7 +41,7 @@ from studies.study.gain import iso_speed
 from studies.study.study import AS_SHOT
 
 Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, and the processor's result
-_CHIP, _FRAME = 0, 1  # second part of the seed, equal to that of `studies.photograph.shot`
+_CHIP, _FRAME, _START = 0, 1, 2  # second part of the seed, the first two equal to `studies.photograph.shot`'s
 _LONGEST_S = 1e7
 
 
@@ -163,6 +165,8 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
         controls.gain,
         controls.iso,
         controls.shot_noise,
+        controls.row_time_us,
+        controls.flicker_depth > 0,
     )
     camera = (controls.sensor, controls.mosaic, *terms)
     optics = (controls.sensor, controls.mosaic, _items(controls.lens))
@@ -202,20 +206,23 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
             exposure_s, sensor = best_exposure(mosaicked_e * scale, sensor, time_s, exposure_s)
         else:
             exposure_s, sensor = amplified(sensor, time_s, exposure_s)
+        exposure_s = steady_exposure_s(lamps_of(controls), exposure_s)
     expected_e = mosaicked_e * (scale * exposure_s)
     shape = (expected_e.shape[0], expected_e.shape[1])
     chip = (controls.sensor, controls.mosaic, _items(controls.pixel), controls.seed)
     device = memo.of("device", chip, draw_device, sensor, shape, np.random.default_rng([controls.seed, _CHIP]))
-    numbers = range(controls.exposure_number, controls.exposure_number + controls.frames)
-    take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
-    exposures = []
-    for number in numbers:
+    exposures, frames_e = [], []
+    for number in range(controls.exposure_number, controls.exposure_number + controls.frames):
         memo.check()
         rng = np.random.default_rng([controls.seed, _FRAME, number])
-        frame_e = expected_e
+        frames_e.append(_in_time(expected_e, controls, sensor, exposure_s, number))
+        frame_e = frames_e[-1]
         if sensor.lens.shake_um:
             frame_e = behind_filters(shaken(per_second_e * (scale * exposure_s), sensor, exposure_s, rng), sensor)
+        take = expose if controls.shot_noise else partial(read_out, draw=draw_mean_frame)
         exposures.append(take(frame_e, sensor, exposure_s=exposure_s, device=device, rng=rng))
+    if controls.flicker_depth:
+        expected_e = np.mean(frames_e, axis=0)
     raw = merged_raw(exposures)
     iso = None if speed is None else speed * sensor.gain / own_gain  # which an automatic exposure may have raised
     return Exposure(
@@ -249,6 +256,17 @@ def to_bytes(linear: Image) -> NDArray[np.uint8]:
 
 
 # Stages
+
+
+def _in_time(expected_e: Image, controls: Controls, sensor: SensorConfig, exposure_s: float, number: int) -> Image:
+    """Return what an exposure of a burst collects of lamps that may flicker; it starts once the one before is read."""
+    lamps = lamps_of(controls)
+    if not lamps:
+        return expected_e
+    shape = (expected_e.shape[0], expected_e.shape[1])
+    (first_s,) = frame_starts_s(sensor, shape, exposure_s, np.random.default_rng([controls.seed, _START]))
+    start_s = first_s + number * frame_interval_s(sensor, shape[0] // sensor.sites, exposure_s)
+    return flickering(expected_e, [(lamp, expected_e) for lamp in lamps], sensor, exposure_s, start_s)
 
 
 def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame:

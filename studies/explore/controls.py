@@ -20,8 +20,10 @@ from rodcone.errors import InputError, require_fields, require_keys, require_nam
 from rodcone.toml_file import strict_converter, structured
 from sensor.cfa import MOSAICS, channels
 from sensor.cfa import OWN as OWN_MOSAIC
-from sensor.config import LONGEST_S, MOST_GAIN, SensorConfig
+from sensor.config import LONGEST_S, MOST_GAIN, MOST_ROW_US, SensorConfig
 from sensor.exposure import AUTO_INFORMATION, RULES
+from sensor.flicker.rows import check_flicker
+from sensor.flicker.waveform import Waveform
 from sensor.presets import VARIATIONS, preset_names
 from sensor.raw import ISO_RANGE
 from studies.metrics.truth import Light, light_in_bands
@@ -103,6 +105,10 @@ class Controls:
         Which exposure of that chip: each has noise of its own.
     frames : int
         Exposures of a burst, merged into one (`sensor.burst.merged_raw`).
+    flicker_depth, flicker_hz : float
+        Amplitude and frequency [Hz] of the cosine by which all lamps swing about their mean; depth 0 is steady light.
+    row_time_us : float or None
+        Time from one row's exposure to the next one's [us]; None takes the preset's.
 
     Raises
     ------
@@ -129,6 +135,9 @@ class Controls:
     seed: Annotated[int, (0, 2**31, "give a whole number")] = 0
     exposure_number: Annotated[int, (0, 2**31, "give a whole number")] = 0
     frames: Annotated[int, (1, MOST_FRAMES, "give the exposures of a burst")] = 1
+    flicker_depth: Annotated[float, (0.0, 1.0, "give a share of the mean, 0 for steady lamps")] = 0.0
+    flicker_hz: Annotated[float, (0.1, 1e6, "give hertz: 100 on mains of 50 Hz, 120 on those of 60")] = 100.0
+    row_time_us: Annotated[float | None, (-MOST_ROW_US, MOST_ROW_US, "give microseconds, 0 for all at once")] = None
 
     def __post_init__(self) -> None:
         require_fields(self)
@@ -280,6 +289,11 @@ def lit_group(group: LightGroup, lamp: Lamp) -> LightGroup:
     return replace(group, spectrum=spectrum * (group_luminance / luminance), power=power)
 
 
+def lamps_of(controls: Controls) -> tuple[Waveform, ...]:
+    """Return the waveform of all lamps; none where they are steady."""
+    return (Waveform(controls.flicker_hz, controls.flicker_depth),) if controls.flicker_depth else ()
+
+
 def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
     """Return the sensor and lens that the controls state; `base` is the sensor with the controls' mosaic.
 
@@ -308,5 +322,8 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
         lens=replace(base.lens, **terms),
         pixel=replace(base.pixel, **controls.pixel),
         bits=base.bits if controls.bits is None else controls.bits,
+        row_time_us=base.row_time_us if controls.row_time_us is None else controls.row_time_us,
     )
+    if controls.flicker_depth:
+        check_flicker(camera)
     return at_gain(camera, gain_text(controls.gain, controls.iso))

@@ -89,6 +89,7 @@ def sensor_terms(sensor: SensorConfig) -> Header:
         "pixel": {term: getattr(sensor.pixel, term) for term in PIXEL},
         "bits": sensor.bits,
         "gain": sensor.gain,
+        "row_time_us": sensor.row_time_us,
         "iso": iso_speed(with_gain(sensor, 1.0)),
         "tile": list(sensor.cfa),
     }

@@ -3,7 +3,7 @@
 // `render` is what a notebook's widget calls, and the page too.
 
 const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "gain", "iso", "processor", "settings",
-  "white_balance", "shot_noise", "seed", "exposure_number", "frames"];
+  "white_balance", "shot_noise", "seed", "exposure_number", "frames", "row_time_us"];
 const TITLES = {
   picture: "Picture", truth: "Reference", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
   "colour error": "Error of colour, CIEDE2000", flip: "Error as seen, FLIP", snr: "SNR map",
@@ -42,6 +42,9 @@ const TERMS = {
   exposure: "How the exposure time is chosen. auto: the 99th percentile of green at 80 % of the well. auto:W: the same of W. auto:information: the time that leaves the least expected error in the picture. time: as stated.",
   exposure_s: "The time, or the longest that the rule may choose.",
   frames: "Exposures that are merged into one: noise falls with the root of their number, the time rises with it.",
+  flicker_depth: "How far the light of all lamps swings about its mean: 0.28 of a fluorescent tube on the mains, 0.95 of a sodium lamp. A rule of exposure then cuts its time to whole periods, if it holds one.",
+  flicker_hz: "Twice the mains' frequency: 100 or 120 Hz.",
+  row_time_us: "From one row's exposure to the next one's; 0: all rows together. Under lamps that flicker rows that roll show bands.",
   seed: "Of the chip's fixed patterns and of the noise: the same seed makes the same bits.",
   f_number: "Focal length over the diameter of the aperture: light falls with its square.",
   defocus_um: "Diameter of the disc on the sensor that a point out of focus becomes.",
@@ -227,7 +230,7 @@ function render({ model, el }) {
     const own = structuredClone(header.controls);
     state = { a: own, b: { ...pick(own, CAMERA), mosaic: "bayer", settings: {} },
       views: [["a", "picture"], ["a", "truth"]], ...before };
-    if (before) state.a = { ...own, ...pick(before.a, [...CAMERA, "level_cd_m2"]) };
+    if (before) state.a = { ...own, ...pick(before.a, [...CAMERA, "level_cd_m2", "flicker_depth", "flicker_hz"]) };
     [underWay, waiting].forEach(kinds => Object.keys(kinds).forEach(kind => delete kinds[kind]));
     shown = undefined;
     cursor = null;
@@ -348,6 +351,8 @@ function render({ model, el }) {
           change();
         }, "level"),
         levelName,
+        slider(["Flicker, depth", 0, 1, "even", ""], state.a.flicker_depth, value => { state.a.flicker_depth = value; change(); }, "flicker_depth", true),
+        slider(["Flicker", 10, 1000, "log", "Hz"], state.a.flicker_hz, value => { state.a.flicker_hz = value; change(); }, "flicker_hz"),
         ...Object.entries(hello.groups).flatMap(([name, coloured]) => lamp(name, coloured)),
         Object.values(hello.groups)[0] && choice("Judged under", hello.illuminants.map(each => [each, each]), state.a.reference_light,
           value => { state.a.reference_light = value; change(); }, "reference_light")),
@@ -362,13 +367,14 @@ function render({ model, el }) {
         slider([rule ? "Time" : "Longest time", 1e-6, 100, "log", "s"], camera.exposure_s, value => set("exposure_s", value), "exposure_s"),
         ...iso ? [iso] : [],
         slider(["Burst, exposures", 1, 64, "whole", ""], camera.frames, value => set("frames", value), "frames"),
+        slider(["Row time", 0, 2000, "cube", "µs"], camera.row_time_us ?? preset.row_time_us, value => set("row_time_us", value === preset.row_time_us ? null : value), "row_time_us", true),
         numberBox("Seed", camera.seed, value => set("seed", value), "seed"),
         make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
       group("Lens", ...terms("lens", LENS, preset.lens)),
       group("Sensor",
         choice("Preset", [...Object.keys(hello.sensors).map(each => [each, each.split(/[\\/]/).pop()]), ["file", "from a file …"]], camera.sensor, value => {
           if (value === "file") { buildControls(); return sensorFile.click(); }
-          Object.assign(camera, { lens: {}, pixel: {}, bits: null, gain: null, iso: null });
+          Object.assign(camera, { lens: {}, pixel: {}, bits: null, gain: null, iso: null, row_time_us: null });
           set("sensor", value, true);
         }, "sensor"),
         sensorFile,
@@ -407,7 +413,7 @@ function render({ model, el }) {
     const text = Object.fromEntries(await Promise.all([...files].map(async file => [file.name, await file.text()])));
     ask("sensor", () => ({ files: text }), ({ sensor, terms }) => {
       hello.sensors[sensor] = terms;
-      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null, gain: null, iso: null });
+      Object.assign(target(), { sensor, lens: {}, pixel: {}, bits: null, gain: null, iso: null, row_time_us: null });
       buildControls();
       change();
     });

@@ -50,6 +50,7 @@ MOVED = {
     "sensor": "table1_output", "mosaic": "rgbw_4x4", "bits": 10, "shot_noise": False, "seed": 3, "exposure_number": 4,
     "frames": 2, "reference_light": "A", "processor": "ple_rgbw", "white_balance": "gray-world",
     "settings": {"sigma_s": 2.0}, "gain": 4.0, "iso": 200.0, "pixel": {}, "lens": {},
+    "flicker_depth": 0.2, "flicker_hz": 9.0, "row_time_us": 300.0,
 }  # fmt: skip
 PIXEL_MOVED = {
     "read_noise_e": 20.0, "dsnu_e": 30.0, "prnu": 0.1, "dark_current_e_per_s": 3e5, "column_gain_spread": 0.1,
@@ -63,7 +64,9 @@ LENS_MOVED = {"f_number": 8.0, "defocus_um": 10.0, "diffraction": 2.0, "veiling_
 def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
     """Whatever is kept from the settings before: exposure, chip, light, truth and what develops the raw image."""
     hot = {"hot_pixel_share": 0.05, "hot_pixel_dark_current_e_per_s": 1e4}  # so that each term of a pair is seen
-    start = Controls(processor="interleaved", exposure="auto:information", pixel=hot)
+    # Lamps too slow for a rule to cut its time to their periods, so that depth and frequency are seen.
+    slow = {"flicker_depth": 0.5, "flicker_hz": 7.0}
+    start = Controls(processor="interleaved", exposure="auto:information", pixel=hot, **slow)
     memo, transport = Memo(), small_transport()
     first = expose_scene(transport, start, memo)
     true_picture_of(first, start, memo)
@@ -148,6 +151,30 @@ def test_in_the_hand_each_frame_has_a_path_of_its_own_and_the_light_of_the_still
     assert np.array_equal(first.dn, sharpness()[1].dn)
     for other in ({"exposure_number": 1}, {"seed": 1}):
         assert np.abs(sharpness(**other)[1].electrons - first.electrons).max() > 5
+
+
+def test_rows_that_roll_under_lamps_that_flicker_have_bands_and_whole_periods_none():
+    """Each row collects its own mean of the cosine, whose amplitude is depth x sinc(f T); frames follow the readout."""
+    still = Controls(exposure=TIME, exposure_s=0.003, row_time_us=400.0, seed=5)
+    flickering, transport = replace(still, flicker_depth=0.8, flicker_hz=120.0), small_transport()
+    steady_e, first_e, second_e = (
+        expose_scene(transport, controls, Memo()).expected_e
+        for controls in (still, flickering, replace(flickering, exposure_number=1))
+    )
+    x = np.pi * 120.0 * 0.003
+    starts = np.arange(40) * 4e-4
+    turns = 2 * np.pi * 120.0 * starts[:, None]
+    for found_e in (first_e, second_e):
+        rows = found_e.sum(axis=1) / steady_e.sum(axis=1) - 1
+        fit, *_ = np.linalg.lstsq(np.concatenate([np.cos(turns), np.sin(turns)], axis=1), rows)
+        assert np.hypot(*fit) == pytest.approx(0.8 * np.sin(x) / x, rel=1e-6)
+    both_e = expose_scene(transport, replace(flickering, frames=2), Memo()).expected_e
+    np.testing.assert_allclose(both_e, (first_e + second_e) / 2, rtol=1e-12)
+    assert np.abs(first_e - second_e).max() > 0.01 * steady_e.max()
+    rule = replace(flickering, exposure="auto", exposure_s=0.1, level_cd_m2=0.1)
+    cut = expose_scene(transport, rule, Memo())
+    assert (cut.exposure_s * 120.0) % 1 == pytest.approx(0.0, abs=1e-9)
+    refusal(expose_scene, transport, replace(flickering, sensor="staggered", mosaic="rgbw"), Memo(), match="flicker: ")
 
 
 @pytest.mark.sample(2)
