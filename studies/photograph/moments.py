@@ -13,6 +13,7 @@ from render.level import Irradiance, SceneMeans
 from render.transport import Transport
 from rodcone.errors import InputError, require_whole
 from rodcone.types import Floats, Planes
+from sensor.config import SensorConfig, row_starts_s
 
 
 def moments_s(exposure_s: float, count: int) -> Floats:
@@ -36,6 +37,65 @@ def moments_s(exposure_s: float, count: int) -> Floats:
     """
     require_whole("count", count, 1, 1 << 16, "give times within the exposure")
     return np.asarray((np.arange(count) + 0.5) * (exposure_s / count))
+
+
+def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: int) -> tuple[Floats, Floats]:
+    """Give the times of a scene that moves while rows roll, and what each row's exposure takes of them.
+
+    The times are the middles of equal parts of the time from the first row's start, 0, to the last row's end. Between
+    two of them the light goes over from the one to the other in a straight line, so that a row's edge lies where it is
+    in the middle of the row's own exposure; before the first and after the last it stays. With rows that start together
+    each time counts the same.
+
+    Parameters
+    ----------
+    sensor : SensorConfig
+        Its `row_time_us` parts the rows' starts; photodiodes that bin are exposed together.
+    rows : int
+        Of photodiodes.
+    exposure_s : float
+        Of a row, above 0.
+    count : int
+
+    Returns
+    -------
+    times_s : (time,) float64
+    shares : (time, row) float64
+        A row's sum is 1.
+    """
+    starts_s = np.repeat(row_starts_s(sensor, rows // sensor.sites), sensor.sites)
+    whole_s = float(starts_s.max()) + exposure_s
+    times_s, step_s = moments_s(whole_s, count), whole_s / count
+
+    def until(time_s: Floats) -> Floats:
+        # Integral from 0 on of the tent about each time, 2 steps wide; the first and the last go on to the ends.
+        away = (time_s - times_s[:, None]) / step_s
+        steps = np.clip(away, -1.0, 1.0)
+        tent = 0.5 + steps - steps * np.abs(steps) / 2
+        tent[0] = np.where(away[0] < 0, 0.5 + away[0], tent[0])
+        tent[-1] = np.where(away[-1] > 0, tent[-1] + away[-1] ** 2 / 2, tent[-1])
+        return np.asarray(tent * step_s)
+
+    return times_s, (until(starts_s + exposure_s) - until(starts_s)) / exposure_s
+
+
+def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transport:
+    """Average the light of a scene at several times, each row by its own shares of them.
+
+    A lens blurs what is known of each row's own time: over the width of its blur the rows' times count as one.
+
+    Parameters
+    ----------
+    transports : iterable of Transport
+    shares : (time, row) float64
+        Of `rolling_moments`, for the transports' rows.
+
+    Raises
+    ------
+    InputError
+        As `time_average`.
+    """
+    return _average(transports, shares)
 
 
 def time_average(transports: Iterable[Transport]) -> Transport:
@@ -68,40 +128,60 @@ def time_average(transports: Iterable[Transport]) -> Transport:
     >>> rodcone.time_average(moving).spp  # doctest: +SKIP
     2.0
     """
+    return _average(transports, None)
+
+
+def _average(transports: Iterable[Transport], shares: Floats | None) -> Transport:
+    """Mean over times, all alike or by shares of each row."""
     mean: Transport | None = None
     meters: list[Callable[[], Irradiance] | None] = []
     for each in transports:
         _require_alike(f"transports[{len(meters)}]", mean or each, each)
         meters.append(each.meter)
-        mean = each if mean is None else _with(mean, each, len(meters))
+        mean = each if mean is None else _with(mean, each, len(meters), _parts(shares, len(meters)))
         del each  # lets go of its light before the next is rendered
     if mean is None:
         raise InputError("transports: none given; allowed: one or more; give those of the times of an exposure")
     if len(meters) == 1:
         return mean
+    if shares is not None:  # a row that sees few of the times has few of the samples
+        fewer = len(meters) * (shares**2).sum(axis=0)
+        counts = np.rint(mean.counts / fewer[:, None]).astype(mean.counts.dtype)
+        error = mean.relative_mc_error * float(np.sqrt(fewer).mean())
+        mean = replace(mean, counts=counts, relative_mc_error=error)
     return replace(mean, meter=None if meters[0] is None else _meter([x for x in meters if x is not None]))
 
 
-def _with(mean: Transport, each: Transport, count: int) -> Transport:
+def _parts(shares: Floats | None, count: int) -> float | Floats:
+    """Over the last of `count` times: the shares of them all, (row, 1), or their number; infinite where it has none."""
+    if shares is None:
+        return count
+    with np.errstate(divide="ignore", invalid="ignore"):
+        parts = shares[:count].sum(axis=0) / shares[count - 1]
+    return np.asarray(np.where(shares[count - 1] > 0, parts, np.inf))[:, None]
+
+
+def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -> Transport:
     """Mean over `count` times, of the mean over all but the last and the last.
 
-    m + (x - m) / k; of independent errors the variance is ((k - 1)^2 v_m + v_x) / k^2.
+    m + (x - m) / k; of independent errors the variance is ((k - 1)^2 v_m + v_x) / k^2. What has rows has `parts` of
+    `_parts` for k.
     """
 
-    def mixed(first: Any, last: Any) -> Any:
-        return first + (last - first) / np.asarray(first).dtype.type(count)
+    def mixed(first: Any, last: Any, k: float | Floats = count) -> Any:
+        return first + (last - first) / np.asarray(k, np.asarray(first).dtype)
 
-    def of_errors(first: Any, last: Any) -> Any:
-        real = np.asarray(first).dtype.type
-        return first * real((1 - 1 / count) ** 2) + last * real(1 / count**2)
+    def of_errors(first: Any, last: Any, k: float | Floats = count) -> Any:
+        real, rest = np.asarray(first).dtype, np.asarray(1 / np.asarray(k, np.float64))
+        return first * ((1 - rest) ** 2).astype(real) + last * (rest**2).astype(real)
 
     def halves(first: Halves, last: Halves) -> Halves:
-        return Halves(mixed(first.mean, last.mean), mixed(first.difference, last.difference))
+        return Halves(mixed(first.mean, last.mean, parts), mixed(first.difference, last.difference, parts))
 
-    variance, means, last = of_errors(mean.variance, each.variance), mean.scene_means, each.scene_means
+    variance, means, last = of_errors(mean.variance, each.variance, parts), mean.scene_means, each.scene_means
     shared = None
     if mean.shared is not None and each.shared is not None:
-        covariance = of_errors(_covariance(mean.shared, mean), _covariance(each.shared, each))
+        covariance = of_errors(_covariance(mean.shared, mean), _covariance(each.shared, each), parts)
         shared = _correlated(mean.shared.groups, covariance, variance)
     return replace(
         mean,

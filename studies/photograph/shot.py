@@ -41,7 +41,7 @@ from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.focus import in_focus
 from studies.photograph.lamps import flicker_of, lamp_parts
-from studies.photograph.moments import moments_s, time_average
+from studies.photograph.moments import moments_s, rolling_average, rolling_moments, time_average
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.cost import PictureCost
 from studies.study.gain import at_gain, gain_text
@@ -216,6 +216,8 @@ class Checked:
         None for a stored radiance.
     moving : tuple of Scene
         The scene at each time of the exposure; empty where it stands still.
+    shares : (time, row) float64 or None
+        Of each time in a row's exposure, where rows roll (`studies.photograph.moments.rolling_moments`).
     exposure_s : float or None
         None by a rule.
     ready : Ready or None
@@ -236,6 +238,7 @@ class Checked:
     cost: PictureCost
     flicker: Mapping[str, Waveform]
     moving: tuple[Scene, ...] = ()
+    shares: Floats | None = None
 
 
 def take(order: Order, step: Step | None = None) -> Taken:
@@ -414,7 +417,11 @@ def _rendered(
         )
 
     transports = (at(number, scene) for number, scene in enumerate(scenes))
-    return time_average(transports) if checked.moving else next(transports)
+    if not checked.moving:
+        return next(transports)
+    if checked.shares is None:
+        return time_average(transports)
+    return rolling_average(transports, np.repeat(checked.shares, samples, axis=1))
 
 
 def _bands(opened: SceneFile, spectra: Mapping[str, Spectrum]) -> tuple[Floats, Floats]:
@@ -499,7 +506,7 @@ def check(order: Order) -> Checked:
         cost = PictureCost((1, pixels), bands, groups, 0, _after_s(sensor))
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     # A scene, rendered or there already.
-    opened, moving = _opened(order, exposure_s)
+    opened, moving, shares = _opened(order, exposure_s, sensor)
     asked_level(opened.scene, order.level)
     spectra = asked_spectra(opened.scene, order.light)
     flicker = flicker_of(order.flicker, opened.scene.groups)
@@ -520,7 +527,7 @@ def check(order: Order) -> Checked:
     cost = PictureCost(
         rendered, centres.size, len(opened.scene.groups), spp, _after_s(sensor), through=through, times=times
     )
-    return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving)
+    return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving, shares)
 
 
 def _after_s(sensor: SensorConfig) -> float:
@@ -528,8 +535,13 @@ def _after_s(sensor: SensorConfig) -> float:
     return _AFTER_S + _TABLE_S * bool(sensor.lens.table)
 
 
-def _opened(order: Order, exposure_s: float | None) -> tuple[SceneFile, tuple[Scene, ...]]:
-    """Open the scene, as it is at the middle of the exposure if it moves, and at each of its times."""
+def _opened(
+    order: Order, exposure_s: float | None, sensor: SensorConfig
+) -> tuple[SceneFile, tuple[Scene, ...], Floats | None]:
+    """Open the scene, as it is at the middle of the exposure if it moves, and at each of its times.
+
+    Where rows roll the exposure lasts until the last row's end, and each row's shares of the times follow.
+    """
 
     def at(time_s: float | None) -> SceneFile:
         source = str(order.source)
@@ -538,7 +550,7 @@ def _opened(order: Order, exposure_s: float | None) -> tuple[SceneFile, tuple[Sc
         )
 
     if order.moments is None:
-        return at(None), ()
+        return at(None), (), None
     if exposure_s is None:
         raise InputError(
             f"exposure: {order.exposure!r} beside moments = {order.moments}; allowed: a time, such as 100ms, because a "
@@ -546,8 +558,14 @@ def _opened(order: Order, exposure_s: float | None) -> tuple[SceneFile, tuple[Sc
         )
     if order.frames > 1:
         raise InputError(f"frames: {order.frames} beside moments = {order.moments}; allowed: 1; leave one of them out")
-    moving = tuple(at(float(time_s)).scene for time_s in moments_s(exposure_s, order.moments))
-    return at(exposure_s / 2), moving
+    times_s, shares = moments_s(exposure_s, order.moments), None
+    still = at(exposure_s / 2)
+    if sensor.row_time_us and exposure_s:
+        rows = _size(order, still)[0]
+        check_frame(sensor, _size(order, still))
+        times_s, shares = rolling_moments(sensor, rows, exposure_s, order.moments)
+        still = at(float(times_s.mean()))
+    return still, tuple(at(float(time_s)).scene for time_s in times_s), shares
 
 
 def _size(order: Order, opened: SceneFile) -> tuple[int, int]:

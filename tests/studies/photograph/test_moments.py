@@ -39,6 +39,17 @@ def test_the_scene_stands_at_the_middles_of_equal_parts_of_the_exposure() -> Non
     assert checked.ready is None
 
 
+def test_where_rows_roll_the_times_reach_to_the_last_row_s_end() -> None:
+    """32 rows of 5 ms start within 155 ms: of a tenth of a second the last ends at 255 ms."""
+    checked = check(Order("walker", exposure="0.1s", moments=4, size=32, row_time="5ms"))
+    heads_m = [scene.geometry["walker_head"]["center"][0] for scene in checked.moving]
+    assert np.diff(heads_m) == pytest.approx([1.4 * 0.255 / 4] * 3)
+    assert checked.shares is not None
+    assert checked.shares.shape == (4, 32)
+    assert checked.shares[0, 0] > 0.5 > checked.shares[0, -1] == 0
+    assert check(Order("walker", exposure="0.1s", moments=4, size=32)).shares is None
+
+
 def test_each_time_costs_a_render() -> None:
     still, moving = (check(Order("walker", exposure="0.4s", size=32, spp=1600, moments=k)) for k in (None, 8))
     assert still.moving == ()

@@ -17,7 +17,9 @@ from rodcone.digests import digest_inputs
 from scenes.catalogue import load
 from scenes.materials import matte, panel
 from scenes.reflectances import grey
-from studies.photograph.moments import moments_s, time_average
+from sensor.photodiodes import binned
+from sensor.presets import low_noise
+from studies.photograph.moments import moments_s, rolling_average, rolling_moments, time_average
 
 NM, WIDTH = np.array([500.0, 600.0]), np.array([20.0, 20.0])
 GROUPS = {"lamp": LightGroup((), illuminant("A"))}
@@ -62,6 +64,66 @@ def test_light_that_is_not_of_one_scene_is_refused():
     refusal(public.time_average, 3, match="give a list or a generator")
     other = replace(light_of(1), wavelength_nm=NM + 1)
     refusal(time_average, [light_of(0), other], match=r"transports\[1\].*render all alike")
+
+
+ROWS, COLUMNS, SPEED_PX_S = 24, 60, 300.0
+
+
+def upright_edge(time_s):
+    """Light left of an upright edge that moves to the right, area-sampled: a row's sum is the edge's place."""
+    place = 10.0 + SPEED_PX_S * time_s
+    row = np.clip(place - np.arange(COLUMNS), 0.0, 1.0)
+    values = np.broadcast_to(row, (1, 2, ROWS, COLUMNS)).astype(np.float32)
+    light = Halves(values, np.float32(0.1) * values)
+    return transport_of(values, GROUPS, NM, WIDTH, light=light, variance=values**2 + np.float32(1.0))
+
+
+@pytest.mark.parametrize("row_time_us", [1000.0, -1000.0])
+@pytest.mark.parametrize("exposure_s", [0.002, 0.02])
+def test_an_upright_edge_that_moves_is_slanted_by_speed_times_row_time(row_time_us, exposure_s):
+    """Closed form: each row's edge lies where it is in the middle of the row's own exposure."""
+    rolling = replace(low_noise(), row_time_us=row_time_us)
+    times_s, shares = rolling_moments(rolling, ROWS, exposure_s, 40)
+    made = rolling_average((upright_edge(float(time_s)) for time_s in times_s), shares)
+    places = made.radiance[0, 0].sum(axis=1)
+    starts_s = np.arange(ROWS)[:: 1 if row_time_us > 0 else -1] * 1e-3
+    middles = 10.0 + SPEED_PX_S * (starts_s + exposure_s / 2)
+    inner = (starts_s >= times_s[0]) & (starts_s + exposure_s <= times_s[-1])
+    assert inner.sum() >= ROWS - 2
+    np.testing.assert_allclose(places[inner], middles[inner], atol=2e-5)
+    lean = np.diff(places)[inner[1:] & inner[:-1]]
+    np.testing.assert_allclose(lean, SPEED_PX_S * row_time_us * 1e-6, atol=3e-5)
+    # A row at either end loses the half part before the first time or after the last: at most an eighth of its way.
+    lost = SPEED_PX_S * (times_s[1] - times_s[0]) ** 2 / 8 / exposure_s
+    np.testing.assert_allclose(places, middles, atol=lost + 2e-5)
+
+
+def test_a_row_s_errors_are_those_of_its_shares():
+    times_s, shares = rolling_moments(replace(low_noise(), row_time_us=1000.0), ROWS, 0.004, 5)
+    made = rolling_average((upright_edge(float(time_s)) for time_s in times_s), shares)
+    each = [upright_edge(float(time_s)) for time_s in times_s]
+    for found, parts, powers in (
+        (made.radiance, [x.radiance for x in each], 1),
+        (made.light.difference, [x.light.difference for x in each], 1),
+        (made.variance, [x.variance for x in each], 2),
+    ):
+        expected = np.einsum("kr,kgbrx->gbrx", shares**powers, np.array(parts))
+        np.testing.assert_allclose(found, expected, atol=1e-6)
+    assert np.all(made.counts <= sum(x.counts for x in each))
+
+
+@pytest.mark.parametrize("count", [1, 2, 7])
+def test_rows_that_start_together_take_each_time_alike_and_all_rows_take_the_whole(count):
+    for row_time_us in (0.0, 1e-6):
+        times_s, shares = rolling_moments(replace(low_noise(), row_time_us=row_time_us), 6, 0.01, count)
+        np.testing.assert_allclose(times_s, moments_s(0.01, count), rtol=1e-8)
+        np.testing.assert_allclose(shares, 1 / count, rtol=1e-7)
+    _, shares = rolling_moments(replace(low_noise(), row_time_us=700.0), 30, 0.003, count)
+    np.testing.assert_allclose(shares.sum(axis=0), 1.0, rtol=1e-12)
+    assert shares.min() >= 0
+    photodiodes = replace(binned(low_noise("quad_bayer"), "charge"), row_time_us=700.0)
+    _, by_pixel = rolling_moments(photodiodes, 30, 0.003, count)
+    np.testing.assert_array_equal(by_pixel[:, ::2], by_pixel[:, 1::2])
 
 
 def white_half(time_s):
