@@ -39,11 +39,11 @@ from sensor.raw_files.raw_file import check_ending
 from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
-from studies.photograph.focus import in_focus
 from studies.photograph.lamps import flicker_of, lamp_parts
 from studies.photograph.moments import moments_s, rolling_average, rolling_moments, time_average
 from studies.photograph.ready_light import Ready, find_ready
 from studies.study.cost import PictureCost
+from studies.study.focus import in_focus
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under

@@ -29,6 +29,7 @@ from rodcone.types import Progress
 from sensor.config import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
+from studies.study.focus import in_focus
 from studies.study.levels import parse_level
 from studies.study.model import RenderModel
 from studies.study.render_noise import render_quietly
@@ -93,7 +94,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         )
     if is_radiance_file(choice.source):
         place = f"for {choice.source}, a picture without surfaces"
-        require_absent(place, extend=choice.extend, chart=choice.chart, define=choice.define, spp=choice.spp)
+        options = ("extend", "chart", "define", "spp", "focus_m")
+        require_absent(place, **{name: getattr(choice, name) for name in options})
         check_radiance_file(choice.source, study.levels)
         if choice.spectra is not None:
             require_name("spectra", choice.spectra, SPECTRA)
@@ -128,8 +130,25 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         check_frame(preset(name), size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
+    if choice.focus_m is not None:
+        scene = _in_focus(scene, choice, study, size)
     identity = digest_inputs([digest_scene(scene), size])
     return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
+
+
+def _in_focus(scene: Scene, choice: SceneChoice, study: Study, size: tuple[int, int]) -> Scene:
+    """Return a scene as the sensors' lens sees it, of which all must have one."""
+    cameras = [study.lens.behind(preset(name)) for name in study.sensors]
+    apart = dict.fromkeys(f"f/{camera.lens.f_number:g}" for camera in cameras)
+    if choice.focal_length_mm is None:
+        apart = dict.fromkeys(f"f/{camera.lens.f_number:g}, {camera.site_pitch_um:g} um" for camera in cameras)
+    if len(apart) > 1 or (study.equal_area is not None and choice.focal_length_mm is None):
+        raise InputError(
+            f"focus_m: {choice.focus_m:g} with sensors of {'; '.join(apart)}; allowed: one f-number, and one sensor's "
+            "width where no focal_length_mm is given, because a render has one lens; state it, or make a study of each"
+        )
+    assert choice.focus_m is not None
+    return in_focus(scene, cameras[0], size, choice.focus_m, choice.focal_length_mm)[0]
 
 
 def make_transport(

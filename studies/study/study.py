@@ -71,6 +71,10 @@ class SceneChoice:
     spectra : str, optional
         Of a photograph's colours, ``surfaces``, which is the default, or ``srgb_basis``
         (`render.radiance_files.photo.read_photo`).
+    focus_m : float, optional
+        Distance of focus: the scene is rendered through a thin lens of the sensors' f-number, which must be one.
+    focal_length_mm : float, optional
+        Of that lens; left out, that of a sensor as wide as the picture's pixels.
 
     Examples
     --------
@@ -86,16 +90,24 @@ class SceneChoice:
     define: tuple[str, ...] = ()
     spp: Annotated[int | None, SPP] = None
     spectra: str | None = None
+    focus_m: Annotated[float | None, (1e-3, 1e6, "give metres")] = None
+    focal_length_mm: Annotated[float | None, (1e-3, 1e5, "give millimetres")] = None
 
     @property
     def label(self) -> str:
-        """Name in rows: of the scene, its file or its chart."""
-        return label(self.chart or self.source)
+        """Name in rows: of the scene, its file or its chart, and the lens that it is seen through."""
+        focal = "" if self.focal_length_mm is None else f"{self.focal_length_mm:g} mm "
+        lens = "" if self.focus_m is None else f", {focal}focused at {self.focus_m:g} m"
+        return label(self.chart or self.source) + lens
 
     def __post_init__(self) -> None:
         source: object = self.source  # from Python it may be a Path
         object.__setattr__(self, "source", str(source) if isinstance(source, Path) else source)
         require_fields(self)
+        if self.focus_m is None and self.focal_length_mm is not None:
+            raise InputError(
+                f"focal_length_mm: {self.focal_length_mm:g} without a distance of focus; allowed: both; give focus_m"
+            )
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,12 @@ from render.scene import LightGroup, Scene
 from render.spectrum import flat
 from sensor.lens.focus import circle_of_confusion_um, focal_length_of_view_mm, pupil_mm
 from sensor.presets import low_noise
-from studies.photograph.focus import in_focus
 from studies.photograph.shot import Order, check
+from studies.study.focus import in_focus
+from studies.study.lit_scene import open_all
+from studies.study.model import LensTerms
+from studies.study.study import SceneChoice, Study
+from studies.study.study_file import read_study
 
 SIDE, VIEW_DEG, RADIUS_M = 48, 8.0, 1e-3
 
@@ -79,6 +83,30 @@ def test_what_has_no_depth_or_no_focus_is_refused():
     refusal(check, Order("still_life", focal_length_mm=50.0), match="focal_length_mm: 50 without a distance of focus")
     refusal(check, Order("photo.exr", focus_m=2.0), match="focus-m: 2.0 for .*a stored picture")
     refusal(Order, "still_life", focus_m=0.0, match="focus_m: 0.0")
+
+
+def test_a_study_s_scene_is_rendered_through_its_sensors_one_lens(tmp_path):
+    near = SceneChoice("still_life", focus_m=1.85, focal_length_mm=200.0)
+    study = Study([SceneChoice("still_life"), near], ["10cd/m2"], sensors=["low_noise", "dual_gain"])
+    pinhole, seen = open_all(study).values()
+    sensor = seen.scene.geometry["sensor"]
+    assert (pinhole.scene.geometry["sensor"]["type"], sensor["type"]) == ("perspective", "thinlens")
+    assert sensor["aperture_radius"] == pytest.approx(0.1 / low_noise().lens.f_number)
+    assert pinhole.identity != seen.identity
+    assert [choice.label for choice in study.scenes] == ["still_life", "still_life, 200 mm focused at 1.85 m"]
+    # A lens by data brings its own f-number, and the pupil follows.
+    (behind,) = open_all(replace(study, scenes=(near,), lens=LensTerms(table="double_gauss"))).values()
+    assert behind.scene.geometry["sensor"]["aperture_radius"] == pytest.approx(0.05, rel=1e-3)
+    path = tmp_path / "study.toml"
+    path.write_text('scenes = [{source = "still_life", focus_m = 2, focal_length_mm = 50}]\nlevels = ["1lux"]\n')
+    assert read_study(path).scenes[0].focus_m == 2.0
+
+    def wrong(choice, **changes):
+        return refusal(open_all, replace(study, scenes=(choice,), **changes), match="focus_m: 2 with sensors of f/")
+
+    wrong(SceneChoice("still_life", focus_m=2.0), sensors=("low_noise", "table1_output_6um"))
+    wrong(SceneChoice("still_life", focus_m=2.0), sensor_side_um=500.0)
+    refusal(SceneChoice, "still_life", focal_length_mm=50.0, match="focal_length_mm: 50 without a distance of focus")
 
 
 def test_the_first_line_tells_the_lens_and_light_that_is_there_is_left_aside():
