@@ -225,7 +225,8 @@ def test_the_page_is_told_every_sensors_and_processors_own_terms():
             assert terms[part] == {key: getattr(getattr(sensor, part), key) for key in keys}, name
         assert terms["iso"] == iso_speed(with_gain(sensor, 1.0))
         assert terms["tile"] == list(sensor.cfa)
-        assert set(terms) == {"lens", "pixel", "bits", "gain", "iso", "tile"}
+        assert terms["row_time_us"] == sensor.row_time_us
+        assert set(terms) == {"lens", "pixel", "bits", "gain", "row_time_us", "iso", "tile"}
     offered = {name for processor in said["processors"].values() for name in processor["mosaics"]}
     assert offered - set(said["mosaics"]) == {"own"}
     for name, mosaic in said["mosaics"].items():
