@@ -79,8 +79,8 @@ def path(exposure_s: float, key: int) -> NDArray[np.float64]:
     return _walk(exposure_s / count, count, key)
 
 
-def _step_count(time_s: float) -> int:
-    return int(np.clip(np.ceil(time_s / STEP_S), *STEPS))
+def _step_count(time_s: float, longest_s: float = STEP_S) -> int:
+    return int(np.clip(np.ceil(time_s / longest_s), *STEPS))
 
 
 def _walk(step_s: float, count: int, key: int) -> NDArray[np.float64]:
@@ -99,7 +99,9 @@ def _walk(step_s: float, count: int, key: int) -> NDArray[np.float64]:
     return np.asarray(places - places.mean(axis=1, keepdims=True))
 
 
-def rolling_path(starts_s: Floats, exposure_s: float, key: int) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def rolling_path(
+    starts_s: Floats, exposure_s: float, key: int, longest_s: float = STEP_S
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
     """Return the path from the first row's exposure to the last one's end, and each row's shares of it.
 
     Parameters
@@ -109,6 +111,8 @@ def rolling_path(starts_s: Floats, exposure_s: float, key: int) -> tuple[NDArray
     exposure_s : float
         Of a row, above 0 [s].
     key : int
+    longest_s : float
+        Of the steps between places.
 
     Returns
     -------
@@ -118,7 +122,7 @@ def rolling_path(starts_s: Floats, exposure_s: float, key: int) -> tuple[NDArray
         Of `row_shares`.
     """
     whole_s = float(np.max(starts_s)) + exposure_s
-    count = _step_count(whole_s)
+    count = _step_count(whole_s, longest_s)
     step_s = whole_s / count
     return _walk(step_s, count + 1, key), row_shares(starts_s, exposure_s, step_s, count + 1)
 

@@ -17,18 +17,18 @@ from sensor.config import SensorConfig, row_starts_s
 from sensor.flicker.waveform import Waveform
 
 
-def check_flicker(sensor: SensorConfig) -> None:
-    """Raise `InputError` for a camera that lamps which flicker aren't modelled for."""
+def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
+    """Raise `InputError` for a camera that lamps which flicker aren't modelled for; `held` allows one that shakes."""
     times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
     if min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels):
         raise InputError(
             "flicker: the camera reads some charge after a part of the time, which sees another part of the lamp's "
             "period; allowed: readings of the whole time; leave flicker out, or give every reading the whole time"
         )
-    if sensor.lens.shake_um:
+    if sensor.lens.shake_um and not held:
         raise InputError(
-            f"flicker: with shake_um {sensor.lens.shake_um:g}, whose blur would follow the lamp's light; allowed: 0; "
-            "leave one of them out"
+            f"flicker: with shake_um {sensor.lens.shake_um:g}, whose blur follows the lamp's light; allowed here: 0; "
+            "leave one of them out, or take single pictures by rodcone capture"
         )
 
 

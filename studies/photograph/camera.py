@@ -338,7 +338,7 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     device = device or draw_device(sensor, shape, np.random.default_rng([0, 0]))
     rng = rng or np.random.default_rng([0, 1])
     if flicker is not None:
-        check_flicker(sensor)
+        check_flicker(sensor, held=True)
         image = form_image(radiance, sensor, samples_per_pixel)
         starts_s = frame_starts_s(sensor, shape, exposure_s, rng)
         (raw,) = photograph_flickering(image, [(flicker, image)], sensor, exposure_s, device, rng, starts_s, exact)

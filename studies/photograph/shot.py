@@ -460,7 +460,7 @@ def check(order: Order) -> Checked:
     if order.row_time is not None:
         sensor = replace(sensor, row_time_us=parse_time(order.row_time, "row_time") * 1e6)
     if order.flicker:
-        check_flicker(sensor)
+        check_flicker(sensor, held=True)
     check_ending(Path(order.out), sensor.cfa)
     if order.size is not None:
         require_absent("beside --size", height=order.height, width=order.width)

@@ -92,5 +92,5 @@ def test_orders_are_refused_before_a_render():
     refusal(check, Order("night_street", flicker=("fluorescent",)), match="is no waveform")
     refusal(check, Order("night_street", row_time="15"), match="row_time: '15' is not a time.*15ms")
     shaken = Order("night_street", flicker=("fluorescent@100Hz",), shake="hand")
-    refusal(check, shaken, match="flicker: with shake_um")
+    assert check(shaken).flicker
     check(Order("night_street", row_time="15us", shake="hand"))
