@@ -119,3 +119,20 @@ def test_cameras_that_flicker_is_not_modelled_for_are_refused():
     refusal(check_flicker, shaky, match="flicker: with shake_um")
     check_flicker(preset("dual_gain"))  # two gains of one charge see the same light
     refusal(replace, ROLLING, row_time_us=1e6, match="row_time_us: 1000000.0")
+
+
+@pytest.mark.parametrize(("frames_per_s", "hertz", "apart"), [(30, 100, 3), (30, 300, 1), (25, 100, 1), (25, 300, 1)])
+def test_a_printer_s_camera_pulsates_under_100_hz_and_not_under_300_or_at_25_frames(frames_per_s, hertz, apart):
+    """What was found of a 3D printer's camera: 30 frames/s see a switched lamp of 100 Hz at three phases in turn.
+
+    github.com/paxx12-snapmaker-u1/SnapmakerU1-Extended-Firmware, pull requests 490 and 575: 300 Hz, or 25 frames/s, end
+    it.
+    """
+    sensor, lamp, exposure_s = replace(ROLLING, row_time_us=1e6 / frames_per_s / ROWS), pwm(hertz, 0.5), 0.002
+    starts_s = frame_starts_s(sensor, (ROWS, 64), exposure_s, np.random.default_rng(1), 12)
+    frames = np.array([row_weights(lamp, sensor, ROWS, exposure_s, start_s) for start_s in starts_s])
+    swing = np.ptp(frames, axis=0)  # of each row, from frame to frame
+    np.testing.assert_allclose(frames[apart:], frames[:-apart], atol=1e-9)
+    assert (swing.max() > 1.5) == (apart > 1)
+    if apart > 1:
+        np.testing.assert_allclose(frames[:3].mean(axis=0).mean(), 1.0, atol=0.01)
