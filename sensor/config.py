@@ -238,7 +238,7 @@ class SensorConfig:
     @property
     def undivided(self) -> "SensorConfig":
         """The camera with one photodiode a pixel, for light that is known no finer than pixels."""
-        return replace(self, chip=replace(self.chip, binning=None))
+        return self if self.chip.binning is None else replace(self, chip=replace(self.chip, binning=None))
 
     @property
     def photosites(self) -> "SensorConfig":

@@ -10,6 +10,7 @@ from loop import loop
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum, flat
 from rodcone.errors import InputError
+from sensor import response
 from sensor.capture import photograph_radiance
 from sensor.cfa import BAYER, RGBW, mask
 from sensor.config import LensConfig, SensorConfig
@@ -19,7 +20,7 @@ from sensor.exposure import auto_exposure_s
 from sensor.optics import form_image
 from sensor.pixel import PixelConfig
 from sensor.presets import low_noise
-from sensor.response import expected_electrons, lost_shares
+from sensor.response import electrons_per_irradiance, expected_electrons, lost_shares
 
 PIXEL = PixelConfig(pitch_um=3.0, fill_factor=0.5, full_well_e=1e5, read_noise_e=2.0, dsnu_e=2.0, prnu=0.1)
 QE = {"R": 0.25, "G": 0.5, "B": 0.125, "W": 1.0}
@@ -188,3 +189,37 @@ def test_responses_known_at_one_wavelength_are_told():
     peak = Spectrum(np.array([524.0, 526.0]), np.array([0.64, 0.64]))
     with pytest.warns(UserWarning, match=r"responses: they are known over 524-526 nm, and count as 0 elsewhere"):
         expected(equal_energy(380.0, 780.0), camera(cfa=("W",), responses=Responses({"W": peak})), 0.01)
+
+
+def test_weights_that_were_asked_for_before_are_those_of_what_is_asked_for_now():
+    """They are kept by all that decides them: a curve's last bit, the bands, the lamp, the window."""
+    nm, width = np.arange(390.0, 771.0, 20.0), np.full(20, 20.0)
+    lamp = Spectrum([380.0, 600.0, 800.0], [1.0, 2.0, 0.5])
+    sensor = low_noise()
+    curves = dict(sensor.responses.curves)
+    values = np.copy(curves["G"].values)
+    values[values.argmax()] *= 1 + 1e-9
+    greener = replace(sensor, responses=Responses({**curves, "G": Spectrum(curves["G"].wavelength_nm, values)}))
+    asked = [
+        (sensor, nm, width, 1.0, None),
+        (greener, nm, width, 1.0, None),
+        (replace(sensor, window_nm=(420.0, 680.0)), nm, width, 1.0, None),
+        (sensor, nm, width, 1.0, lamp),
+        (sensor, nm, width, 1.0, Spectrum(lamp.wavelength_nm, lamp.values[::-1])),
+        (sensor, nm, width * 0.999, 1.0, None),
+    ]
+    first = [electrons_per_irradiance(*what) for what in asked]
+    kept = [weights.copy() for weights in first]
+    assert len({weights.tobytes() for weights in first}) == len(asked)
+    for weights in first:
+        weights[:] = 0.0  # a caller's own
+    for what, weights in zip(asked, kept, strict=True):
+        assert np.array_equal(electrons_per_irradiance(*what), weights)
+        response._response_weights.cache_clear()
+        assert np.array_equal(electrons_per_irradiance(*what), weights)
+    assert np.array_equal(electrons_per_irradiance(sensor, nm, width, 0.25), kept[0] / 4)
+
+
+def test_a_camera_that_does_not_bin_is_its_own_undivided():
+    sensor = low_noise()
+    assert sensor.undivided is sensor
