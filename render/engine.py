@@ -26,7 +26,7 @@ from render.runs import add_run, clear_traceback, fields_of, means_of, no_means,
 from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
-from render.transport import Transport
+from render.transport import Stop, Transport
 from rodcone.errors import InputError, is_out_of_memory, one_line, require_whole
 from rodcone.jit import compiling, release_memory
 from rodcone.progress import Step, progress_bar, render_words
@@ -85,8 +85,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
         samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
-        Called after each run with the share done and the error so far (infinite before the first look); left out, a
-        notebook shows a bar.
+        Called after each run with the share done and the error so far (infinite before the first look); where it raises
+        `KeyboardInterrupt`, that ends the render as Ctrl-C does. Left out, a notebook shows a bar.
     denoise : bool
         Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
         measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
@@ -210,7 +210,7 @@ def _render(
     piloted = limits.most_samples > PILOT_FROM
     loaded = load_groups(scene, film)
     lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
-    stopped_by = None
+    stopped_by: Stop | None = None
     # Go on from the earlier means, or begin
     if earlier and (earlier.spp > PILOT_FROM or not piloted):
         means = means_of(earlier, split=denoise)
@@ -230,10 +230,15 @@ def _render(
                 fields = fields_of(lights, means)
             now = time.perf_counter()
             error = fields["relative_mc_error"]
-            progress(own_share * limits.share(means.count, error, now - start), error)
+            try:
+                progress(own_share * limits.share(means.count, error, now - start), error)
+            except KeyboardInterrupt:
+                if interrupted():  # the second Ctrl-C came just then
+                    raise
+                stopped_by = "interrupt"
             # The error is told after every run, and stops the render at a look alone.
             looked_at = error if means.count >= look else np.inf
-            stopped_by = limits.stop(means.count, looked_at, now - start, now - run_start)
+            stopped_by = stopped_by or limits.stop(means.count, looked_at, now - start, now - run_start)
             look = limits.next_look(means.count) if means.count >= look else look
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"

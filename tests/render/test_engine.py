@@ -346,6 +346,18 @@ def test_control_c_keeps_what_was_made_so_far(tmp_path):
     assert np.array_equal(on.radiance, small(spp=None, max_spp=128).radiance)
 
 
+def test_a_callback_that_raises_keyboard_interrupt_ends_a_render_in_another_thread_as_control_c_does(tmp_path):
+    def stop(share, error):
+        raise KeyboardInterrupt
+
+    with ThreadPoolExecutor(1) as pool:
+        made = pool.submit(small, spp=None, max_spp=4096, cache=tmp_path, progress=stop).result()
+    assert (made.stopped_by, made.spp) == ("interrupt", 32)
+    on = small(spp=None, max_spp=128, cache=tmp_path)
+    assert (on.spp, on.stopped_by) == (128, "samples")
+    assert np.array_equal(on.radiance, small(spp=None, max_spp=128).radiance)
+
+
 def test_a_render_in_another_thread_leaves_control_c_alone():
     with ThreadPoolExecutor(1) as pool:
         assert pool.submit(small).result().stopped_by == "samples"
