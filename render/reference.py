@@ -15,7 +15,7 @@ from typing import Any
 from zipfile import ZipFile, is_zipfile
 
 import numpy as np
-from scipy.special import gammaincc
+import scipy
 
 from render.cache import ENGINE_VERSION, read_arrays, scene_terms, write_arrays
 from render.combine import emission
@@ -263,7 +263,7 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
         lit = variance > 0
         chi_square = float((gap[lit] ** 2 / variance[lit]).sum())
         blocks = int(lit.sum())
-        chance = min(1.0, count * float(gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
+        chance = min(1.0, count * float(scipy.special.gammaincc(blocks / 2, chi_square / 2))) if blocks else 1.0
         tests.append(Agreement(float(live.wavelength_nm[band]), chi_square, blocks, chance))
     return min(tests, key=lambda test: test.chance)
 

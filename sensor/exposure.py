@@ -7,8 +7,8 @@ from math import ceil, floor, log2
 from types import MappingProxyType
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import ndtr
 
 from rodcone.errors import require_name, require_range
 from rodcone.types import Mosaic
@@ -262,7 +262,7 @@ def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposur
         if readings[0].sites is None
         else by_site([x.headroom_e for x in readings], readings, expected_e.shape)
     )
-    clear = np.maximum(ndtr((full_e - expected_e) / np.sqrt(variance_e2) - _CLEAR_SIGMAS), 1e-12)
+    clear = np.maximum(scipy.special.ndtr((full_e - expected_e) / np.sqrt(variance_e2) - _CLEAR_SIGMAS), 1e-12)
     noise_to_light = variance_e2 / (clear * np.maximum(expected_e, 1e-9) ** 2)
     # Light over that of a white surface, a channel's white being the mean's colour at the bright end of all sites.
     shape, names = expected_e.shape, sensor.channels

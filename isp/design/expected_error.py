@@ -19,8 +19,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import erfcx, ndtr
 
 from rodcone.types import Floats
 from sensor.noise_law import NoiseLaw
@@ -97,8 +97,8 @@ def opening(distance: Floats) -> tuple[Floats, Floats]:
     """
     a = np.minimum(distance, FAR)
     density = np.exp(-(a**2) / 2) / np.sqrt(2 * np.pi)
-    over = np.sqrt(2 / np.pi) / erfcx(a / np.sqrt(2)) - a
-    share = np.asarray(ndtr(a) + density * over)
+    over = np.sqrt(2 / np.pi) / scipy.special.erfcx(a / np.sqrt(2)) - a
+    share = np.asarray(scipy.special.ndtr(a) + density * over)
     return np.maximum(share, LEAST_SHARE), np.where(share > LEAST_SHARE, density * over**2, 0.0)
 
 

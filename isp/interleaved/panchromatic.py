@@ -10,8 +10,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
 
 from isp.anscombe import stabilise_channel
 from isp.interleaved.kernel.edges import TINY, channel_noise
@@ -108,8 +108,8 @@ def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:
 
 def _mean(values: Floats, weights: Floats, across: Floats | None = None) -> Floats:
     """Weighted mean down and across around each pixel of each plane, mirrored at the border; weights sum to 1."""
-    lines = correlate1d(values, weights, 0, mode="mirror")
-    return np.asarray(correlate1d(lines, weights if across is None else across, 1, mode="mirror"))
+    lines = scipy.ndimage.correlate1d(values, weights, 0, mode="mirror")
+    return np.asarray(scipy.ndimage.correlate1d(lines, weights if across is None else across, 1, mode="mirror"))
 
 
 def _box(values: Floats, size: int) -> Floats:

@@ -26,8 +26,8 @@ from os import cpu_count
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from isp.ple.residual_lines import GUIDES
 from rodcone.types import Singles
@@ -95,7 +95,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
         for c in colours:
             by_pixel = np.repeat(np.repeat(share[..., c], CELL, axis=0), CELL, axis=1)
             if together == 1:  # linear between cells' centres, as those of wider ones are by `_to_cells`
-                by_pixel = uniform_filter(by_pixel, 2 * CELL - 1)
+                by_pixel = scipy.ndimage.uniform_filter(by_pixel, 2 * CELL - 1)
             planes[..., c] += by_pixel[: raw.shape[0], : raw.shape[1]] * np.maximum(planes[..., c], 0.0)
 
 

@@ -17,8 +17,8 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.special import gammaln, xlogy
 
 from isp.anscombe import stabilise
 from rodcone.types import Floats
@@ -98,7 +98,7 @@ def readings(dark_e: float) -> Readings:
     density /= density.sum()
     if dark_e < 1.0:
         counts = np.arange(2 * electrons[-1, 0])
-        shares = np.exp(xlogy(counts, electrons) - electrons - gammaln(counts + 1))
+        shares = np.exp(scipy.special.xlogy(counts, electrons) - electrons - scipy.special.gammaln(counts + 1))
         values = transform(counts[:, None] + dark_e * _NORMAL, dark_e)
     else:
         spread = np.sqrt(electrons + dark_e**2)

@@ -1,8 +1,8 @@
 """Samples where they are needed: how many more a pixel gets than the others, by the noise of a pilot."""
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import uniform_filter
 
 from rodcone.types import Floats, Planes
 
@@ -31,8 +31,8 @@ def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
     """
     weight = np.zeros(seen.shape[1:])
     for sets, lamp in zip(scattered, seen, strict=True):
-        variance = uniform_filter(sets.var(axis=0, ddof=1, dtype=np.float64), POOL, mode="nearest")
-        light = uniform_filter(sets.mean(axis=0, dtype=np.float64), POOL, mode="nearest")
+        variance = scipy.ndimage.uniform_filter(sets.var(axis=0, ddof=1, dtype=np.float64), POOL, mode="nearest")
+        light = scipy.ndimage.uniform_filter(sets.mean(axis=0, dtype=np.float64), POOL, mode="nearest")
         floor = FLOOR * light.mean()
         if floor > 0:
             weight = np.maximum(weight, variance / (light + lamp + floor))

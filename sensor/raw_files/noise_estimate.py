@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import convolve
 
 _BINS = 24  # of brightness
 _SMOOTHEST = 0.2  # share of a bin's blocks that is used
@@ -67,7 +67,9 @@ def _blocks(
     a, b, c, d = sites.swapaxes(0, 1)
     diagonal = (a - b - c + d) / 2
     around = np.full((1, 3, 3), 1.0)
-    structure = convolve(((a + b - c - d) ** 2 + (a - b + c - d) ** 2) / 4 + diagonal**2, around) - diagonal**2
+    structure = (
+        scipy.ndimage.convolve(((a + b - c - d) ** 2 + (a - b + c - d) ** 2) / 4 + diagonal**2, around) - diagonal**2
+    )
     inside = (sites.min(axis=1) > 0) & (sites.max(axis=1) < 0.95 * full_dn)
     return ((a + b + c + d) / 4)[inside], diagonal[inside], structure[inside]
 

@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import ndtr
+import scipy
 
 from rodcone.types import Floats
 from sensor.cfa import mask
@@ -55,10 +55,10 @@ def censored(mean: Floats, variance: Floats, most: Floats | float) -> tuple[Floa
     """Return E[min(n, most)] - mean, E[(min(n, most) - mean)^2] and the share P(n < most), for a Gaussian n."""
     sigma = np.sqrt(variance)
     z = np.clip((most - mean) / np.maximum(sigma, 1e-300), -1e8, 1e8)
-    below = ndtr(z)
+    below = scipy.special.ndtr(z)
     density = np.exp(-np.square(np.clip(z, -40, 40)) / 2) / np.sqrt(2 * np.pi)
-    first = sigma * (z * ndtr(-z) - density)
-    second = variance * (below - z * density + z**2 * ndtr(-z))
+    first = sigma * (z * scipy.special.ndtr(-z) - density)
+    second = variance * (below - z * density + z**2 * scipy.special.ndtr(-z))
     return first, second, below
 
 

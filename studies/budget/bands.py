@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from render.error_estimates import Halves
 from render.radiance import SpectralRadiance
@@ -54,7 +54,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     matrix = _means(transport.width_nm, groups)
     means = transport.scene_means
     # Of all light groups' bands, and of the uncovered part that stands behind them.
-    every = block_diag(*[matrix] * len(transport.groups), 1.0)
+    every = scipy.linalg.block_diag(*[matrix] * len(transport.groups), 1.0)
 
     def merged(halves: Halves) -> Halves:
         return Halves(_merge(matrix, halves.mean), _merge(matrix, halves.difference))

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from math import ceil, pi
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import correlate1d
 
 from rodcone.colour_spaces import decode_srgb
 from rodcone.types import Floats, Image
@@ -130,7 +130,7 @@ def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]
 
 def _along(plane: Image, taps: Floats, axis: int) -> Image:
     """Return a plane after a filter along one axis, the border's pixels going on beyond it."""
-    return np.asarray(correlate1d(plane, taps, axis=axis, mode="nearest"))
+    return np.asarray(scipy.ndimage.correlate1d(plane, taps, axis=axis, mode="nearest"))
 
 
 def _hunt_lab(linear: Image) -> Image:

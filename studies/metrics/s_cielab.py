@@ -5,8 +5,8 @@ three opponent planes, each blurred by the eye's own spread, back to XYZ, then C
 """
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.fft import dctn, idctn
 from skimage.color import deltaE_cie76, xyz2lab
 from skimage.color.colorconv import xyz_from_rgb
 
@@ -41,11 +41,11 @@ def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGR
     In cosine space, where a mirrored blur is a product: exact for any spread, the 4.3 degrees' too, in O(n log n).
     There each Gaussian is one of the rows' frequencies times one of the columns'.
     """
-    spectrum = dctn(xyz @ XYZ_TO_OPPONENT.T, axes=(0, 1))
+    spectrum = scipy.fft.dctn(xyz @ XYZ_TO_OPPONENT.T, axes=(0, 1))
     down, across = (np.arange(n) / (2 * n) * pixels_per_degree for n in xyz.shape[:2])
     for plane in range(3):
         spectrum[..., plane] *= (_gaussians(plane, down) * _weights(plane)) @ _gaussians(plane, across).T
-    return np.asarray(idctn(spectrum, axes=(0, 1)) @ np.linalg.inv(XYZ_TO_OPPONENT).T)
+    return np.asarray(scipy.fft.idctn(spectrum, axes=(0, 1)) @ np.linalg.inv(XYZ_TO_OPPONENT).T)
 
 
 def _gaussians(plane: int, cycles_per_degree: Floats) -> Floats:

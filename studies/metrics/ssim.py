@@ -6,8 +6,8 @@ Numbers of equations are theirs. Each local mean weighs an 11 x 11 window by a G
 from dataclasses import dataclass
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
-from scipy.ndimage import gaussian_filter
 
 from rodcone.types import Image
 
@@ -52,4 +52,4 @@ def ssim(picture: NDArray[np.floating], truth: LocalMoments) -> float:
 
 def _local_mean(planes: Image) -> Image:
     """Return each pixel's mean under the window, the picture mirrored at its borders."""
-    return np.asarray(gaussian_filter(planes, (0, SIGMA_PX, SIGMA_PX), truncate=REACH_PX / SIGMA_PX))
+    return np.asarray(scipy.ndimage.gaussian_filter(planes, (0, SIGMA_PX, SIGMA_PX), truncate=REACH_PX / SIGMA_PX))
