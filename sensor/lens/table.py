@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from scipy.interpolate import PchipInterpolator
+import scipy
 
 from rodcone.digests import digest, digest_file
 from rodcone.errors import InputError, in_place, read_errors, require_name, require_range
@@ -128,14 +128,15 @@ class LensTable:
         return np.array([np.interp(wavelength_nm, self.wavelength_nm, of_field) for of_field in self.lateral_um.T])
 
     @cached_property
-    def _curves(self) -> tuple[PchipInterpolator, PchipInterpolator]:
-        return PchipInterpolator(self.field, self.relative_illumination), PchipInterpolator(self.field, self.distortion)
+    def _curves(self) -> tuple[Any, Any]:
+        pchip = scipy.interpolate.PchipInterpolator
+        return pchip(self.field, self.relative_illumination), pchip(self.field, self.distortion)
 
     def wavefront_nm(self, height: float, wavelength_nm: float) -> tuple[Floats, Floats]:
         """Coefficients [nm] and the pupil's half axes at an image height, of a lens with wavefronts."""
         assert isinstance(self.point_spread, Wavefronts)
         both = np.concatenate([self.point_spread.path_nm, self.point_spread.pupil], axis=2)
-        of_field = PchipInterpolator(self.field, both)(min(height, 1.0))
+        of_field = scipy.interpolate.PchipInterpolator(self.field, both)(min(height, 1.0))
         share = np.interp(wavelength_nm, self.wavelength_nm, np.arange(self.wavelength_nm.size))
         low = min(int(share), self.wavelength_nm.size - 1)
         high = min(low + 1, self.wavelength_nm.size - 1)
