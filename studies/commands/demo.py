@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -34,7 +33,7 @@ from studies.study.study import SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep.cost import estimated
 from studies.sweep.provenance import versions
-from studies.sweep.workers import run_in_processes
+from studies.sweep.workers import worker_processes
 
 STUDY = Path(__file__).parent.parent / "configs" / "demo.toml"
 
@@ -145,8 +144,7 @@ def demo(
     if not told(sizes, dry_run=dry_run, json=False):
         return
     require_enough(study, sizes, force=force)
-    runner = partial(run_in_processes, workers=cores())
-    _, report = make_all(study, out, lambda step: plan_from_settings(study), runner, clock=clock)
+    _, report = make_all(study, out, lambda step: plan_from_settings(study), worker_processes(cores()), clock)
     print(report)
 
 

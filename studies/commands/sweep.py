@@ -3,7 +3,7 @@
 import errno
 import sys
 from collections.abc import Callable, Generator, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
@@ -30,7 +30,7 @@ from studies.sweep.database import FILE
 from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, SweepResult, locked_folder
 from studies.sweep.run_sweep import sweep as run_sweep
-from studies.sweep.workers import InThisProcess, run, run_in_processes
+from studies.sweep.workers import InThisProcess, run, worker_processes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +65,9 @@ class Workers:
         """What runs tasks, for as long as it is open."""
         if self.cluster is not None:
             return on_cluster(self.cluster)
-        return nullcontext(
-            partial(run, executor=InThisProcess())
-            if self.processes == 1
-            else partial(run_in_processes, workers=self.processes)
-        )
+        if self.processes == 1:
+            return nullcontext(partial(run, executor=InThisProcess()))
+        return worker_processes(self.processes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -142,8 +140,8 @@ def sweep(
     if not told(sizes, dry_run=order.dry_run, json=json):
         return 0
     require_enough(task, sizes, force=workforce.force)
-    with workforce.runner() as runner:
-        swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock)
+    runner, ahead = workforce.runner(), workforce.processes != 1
+    swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock, ahead=ahead)
     say(f"its report is {report}")
     ledger = swept.out / FILE
     paths = {"out": str(swept.out), "ledger": str(ledger), "report": str(report)}
@@ -159,7 +157,13 @@ def require_enough(study: Study, sizes: Estimate, *, force: bool) -> None:
 
 
 def make_all(
-    study: Study, out: Path, planned: Callable[[Step], Plan], runner: Runner, clock: Clock
+    study: Study,
+    out: Path,
+    planned: Callable[[Step], Plan],
+    runner: AbstractContextManager[Runner],
+    clock: Clock,
+    *,
+    ahead: bool = True,
 ) -> tuple[SweepResult, Path]:
     """Sweep a study into a folder and write its report there; says on stderr how far it is and what it had to assume.
 
@@ -167,24 +171,31 @@ def make_all(
     ----------
     planned : callable
         Makes the plan; its progress goes to what it is given.
+    runner : context manager of callable
+        Open while cells are made: its workers leave before the report is drawn.
     clock : Clock
         Whose start is the run's.
+    ahead : bool
+        As of `studies.sweep.run_sweep.sweep`.
 
     Returns
     -------
     SweepResult, Path
         What was made, and the report.
     """
-    # the folder first: one that can't be written fails before anything is rendered
-    with locked_folder(out), saying_what_is_kept(out), progress(sys.stderr) as step:
-        with clock.stage("plan"):
-            plan = planned(step)
-        swept = run_sweep(study, out, plan, runner, step, clock=clock)
-        report = out / REPORT
-        if swept.made or not is_current(out):
-            from studies.commands.report import write_results  # takes a second, for what draws a page
+    with ExitStack() as at_work:
+        run_cells = at_work.enter_context(runner)
+        # the folder before the plan: one that can't be written fails before anything is rendered
+        with locked_folder(out), saying_what_is_kept(out), progress(sys.stderr) as step:
+            with clock.stage("plan"):
+                plan = planned(step)
+            swept = run_sweep(study, out, plan, run_cells, step, clock=clock, ahead=ahead)
+            at_work.close()
+            report = out / REPORT
+            if swept.made or not is_current(out):
+                from studies.commands.report import write_results  # takes a second, for what draws a page
 
-            report = write_results(out)
+                report = write_results(out)
     say(*swept.notes)
     return swept, report
 

@@ -10,7 +10,7 @@ from typing import Any
 
 from render.radiance_files.radiance_source import extent_of
 from render.reference import find_reference
-from rodcone.memory import memory
+from rodcone.memory import Memory, memory
 from rodcone.progress import duration
 from studies.budget.ledger import Plan
 from studies.budget.starting_points import plan_from_settings, reference_plan
@@ -137,7 +137,7 @@ def estimate(
     """Estimate a sweep of opened scenes, `kept` cells of which are there; others as of `estimated`."""
     cells = len(conditions(study)) * len(study.seeds) * len(study_mosaics(study) if frames else study.processors)
     parts = [_part(study, plan, opened) for opened in scenes.values()]
-    needs = [memory(x.pixels, x.bands, x.groups, workers, spp=x.spp, denoised=x.denoised) for x in parts]
+    need = _memory(parts, workers, ahead=workers > 1 and not frames)
     at = partial(_seconds, study, parts, workers, planned, frames)
     return Estimate(
         cells=cells,
@@ -147,9 +147,24 @@ def estimate(
         seconds=at(cells, 1.0),
         half_size_seconds=at(cells, _HALF_SIZE),
         half_cells_seconds=at(cells / 2, 1.0),
-        bytes=max(need.total for need in needs),
-        largest_bytes=max(need.largest for need in needs),
+        bytes=need.total,
+        largest_bytes=need.largest,
     )
+
+
+def _memory(parts: Sequence[_Part], workers: int, *, ahead: bool) -> Memory:
+    """Memory of the scene that needs most; with `ahead` a scene may be rendered beside the cells of any other."""
+
+    def of(part: _Part, workers: int) -> Memory:
+        return memory(part.pixels, part.bands, part.groups, workers, spp=part.spp, denoised=part.denoised)
+
+    needs = [of(part, workers) for part in parts]
+    largest = max(need.largest for need in needs)
+    if not ahead:
+        return Memory(max(need.total for need in needs), largest)
+    renders = [of(part, 0).total for part in parts]
+    cells = [need.total - render for need, render in zip(needs, renders, strict=True)]
+    return Memory(max(renders) + max(cells), largest)
 
 
 def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:

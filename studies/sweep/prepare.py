@@ -2,9 +2,11 @@
 
 import sqlite3
 import warnings
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from pathlib import Path
+from typing import Protocol
 
 import numpy as np
 
@@ -70,6 +72,13 @@ class Job:
         return {name: processor_of(name, user_versions) for name, user_versions in self.own.items()}
 
 
+class StageClock(Protocol):
+    """What notes the seconds of stages."""
+
+    def stage(self, name: str) -> AbstractContextManager[None]:
+        """Add what is done within to a stage."""
+
+
 Imaged = tuple[str, str, LensConfig, str]  # spectrum, sensor, modelled lens and mosaic: what a frame belongs to
 Sensors = tuple[SensorConfig, SensorConfig]
 
@@ -91,11 +100,30 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
         Where a file can't be written.
     """
     cells = known_cells(job, opened)
-    if cells is not None:
-        return cells
-    with job.clock.stage("renders"):
+    if cells is None:
+        record, cells = make_scene(job, opened, job.clock, progress)
+        note_scene(job, opened, record)
+    return cells
+
+
+def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progress) -> tuple[RenderRecord, list[Cell]]:
+    """Render a scene, make the files that its cells share, and give its record and its cells in the study's order.
+
+    The results database isn't touched, so that another thread may do this; `note_scene` then notes it.
+
+    Parameters
+    ----------
+    clock : StageClock
+        Of the thread that makes the scene.
+
+    Raises
+    ------
+    InputError, OSError
+        As `scene_cells`.
+    """
+    with clock.stage("renders"):
         transport, assumed = scene_transport(job, opened, progress)
-    with job.clock.stage("what cells share"), warnings.catch_warnings():
+    with clock.stage("what cells share"), warnings.catch_warnings():
         if job.plan.ledgers:  # they charge the error within bands
             warnings.simplefilter("ignore", WideBandsWarning)
         record = RenderRecord(
@@ -105,11 +133,15 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
             notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
         _make_files(job, opened, record, transport)
-        note_render(job.base, _request(job, opened), record)
         cells = _cells(job, opened, record)
     if cells is None:
         raise OSError(None, "files just written are gone", str(job.out / FRAMES))
-    return cells
+    return record, cells
+
+
+def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
+    """Note in the results database that a scene's files stand."""
+    note_render(job.base, _request(job, opened), record)
 
 
 def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:

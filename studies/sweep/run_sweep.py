@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
+from functools import partial
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -20,10 +21,11 @@ from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import Plan
 from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
-from studies.study.lit_scene import open_all
+from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note
 from studies.study.study import Study, conditions, label
-from studies.sweep.cells import Cell
+from studies.sweep.ahead import Ahead
+from studies.sweep.cells import Cell, RenderRecord
 from studies.sweep.database import (
     FILE,
     add,
@@ -36,7 +38,7 @@ from studies.sweep.database import (
     rows,
     want,
 )
-from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, scene_cells
+from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, make_scene, note_scene, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
 
@@ -121,6 +123,7 @@ def sweep(
     step: Step | None = None,
     *,
     clock: Clock | None = None,
+    ahead: bool = False,
 ) -> SweepResult:
     """Make the missing cells of a study and store each in the results database of a folder.
 
@@ -141,6 +144,8 @@ def sweep(
         Called with what is being done and the share that is done; left out, a notebook shows a bar.
     clock : Clock, optional
         That began when the work did, where something was done before.
+    ahead : bool
+        Render the next scene while the cells of one are made, for a runner whose cells are made in other processes.
 
     Raises
     ------
@@ -164,17 +169,17 @@ def sweep(
         cell_lists = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         want(base, chain.from_iterable([cell.key for cell in cells or ()] or [None] * count for cells in cell_lists))
-        count_made = 0
+        count_made, shares = 0, Shares(show, len(scenes))
         notes = dict[str, None]()
-        for index, opened in enumerate(scenes.values()):
-            part = _part(show, index, len(scenes))
-            cells = cell_lists[index] or scene_cells(job, opened, _rendering(part))
-            asked_keys = [cell.key for cell in cells]
-            notes.update(dict.fromkeys(cells[0].render.notes))
-            if not cell_lists[index]:
-                note_keys(base, index * count, asked_keys)
-            stored = done(base, out / PICTURES, asked_keys)
-            count_made += _run(job, number, [cell for cell in cells if cell.key not in stored], runner, part)
+        with closing(_scenes(job, list(scenes.values()), cell_lists, shares, ahead=ahead)) as coming:
+            for index, cells in enumerate(coming):
+                asked_keys = [cell.key for cell in cells]
+                notes.update(dict.fromkeys(cells[0].render.notes))
+                if not cell_lists[index]:
+                    note_keys(base, index * count, asked_keys)
+                stored = done(base, out / PICTURES, asked_keys)
+                missing = [cell for cell in cells if cell.key not in stored]
+                count_made += _run(job, number, missing, runner, partial(shares.made, index))
         forget_old(base)
         notes.update(dict.fromkeys(_noise_notes(rows(base))))
         stages = clock.stages()
@@ -197,6 +202,55 @@ def _noted(study: Study) -> dict[str, Any]:
     return asdict(study) | named | {"scenes": [asdict(scene) | {"source": scene.label} for scene in study.scenes]}
 
 
+def _scenes(
+    job: Job, scenes: Sequence[OpenedScene], known: Sequence[list[Cell] | None], shares: "Shares", *, ahead: bool
+) -> Generator[list[Cell], None, None]:
+    """Give the cells of each scene; with `ahead` the next scene is made meanwhile, where it isn't known."""
+    coming: Ahead[tuple[RenderRecord, list[Cell]]] | None = None
+    following = known[0]
+    try:
+        for index, opened in enumerate(scenes):
+            cells, rendered = following, partial(shares.rendered, index)
+            if coming is not None:
+                (record, cells), waited_s = coming.result(rendered)
+                coming = None
+                note_scene(job, opened, record)
+                for name, seconds in waited_s.items():
+                    job.clock.add(name, seconds)
+            elif cells is None:
+                cells = scene_cells(job, opened, rendered)
+            if index + 1 < len(scenes):
+                following = known[index + 1] or known_cells(job, scenes[index + 1])  # it may be of one just made
+                if ahead and following is None:
+                    coming = Ahead(partial(make_scene, job, scenes[index + 1]))
+            shares.coming = coming
+            yield cells
+    finally:
+        if coming is not None:
+            coming.stop()
+
+
+class Shares:
+    """How far a sweep is: of each scene its render and its cells, and of the whole the mean over all scenes."""
+
+    def __init__(self, step: Step, count: int) -> None:
+        self._step, self._count = step, count
+        self.coming: Ahead[Any] | None = None  # the next scene, while cells are made
+
+    def rendered(self, index: int, share: float, error: float) -> None:
+        """Show how far the render of a scene is that is waited for."""
+        self._show(index, render_words(error), RENDER_SHARE * share)
+
+    def made(self, index: int, what: str, share: float) -> None:
+        """Show how far the cells of a scene are, whose render is done."""
+        rendered = 1.0 + (0.0 if self.coming is None else self.coming.share)
+        self._show(index, what, RENDER_SHARE * rendered + (1 - RENDER_SHARE) * share)
+
+    def _show(self, index: int, what: str, share: float) -> None:
+        words = f"scene {index + 1} of {self._count}: " if self._count > 1 else ""
+        self._step(words + what, (index + share) / self._count)
+
+
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
     count = 0
@@ -214,18 +268,7 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
             # as wall time: the workers work at the same time
             on_the_clock = {name: value / len(workers) for name, value in seconds.items()}
             note_stages(job.base, run, job.clock.stages(on_the_clock))
-            share = RENDER_SHARE + (1 - RENDER_SHARE) * count / len(missing)
-            part(f"cell {count} of {len(missing)}", share)
+            part(f"cell {count} of {len(missing)}", count / len(missing))
     for name, value in on_the_clock.items():
         job.clock.add(name, value)
     return count
-
-
-def _part(step: Step, index: int, count: int) -> Step:
-    """Progress of one scene as part of the whole."""
-    words = f"scene {index + 1} of {count}: " if count > 1 else ""
-    return lambda what, share: step(words + what, (index + share) / count)
-
-
-def _rendering(part: Step) -> Callable[[float, float], None]:
-    return lambda share, error: part(render_words(error), RENDER_SHARE * share)

@@ -7,7 +7,7 @@ import threading
 from collections import Counter, deque
 from collections.abc import Callable, Generator, Hashable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, Executor, Future, ProcessPoolExecutor, wait
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import cache, partial
 from multiprocessing import active_children
 from multiprocessing.connection import wait as wait_for
@@ -178,22 +178,64 @@ def run_in_processes(
     InputError
         For no workers; at the end, where a cell ended its worker `MOST_DEATHS` times; all others are done by then.
     """
+    with worker_processes(workers) as run_cells:
+        yield from run_cells(cells, make)
+
+
+@contextmanager
+def worker_processes(workers: int) -> Iterator[Callable[..., Generator[Any, None, None]]]:
+    """Give a function that runs cells as `run_in_processes` does, on processes that stay from one call to the next.
+
+    They start with the first cell: a process imports and compiles once, whatever the number of scenes.
+
+    Raises
+    ------
+    InputError
+        For no workers.
+    """
     require_whole("workers", workers, 1, MOST_WORKERS, "give processes to run at once")
-    threads = max(1, cores() // workers)
+    with ExitStack() as pools:
+        yield partial(_run_on_pools, _Pools(pools, workers))
+
+
+class _Pools:
+    """The pool at work; another takes its place once it broke."""
+
+    def __init__(self, stack: ExitStack, workers: int) -> None:
+        self.workers = workers
+        self.threads = max(1, cores() // workers)
+        self._stack = stack
+        self._pool: ProcessPoolExecutor | None = None
+
+    def whole(self) -> ProcessPoolExecutor:
+        """Return a pool that isn't known to be broken."""
+        if self._pool is None:
+            self._pool = self._stack.enter_context(_pool(self.workers, self.threads))
+        return self._pool
+
+    def drop(self) -> None:
+        """End the pool, which is broken."""
+        self._pool = None
+        self._stack.close()
+
+
+def _run_on_pools(
+    pools: _Pools, cells: Sequence[Task], make: Callable[..., Any] = run_cell
+) -> Generator[Any, None, None]:
     waiting = {cell.key: cell for cell in cells}
     deaths = Counter[str]()
     given_up: list[Task] = []
     while waiting:
         untried = [cell for cell in waiting.values() if not deaths[cell.key]]
-        batch, at_once = (untried, workers) if untried else (list(waiting.values()), 1)
-        with _pool(workers, threads) as pool:
-            try:
-                for row in run(batch, pool, at_once=at_once, threads=threads, make=make):
-                    del waiting[row.key]
-                    yield row
-            except WorkerLostError as lost:
-                deaths.update(cell.key for cell in lost.cells)
-                given_up += [waiting.pop(cell.key) for cell in lost.cells if deaths[cell.key] >= MOST_DEATHS]
+        batch, at_once = (untried, pools.workers) if untried else (list(waiting.values()), 1)
+        try:
+            for row in run(batch, pools.whole(), at_once=at_once, threads=pools.threads, make=make):
+                del waiting[row.key]
+                yield row
+        except WorkerLostError as lost:
+            deaths.update(cell.key for cell in lost.cells)
+            given_up += [waiting.pop(cell.key) for cell in lost.cells if deaths[cell.key] >= MOST_DEATHS]
+            pools.drop()
     if given_up:
         first = given_up[0]
         raise InputError(

@@ -22,7 +22,7 @@ from studies.study.cost import START_S, PictureCost, pace, render_seconds
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep import cost as sweep_cost
-from studies.sweep.cost import Estimate, estimate, estimated
+from studies.sweep.cost import Estimate, _memory, _Part, estimate, estimated
 
 PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
@@ -206,3 +206,16 @@ def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
     needs = [memory(area, n, count, 1, spp=of) for area, n, count, of in zip(pixels, bands, groups, spp, strict=True)]
     assert estimates.bytes == max(need.total for need in needs)
     assert estimates.largest_bytes == max(need.largest for need in needs)
+
+
+def test_memory_counts_a_scene_rendered_beside_the_cells_of_another() -> None:
+    fine, wide = _Part(64**2, 64**2, 200, 4, 512.0), _Part(1000**2, 1000**2, 3, 1, 4.0)
+    (render, cells), (other, others) = (
+        (memory(x.pixels, x.bands, x.groups, 0, spp=x.spp).total, 350e6 + 800 * x.pixels) for x in (fine, wide)
+    )
+    assert render > other
+    assert others > cells
+    assert _memory([fine, wide], 2, ahead=True).total == pytest.approx(render + 2 * others)
+    assert _memory([fine, wide], 2, ahead=False).total == pytest.approx(max(render + 2 * cells, other + 2 * others))
+    for one in (fine, wide):  # of one scene the same
+        assert _memory([one], 2, ahead=True) == _memory([one], 2, ahead=False)

@@ -1,0 +1,94 @@
+"""Work of a sweep that goes on beside its cells, in a thread: the next scene is made while workers make cells.
+
+One thing at a time: memory holds one render, whatever the number of scenes. Dr.Jit belongs to that thread meanwhile; so
+the cells must be made in other processes.
+"""
+
+import time
+from collections.abc import Callable, Iterator
+from concurrent.futures import Future, wait
+from contextlib import contextmanager
+from threading import Event, Thread
+from typing import Generic, TypeVar
+
+from rodcone.types import Progress
+
+Result = TypeVar("Result")
+LOOK_S = 0.2  # how often one who waits shows how far it is
+
+
+class Spans:
+    """Stages with the times between which they went on: those of a thread beside the run's own clock."""
+
+    def __init__(self) -> None:
+        self._spans: list[tuple[str, float, float]] = []
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Note what is done within as a stage, also where it ends in an error."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            self._spans.append((name, start, time.perf_counter()))
+
+    def within(self, start: float, end: float) -> dict[str, float]:
+        """Seconds of each stage between two times of `time.perf_counter`."""
+        seconds: dict[str, float] = {}
+        for name, first, last in self._spans:
+            seconds[name] = seconds.get(name, 0.0) + max(0.0, min(last, end) - max(first, start))
+        return seconds
+
+
+class Ahead(Generic[Result]):
+    """A call in a thread of its own, which begins at once.
+
+    Parameters
+    ----------
+    call : callable
+        Takes the stages that it notes its seconds in, and its progress, which raises `KeyboardInterrupt` once `stop`
+        was asked for: a render then keeps what it has and ends.
+
+    Attributes
+    ----------
+    share : float
+        How much of it is done, as its progress told last.
+    """
+
+    def __init__(self, call: Callable[[Spans, Progress], Result]) -> None:
+        self._spans, self._stopped = Spans(), Event()
+        self.share, self._error = 0.0, float("inf")
+        self._future: Future[Result] = Future()
+        # no worker of a pool, which Python waits for at its end: a second Ctrl-C leaves at once
+        Thread(target=self._make, args=(call,), daemon=True).start()
+
+    def _make(self, call: Callable[[Spans, Progress], Result]) -> None:
+        try:
+            self._future.set_result(call(self._spans, self._show))
+        except BaseException as error:
+            self._future.set_exception(error)
+
+    def _show(self, share: float, error: float) -> None:
+        if self._stopped.is_set():
+            raise KeyboardInterrupt
+        self.share, self._error = share, error
+
+    def result(self, progress: Progress) -> tuple[Result, dict[str, float]]:
+        """Wait for the result, and give it with the seconds of each stage that were waited for.
+
+        Progress is called from the caller's own thread.
+
+        Raises
+        ------
+        BaseException
+            That the call raised.
+        """
+        start = time.perf_counter()
+        while not wait([self._future], LOOK_S).done:
+            progress(self.share, self._error)
+        return self._future.result(), self._spans.within(start, time.perf_counter())
+
+    def stop(self) -> None:
+        """End the call at its next progress, and wait for that; whatever it gives or raises is let go of."""
+        self._stopped.set()
+        wait([self._future])
