@@ -26,7 +26,7 @@ def digest_inputs(value: Any) -> str:
     bits on another one. The same inputs have the same hash on all; only a float that happens to lie on the edge
     between two roundings (one in a million of those that differ) makes a result be made again.
     """
-    return digest(_rounded(value))
+    return digest(rounded(value))
 
 
 def digest_bytes(*parts: bytes | memoryview) -> str:
@@ -52,17 +52,17 @@ def _plain(value: Any) -> Any:
     return np.asarray(value).tolist()  # arrays, NumPy's scalars and Dr.Jit's matrices
 
 
-def _rounded(value: Any) -> Any:
-    """Plain data with its floats rounded."""
+def rounded(value: Any) -> Any:
+    """Plain data with its floats rounded, as `digest_inputs` hashes it."""
     if isinstance(value, str) and "," in value:  # a spectrum as Mitsuba takes it is text: 0.25,0.5,...
         with suppress(ValueError):
-            return _rounded(np.array(value.split(","), dtype=np.float64))
+            return rounded(np.array(value.split(","), dtype=np.float64))
     if value is None or isinstance(value, str | int):
         return value
     if is_dataclass(value) or isinstance(value, Mapping):
-        return {name: _rounded(part) for name, part in _plain(value).items()}
+        return {name: rounded(part) for name, part in _plain(value).items()}
     if isinstance(value, list | tuple):
-        return [_rounded(part) for part in value]
+        return [rounded(part) for part in value]
     array = np.asarray(value)
     if array.dtype.kind != "f":
         return array.tolist()

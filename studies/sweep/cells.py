@@ -1,6 +1,7 @@
 """Cells of a study: one picture each, all that decides it, its key, and the random streams of its noise."""
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
@@ -8,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit
-from rodcone.digests import digest, digest_inputs
+from rodcone.digests import digest, rounded
 from sensor.flicker.waveform import Waveform
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.render_facts import RenderFacts
@@ -108,23 +109,24 @@ def labels(condition: Condition) -> dict[str, Any]:
     return vars(condition) | {"scene": condition.scene.label, **files}
 
 
-def cell_key(
+def cell_keys(
     condition: Condition,
     processor: str,
-    seed: int,
+    seeds: Sequence[int],
     frame: str,
     luminance_cd_m2: float,
     exposure_s: float,
     made_by: Provenance,
     flicker: Waveform | None = None,
-) -> str:
-    """Key of a cell: its place in the study, which decides its noise, and all that its picture is made from.
+) -> list[str]:
+    """Key of each seed's cell: its place in the study, which decides its noise, and all that its picture is made from.
 
     The processor's colours follow from the frame's sensor and light.
     """
     lamps: list[object] = [] if flicker is None else [flicker]
-    inputs = [labels(condition), processor, seed, frame, luminance_cd_m2, exposure_s, made_by]
-    return digest_inputs(inputs + lamps)
+    place = rounded([labels(condition), processor])
+    made_from = rounded([frame, luminance_cd_m2, exposure_s, made_by, *lamps])
+    return [digest([*place, seed, *made_from]) for seed in seeds]
 
 
 def device_stream(sensor: str, mosaic: str, seed: int) -> np.random.Generator:

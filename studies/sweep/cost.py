@@ -18,8 +18,7 @@ from studies.study.cost import START_S, cores, pace, render_seconds
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, film_of, open_all
 from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
-from studies.sweep.database import FILE
-from studies.sweep.export import read_rows
+from studies.sweep.database import FILE, made_with, read_results
 from studies.sweep.provenance import versions
 
 # Processor seconds on a server's cores with AVX-512, by 16 cells of the demo in one process.
@@ -118,9 +117,10 @@ def estimated(
     """
     everything = reference or study.budget.model == REFERENCE
     plan = reference_plan(study) if everything else plan_from_settings(study)
-    rows = read_rows(out) if (out / FILE).is_file() else []
-    code = versions()["rodcone"]
-    kept = sum(json.loads(row.versions).get("rodcone") == code for row in rows)
+    code, kept = versions()["rodcone"], 0
+    if (out / FILE).is_file():
+        with read_results(out) as base:
+            kept = sum(count for text, count in made_with(base).items() if json.loads(text).get("rodcone") == code)
     return estimate(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
 
 

@@ -243,14 +243,39 @@ def note_keys(base: sqlite3.Connection, first: int, keys: Iterable[str]) -> None
     base.execute("COMMIT")
 
 
+def noisiest(base: sqlite3.Connection) -> list[Row]:
+    """Row of the largest `mc_share` in each scene of the last run, the first of equal ones, in the study's order.
+
+    Raises
+    ------
+    InputError
+        Where one of them isn't what was written.
+    """
+    ranked = (
+        "SELECT key, row_number() OVER (PARTITION BY scene ORDER BY mc_share DESC, place) AS rank, "
+        "min(place) OVER (PARTITION BY scene) AS first FROM wanted JOIN cells USING (key)"
+    )
+    worst = f"SELECT {_COLUMNS} FROM cells JOIN ({ranked}) USING (key) WHERE rank = 1 ORDER BY first"
+    return [Row(*_require_sound(values, f"row {values[0]!r}")) for values in base.execute(worst)]
+
+
+def made_with(base: sqlite3.Connection) -> dict[str, int]:
+    """Count the rows of the last run by the versions that made them."""
+    return dict(base.execute("SELECT versions, count(*) FROM wanted JOIN cells USING (key) GROUP BY versions"))
+
+
 def forget_old(base: sqlite3.Connection) -> None:
     """Remove earlier rows of cells that this run has made anew with other versions or another variant's render.
 
     The backend counts among the versions; a row that differs in its engines alone is another plan's.
     """
+    others = f"SELECT {_COLUMNS} FROM cells WHERE key NOT IN (SELECT key FROM wanted WHERE key IS NOT NULL)"
+    if base.execute(f"{others} LIMIT 1").fetchone() is None:
+        return
     place = attrgetter(*AXES, "seed")
     new = {place(row): (row.variant, row.versions) for row in rows(base)}
-    old = [(row.key,) for row in _sound_rows(base) if new.get(place(row), made := (row.variant, row.versions)) != made]
+    sound = (Row(*values[:-1]) for values in base.execute(others) if _is_sound(values))
+    old = [(row.key,) for row in sound if new.get(place(row), made := (row.variant, row.versions)) != made]
     base.executemany("DELETE FROM cells WHERE key = ?", old)
 
 
@@ -294,8 +319,3 @@ def _require_sound(values: tuple[Any, ...], what: str) -> tuple[Any, ...]:
     if not _is_sound(values):
         raise InputError(f"results: {what} isn't what was written (damaged); run rodcone sweep again, which makes it")
     return values[:-1]
-
-
-def _sound_rows(base: sqlite3.Connection) -> Iterator[Row]:
-    """Give all rows but the damaged ones."""
-    return (Row(*values[:-1]) for values in base.execute(f"SELECT {_COLUMNS} FROM cells") if _is_sound(values))

@@ -41,7 +41,7 @@ from studies.study.lit_scene import (
 from studies.study.render_facts import render_facts
 from studies.study.render_noise import render_share
 from studies.study.study import Study, conditions, label, study_mosaics
-from studies.sweep.cells import Cell, RenderRecord, cell_key
+from studies.sweep.cells import Cell, RenderRecord, cell_keys
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, load_frame, make_frames
 from studies.sweep.provenance import provenance, versions
@@ -219,6 +219,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             if software.mosaic == imaged[-1]:
                 colours[imaged, name] = colours_under(frame.sensor, software, light)
     cells, lamps = [], waveform(job.study.flicker) if job.study.flicker else None
+    seeds, pictures = job.study.seeds, (job.out / PICTURES).resolve()
     for condition in conditions(job.study, opened.choice):
         image = job.plan.images[condition]
         for name, software in job.software.items():
@@ -231,24 +232,27 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             if lamps is not None and parse_exposure(condition.exposure) is None:
                 exposure_s = steady_exposure_s([lamps], exposure_s)
             made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
+            keys = cell_keys(condition, label(name), seeds, frame.key, luminance, exposure_s, made_by, lamps)
+            of_sensor = replace(frame, sensor=sensor)
+            processor = str(Path(name).resolve()) if user_file(name) else name
             cells += [
                 Cell(
-                    key=cell_key(condition, label(name), seed, frame.key, luminance, exposure_s, made_by, lamps),
+                    key=key,
                     condition=condition,
-                    processor=str(Path(name).resolve()) if user_file(name) else name,
+                    processor=processor,
                     seed=seed,
                     luminance_cd_m2=luminance,
                     illuminance_lux=None if frame.lux_per_cd_m2 is None else luminance * frame.lux_per_cd_m2,
                     exposure_s=exposure_s,
-                    frame=replace(frame, sensor=sensor),
+                    frame=of_sensor,
                     made_by=made_by,
                     colours=colours[imaged, name],
                     white_cd_m2=frame.white_cd_m2 * luminance,
-                    pictures=(job.out / PICTURES).resolve(),
+                    pictures=pictures,
                     render=record,
                     budget_share=job.plan.shares.get(condition),
                     flicker=lamps,
                 )
-                for seed in job.study.seeds
+                for key, seed in zip(keys, seeds, strict=True)
             ]
     return cells

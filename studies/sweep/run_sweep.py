@@ -4,8 +4,9 @@ import fcntl
 import json
 import os
 import platform
+import time
 from collections import defaultdict
-from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterable, Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager, suppress
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
@@ -31,11 +32,11 @@ from studies.sweep.database import (
     add,
     done,
     forget_old,
+    noisiest,
     note_keys,
     note_run,
     note_stages,
     open_results,
-    rows,
     want,
 )
 from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, make_scene, note_scene, scene_cells
@@ -89,6 +90,7 @@ def _remove_half_written(out: Path) -> None:
 
 # Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
+NOTE_S = 1.0  # of a killed run's seconds so many are lost; to note them with every row took a third of its time
 RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
 
 
@@ -181,18 +183,15 @@ def sweep(
                 missing = [cell for cell in cells if cell.key not in stored]
                 count_made += _run(job, number, missing, runner, partial(shares.made, index))
         forget_old(base)
-        notes.update(dict.fromkeys(_noise_notes(rows(base))))
+        notes.update(dict.fromkeys(_noise_notes(noisiest(base))))
         stages = clock.stages()
         note_stages(base, number, stages)
     return SweepResult(out, count * len(scenes), count_made, sum(stages.values()), tuple(notes))
 
 
-def _noise_notes(cells: Iterable[Row]) -> list[str]:
+def _noise_notes(worst: Iterable[Row]) -> list[str]:
     """For each scene whose render's noise exceeds a sensor's, where it does so most."""
-    worst: dict[str, Row] = {}
-    for row in cells:
-        worst[row.scene] = max(worst.get(row.scene, row), row, key=lambda row: row.mc_share)
-    notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst.values()]
+    notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst]
     return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
 
 
@@ -251,13 +250,23 @@ class Shares:
         self._step(words + what, (index + share) / self._count)
 
 
+@contextmanager
+def noting_stages(job: Job, run: int, more: Mapping[str, float]) -> Iterator[None]:
+    """Note the seconds so far when the cells of a scene end, however they do; `more` beside those of the clock."""
+    try:
+        yield
+    finally:
+        note_stages(job.base, run, job.clock.stages(more))
+
+
 def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step) -> int:
     """Make cells, store each as it comes with the time taken so far; returns their number."""
     count = 0
     workers = set[tuple[str, int]]()
     seconds = defaultdict[str, float](float)
     on_the_clock = dict[str, float]()
-    with closing(runner(missing)) as coming:
+    noted_s = time.monotonic()
+    with noting_stages(job, run, on_the_clock), closing(runner(missing)) as coming:
         for count, row in enumerate(coming, start=1):
             add(job.base, row)
             workers.add((row.host, row.worker))
@@ -266,8 +275,10 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
             seconds["metrics"] += row.measure_s or 0.0
             seconds[FIRST] += row.first_s
             # as wall time: the workers work at the same time
-            on_the_clock = {name: value / len(workers) for name, value in seconds.items()}
-            note_stages(job.base, run, job.clock.stages(on_the_clock))
+            on_the_clock.update((name, value / len(workers)) for name, value in seconds.items())
+            if time.monotonic() - noted_s >= NOTE_S:
+                noted_s = time.monotonic()
+                note_stages(job.base, run, job.clock.stages(on_the_clock))
             part(f"cell {count} of {len(missing)}", count / len(missing))
     for name, value in on_the_clock.items():
         job.clock.add(name, value)

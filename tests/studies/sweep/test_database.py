@@ -23,6 +23,8 @@ from studies.sweep.database import (
     done,
     forget_old,
     last_run,
+    made_with,
+    noisiest,
     note_keys,
     note_render,
     note_run,
@@ -123,6 +125,22 @@ def test_what_is_made_anew_is_forgotten_and_what_was_not_asked_for_stays(tmp_pat
         want(base, ["new", None])
         forget_old(base)
         assert [row.key for row in rows(base, everything=True)] == ["another plan", "another seed", "coarser", "new"]
+
+
+def test_the_noisiest_row_of_each_scene_is_the_first_of_equals_in_the_studys_order(tmp_path: Path) -> None:
+    shares = {"b1": 0.1, "b2": 0.4, "b3": 0.4, "a1": 0.2, "a2": 0.05}
+    with open_results(tmp_path) as base:
+        for key, share in shares.items():
+            add(base, replace(ROW, key=key, scene=key[0], mc_share=share, versions=f'{{"rodcone": "{key[1]}"}}'))
+        add(base, replace(ROW, key="a9", scene="a", mc_share=0.9))  # of an earlier run
+        want(base, [*sorted(shares, reverse=True), None])
+        assert [row.key for row in noisiest(base)] == ["b3", "a1"]
+        want(base, shares)
+        assert [row.key for row in noisiest(base)] == ["b2", "a1"]
+        assert made_with(base) == {f'{{"rodcone": "{n}"}}': count for n, count in ((1, 2), (2, 2), (3, 1))}
+        base.execute("UPDATE cells SET mc_share = 0.5 WHERE key = 'b1'")
+        with pytest.raises(InputError, match="row 'b1' isn't what was written"):
+            noisiest(base)
 
 
 def test_another_version_is_refused_and_left_as_it_is(tmp_path: Path) -> None:

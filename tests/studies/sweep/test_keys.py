@@ -12,6 +12,7 @@ import sweep_sample as SAMPLE
 
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
+from rodcone.digests import digest_inputs
 from sensor.exposure import auto_exposure_s
 from sensor.flicker.waveform import Waveform
 from sensor.lens.table import terms_of
@@ -27,7 +28,15 @@ from studies.study.render_facts import RenderFacts, render_facts
 from studies.study.study import Condition, RenderLimits, SceneChoice
 from studies.sweep import frames as frames_module
 from studies.sweep import prepare as prepare_module
-from studies.sweep.cells import RenderRecord, cell_key, device_stream, exposure_stream, render_text, shake_stream
+from studies.sweep.cells import (
+    RenderRecord,
+    cell_keys,
+    device_stream,
+    exposure_stream,
+    labels,
+    render_text,
+    shake_stream,
+)
 from studies.sweep.database import open_results
 from studies.sweep.frames import frame_key, load_frame
 from studies.sweep.prepare import FRAMES, Job, scene_cells
@@ -125,16 +134,23 @@ def test_every_field_of_a_sensor_is_in_a_frames_key(tmp_path: Path) -> None:
 
 def test_a_cells_key_changes_with_each_of_its_inputs_alone() -> None:
     inputs: dict[str, Any] = {
-        "condition": CONDITION, "processor": "ple", "seed": 0, "frame": "f", "luminance_cd_m2": 1.0,
+        "condition": CONDITION, "processor": "ple", "seeds": (0,), "frame": "f", "luminance_cd_m2": 1.0,
         "exposure_s": 0.01, "made_by": "m",
     }  # fmt: skip
     other = {
-        "condition": replace(CONDITION, white_balance="gray-world"), "processor": "bayer", "seed": 1, "frame": "g",
+        "condition": replace(CONDITION, white_balance="gray-world"), "processor": "bayer", "seeds": (1,), "frame": "g",
         "luminance_cd_m2": 2.0, "exposure_s": 0.02, "made_by": "n",
     }  # fmt: skip
-    keys = {cell_key(**inputs)} | {cell_key(**inputs | {name: value}) for name, value in other.items()}
-    keys |= {cell_key(**inputs, flicker=lamp) for lamp in (Waveform(100.0, 0.5), Waveform(120.0, 0.5))}
+    keys = {*cell_keys(**inputs)}.union(*(cell_keys(**inputs | {name: value}) for name, value in other.items()))
+    keys = keys.union(*(cell_keys(**inputs, flicker=lamp) for lamp in (Waveform(100.0, 0.5), Waveform(120.0, 0.5))))
     assert len(keys) == 3 + len(other)
+
+
+def test_keys_are_digests_of_all_inputs_with_each_seed() -> None:
+    named = [labels(CONDITION), "ple"]
+    made_from = ["f", 0.1 + 0.2, 0.01, {"numpy": "2"}]
+    keys = cell_keys(CONDITION, "ple", (3, 5), *made_from)  # type: ignore[arg-type]
+    assert keys == [digest_inputs([*named, seed, *made_from]) for seed in (3, 5)]
 
 
 def test_a_stream_of_noise_has_a_draw_of_its_own_for_each_of_its_coordinates() -> None:

@@ -48,7 +48,7 @@ from studies.pages.report_pictures import opened
 from studies.photograph.camera import develop_to_scale
 from studies.study.model import LensTerms
 from studies.study.study import Condition, RenderLimits, SceneChoice, Study
-from studies.sweep.cells import Cell, cell_key, device_stream, exposure_stream, flicker_stream, shake_stream
+from studies.sweep.cells import Cell, cell_keys, device_stream, exposure_stream, flicker_stream, shake_stream
 from studies.sweep.provenance import Provenance
 from studies.sweep.run_cell import run_cell
 from studies.sweep.stored import keep
@@ -396,14 +396,14 @@ def test_streams_are_those_of_the_first_release() -> None:
 
 def test_a_key_changes_with_each_thing_that_decides_a_picture() -> None:
     made_by = Provenance("llvm_ad_spectral", "llvm", "numpy", "{}")
-    given = (AT, "bayer", 0, "frame", 25.0, 0.01, made_by)
-    others = (replace(AT, level="1lux"), "interleaved", 1, "other", 25.1, 0.011)
-    keys = [cell_key(*given)]
+    given = (AT, "bayer", (0,), "frame", 25.0, 0.01, made_by)
+    others = (replace(AT, level="1lux"), "interleaved", (1,), "other", 25.1, 0.011)
+    keys = [*cell_keys(*given)]
     for place, other in enumerate(others):
         changed = list(given)
         changed[place] = other
-        keys.append(cell_key(*changed))  # type: ignore[arg-type]
+        keys.extend(cell_keys(*changed))  # type: ignore[arg-type]
     for field in ("variant", "readout_engine", "development_engine", "versions"):
-        keys.append(cell_key(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
+        keys.extend(cell_keys(*given[:-1], replace(made_by, **{field: "another"})))  # type: ignore[arg-type]
     assert len(set(keys)) == 1 + 6 + 4
-    assert cell_key(*given) == keys[0]
+    assert cell_keys(*given) == keys[:1]
