@@ -8,8 +8,8 @@ HDR", Picture Coding Symposium 2021; constants as the authors publish them with 
 from dataclasses import dataclass
 
 import numpy as np
+import skimage
 from numpy.typing import ArrayLike, NDArray
-from skimage.color import deltaE_cie76, deltaE_ciede2000, rgb2lab
 
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.errors import InputError
@@ -68,8 +68,8 @@ def picture_quality(picture: NDArray[np.float64], truth: "NDArray[np.float64] | 
         require_finite(picture=picture)
     else:
         require_finite(picture=picture, truth=truth)
-        encoded, lab, moments = truth, rgb2lab(truth), local_moments(truth)
-    delta_e = deltaE_ciede2000(rgb2lab(picture), lab)
+        encoded, lab, moments = truth, skimage.color.rgb2lab(truth), local_moments(truth)
+    delta_e = skimage.color.deltaE_ciede2000(skimage.color.rgb2lab(picture), lab)
     return Quality(
         psnr_db(picture, encoded), ssim(picture, moments), float(np.median(delta_e)), float(np.percentile(delta_e, 95))
     )
@@ -127,7 +127,12 @@ def true_picture(linear: Image) -> TruePicture:
     encoded = encode_srgb(linear)
     shown = np.clip(linear, 0.0, 1.0)
     return TruePicture(
-        linear, encoded, rgb2lab(encoded), eye_lab_of_light(shown), seen_light(shown), local_moments(encoded)
+        linear,
+        encoded,
+        skimage.color.rgb2lab(encoded),
+        eye_lab_of_light(shown),
+        seen_light(shown),
+        local_moments(encoded),
     )
 
 
@@ -150,7 +155,7 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
     """
     require_finite(picture=linear)
     shown = np.clip(linear, 0.0, 1.0)
-    difference = deltaE_cie76(eye_lab_of_light(shown), truth.eye_lab)
+    difference = skimage.color.deltaE_cie76(eye_lab_of_light(shown), truth.eye_lab)
     luminances = (luminance_of_srgb(picture) * white_cd_m2 for picture in (linear, truth.linear))
     return Appearance(
         float(np.median(difference)),

@@ -6,9 +6,8 @@ three opponent planes, each blurred by the eye's own spread, back to XYZ, then C
 
 import numpy as np
 import scipy
+import skimage
 from numpy.typing import NDArray
-from skimage.color import deltaE_cie76, xyz2lab
-from skimage.color.colorconv import xyz_from_rgb
 
 from rodcone.colour_spaces import decode_srgb
 from rodcone.types import Floats, Image
@@ -67,7 +66,9 @@ def eye_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_
 
 def eye_lab_of_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Image:
     """CIELAB of a display's light, linear sRGB (h, w, 3) in [0, 1], after the eye's blur."""
-    return np.asarray(xyz2lab(eye_xyz(linear @ xyz_from_rgb.T, pixels_per_degree)))
+    return np.asarray(
+        skimage.color.xyz2lab(eye_xyz(linear @ skimage.color.colorconv.xyz_from_rgb.T, pixels_per_degree))
+    )
 
 
 def s_cielab(
@@ -82,4 +83,6 @@ def s_cielab(
     pixels_per_degree : float
         Of the eye's view. With fewer the picture is nearer, and finer detail is seen.
     """
-    return np.asarray(deltaE_cie76(eye_lab(picture, pixels_per_degree), eye_lab(truth, pixels_per_degree)))
+    return np.asarray(
+        skimage.color.deltaE_cie76(eye_lab(picture, pixels_per_degree), eye_lab(truth, pixels_per_degree))
+    )

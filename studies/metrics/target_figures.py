@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
+import skimage
 from numpy.typing import NDArray
-from skimage.color import deltaE_ciede2000, xyz2lab
 
 from render.illuminants import illuminant
 from render.scene import Scene
@@ -76,7 +76,7 @@ def patch_means(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
 
 def patch_labs(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
     """CIELAB of each patch's mean colour, shape (patch, 3), of linear sRGB (h, w, 3)."""
-    return np.asarray(xyz2lab(patch_means(linear, masks) @ SRGB_TO_XYZ.T))
+    return np.asarray(skimage.color.xyz2lab(patch_means(linear, masks) @ SRGB_TO_XYZ.T))
 
 
 def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
@@ -103,7 +103,7 @@ def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64]
         left; clipping or encoding first would turn noise into a shift.
     masks : (patch, h, w) bool
     """
-    return np.asarray(deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
+    return np.asarray(skimage.color.deltaE_ciede2000(patch_labs(picture, masks), patch_labs(truth, masks)))
 
 
 EDGE, CHART = "slanted_edge", "color_checker"  # names in `scenes.catalogue`
@@ -177,7 +177,7 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
         Of `studies.metrics.target_figures.patch_masks`.
     """
     lab = patch_labs(linear, masks)
-    return np.asarray(deltaE_ciede2000(lab[0::2], lab[1::2]))
+    return np.asarray(skimage.color.deltaE_ciede2000(lab[0::2], lab[1::2]))
 
 
 def true_pair_delta_e(light: str) -> NDArray[np.float64]:
@@ -186,8 +186,8 @@ def true_pair_delta_e(light: str) -> NDArray[np.float64]:
     In closed form, in the renderer's bands of 10 nm, adapted to D65 as pictures are.
     """
     surfaces, white = _xyz(light, [curve for pair in pairs() for curve in pair])
-    lab = xyz2lab(adapt_to_d65(surfaces / white[1], white))
-    return np.asarray(deltaE_ciede2000(lab[0::2], lab[1::2]))
+    lab = skimage.color.xyz2lab(adapt_to_d65(surfaces / white[1], white))
+    return np.asarray(skimage.color.deltaE_ciede2000(lab[0::2], lab[1::2]))
 
 
 def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
@@ -196,7 +196,11 @@ def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.fl
     Both show the white patch's luminance, under its own light, at `WHITE_AT`: nothing is fitted to the
     picture.
     """
-    return np.asarray(deltaE_ciede2000(patch_labs(linear, masks), xyz2lab(daylight_srgb() @ SRGB_TO_XYZ.T)))
+    return np.asarray(
+        skimage.color.deltaE_ciede2000(
+            patch_labs(linear, masks), skimage.color.xyz2lab(daylight_srgb() @ SRGB_TO_XYZ.T)
+        )
+    )
 
 
 @cache

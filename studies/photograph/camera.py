@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import numpy as np
+import skimage
 from numpy.typing import ArrayLike, NDArray
-from skimage.color import deltaE_ciede2000, xyz2lab
 
 from isp.colour.colour_fit import ColourFit, fit_colours, fit_through_neutral, grey_of, mixed_fit, training
 from isp.colour.white_balance import WhiteBalance
@@ -249,8 +249,8 @@ def balance_delta_e(
     unit_e = scale * neutral[raw.channels.index(raw.unit_channel)]
     names = colours.channels[:3]
     developed = GREY * colours.matrix(names) @ [read[name] / unit_e for name in names]
-    lab, grey = (xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (developed, np.full(3, GREY)))
-    return float(deltaE_ciede2000(lab, grey))
+    lab, grey = (skimage.color.xyz2lab(SRGB_TO_XYZ @ rgb) for rgb in (developed, np.full(3, GREY)))
+    return float(skimage.color.deltaE_ciede2000(lab, grey))
 
 
 def _even_field(raw: RawImage, sensor: SensorConfig, light: Light) -> tuple[RawImage, float]:

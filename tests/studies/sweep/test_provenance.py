@@ -1,5 +1,6 @@
 """What a row says that made it is what did: versions, engines, threads, counted another way; and nothing is mixed."""
 
+import ast
 import json
 import os
 import shutil
@@ -233,6 +234,18 @@ def test_all_that_making_a_picture_imports_decides_it() -> None:
         "print(*(module.__file__ for module in found.values() if not hasattr(module, '__path__')))"
     )
     assert {Path(file).resolve() for file in in_new_python(script).split()} <= set(deciding_modules())
+
+
+def test_modules_that_decide_are_those_that_the_syntax_trees_tell() -> None:
+    paths, waiting = set[Path](), ["studies.sweep.run_cell", "studies.sweep.frames"]
+    while waiting:
+        path = ROOT.joinpath(*waiting.pop().split(".")).with_suffix(".py")
+        if path.is_file() and path not in paths:
+            paths.add(path)
+            for node in ast.walk(ast.parse(path.read_text("utf-8"))):
+                if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith("studies."):
+                    waiting += [node.module, *(f"{node.module}.{alias.name}" for alias in node.names)]
+    assert deciding_modules() == sorted(paths)
 
 
 @pytest.mark.sample(2)
