@@ -16,7 +16,6 @@ from rodcone.errors import require_absent, require_fields
 from rodcone.memory import Memory, require_memory
 from rodcone.progress import Step, progress
 from studies.budget.ledger import Plan
-from studies.budget.plan import plan as plan_study
 from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.commands.console import INTERRUPTED, print_result, say, told
 from studies.commands.report_mark import REPORT, is_current
@@ -27,6 +26,7 @@ from studies.study.study_file import read_study
 from studies.sweep.cluster import on_cluster
 from studies.sweep.cost import Estimate, estimated
 from studies.sweep.database import FILE
+from studies.sweep.kept_plan import kept_plan
 from studies.sweep.prepare import PILOTS
 from studies.sweep.run_sweep import Runner, SweepResult, locked_folder
 from studies.sweep.run_sweep import sweep as run_sweep
@@ -107,7 +107,7 @@ class SweepOrder:
             return reference_plan(study)
         if self.as_stated:
             return plan_from_settings(study)
-        return plan_study(study, cache=self.out / PILOTS, step=lambda what, share: step(f"plan: {what}", 0.0))
+        return kept_plan(study, self.out / PILOTS, lambda what, share: step(f"plan: {what}", 0.0))
 
 
 ORDER = SweepOrder()

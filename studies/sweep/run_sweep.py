@@ -20,7 +20,6 @@ from rodcone.errors import InputError
 from rodcone.files import is_half_written
 from rodcone.progress import Step, progress_bar, render_words
 from studies.budget.ledger import Plan
-from studies.budget.plan import plan as plan_of
 from studies.photograph.clock import FIRST, Clock
 from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.render_noise import noise_note
@@ -39,6 +38,7 @@ from studies.sweep.database import (
     open_results,
     want,
 )
+from studies.sweep.kept_plan import kept_plan
 from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, make_scene, note_scene, scene_cells
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
@@ -164,7 +164,7 @@ def sweep(
     scenes = open_all(study)
     runner = runner or (lambda cells: run(cells, InThisProcess()))
     with locked_folder(out), progress_bar(step) as show, open_results(out) as base:
-        plan = plan or plan_of(study, cache=out / PILOTS, step=step)
+        plan = plan or kept_plan(study, out / PILOTS, step)
         job = Job(study, plan, out, base, clock)
         now = datetime.now(UTC).isoformat(timespec="seconds")
         number = note_run(base, now, platform.node(), json.dumps(_noted(study)))
