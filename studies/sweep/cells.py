@@ -67,8 +67,8 @@ class Cell:
         Its sensor has the processor's mosaic and the lens that is modelled.
     made_by : Provenance
         Of the process that asks; a worker with other versions or engines refuses the cell.
-    colours : ColourFit
-        Of the processor's balanced planes, under the scene's light.
+    colours : ColourFit or None
+        Of the processor's balanced planes, under the scene's light; a cell that is made has them.
     white_cd_m2 : float
         Luminance shown as white.
     pictures : Path
@@ -90,12 +90,19 @@ class Cell:
     exposure_s: float
     frame: UnitFrame
     made_by: Provenance
-    colours: ColourFit
+    colours: ColourFit | None
     white_cd_m2: float
     pictures: Path
     render: RenderRecord
     budget_share: float | None = None
     flicker: Waveform | None = None
+
+    @property
+    def fit(self) -> ColourFit:
+        """Return the colours of a cell that is made."""
+        if self.colours is None:
+            raise ValueError("a cell that is made has colours")
+        return self.colours
 
     @property
     def kind(self) -> tuple[str, Condition]:

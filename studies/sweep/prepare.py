@@ -2,6 +2,7 @@
 
 import sqlite3
 import warnings
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
@@ -40,7 +41,7 @@ from studies.study.lit_scene import (
 )
 from studies.study.render_facts import render_facts
 from studies.study.render_noise import render_share
-from studies.study.study import Study, conditions, label, study_mosaics
+from studies.study.study import Condition, Study, conditions, label, study_mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_keys
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, load_frame, make_frames
@@ -84,9 +85,38 @@ Sensors = tuple[SensorConfig, SensorConfig]
 
 
 def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
-    """Cells of one scene in the study's order; None before its render, or where a shared file is damaged."""
+    """Cells of one scene in the study's order; None before its render, or where a shared file is damaged.
+
+    They lack the colours that `coloured` adds: what is stored already needs none.
+    """
     record = render_record(job.base, _request(job, opened))
     return None if record is None else _cells(job, opened, record)
+
+
+def coloured(job: Job, opened: OpenedScene, cells: Sequence[Cell]) -> list[Cell]:
+    """Add to cells of one scene that lack them the colours of their processors under its light."""
+    sensors = _imaged(job, opened) if cells else {}
+    software = {_portable(name): software for name, software in job.software.items()}
+    fits: dict[tuple[Imaged, str], ColourFit] = {}
+
+    def fit(cell: Cell) -> ColourFit:
+        imaged = *_image_of(job, cell.condition), software[cell.processor].mosaic
+        if (imaged, cell.processor) not in fits:
+            light = white_spectrum(opened, cell.condition.spectrum)
+            fits[imaged, cell.processor] = colours_under(sensors[imaged][1], software[cell.processor], light)
+        return fits[imaged, cell.processor]
+
+    return [cell if cell.colours is not None else replace(cell, colours=fit(cell)) for cell in cells]
+
+
+def _image_of(job: Job, condition: Condition) -> tuple[str, str, LensConfig]:
+    """Return what a frame belongs to, but for the mosaic."""
+    return condition.spectrum, condition.sensor, job.plan.images[condition].lens
+
+
+def _portable(processor: str) -> str:
+    """Name of a processor; a user's file by its whole path, as its worker may start elsewhere."""
+    return str(Path(processor).resolve()) if user_file(processor) else processor
 
 
 def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]:
@@ -103,7 +133,7 @@ def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]
     if cells is None:
         record, cells = make_scene(job, opened, job.clock, progress)
         note_scene(job, opened, record)
-    return cells
+    return coloured(job, opened, cells)
 
 
 def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progress) -> tuple[RenderRecord, list[Cell]]:
@@ -134,9 +164,9 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
         )
         _make_files(job, opened, record, transport)
         cells = _cells(job, opened, record)
-    if cells is None:
-        raise OSError(None, "files just written are gone", str(job.out / FRAMES))
-    return record, cells
+        if cells is None:
+            raise OSError(None, "files just written are gone", str(job.out / FRAMES))
+        return record, coloured(job, opened, cells)
 
 
 def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
@@ -206,25 +236,20 @@ def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: 
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
-    """Cells of a scene whose files stand; None where one is missing."""
-    frames, colours = dict[Imaged, UnitFrame](), dict[tuple[Imaged, str], ColourFit]()
+    """Cells of a scene whose files stand, without their colours; None where one is missing."""
+    frames = dict[Imaged, UnitFrame]()
     for imaged, sensors in _imaged(job, opened).items():
         key = frame_key(record.content, opened, imaged[0], job.study, *sensors)
         frame = load_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None
         frames[imaged] = frame
-        light = white_spectrum(opened, imaged[0])
-        for name, software in job.software.items():
-            if software.mosaic == imaged[-1]:
-                colours[imaged, name] = colours_under(frame.sensor, software, light)
     cells, lamps = [], waveform(job.study.flicker) if job.study.flicker else None
     seeds, pictures = job.study.seeds, (job.out / PICTURES).resolve()
     for condition in conditions(job.study, opened.choice):
         image = job.plan.images[condition]
         for name, software in job.software.items():
-            imaged = condition.spectrum, condition.sensor, image.lens, software.mosaic
-            frame = frames[imaged]
+            frame = frames[*_image_of(job, condition), software.mosaic]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
             exposure_s, sensor = exposure_of(
                 frame, condition.exposure, condition.gain, luminance, job.study.longest_exposure_s
@@ -234,7 +259,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
             made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
             keys = cell_keys(condition, label(name), seeds, frame.key, luminance, exposure_s, made_by, lamps)
             of_sensor = replace(frame, sensor=sensor)
-            processor = str(Path(name).resolve()) if user_file(name) else name
+            processor = _portable(name)
             cells += [
                 Cell(
                     key=key,
@@ -246,7 +271,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
                     exposure_s=exposure_s,
                     frame=of_sensor,
                     made_by=made_by,
-                    colours=colours[imaged, name],
+                    colours=None,
                     white_cd_m2=frame.white_cd_m2 * luminance,
                     pictures=pictures,
                     render=record,

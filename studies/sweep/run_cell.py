@@ -88,7 +88,7 @@ def run_cell(cell: Cell) -> Row:
     neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
     options = {"balance": neutral} if as_shot else {}
     (linear, picture), develop_s, first_develop_s = timed(
-        lambda: develop_to_scale(raw, processor, cell.colours, sensor, neutral, cell.white_cd_m2, **options),
+        lambda: develop_to_scale(raw, processor, cell.fit, sensor, neutral, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # each has other kernels
     )
     if linear.shape != truth.linear.shape:  # of sensors of one size: compared at the coarsest's pixels
@@ -126,9 +126,7 @@ def run_cell(cell: Cell) -> Row:
         snr_db=picture.snr_db,
         substitution=None if picture.substituted is None else int(picture.substituted),
         saturated=float(saturated.mean()),
-        balance_delta_e=(
-            balance_delta_e(raw, cell.colours, sensor, frame.light, **options) if picture.balance else None
-        ),
+        balance_delta_e=(balance_delta_e(raw, cell.fit, sensor, frame.light, **options) if picture.balance else None),
         balance=json.dumps(dict(picture.balance)),
         mean_electrons=json.dumps(
             {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}

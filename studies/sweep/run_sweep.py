@@ -39,7 +39,17 @@ from studies.sweep.database import (
     want,
 )
 from studies.sweep.kept_plan import kept_plan
-from studies.sweep.prepare import FOLDERS, PICTURES, PILOTS, Job, known_cells, make_scene, note_scene, scene_cells
+from studies.sweep.prepare import (
+    FOLDERS,
+    PICTURES,
+    PILOTS,
+    Job,
+    coloured,
+    known_cells,
+    make_scene,
+    note_scene,
+    scene_cells,
+)
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
 
@@ -174,13 +184,13 @@ def sweep(
         count_made, shares = 0, Shares(show, len(scenes))
         notes = dict[str, None]()
         with closing(_scenes(job, list(scenes.values()), cell_lists, shares, ahead=ahead)) as coming:
-            for index, cells in enumerate(coming):
+            for index, (opened, cells) in enumerate(zip(scenes.values(), coming, strict=True)):
                 asked_keys = [cell.key for cell in cells]
                 notes.update(dict.fromkeys(cells[0].render.notes))
                 if not cell_lists[index]:
                     note_keys(base, index * count, asked_keys)
                 stored = done(base, out / PICTURES, asked_keys)
-                missing = [cell for cell in cells if cell.key not in stored]
+                missing = coloured(job, opened, [cell for cell in cells if cell.key not in stored])
                 count_made += _run(job, number, missing, runner, partial(shares.made, index))
         forget_old(base)
         notes.update(dict.fromkeys(_noise_notes(noisiest(base))))
