@@ -61,6 +61,17 @@ def test_order_and_executor_change_nothing(tmp_path: Path) -> None:
     assert content(tmp_path / "one") == content(tmp_path / "turned") == content(tmp_path / "threads")
 
 
+def test_colours_are_fitted_for_cells_that_are_made_alone(tmp_path, monkeypatch):
+    study = small_study(tmp_path)
+    swept(study, tmp_path / "whole")
+    with pytest.raises(KeyboardInterrupt):
+        swept(study, tmp_path / "out", partial(SAMPLE.ended_after, 2))
+    swept(study, tmp_path / "out")
+    assert content(tmp_path / "out") == content(tmp_path / "whole")
+    monkeypatch.setattr("studies.sweep.prepare.colours_under", lambda *_: pytest.fail("nothing is to be made"))
+    assert swept(study, tmp_path / "out").made == 0
+
+
 @pytest.mark.thorough
 def test_sensors_of_one_size_get_the_same_light_and_are_compared_at_the_coarsest_pixels(tmp_path: Path) -> None:
     SAMPLE.picture(tmp_path / "scene.exr", (48, 64))
