@@ -111,8 +111,8 @@ def spawned(pid: int) -> list[int]:
     """Process numbers of a process's descendants that are workers."""
     found = list[int]()
     with suppress(OSError):
-        of_threads = [path.read_text().split() for path in Path(f"/proc/{pid}/task").glob("*/children")]
-        for child in map(int, sum(of_threads, [])):  # dask's nannies start workers in a thread
+        of_threads = Path(f"/proc/{pid}/task").glob("*/children")  # dask's nannies start workers in a thread
+        for child in [int(text) for path in of_threads for text in path.read_text().split()]:
             if "spawn_main" in Path(f"/proc/{child}/cmdline").read_text():
                 found.append(child)
             found += spawned(child)
