@@ -3,13 +3,17 @@
 from dataclasses import replace
 from importlib import metadata
 from operator import attrgetter
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from render import engine
+from render.cache import read_transport, save_transport
 from render.engine import render
+from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
+from render.loader import Film
 from render.scene import LightGroup
 from render.spectrum import flat
 from scenes.catalogue import load
@@ -154,7 +158,31 @@ def test_a_render_of_other_versions_is_another_entry(tmp_path, renders, monkeypa
     small(tmp_path)
     monkeypatch.setattr("render.cache.ENGINE_VERSION", 10**6)
     small(tmp_path)
-    assert len(renders) == 5
+    monkeypatch.setattr("render.cache.INTEGRATOR", "another")
+    small(tmp_path)
+    monkeypatch.setattr("render.cache.variant", lambda: "another")
+    small(tmp_path)
+    assert len(renders) == 7
+
+
+def test_lights_that_share_their_paths_do_so_when_they_are_read_back(tmp_path, rendered):
+    """Or the error of both together would be told as that of independent ones."""
+    scene = load("flat_field")
+    (name, group), sun = next(iter(scene.groups.items())), "a second"
+    scene = SimpleNamespace(**vars(scene) | {"groups": {name: group, sun: group}})
+    twice = {field: np.repeat(getattr(rendered, field), 2, axis=0) for field in ("variance", "counts")}
+    halves = Halves(*(np.repeat(getattr(rendered.light, field), 2, axis=0) for field in ("mean", "difference")))
+    correlation = np.linspace(0.1, 0.9, twice["variance"][0].size, dtype=np.float32).reshape(
+        twice["variance"].shape[1:]
+    )
+    shared = SharedPaths((0, 1), correlation)
+    made = replace(rendered, light=halves, seen=rendered.seen * 2, groups=dict(scene.groups), shared=shared, **twice)
+    film = Film(SIZE, BANDS_NM, np.full(BANDS_NM.size, 50.0), max_depth=8)
+    save_transport(tmp_path, scene, film, 3, made)
+    found = read_transport(tmp_path, scene, film, 3)
+    assert found.shared.groups == (0, 1)
+    assert np.array_equal(found.shared.correlation, correlation)
+    assert read_transport(tmp_path, scene, film, 4) is None
 
 
 def after(folder, damage):

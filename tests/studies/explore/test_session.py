@@ -1,12 +1,16 @@
 """One explorer's thread: a render that fails, pages that take over from one another."""
 
+import io
 import json
 import pickle
+import sys
 import threading
 import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -42,7 +46,7 @@ from studies.explore.controls import (
 from studies.explore.memo import Memo, never_cancel
 from studies.explore.messages import KINDS, first_message, is_superseded_by, read_message, read_views, write_dropped
 from studies.explore.session import Session
-from studies.explore.slow import stand_in
+from studies.explore.slow import begin, stand_in
 from studies.explore.source import FIRST_SIDE, RenderOptions, RenderState, of_transport, open_source
 from studies.explore.views import histogram, pixel
 from studies.photograph.picture_file import to_png
@@ -698,3 +702,29 @@ def test_an_answer_brings_eight_notes_at_most(session: Session, monkeypatch: pyt
     assert page.ask(session, "histogram", 1, cameras=[QUICK])["notes"] == [
         f"note {number:02}" for number in range(3, 11)
     ]
+
+
+def test_a_slow_processor_is_at_work_in_a_process_that_reads_its_task(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The child is Python with one line of code; run here, that line develops what it is given."""
+    came = threading.Event()
+    told: list[Any] = []
+
+    class Child:
+        returncode = 0
+
+        def __init__(self, arguments: list[str], **_: Any) -> None:
+            self.arguments = arguments
+
+        def communicate(self, task: bytes) -> tuple[bytes, None]:
+            program, option, code = self.arguments
+            assert (program, option) == (sys.executable, "-c")
+            given, taken = io.BytesIO(task), io.BytesIO()
+            monkeypatch.setattr(sys, "stdin", SimpleNamespace(buffer=given))
+            monkeypatch.setattr(sys, "stdout", SimpleNamespace(buffer=taken))
+            exec(code, {})
+            return taken.getvalue(), None
+
+    monkeypatch.setattr("studies.explore.slow.subprocess.Popen", Child)
+    begin("bm3d", partial(divmod, 17, 5), lambda result: told.append(result) or came.set())
+    assert came.wait(30)
+    assert told == [(3, 2)]

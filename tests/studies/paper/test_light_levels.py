@@ -104,6 +104,17 @@ def test_best_time_of_a_grating_under_shot_noise_is_the_closed_form() -> None:
     assert found_s == pytest.approx(best_s, rel=0.17)
 
 
+def test_the_parabola_goes_through_the_best_time_and_its_two_neighbours_alone() -> None:
+    """Of values a, b, c an octave apart the top is (a - c) / (a - 2 b + c) / 2 octaves beside b."""
+    times_s = 0.01 * 2.0 ** np.arange(5)
+    for at in (1, 2, 3):
+        quality = np.full(5, -50.0)
+        quality[at - 1 : at + 2] = 10.0, 12.0, 11.0
+        offset = (10.0 - 11.0) / (10.0 - 24.0 + 11.0) / 2
+        best = 12.0 - (10.0 - 11.0) * offset / 4
+        assert best_time_s(times_s, quality) == pytest.approx((times_s[at] * 2**offset, best))
+
+
 def test_parabola_finds_the_top_between_times_and_an_end_is_that_time() -> None:
     times_s = 0.01 * 2.0 ** np.arange(5)
     quality = 20 - 3 * (np.log(times_s) - np.log(0.047)) ** 2

@@ -15,15 +15,17 @@ import rodcone as public
 from rodcone.colour_spaces import SRGB_TO_XYZ
 from scenes.dead_leaves import autocovariance, draw_leaves
 from studies.metrics.s_cielab import eye_xyz
+from studies.metrics.truth import named_light
 from studies.photograph.snr import snr
 from studies.score.developed import developed_figures
 from studies.score.developed_range import picture_range
+from studies.score.even_field import even_field
 from studies.score.figure import REPEATS, Definition, Merit, measured
 from studies.score.information import information
 from studies.score.over_light import over_light
 from studies.score.score import definitions, score
 from studies.score.texture_response import texture_response
-from studies.score.visual_noise import colour_fields, raw_visual_noise, visual_noise
+from studies.score.visual_noise import _variances, colour_fields, raw_visual_noise, visual_noise
 
 
 @pytest.mark.thorough
@@ -118,6 +120,19 @@ def test_visual_noise_with_stripes_of_columns_is_what_frames_show() -> None:
 
 
 @pytest.mark.thorough
+def test_noise_of_pixels_columns_and_rows_is_all_of_it() -> None:
+    """Columns and rows as the pixel states them, at 500 electrons; the three together are the law's variance."""
+    sensor = public.low_noise("bayer")
+    terms = {"column_gain_spread": 0.02, "column_offset_e": 6.0, "row_noise_e": 5.0, "read_noise_e": 9.0}
+    field = even_field(replace(sensor, pixel=replace(sensor.pixel, **terms)), named_light("D65"), 0.033, "G")
+    alone, columns, rows = _variances(field, 500.0)
+    (reading,) = field.readings
+    assert alone + columns + rows == pytest.approx(float(reading.law.variance(np.array([500.0]))[0]))
+    assert rows == pytest.approx(25.0)
+    of_gains = 0.02**2 * (500.0**2 + 500.0 + (sensor.pixel.prnu * 500.0) ** 2)
+    assert columns == pytest.approx(36.0 + of_gains, rel=1e-2)
+
+
 def test_visual_noise_with_stripes_of_rows_is_what_frames_show() -> None:
     """All of 20 e- of read noise in rows: within 12 standard errors of the mean of eight measurements."""
     sensor = public.low_noise()
