@@ -119,7 +119,6 @@ def test_visual_noise_with_stripes_of_columns_is_what_frames_show() -> None:
     assert abs(merit.measured - merit.computed) < 3 * (merit.high - merit.low)
 
 
-@pytest.mark.thorough
 def test_noise_of_pixels_columns_and_rows_is_all_of_it() -> None:
     """Columns and rows as the pixel states them, at 500 electrons; the three together are the law's variance."""
     sensor = public.low_noise("bayer")
@@ -133,6 +132,7 @@ def test_noise_of_pixels_columns_and_rows_is_all_of_it() -> None:
     assert columns == pytest.approx(36.0 + of_gains, rel=1e-2)
 
 
+@pytest.mark.thorough
 def test_visual_noise_with_stripes_of_rows_is_what_frames_show() -> None:
     """All of 20 e- of read noise in rows: within 12 standard errors of the mean of eight measurements."""
     sensor = public.low_noise()
