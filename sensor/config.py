@@ -95,11 +95,8 @@ class LensConfig:
                 f"scatter: {self.scatter:g} beside eye_age_years {self.eye_age_years:g}; allowed: a lens's wings or an "
                 "eye's; leave one out"
             )
-        if self.table_digest and not self.table:
-            raise InputError(
-                f"table_digest: {self.table_digest!r} without a table; allowed: what a table's reader states; leave it "
-                "out"
-            )
+        if not self.table:  # whoever takes a table off leaves its hash
+            object.__setattr__(self, "table_digest", "")
 
 
 @dataclass(frozen=True)

@@ -3,14 +3,16 @@
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from refusal import refusal
 
+from render.radiance import SpectralRadiance
 from sensor.presets import low_noise, preset_file
 from studies.budget.starting_points import plan_from_settings, reference_plan
 from studies.study.levels import parse_exposure
 from studies.study.lit_scene import open_all
-from studies.study.model import LensTerms
+from studies.study.model import LensTerms, unit_exposure_s
 from studies.study.study import SceneChoice, Study, conditions, study_mosaics
 from studies.study.study_file import read_study
 
@@ -260,6 +262,15 @@ def test_a_lens_by_data_stands_in_front_of_all_sensors_at_its_own_f_number(tmp_p
     (tmp_path / "mine.toml").write_text("f_number = 4.0\nfield = [0.0, 1.0]\n")
     path = written(tmp_path, TEXT + '\n[lens]\ntable = "mine.toml"\n')
     assert read_study(path).lens.table == str(tmp_path / "mine.toml")
+
+
+def test_exposures_go_by_the_f_number_of_a_lens_of_one_s_own_and_not_by_its_falloff(tmp_path: Path) -> None:
+    path = tmp_path / "mine.toml"
+    path.write_text("f_number = 5.6\nfield = [0.0, 1.0]\nrelative_illumination = [1.0, 0.2]\n")
+    light = SpectralRadiance(np.ones((8, 8, 4)), np.arange(430.0, 780.0, 100.0))
+    stopped = replace(low_noise(), lens=replace(low_noise().lens, f_number=5.6))
+    behind = LensTerms(table=str(path)).behind(low_noise())
+    assert unit_exposure_s(light, behind) == pytest.approx(unit_exposure_s(light, stopped), rel=1e-12)
 
 
 def test_a_lens_that_no_camera_can_have_is_refused(tmp_path: Path) -> None:
