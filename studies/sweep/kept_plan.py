@@ -45,7 +45,7 @@ def _key(study: Study) -> str:
     lights = [illuminant(name) for name in study.spectra if name != OWN]
     scenes = [opened.identity for opened in open_all(study).values()]
     code = [digest_file(path) for path in deciding_modules(names=("studies.budget.plan",))]
-    sensors = [preset(name) for name in study.sensors]
+    sensors = [study.lens.behind(preset(name)) for name in study.sensors]
     return digest_inputs([study, study_mosaics(study), scenes, sensors, lights, versions(), code])
 
 

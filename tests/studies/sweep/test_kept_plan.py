@@ -1,6 +1,7 @@
 """A plan that was kept is the plan that was made, and only where all that it is made from is the same."""
 
 from dataclasses import replace
+from importlib import resources
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +11,9 @@ import sweep_sample as SAMPLE
 from sensor.presets import preset_file
 from studies.budget import plan as module
 from studies.budget.ledger import Plan
+from studies.study.model import LensTerms
 from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.sweep import kept_plan as kept
 from studies.sweep.kept_plan import kept_plan
 
 
@@ -41,6 +44,25 @@ def test_a_kept_plan_is_the_plan_and_another_study_sensor_or_scene_has_its_own(t
         path.write_bytes(path.read_bytes()[:-9])
     kept_plan(study, pilots)
     assert len(made) == 5
+
+
+def test_a_lens_file_that_changes_makes_another_plan(tmp_path, monkeypatch):
+    """The plan itself is a stand-in: a lens by data takes seconds."""
+    for path in resources.files("sensor.lens").joinpath("data").iterdir():
+        if path.name.startswith("cooke_triplet"):
+            (tmp_path / path.name).write_bytes(path.read_bytes())
+    table, made = tmp_path / "cooke_triplet.toml", list[int]()
+    study = replace(SAMPLE.small_study(tmp_path, seeds=(0,)), lens=LensTerms(table=str(table)))
+    plan = Plan(renders={}, images={}, shares={}, ledgers=(), summary=())
+    monkeypatch.setattr(module, "plan", lambda *given, **named: made.append(1) or plan)
+    monkeypatch.setattr(kept, "_facts", lambda study, plan: {})
+    monkeypatch.setattr(kept, "_plan", lambda study, facts: plan)
+    for _ in range(2):
+        kept_plan(study, tmp_path / "pilots")
+    assert len(made) == 1
+    table.write_text(table.read_text("utf-8").replace("0.9939", "0.9938"), "utf-8")
+    kept_plan(study, tmp_path / "pilots")
+    assert len(made) == 2
 
 
 @pytest.mark.thorough
