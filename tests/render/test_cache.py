@@ -10,6 +10,7 @@ import pytest
 
 from render import engine
 from render.cache import read_transport, save_transport
+from render.denoised.denoise import Denoised
 from render.engine import render
 from render.error_estimates import Halves, SharedPaths
 from render.illuminants import illuminant
@@ -183,6 +184,21 @@ def test_lights_that_share_their_paths_do_so_when_they_are_read_back(tmp_path, r
     assert found.shared.groups == (0, 1)
     assert np.array_equal(found.shared.correlation, correlation)
     assert read_transport(tmp_path, scene, film, 4) is None
+
+
+def test_denoised_light_is_read_back_beside_the_unbiased(tmp_path, rendered):
+    planes = np.arange(rendered.radiance.size, dtype=np.float32).reshape(rendered.radiance.shape)
+    light = Denoised(planes, Halves(2 * planes, 3 * planes), Halves(4 * planes, 5 * planes), fold_points=6)
+    scene, film = load("flat_field"), Film(SIZE, BANDS_NM, np.full(BANDS_NM.size, 50.0), max_depth=8)
+    save_transport(tmp_path, scene, film, 3, replace(rendered, denoised=light))
+    found = read_transport(tmp_path, scene, film, 3, denoised=True).denoised
+    assert np.array_equal(found.radiance, planes)
+    for times, values in enumerate(
+        (found.indirect.mean, found.indirect.difference, found.folds.mean, found.folds.difference), 2
+    ):
+        assert np.array_equal(values, times * planes)
+    assert found.fold_points == 6
+    assert read_transport(tmp_path, scene, film, 3) is None  # an entry of its own
 
 
 def after(folder, damage):
