@@ -100,7 +100,7 @@ def _remove_half_written(out: Path) -> None:
 
 # Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
-NOTE_S = 1.0  # of a killed run's seconds so many are lost; to note them with every row took a third of its time
+NOTE_S = 1.0  # of a killed run's seconds so many are lost; to note them with every row costs a write each
 RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
 
 
