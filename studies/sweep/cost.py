@@ -120,8 +120,16 @@ def estimated(
     code, kept = versions()["rodcone"], 0
     if (out / FILE).is_file():
         with read_results(out) as base:
-            kept = sum(count for text, count in made_with(base).items() if json.loads(text).get("rodcone") == code)
+            kept = sum(count for text, count in made_with(base).items() if _code_of(text) == code)
     return estimate(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
+
+
+def _code_of(versions_text: Any) -> Any:
+    """Version of rodcone among a row's versions; None where the row is damaged, which a sweep makes again."""
+    try:
+        return json.loads(versions_text)["rodcone"]
+    except (ValueError, TypeError, LookupError):
+        return None
 
 
 def estimate(
