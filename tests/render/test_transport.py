@@ -93,6 +93,7 @@ def test_a_level_and_its_error_are_those_of_a_ratio_of_means():
     rng = np.random.default_rng(5)
     radiance, uncovered = rng.uniform(0.5, 1.0, (2, NM.size)), 0.9
     spread = rng.normal(size=(2 * NM.size + 1, 4)) * 0.004  # four causes move all means together
+    spread[-1] *= 4  # and the area most, so that its part is a large one
     made = transport(scene_means=SceneMeans(radiance, uncovered, spread @ spread.T))
     emitted = np.stack([100.0 * factor * RAMP.band_average(NM, WIDTH_NM) for factor in (7.0, 0.3)])
 
