@@ -76,30 +76,34 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
     def variance_of(light: Singles) -> Singles:
         return np.asarray(shot * light + dark + (np.float32(raw.prnu) * light) ** 2)
 
-    samples = np.where(sites, raw.electrons.astype(np.float32)[..., None], np.float32(0))
-    of_cell, n, in_samples = _sums(np.ones(raw.shape, np.float32))[..., None], _sums(sites), _sums(samples)
-    residuals = np.where(sites, samples - planes, np.float32(0))
-    r = _sums(residuals)
+    residuals = np.where(sites, raw.electrons.astype(np.float32)[..., None] - planes, np.float32(0))
+    of_cell, n, r = _sums(np.ones(raw.shape, np.float32))[..., None], _sums(sites), _sums(residuals)
+    light, x = _sums(planes), _sums(stable)
     # Where residuals spread more than noise makes them, there is no even surface.
     spread = _sums(residuals * residuals) - r**2 / np.maximum(n, 1.0)
-    of_light = variance_of(np.maximum(_sums(planes) / of_cell, 0.0))
+    of_light = variance_of(np.maximum(light / of_cell, 0.0))
     surface = np.all(spread < LAMP_SIGMAS**2 * of_light, axis=-1, keepdims=True)
     n *= surface
-    in_noise = _sums(stable)
+
+    # A share raises what isn't under 0: of a cell's light, and of what its samples were taken for.
+    positive = np.maximum(planes, np.float32(0))
+    raised, raised_at_sites = _sums(positive), _sums(np.where(sites, positive, np.float32(0)))
+    factor = np.ones_like(light)
     for together in TOGETHER_CELLS:
-        pixels, light, x = (_sums(values, together) for values in (of_cell, _sums(planes), in_noise))
-        r = in_samples - _sums(np.where(sites, planes, np.float32(0)))
-        light = np.maximum(light / pixels, 0.0)
-        count = _sums(n, together)
-        sums = [_sums(r * surface, together), count, count * variance_of(light)]
-        wide = x / pixels
-        share = _biases(wide, sums, light, guide, colours) / (light + _LEAST)
-        share = _to_cells(share, wide, in_noise / of_cell, together) * surface
-        for c in colours:
-            by_pixel = np.repeat(np.repeat(share[..., c], CELL, axis=0), CELL, axis=1)
-            if together == 1:  # linear between cells' centres, as those of wider ones are by `_to_cells`
-                by_pixel = scipy.ndimage.uniform_filter(by_pixel, 2 * CELL - 1)
-            planes[..., c] += by_pixel[: raw.shape[0], : raw.shape[1]] * np.maximum(planes[..., c], 0.0)
+        pixels, count = _sums(of_cell, together), _sums(n, together)
+        wide_x, wide_light = _sums(x, together) / pixels, np.maximum(_sums(light, together) / pixels, 0.0)
+        sums = [_sums(r * surface, together), count, count * variance_of(wide_light)]
+        share = _biases(wide_x, sums, wide_light, guide, colours) / (wide_light + _LEAST)
+        share = _to_cells(share, wide_x, x / of_cell, together) * surface
+        if together > 1:
+            light += share * factor * raised
+            r -= share * factor * raised_at_sites
+            factor *= 1 + share
+    for c in colours:
+        wider, last = (np.repeat(np.repeat(of[..., c], CELL, axis=0), CELL, axis=1) for of in (factor, share))
+        last = scipy.ndimage.uniform_filter(last, 2 * CELL - 1)  # linear between cells' centres
+        added = wider * (1 + last) - 1
+        planes[..., c] += added[: raw.shape[0], : raw.shape[1]] * positive[..., c]
 
 
 def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singles:
