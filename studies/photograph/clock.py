@@ -4,12 +4,22 @@ import os
 import platform
 import time
 from collections.abc import Callable, Hashable, Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any, TypeVar
 
 Result = TypeVar("Result")
 FIRST, OTHER = "first calls", "other"
+
+
+@contextmanager
+def noting_times(note: Callable[[float, float], None]) -> Iterator[None]:
+    """Call `note` with the times (`time.perf_counter`) between which what is within went on, also for an error."""
+    start = time.perf_counter()
+    try:
+        yield
+    finally:
+        note(start, time.perf_counter())
 
 
 class Clock:
@@ -23,14 +33,9 @@ class Clock:
         """Add seconds to a stage."""
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str) -> AbstractContextManager[None]:
         """Add what is done within to a stage, also where it ends in an error."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self.add(name, time.perf_counter() - start)
+        return noting_times(lambda start, end: self.add(name, end - start))
 
     def stages(self, more: Mapping[str, float] | None = None) -> dict[str, float]:
         """Seconds by stage, some more added; with `OTHER` they are those since the clock was made."""

@@ -5,13 +5,14 @@ the cells must be made in other processes.
 """
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, wait
-from contextlib import contextmanager
+from contextlib import AbstractContextManager
 from threading import Event, Thread
 from typing import Generic, TypeVar
 
 from rodcone.types import Progress
+from studies.photograph.clock import noting_times
 
 Result = TypeVar("Result")
 LOOK_S = 0.2  # how often one who waits shows how far it is
@@ -23,14 +24,9 @@ class Spans:
     def __init__(self) -> None:
         self._spans: list[tuple[str, float, float]] = []
 
-    @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
+    def stage(self, name: str) -> AbstractContextManager[None]:
         """Note what is done within as a stage, also where it ends in an error."""
-        start = time.perf_counter()
-        try:
-            yield
-        finally:
-            self._spans.append((name, start, time.perf_counter()))
+        return noting_times(lambda start, end: self._spans.append((name, start, end)))
 
     def within(self, start: float, end: float) -> dict[str, float]:
         """Seconds of each stage between two times of `time.perf_counter`."""

@@ -13,8 +13,8 @@ import pytest
 import sweep_sample as SAMPLE
 
 from rodcone.errors import InputError
+from studies.photograph import clock
 from studies.study.study import SceneChoice, Study
-from studies.sweep import ahead as module
 from studies.sweep import run_sweep as sweep_run
 from studies.sweep.ahead import Ahead, Spans
 from studies.sweep.cells import Cell
@@ -39,7 +39,7 @@ def swept_ahead(study: Study, out: Path, runner: Any = SAMPLE.here, step: Any = 
 
 def test_stages_count_for_as_long_as_they_were_waited_for(monkeypatch: pytest.MonkeyPatch) -> None:
     times = iter([10.0, 14.0, 14.0, 20.0, 20.0, 21.0])
-    monkeypatch.setattr(module, "time", SimpleNamespace(perf_counter=lambda: next(times)))
+    monkeypatch.setattr(clock, "time", SimpleNamespace(perf_counter=lambda: next(times)))
     spans = Spans()
     for name in ("renders", "files", "renders"):
         with spans.stage(name):
