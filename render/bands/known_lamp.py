@@ -55,11 +55,8 @@ def over_lamp(radiance: SpectralRadiance, lamp: Spectrum) -> SpectralRadiance | 
         )
         return None
     if radiance.light is not None and not of_few_lines(emitted * width):
-        finer, widths, weights = (
-            nm,
-            width,
-            np.diag(np.divide(1.0, emitted, out=np.zeros_like(emitted), where=emitted > 0)),
-        )
+        finer, widths = nm, width
+        weights = np.diag(np.divide(1.0, emitted, out=np.zeros_like(emitted), where=emitted > 0))
     else:
         finer, widths = _finer(nm, width)
         weights = transport_of_light(nm, width, lamp, finer, widths)
