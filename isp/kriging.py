@@ -8,10 +8,12 @@ channel by channel, near lamps.
 """
 
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import scipy
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from isp.anscombe import stabilise_raw, unstabilise, without_prnu
@@ -22,9 +24,11 @@ from sensor.raw import RawImage
 
 # Of 3 radii, 6 correlations and 4 lengths on three scenes in two lights (docs/decisions/0048).
 RADIUS = 6  # of the window that samples are taken from [pixels]: a corner shows every channel on three lines or more
+SIDE = 2 * RADIUS + 1  # of the window
 CORRELATION = 0.93  # of two channels' values at one pixel
 LENGTH = 6.0  # of the exponential covariance [pixels]
 BESIDE_LAMPS = 1e3  # what a channel shows beside a lamp [standard deviations of noise]
+TOGETHER = 16  # rows of windows that are summed together: all at once would hold each sample 169 times
 OUTLYING = 8.0  # half widths of the middle two thirds, above which a sample is a lamp's
 LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
 
@@ -46,9 +50,9 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
     estimate, noise_gain = krige(values, raw.cfa, deviation)
     bright = raw.saturated | (values > np.select(sampled, list(high + OUTLYING * np.maximum(spread, 1.0))))
-    beside = scipy.ndimage.maximum_filter(bright, size=2 * RADIUS + 1)[..., None]
+    beside = scipy.ndimage.maximum_filter(bright, size=SIDE)[..., None]
     if beside.any():
-        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0)
+        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0, where=beside[..., 0])
         estimate, noise_gain = np.where(beside, apart[0], estimate), np.where(beside, apart[1], noise_gain)
     # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
     # A channel that is read apart counts its own electrons, 1 over its factor of shot noise.
@@ -59,7 +63,14 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     return Reconstruction(electrons, noise_gain, engine="numpy")
 
 
-def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORRELATION) -> tuple[Plane, Plane]:
+def krige(
+    values: Plane,
+    tile: Tile,
+    deviation: Plane,
+    correlation: float = CORRELATION,
+    *,
+    where: NDArray[np.bool_] | None = None,
+) -> tuple[Plane, Plane]:
     """Estimate every channel at every pixel of a mosaic whose samples have noise of variance 1.
 
     Parameters
@@ -71,6 +82,8 @@ def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORR
         Standard deviation of what each channel shows, above 0.
     correlation : float
         Of two channels at one pixel.
+    where : (h, w) bool, optional
+        Pixels that are asked for, all by default; others may come out as 0.
 
     Returns
     -------
@@ -80,19 +93,17 @@ def krige(values: Plane, tile: Tile, deviation: Plane, correlation: float = CORR
     height, width = values.shape
     count = len(channels(tile))
     scales = (*deviation.tolist(), correlation)
-    estimate, noise_gain = np.empty((count, height, width)), np.empty((count, height, width))
+    estimate, noise_gain = np.zeros((2, count, height, width))
     blas = ThreadpoolController()
     for rows in _alike(height, len(tile)):
         for columns in _alike(width, len(tile[0])):
+            if where is not None and not where[rows, columns].any():
+                continue
             first = rows.start, columns.start
             down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
             with blas.limit(limits=1, user_api="blas"):  # of BLAS: on a busy machine several wait for each other
                 weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
-            total = np.zeros((count, len(range(height)[rows]), len(range(width)[columns])))
-            for number, (i, j) in enumerate(np.ndindex(down[1] - down[0], across[1] - across[0])):
-                samples = values[_moved(rows, down[0] + i), _moved(columns, across[0] + j)]
-                total += weights[:, number, None, None] * samples
-            estimate[:, rows, columns] = total
+                estimate[:, rows, columns] = _weighted(values, weights, rows, columns, (down, across))
             noise_gain[:, rows, columns] = (weights**2).sum(axis=1)[:, None, None]
     return np.moveaxis(estimate, 0, -1), np.moveaxis(noise_gain, 0, -1)
 
@@ -110,8 +121,26 @@ def _alike(side: int, period: int) -> list[slice]:
     return [slice(at, at + 1, period) for at in border] + phases
 
 
-def _moved(positions: slice, offset: int) -> slice:
-    return slice(positions.start + offset, positions.stop + offset, positions.step)
+def _weighted(
+    values: Plane, weights: Plane, rows: slice, columns: slice, window: tuple[tuple[int, int], tuple[int, int]]
+) -> Plane:
+    """Sums of each window's samples by the same weights, shape (channel, row, column)."""
+    (top, bottom), (left, right) = window
+    around = values[rows.start + top : rows.stop - 1 + bottom, columns.start + left : columns.stop - 1 + right]
+    windows = sliding_window_view(around, (bottom - top, right - left))[:: rows.step, :: columns.step]
+    height, width = windows.shape[:2]
+    total = np.empty((len(weights), height, width))
+    for first in range(0, height, TOGETHER):
+        samples = windows[first : first + TOGETHER].reshape(-1, weights.shape[1])
+        total[:, first : first + TOGETHER] = (weights @ samples.T).reshape(len(weights), -1, width)
+    return total
+
+
+@cache
+def _nearness() -> Plane:
+    """Return exp(-distance / LENGTH) between every two pixels of a whole window, row by row."""
+    rows, columns = np.divmod(np.arange(SIDE**2), SIDE)
+    return np.asarray(np.exp(-np.hypot(rows[:, None] - rows, columns[:, None] - columns) / LENGTH))
 
 
 @lru_cache(maxsize=1024)
@@ -126,9 +155,9 @@ def _weights(
 
     # Covariance between samples, and of samples with what is asked for.
     between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
-    distance = np.hypot(rows[:, None] - rows, columns[:, None] - columns)
-    covariance = between[channel[:, None], channel] * np.exp(-distance / LENGTH) + np.eye(rows.size)
-    target_covariance = between[:, channel] * np.exp(-np.hypot(rows, columns) / LENGTH)
+    near, at = _nearness(), (RADIUS + rows) * SIDE + RADIUS + columns
+    covariance = between[channel[:, None], channel] * near[at[:, None], at] + np.eye(rows.size)
+    target_covariance = between[:, channel] * near[len(near) // 2, at]
 
     # Lagrange's multipliers: planes of each channel by itself come out exactly.
     sampled = channel == np.arange(len(names))[:, None]

@@ -26,7 +26,6 @@ from os import cpu_count
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from isp.ple.residual_lines import GUIDES
@@ -100,10 +99,19 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
             r -= share * factor * raised_at_sites
             factor *= 1 + share
     for c in colours:
-        wider, last = (np.repeat(np.repeat(of[..., c], CELL, axis=0), CELL, axis=1) for of in (factor, share))
-        last = scipy.ndimage.uniform_filter(last, 2 * CELL - 1)  # linear between cells' centres
-        added = wider * (1 + last) - 1
+        wider = np.repeat(np.repeat(factor[..., c], CELL, axis=0), CELL, axis=1)
+        added = wider * (1 + _to_pixels(_to_pixels(share[..., c]).T).T) - 1
         planes[..., c] += added[: raw.shape[0], : raw.shape[1]] * positive[..., c]
+
+
+def _to_pixels(cells: Singles) -> Singles:
+    """Values of each row's pixels from those of its cells: means over 2 `CELL` - 1 pixels, linear in between."""
+    wide = np.pad(cells, ((1, 1), (0, 0)), mode="edge")
+    side = 2 * CELL - 1
+    place = np.arange(CELL, dtype=np.float32)[:, None] / side
+    before, own, after = wide[:-2, None], wide[1:-1, None], wide[2:, None]
+    pixels = own * np.float32(CELL / side) + before * (np.float32(1 - CELL / side) - place) + after * place
+    return np.asarray(pixels.reshape(-1, cells.shape[1]))
 
 
 def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singles:

@@ -7,7 +7,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from skimage.transform import resize_local_mean
 
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
 from isp.colour.encoding import encode
@@ -181,4 +180,6 @@ def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) 
         )
     if size == raw_size:
         return linear
+    from skimage.transform import resize_local_mean  # imported here: it takes as long as a small picture
+
     return np.asarray(resize_local_mean(linear, size, channel_axis=-1))

@@ -323,9 +323,12 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     raw = raws[0]
     warn_if_dark(raw)
     if opened is not None:
-        even, odd = (_frame_e(half, sensor, exposure_s, samples) for half in transport.relight_halves(spectra, **level))
-        # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
-        frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
+        # The render's error is half the difference of its halves: how far one lies from their mean, the frame. Beside
+        # a lamp a lens that is sampled once a pixel undershoots; a frame has no light there (`form_image`).
+        expected_e = _mosaic(per_second_e * exposure_s, sensor)
+        even = imaged_electrons(transport.relight_halves(spectra, **level)[0], sensor, exposure_s, samples)
+        error_e = np.where(expected_e > 0, _mosaic(even, sensor) - expected_e, 0.0)
+        frame = error_e, expected_e, sensor, exposure_s
         notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
@@ -439,9 +442,9 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
     return find_ready(opened.scene, opened.size, asked, lights)
 
 
-def _frame_e(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float, samples: int) -> NDArray[np.float64]:
-    """Expected electrons of the raw image's pixels, shape (h, w)."""
-    return sensor.pixel_sums(behind_filters(imaged_electrons(radiance, sensor, exposure_s, samples), sensor))
+def _mosaic(channels_e: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
+    """Expected electrons of the raw image's pixels, shape (h, w), of those behind every filter."""
+    return sensor.pixel_sums(behind_filters(channels_e, sensor))
 
 
 def check(order: Order) -> Checked:
