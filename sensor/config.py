@@ -179,7 +179,7 @@ class SensorConfig:
         if not (all(isinstance(nm, Real) for nm in pair) and SHORTEST_NM <= pair[0] < pair[1] <= LONGEST_NM):
             raise InputError(f"window_nm: {self.window_nm!r} is not allowed; give [shortest, longest] in 100-20000 nm")
         object.__setattr__(self, "window_nm", (float(pair[0]), float(pair[1])))
-        self.responses.band_average(self.channels, [550.0], [1.0])  # every channel needs a curve
+        require_keys("responses: channel", self.channels, self.responses.curves)
         require_keys("channels: channel", (apart.channel for apart in self.chip.channels), self.channels)
         time_shares = [x.time_share for x in self.chip.readings] + [x.time_share for x in self.chip.channels]
         if self.lens.shake_um and min(time_shares, default=1.0) < 1:

@@ -4,7 +4,7 @@ Light is linear: a mosaic's expected electrons at any level and exposure are tho
 cell reads one (h, w) array from its path, whatever the number of bands, and no array goes through a scheduler.
 """
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -21,14 +21,15 @@ from rodcone.curve_file import is_curve_file
 from rodcone.digests import digest_inputs
 from rodcone.types import Floats
 from sensor.config import SensorConfig
-from sensor.exposure import AUTO, AUTO_W, amplified, at_level_s, best_exposure
+from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, amplified, at_level_s, best_exposure
+from sensor.photodiodes import with_gain
 from sensor.response import behind_filters, imaged_electrons
 from studies.metrics.truth import Light, light_in_bands, shown_white_cd_m2, true_srgb
 from studies.photograph.camera import colour_fit
 from studies.study.equal_area import in_pixels, site_grid
 from studies.study.gain import at_gain
 from studies.study.levels import parse_exposure
-from studies.study.lit_scene import OpenedScene, in_lux, lux_per_cd_m2
+from studies.study.lit_scene import OpenedScene, in_lux, level_luminance, lux_per_cd_m2
 from studies.study.model import unit_exposure_s
 from studies.study.study import Study
 from studies.sweep.provenance import versions
@@ -173,6 +174,26 @@ def exposure_of(
         per_second_e = behind_filters(per_second_e, frame.sensor)
     green_s = less * at_level_s(frame.auto_s, luminance_cd_m2, AUTO, frame.sensor)
     return best_exposure(per_second_e, sensor, green_s, longest_s)
+
+
+def kept_exposures(
+    folder: Path, frame: UnitFrame, exposure: str, gain: str, levels: Sequence[str], longest_s: float
+) -> list[tuple[float, SensorConfig]]:
+    """`exposure_of` a frame at each of a study's levels; those that need a look at its light are kept beside it."""
+    key = digest_inputs([frame.key, exposure, gain, levels, longest_s])
+    facts = read_facts(folder, key) if exposure == AUTO_INFORMATION else None
+    sensor = at_gain(frame.sensor, gain)
+    if facts is None:
+        luminances_cd_m2 = (level_luminance(level, frame.lux_per_cd_m2) for level in levels)
+        made = [exposure_of(frame, exposure, gain, luminance, longest_s) for luminance in luminances_cd_m2]
+        if exposure == AUTO_INFORMATION:
+            rungs = [(exposure_s, None if camera is sensor else camera.gain) for exposure_s, camera in made]
+            keep_facts(folder, key, {"exposures": rungs})
+        return made
+    return [
+        (exposure_s, sensor if raised_to is None else with_gain(sensor, raised_to))
+        for exposure_s, raised_to in facts["exposures"]
+    ]
 
 
 def colours_under(sensor: SensorConfig, processor: Processor, spectrum: Spectrum) -> ColourFit:

@@ -44,7 +44,7 @@ from studies.study.render_noise import render_share
 from studies.study.study import Condition, Study, conditions, label, study_mosaics
 from studies.sweep.cells import Cell, RenderRecord, cell_keys
 from studies.sweep.database import note_render, render_record
-from studies.sweep.frames import UnitFrame, colours_under, exposure_of, frame_key, load_frame, make_frames
+from studies.sweep.frames import UnitFrame, colours_under, frame_key, kept_exposures, load_frame, make_frames
 from studies.sweep.provenance import provenance, versions
 
 # Folders beside the results database: the fourth of a plan's renders, the last two of a data set's planes and shards.
@@ -244,6 +244,8 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         if frame is None:
             return None
         frames[imaged] = frame
+    # Processors, balances and seeds share exposures: of each frame, by rule and gain, one for each level.
+    exposures = dict[tuple[str, str, str], list[tuple[float, SensorConfig]]]()
     cells, lamps = [], waveform(job.study.flicker) if job.study.flicker else None
     seeds, pictures = job.study.seeds, (job.out / PICTURES).resolve()
     for condition in conditions(job.study, opened.choice):
@@ -251,9 +253,11 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         for name, software in job.software.items():
             frame = frames[*_image_of(job, condition), software.mosaic]
             luminance = level_luminance(condition.level, frame.lux_per_cd_m2)
-            exposure_s, sensor = exposure_of(
-                frame, condition.exposure, condition.gain, luminance, job.study.longest_exposure_s
-            )
+            asked = frame.key, condition.exposure, condition.gain
+            if asked not in exposures:
+                limits = job.study.levels, job.study.longest_exposure_s
+                exposures[asked] = kept_exposures(job.out / FRAMES, frame, *asked[1:], *limits)
+            exposure_s, sensor = exposures[asked][job.study.levels.index(condition.level)]
             if lamps is not None and parse_exposure(condition.exposure) is None:
                 exposure_s = steady_exposure_s([lamps], exposure_s)
             made_by = provenance(record.facts.variant, name, software.on_backend, job.own[name], image.exact)
