@@ -64,7 +64,7 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
         name: np.median([row.develop_s for of in places.values() for row in of[name] if row.develop_s is not None])
         for name in (OURS, *names)
     }
-    lines = []
+    lines, counted = [], dict[str, list[str]]()
     for name in names:
         outcomes = [
             [lead[place, name, metric.key].outcome for place in places if place[0] == balance]
@@ -78,6 +78,7 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
             here = [[lead[place, name, metric.key] for name in among] for place in places if place[0] == balance]
             cells.append(str(sum(all(x.mean - x.half >= -MARGINS[metric.key] for x in of) for of in here)))
         lines.append([words, *cells, ""])
+        counted[words] = cells
 
     # The figure: means over scenes, sensors and seeds, as the first balance has them. The CSV: every condition.
     levels = list(dict.fromkeys(place[3] for place in places))
@@ -106,7 +107,17 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
     set_up = (
         f"The numbers are those of rodcone {version}, {len(places) // len(balances)} conditions under each balance."
     )
-    content = {"set-up": set_up, "ranks": table(head, lines)}
+    conditions, bayer_counts = len(places) // len(balances), iter(counted["no worse than every Bayer camera"])
+    by_metric = [
+        f"in {metric.name.partition(',')[0]} in "
+        + " and ".join(f"{next(bayer_counts)} under `{balance}`" for balance in balances)
+        for metric in METRICS
+    ]
+    summary = (
+        f"Of {conditions} conditions under each white balance `{OURS}` is no worse than every Bayer camera "
+        f"{', '.join(by_metric)}."
+    )
+    content = {"set-up": set_up, "summary": summary, "ranks": table(head, lines)}
     return content, svg_text(light_charts(light, charts)), csv_text(header, cells)
 
 
