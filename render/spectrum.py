@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from render.band_weights import band_weights
+from rodcone.digests import ByBits, by_bits
 from rodcone.display import Axes, brief, draw_curves, png_of
 from rodcone.doors import method
 from rodcone.errors import InputError
@@ -334,16 +335,19 @@ def observer_weights(wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spect
     """Weights of band means in the integrals of x, y and z over them, shape (3, band); parameters as of `luminance`."""
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape)
-    known = None if light is None else (light.wavelength_nm.tobytes(), light.values.tobytes())
-    return _observer_weights(nm.tobytes(), widths.tobytes(), known)
+    return _observer_weights(by_bits((nm, widths), nm, widths), None if light is None else spectrum_by_bits(light))
 
 
 @lru_cache(maxsize=64)
-def _observer_weights(nm: bytes, width_nm: bytes, light: tuple[bytes, bytes] | None) -> Floats:
-    known = None if light is None else Spectrum(np.frombuffer(light[0]), np.frombuffer(light[1]))
-    weights = band_weights(observer, OBSERVER_NM, np.frombuffer(nm), np.frombuffer(width_nm), known)
+def _observer_weights(bands: ByBits[tuple[Floats, Floats]], light: ByBits[Spectrum] | None) -> Floats:
+    weights = band_weights(observer, OBSERVER_NM, *bands.value, None if light is None else light.value)
     weights.setflags(write=False)
     return weights
+
+
+def spectrum_by_bits(spectrum: Spectrum) -> ByBits[Spectrum]:
+    """Return a spectrum as a cache takes it."""
+    return by_bits(spectrum, spectrum.wavelength_nm, spectrum.values)
 
 
 def observer(wavelength_nm: Floats) -> Floats:

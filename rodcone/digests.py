@@ -1,15 +1,17 @@
-"""Hashes that name what determines a result: plain data by its values, files by their content."""
+"""What names the inputs of a result: hashes of plain data, by its values, and of files; in memory bits of arrays."""
 
 import hashlib
 import json
 from collections.abc import Mapping
 from contextlib import suppress
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Generic, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+T = TypeVar("T")
 _BITS = 30  # of a float: what processors differ by is a millionth of the last, single precision has 24
 _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide with a chance of 1e-27
 
@@ -46,7 +48,7 @@ def digest_file(path: str | Path) -> str:
 def _plain(value: Any) -> Any:
     """What JSON holds in place of a value that it doesn't know."""
     if is_dataclass(value):
-        return {field.name: getattr(value, field.name) for field in fields(value)}
+        return {x.name: getattr(value, x.name) for x in fields(value)}
     if isinstance(value, Mapping):
         return dict(value)
     return np.asarray(value).tolist()  # arrays, NumPy's scalars and Dr.Jit's matrices
@@ -68,3 +70,23 @@ def rounded(value: Any) -> Any:
         return array.tolist()
     _, exponent = np.frexp(np.abs(array[np.isfinite(array)]).max(initial=0.0))
     return (np.ldexp(np.rint(np.ldexp(array, _BITS - exponent)), exponent - _BITS) + 0.0).tolist()  # + 0.0: no -0.0
+
+
+@dataclass(frozen=True)
+class ByBits(Generic[T]):
+    """A value that equals another one where the arrays that it is made of have the same types and bits.
+
+    Attributes
+    ----------
+    value : object
+    bits : tuple of (str, bytes)
+        Type and memory of each array.
+    """
+
+    value: T = field(compare=False)
+    bits: tuple[tuple[str, bytes], ...]
+
+
+def by_bits(value: T, *arrays: NDArray[Any]) -> ByBits[T]:
+    """Return a value as a cache takes it, with the arrays that it is made of."""
+    return ByBits(value, tuple((array.dtype.str, array.tobytes()) for array in arrays))

@@ -3,14 +3,14 @@
 import warnings
 from collections.abc import Sequence
 from functools import lru_cache, partial
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.band_weights import band_weights
 from render.radiance import SpectralRadiance
-from render.spectrum import VISIBLE_NM, Spectrum, per_joule, photons_per_joule
+from render.spectrum import VISIBLE_NM, Spectrum, per_joule, photons_per_joule, spectrum_by_bits
+from rodcone.digests import ByBits, by_bits
 from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.cfa import channel_mixing, channels, check_covers, mask
@@ -61,45 +61,24 @@ def electrons_per_irradiance(
             stacklevel=3,
         )
     area_m2 = (sensor.site_pitch_um * 1e-6) ** 2 * sensor.pixel.fill_factor
-    curves = tuple(_Bits.of_curve(sensor.responses.curves[channel]) for channel in sensor.channels)
-    bands = _Bits.of(wavelength_nm), _Bits.of(width_nm)
-    lamp = None if light is None else _Bits.of_curve(light)
-    return area_m2 * exposure_s * _response_weights(curves, sensor.window_nm, *bands, lamp)
-
-
-class _Bits(NamedTuple):
-    """An array by its bits, which a cache can look up."""
-
-    kind: str
-    bits: bytes
-
-    @classmethod
-    def of(cls, values: Floats) -> "_Bits":
-        return cls(values.dtype.str, values.tobytes())
-
-    @classmethod
-    def of_curve(cls, curve: Spectrum) -> tuple["_Bits", "_Bits"]:
-        return cls.of(curve.wavelength_nm), cls.of(curve.values)
-
-    @property
-    def array(self) -> Floats:
-        return np.frombuffer(self.bits, self.kind)
+    curves = tuple(spectrum_by_bits(sensor.responses.curves[channel]) for channel in sensor.channels)
+    bands = by_bits((wavelength_nm, width_nm), wavelength_nm, width_nm)
+    lamp = None if light is None else spectrum_by_bits(light)
+    return area_m2 * exposure_s * _response_weights(curves, sensor.window_nm, bands, lamp)
 
 
 @lru_cache(maxsize=64)
 def _response_weights(
-    curves: tuple[tuple[_Bits, _Bits], ...],
+    curves: tuple[ByBits[Spectrum], ...],
     window_nm: tuple[float, float],
-    wavelength_nm: _Bits,
-    width_nm: _Bits,
-    lamp: tuple[_Bits, _Bits] | None,
+    bands: ByBits[tuple[Floats, Floats]],
+    lamp: ByBits[Spectrum] | None,
 ) -> Floats:
     """`band_weights` of the channels: a cell of a sweep asks four times, and its neighbours ask for the same."""
-    spectra = [Spectrum(nm.array, values.array) for nm, values in curves]
-    light = None if lamp is None else Spectrum(lamp[0].array, lamp[1].array)
+    spectra = [curve.value for curve in curves]
     corners = np.concatenate([np.array(window_nm), *(curve.wavelength_nm for curve in spectra)])
     seen = partial(_electrons_per_joule, spectra, window_nm)
-    return band_weights(seen, corners, wavelength_nm.array, width_nm.array, light)
+    return band_weights(seen, corners, *bands.value, None if lamp is None else lamp.value)
 
 
 def _electrons_per_joule(curves: Sequence[Spectrum], window_nm: tuple[float, float], wavelength_nm: Floats) -> Floats:
