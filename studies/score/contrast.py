@@ -6,8 +6,9 @@ readings. The probability of a reading is
 
     P(DN) = sum_n Poisson(n; e + m) P(DN | n),
 
-where e are the expected photo-electrons and m those of dark current. P(DN | n) is the normal distribution of all other
-noise, rounded and clipped by the converter. From 1000 electrons on, one normal distribution stands for all noise.
+where e are the expected photo-electrons and m those of dark current, whose mean is part of black. P(DN | n) is the
+normal distribution of all other noise, rounded and clipped by the converter. From 1000 electrons on, one normal
+distribution stands for all noise.
 """
 
 from collections.abc import Iterator
@@ -76,7 +77,9 @@ def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floa
     law, gain = reading.law.over(1 / share), seen.gain_e_per_dn
     mean_e, dark_e = expected_e * share, seen.pixel.dark_current_e_per_s * reading.exposure_s
     temporal_e2 = max(law.dark_e**2 - gain**2 / 12 - dark_e, 0.0)
-    rest_e = float(np.sqrt(temporal_e2 + law.fixed_e**2 + (law.prnu * mean_e) ** 2))
+    # Beside Poisson's count, light raises what the columns' gains make of it and of the dark current together.
+    lit_e2 = (law.prnu * mean_e) ** 2 + (law.shot - 1) * mean_e
+    rest_e = float(np.sqrt(temporal_e2 + law.fixed_e**2 + lit_e2))
     counts, weights = np.array([mean_e + dark_e]), np.ones(1)
     if mean_e < COUNTED_E:
         counts = np.arange(int(poisson.ppf(1 - TAIL, mean_e + dark_e)) + 1.0)
@@ -89,7 +92,8 @@ def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floa
     dn = np.arange(low, high + 1.0)
     edges = np.concatenate(([-np.inf], (dn[1:] + dn[:-1]) / 2, [np.inf]))
     below = ndtr((edges - centre[:, None]) / max(rest_e / gain, 1e-9))
-    return (dn - seen.black_dn) * gain / share, np.asarray(weights @ np.diff(below, axis=1))
+    # Less the dark current's mean, which is in a raw image's black level.
+    return ((dn - seen.black_dn) * gain - dark_e) / share, np.asarray(weights @ np.diff(below, axis=1))
 
 
 def accuracy_on_frames(field: EvenField, mean_cd_m2: float, rng: np.random.Generator) -> float:

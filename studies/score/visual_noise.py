@@ -79,11 +79,10 @@ def colour_fields(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[
 
 def measured_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator) -> float:
     """Measure the visual noise of 18 % grey on frames of the channels; the luminance is shown as white."""
-    planes = [
-        field.samples_e(field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)).reshape(SIDE_PX, SIDE_PX)
-        / (white_cd_m2 * field.electrons_per_cd_m2)
-        for field in fields
-    ]
+    planes = []
+    for field in fields:
+        raw = field.shoot(GREY * white_cd_m2, field.draw_chip(rng), rng)
+        planes.append(field.samples_e(raw).reshape(raw.shape) / (white_cd_m2 * field.electrons_per_cd_m2))
     return visual_noise(np.stack(planes, axis=-1) @ matrix.T)
 
 
@@ -91,7 +90,7 @@ def expected_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: flo
     """Compute the same in closed form, of noise that is small beside the grey."""
     whites_e = [white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
     by_channel = [_variances(field, GREY * e) / e**2 for field, e in zip(fields, whites_e, strict=True)]
-    return _expected(np.array(by_channel), matrix)
+    return _expected(np.array(by_channel), matrix, SIDE_PX // fields[0].sensor.sites)
 
 
 def _variances(field: EvenField, electrons: float) -> Floats:
@@ -107,17 +106,17 @@ def _variances(field: EvenField, electrons: float) -> Floats:
     return np.array([sum(by_source.values()) - columns - rows, columns, rows])
 
 
-def _expected(variances: Floats, matrix: Floats) -> float:
+def _expected(variances: Floats, matrix: Floats, side: int) -> float:
     """Return the visual noise of relative variances of the channels, (channel, 3): of pixels, columns and rows.
 
     In cosine space, where the eye's blur is a product, noise is the same at all frequencies, that of columns at those
     that don't change down a column, that of rows at those that don't change along a row.
     """
-    cycles = np.arange(SIDE_PX) / (2 * SIDE_PX) * PIXELS_PER_DEGREE
+    cycles = np.arange(side) / (2 * side) * PIXELS_PER_DEGREE
     passed = np.stack([transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
     passed[0, 0] = 0.0  # the mean isn't noise
-    every = np.einsum("hwi,hwj->ij", passed, passed) / SIDE_PX**2
-    kept = (every, passed[0].T @ passed[0] / SIDE_PX, passed[:, 0].T @ passed[:, 0] / SIDE_PX)
+    every = np.einsum("hwi,hwj->ij", passed, passed) / side**2
+    kept = (every, passed[0].T @ passed[0] / side, passed[:, 0].T @ passed[:, 0] / side)
     to_xyz = SRGB_TO_XYZ @ matrix
     to_opponent, to_eye = XYZ_TO_OPPONENT @ to_xyz, np.linalg.inv(XYZ_TO_OPPONENT)
     opponent = sum(to_opponent * of @ to_opponent.T * share for of, share in zip(variances.T, kept, strict=True))

@@ -25,11 +25,11 @@ from sensor.presets import low_noise
 from sensor.readout import noise_variance
 from sensor.response import electrons_per_irradiance, expected_electrons
 from sensor.shake import held_lens
-from studies.budget.bands import COUNTS, band_groups, merge_radiance, merge_transport
+from studies.budget.bands import COUNTS, band_groups, merge_radiance, merge_transport, possible_counts
 from studies.budget.costs import image_ns, render_ns
 from studies.budget.effects import IMAGING_TERMS, KERNEL, Effects, find_effects, kernel_rms_e, shake_effect
 from studies.budget.how_many_bands import choose
-from studies.budget.ledger import LEVEL, LIGHT, MONTE_CARLO, RESPONSE, ledger
+from studies.budget.ledger import LEVEL, LIGHT, MONTE_CARLO, RESPONSE, ledger, share_text
 from studies.budget.scaled_effects import PilotNoise, ScaledEffects, scale_effects
 from studies.study.study import BudgetShares, Condition, SceneChoice
 
@@ -111,10 +111,12 @@ def test_wide_bands_are_as_many_as_asked_for_and_as_even_as_can_be() -> None:
 
 def test_merged_bands_hold_means_weighted_by_width() -> None:
     made = transport(np.arange(40.0)[:, None, None] * np.ones((1, 4, 4)))
-    made = replace(made, width_nm=np.r_[5.0, np.full(39, 10.0)], wavelength_nm=np.r_[387.5, NM[1:]])
+    meter: Any = SimpleNamespace()
+    made = replace(made, width_nm=np.r_[5.0, np.full(39, 10.0)], wavelength_nm=np.r_[387.5, NM[1:]], meter=meter)
     merged = merge_transport(made, band_groups(made.width_nm, 20))
     assert merged.radiance[0, 0, 0, 0] == pytest.approx((0 * 5 + 1 * 10) / 15)
     assert merged.radiance[0, 1, 0, 0] == pytest.approx(2.5)
+    assert merged.meter is None, "its bands are the fine ones"
     assert (merged.wavelength_nm[0], merged.width_nm[0]) == (392.5, 15.0)
     radiance = merge_radiance(made.relight(), band_groups(made.width_nm, 20))
     values = made.relight().values[0, 0]
@@ -429,3 +431,16 @@ def test_a_picture_files_pilot_has_no_noise_and_a_renders_is_scaled_to_the_whole
     assert _pilot_noise(pilot, lit) == PilotNoise(96.0, 48.0, pytest.approx(0.02**2 * 96 * 48 / 2400))
     lit.level = lambda: SimpleNamespace(relative_error=None)
     assert _pilot_noise(pilot, lit).level == 0.0
+
+
+def test_a_plan_may_choose_all_fine_bands_where_there_are_more_than_forty() -> None:
+    assert possible_counts(WIDTH_NM) == COUNTS == (4, 8, 12, 16, 20, 28, 40)
+    assert possible_counts(np.full(41, 10.0)) == (*COUNTS, 41)
+
+
+def test_shares_are_written_as_per_cent_and_from_two_on_as_factors() -> None:
+    told = {
+        0.0: "0%", 0.0009: "<0.1%", 0.001: "0.1%", 0.0123: "1.2%", 0.0999: "10%", 0.1: "10%", 0.456: "46%",
+        1.994: "199%", 2.0: "2.0x", 9.94: "9.9x", 10.0: "10x", 123.4: "123x",
+    }  # fmt: skip
+    assert {share: share_text(share) for share in told} == told

@@ -5,6 +5,7 @@ import re
 from dataclasses import replace
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -18,6 +19,7 @@ from sensor.kernel.kernel import expected_electrons_single
 from sensor.optics import form_image
 from sensor.presets import low_noise, preset, vary
 from sensor.response import electrons_per_irradiance, expected_electrons
+from studies.budget import pilot as pilot_module
 from studies.budget import plan as planning
 from studies.budget.costs import cost_over_reference
 from studies.budget.ledger import LEVEL, MONTE_CARLO, Ledger, Plan, Term, ledger_html
@@ -25,6 +27,8 @@ from studies.budget.pilot import make_pilot
 from studies.budget.plan import plan
 from studies.budget.plan_text import plan_json, plan_table
 from studies.budget.starting_points import plan_from_settings, reference_plan, starting_point
+from studies.budget.summary import _bands as bands_text
+from studies.budget.summary import _left_out as left_out_text
 from studies.budget.summary import summary
 from studies.study.lit_scene import level_luminance, lux_per_cd_m2, make_transport, open_all, photographed, under
 from studies.study.model import ImageModel, LensTerms, RenderModel
@@ -410,3 +414,72 @@ def test_the_pilot_of_a_large_picture_has_the_means_of_its_blocks(tmp_path: Path
     small, large = (x.relight(luminance_cd_m2=1.0).values for x in (pilot.transport, whole))
     np.testing.assert_allclose(small[7, 9], large[21:24, 27:30].mean(axis=(0, 1)), rtol=1e-5)
     np.testing.assert_allclose(small[43, 99], large[129:, 297:].mean(axis=(0, 1)), rtol=1e-5)
+
+
+@pytest.mark.parametrize(
+    ("widths", "words"),
+    [
+        ((7.27272, 7.27272), "2 bands of 7.3 nm"), ((7.26, 7.34, 20.0), "3 bands of 7.3 to 20 nm"),
+        ((0.6, 100.04), "2 bands of 0.6 to 100 nm"), ((10.0,), "1 bands of 10 nm"),
+    ],
+)  # fmt: skip
+def test_bands_are_told_by_their_number_and_their_widths_to_a_tenth(widths: tuple[float, ...], words: str) -> None:
+    assert bands_text(RenderModel(tuple(400.0 + x for x in widths), widths, 64)) == words
+
+
+def test_conditions_that_leave_effects_out_are_counted_once_for_all_mosaics() -> None:
+    """Of three conditions and two mosaics; effects of the same number share their words, the fewest first."""
+    conditions_of = [replace(CONDITION, level=f"{level}cd/m2") for level in (1, 2, 3)]
+    names = {"diffraction": (0,), "veiling glare": (0,), "cos^4": (0, 1, 2), "kernel": (1, 2)}
+    ledgers = [
+        Ledger(
+            condition, mosaic, 0.066, 10.0,
+            tuple(Term(x, 1.0, 0.01, modelled=number not in of) for x, of in names.items()),
+            2.0, 0.05,
+        )
+        for number, condition in enumerate(conditions_of)
+        for mosaic in ("bayer", "rgbw")
+    ]  # fmt: skip
+    assert left_out_text(ledgers) == (
+        "It leaves out diffraction and veiling glare in 1 of 3 conditions, and exact readout in 2 of 3 conditions, "
+        "and cos^4 in all 3 conditions."
+    )
+    none = [replace(row, terms=tuple(replace(term, modelled=True) for term in row.terms)) for row in ledgers]
+    assert left_out_text(none) == "It leaves no effect of lens or readout out."
+
+
+@pytest.mark.parametrize(
+    ("size", "most", "asked"),
+    [
+        ((64, 48), 200, ((64, 48), 128)), ((65, 32), 100, ((64, 32), 100)), ((300, 200), 128, ((64, 43), 128)),
+        ((2, 4096), 7, ((1, 64), 7)), ((32, 32), 127, ((32, 32), 127)),
+    ],
+)  # fmt: skip
+def test_a_pilot_is_a_small_render_of_few_samples_in_fine_bands_with_a_seed_of_its_own(
+    size: tuple[int, int], most: int, asked: tuple[Any, int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its longer side is 64 pixels at most, and its samples 128; its seed is none that a study can have."""
+    told: list[dict[str, Any]] = []
+    monkeypatch.setattr(pilot_module, "render", lambda scene, of, **more: told.append({"size": of} | more) or "light")
+    study = replace(SMALL, render=RenderLimits(size=16, spp=most, seed=3))
+    (opened,) = open_all(study).values()
+    made = make_pilot(replace(opened, size=size), study, [8, 40], Path("renders"))
+    ((one,),) = (told,)
+    assert (one["size"], one["max_spp"]) == asked
+    assert one["seed"] == 3 + 2**32
+    assert one["cache"] == Path("renders")
+    assert (one["wavelength_nm"].size, one["width_nm"].sum()) == (40, pytest.approx(400.0))
+    assert made.transport == "light"
+    assert {count: len(groups) for count, groups in made.groups.items()} == {8: 8, 40: 40}
+    assert made.rendered
+
+
+@pytest.mark.parametrize(("side", "seen"), [(128, 128), (129, 65), (256, 128), (257, 86)])
+def test_a_picture_files_pilot_has_a_longer_side_of_128_pixels_at_most(side: int, seen: int, tmp_path: Path) -> None:
+    np.save(tmp_path / "wall.npy", np.full((16, side, 3), 0.5, np.float32))
+    (tmp_path / "wall.toml").write_text('holds = "radiance"\nwavelength_nm = [400, 550, 700]\n', "utf-8")
+    study = replace(SMALL, scenes=(SceneChoice(str(tmp_path / "wall.npy")),))
+    (opened,) = open_all(study).values()
+    pilot = make_pilot(opened, study, [3])
+    assert pilot.transport.counts.shape[1] == seen
+    assert not pilot.rendered

@@ -6,6 +6,7 @@ import sys
 from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -19,10 +20,10 @@ from studies.commands import cli, develop, expect
 from studies.photograph import shot
 from studies.study import cost
 from studies.study.cost import START_S, PictureCost, pace, render_seconds
-from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.study.study import BudgetShares, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep import cost as sweep_cost
-from studies.sweep.cost import Estimate, _memory, _Part, estimate, estimated
+from studies.sweep.cost import Estimate, _code_of, _memory, _Part, estimate, estimated
 
 PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
@@ -219,3 +220,32 @@ def test_memory_counts_a_scene_rendered_beside_the_cells_of_another() -> None:
     assert _memory([fine, wide], 2, ahead=False).total == pytest.approx(max(render + 2 * cells, other + 2 * others))
     for one in (fine, wide):  # of one scene the same
         assert _memory([one], 2, ahead=True) == _memory([one], 2, ahead=False)
+
+
+def test_a_row_whose_versions_cannot_be_read_counts_as_made_by_no_code() -> None:
+    assert _code_of('{"rodcone": "1.2", "numpy": "2"}') == "1.2"
+    for damaged in ("{", "{}", "[]", "null", "3", '"rodcone"', None, b"\xff"):
+        assert _code_of(damaged) is None, damaged
+
+
+def test_a_sweeps_cost_is_that_of_the_study_as_stated_unless_everything_is_modelled(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By the option or by the study's own budget; pilots, frames, workers and kept cells go on as they are asked."""
+    told: list[tuple[Any, ...]] = []
+    monkeypatch.setattr(sweep_cost, "plan_from_settings", lambda study: "as stated")
+    monkeypatch.setattr(sweep_cost, "reference_plan", lambda study: "everything")
+    monkeypatch.setattr(sweep_cost, "open_all", lambda study: "scenes")
+    monkeypatch.setattr(sweep_cost, "estimate", lambda *asks, **more: told.append((*asks, more)))
+    study = SAMPLE.small_study(tmp_path)
+    whole = replace(study, budget=BudgetShares(model="reference"))
+    none = {"planned": False, "frames": False}
+    for asked, options, plan, passed in (
+        (study, {}, "as stated", none),
+        (study, {"reference": True}, "everything", none),
+        (whole, {}, "everything", none),
+        (study, {"planned": True}, "as stated", none | {"planned": True}),
+        (study, {"frames": True}, "as stated", none | {"frames": True}),
+    ):
+        estimated(asked, tmp_path / "out", 3, **options)
+        assert told.pop() == (asked, plan, "scenes", 3, 0, passed)

@@ -25,6 +25,7 @@ from render.radiance_files.radiance_source import extent_of
 from render.surfaces import see_surfaces
 from rodcone.digests import digest
 from scenes.catalogue import load
+from sensor.response import imaged_electrons
 from studies.dataset import make_set as make_set_module
 from studies.dataset import order as order_module
 from studies.dataset import sample as sample_module
@@ -33,7 +34,7 @@ from studies.dataset.make_set import CARD, make_set
 from studies.dataset.order import SetOrder
 from studies.dataset.sample import Sample
 from studies.dataset.shards import MANIFEST, Shard, read_manifest, read_shard, split_of
-from studies.study.lit_scene import open_all
+from studies.study.lit_scene import open_all, photographed, under
 from studies.study.model import LensTerms
 from studies.study.study import RenderLimits, SceneChoice
 from studies.study.study_file import read_study
@@ -607,6 +608,44 @@ def test_what_a_scenes_surfaces_are_is_kept_by_plane(tmp_path: Path, monkeypatch
     np.testing.assert_allclose(behind[::2, ::2, 0], electrons[::2, ::2], rtol=1e-5)
 
 
+def test_planes_of_a_scene_that_is_sampled_within_its_pixels_are_of_whole_pixels(tmp_path: Path) -> None:
+    """Four samples of light a pixel: XYZ, shares and electrons are means over them, in the frame's own size."""
+    study = SAMPLE.small_study(tmp_path, seeds=(0,), levels=("1cd/m2",))
+    with open_results(tmp_path) as base:
+        job = Job(study, SAMPLE.stated(study), tmp_path, base)
+        (opened,) = open_all(study).values()
+        cells = scene_cells(job, opened, lambda *_: None)
+        transport = scene_transport(job, opened, lambda *_: None)[0]
+        fine: Any = SimpleNamespace(out=tmp_path, study=study, plan=SimpleNamespace(samples_a_side=lambda _: 2))
+        frames = {sample_module._frame_key(cell): cell for cell in cells}
+        (tmp_path / "planes").mkdir(exist_ok=True)
+        whole, halved = (sample_module._make_files(x, opened, frames, transport) for x in (job, fine))
+
+    def planes(facts: dict[str, Any]) -> dict[str, np.ndarray]:
+        ((_, names),) = facts["files"].items()
+        return {name: np.load(job.out / sample_module.PLANES / path) for name, path in names.items()}
+
+    def means(plane: np.ndarray) -> np.ndarray:
+        height, width, *rest = plane.shape
+        return plane.reshape(height // 2, 2, width // 2, 2, *rest).mean(axis=(1, 3))
+
+    large, small = planes(whole), planes(halved)
+    assert set(small) == {"xyz", "shares", "channels_e"}
+    np.testing.assert_allclose(small["xyz"], means(large["xyz"]), rtol=1e-5)
+    np.testing.assert_allclose(small["shares"], 1.0, atol=1e-6)
+    assert small["shares"].shape == (*small["xyz"].shape[:2], 1)
+    height, width = SAMPLE.SIZE
+    view = photographed(under(transport, "own"), 1.0)
+    electrons = imaged_electrons(view, cells[0].frame.sensor, 1.0, 2)
+    assert small["channels_e"].shape == (height // 2, width // 2, 3)
+    np.testing.assert_allclose(small["channels_e"], electrons, rtol=1e-5)
+    assert halved["illuminants"] == whole["illuminants"]
+    (told,) = halved["illuminants"].values()
+    for name, emitted in told["groups"].items():
+        lamp = transport.groups[name].spectrum.band_average(np.array(told["wavelength_nm"]), np.array(told["width_nm"]))
+        assert np.array(emitted) == pytest.approx(lamp * transport.groups[name].power / transport.level().value)
+
+
 def test_an_orders_numbers_have_their_limits() -> None:
     limits = {"generated": (0, 100_000), "diorama": (0, 100_000), "shards": (1, 100_000), "crop": (16, 8192)}
     for name, (least, most) in limits.items():
@@ -636,10 +675,10 @@ def test_the_room_of_rendered_scenes_is_counted_by_planes_bands_lamps_and_channe
     groups = {"sun": None, "sky": None, "lamp": None}
     opened: Any = SimpleNamespace(choice=choice, size=(30, 50), scene=SimpleNamespace(groups=groups))
     plan: Any = SimpleNamespace(
-        renders={choice: SimpleNamespace(wavelength_nm=np.arange(7.0))}, samples_a_side=lambda *_: 1
+        renders={choice: SimpleNamespace(wavelength_nm=np.arange(7.0))}, samples_a_side=lambda *_: 3
     )
     order = SetOrder(truth="mosaic_e,channels_e,rgb,depth,normals,ids,shares")
-    wanted = 3 * 4 * 1500 * 7 * 3
+    wanted = 3 * 4 * (9 * 1500) * 7 * 3  # nine samples of light a pixel
     for channels in (3, 4):
         planes = 2 + 4 + 4 * channels + 12 + 4 + 12 + 4 + 4 * 3
         wanted += 3 * 2 * 2 * (1500 * planes + 20_000) + 4 * 1500 * (20 + channels)

@@ -18,6 +18,7 @@ from rodcone.errors import InputError
 from sensor.cfa import Tile, quad
 from sensor.config import SensorConfig, with_channel_readings
 from sensor.config_file import read_sensor
+from sensor.exposure import exposure_of_electrons_s
 from sensor.noise_law import NoiseLaw
 from sensor.optics import form_image
 from sensor.pixel import ChannelReading
@@ -29,6 +30,7 @@ from studies.design.expect import (
     _lab_root,
     drawn_pixels,
     expect,
+    exposed,
     lens_of,
     metric_rows,
     noise_of,
@@ -347,3 +349,51 @@ def test_a_samples_room_in_the_well_is_what_dark_current_leaves() -> None:
     frame = np.full((4, 4), 100.0)
     assert noise_of(resolve(BAYER, frame, 0.1)).full_e == pytest.approx(BAYER.top_e)
     assert noise_of(resolve(dark, frame, 0.1)).full_e == pytest.approx(BAYER.top_e - 5000.0)
+
+
+def test_each_samples_noise_is_that_of_its_own_channel_in_every_term() -> None:
+    """White, read after a quarter of the time behind a density of 2, has eight times its electrons' shot noise."""
+    terms = {"dark_current_e_per_s": 300.0, "column_gain_spread": 0.02, "column_offset_e": 3.0, "prnu": 0.03}
+    busy = replace(RGBW, pixel=replace(RGBW.pixel, **terms))
+    sensor = with_channel_readings(busy, [ChannelReading("W", time_share=0.25, light_share=0.5)])
+    noise = noise_of(chip_readings(sensor, 0.1))
+    plain, white = chip_readings(sensor, 0.1)
+    names = [sensor.cfa[row % 2][column % 2] for row in range(8) for column in range(8)]
+    for field in ("shot", "dark_e", "fixed_e", "prnu"):
+        by_hand = [getattr((white if name == "W" else plain).law, field) for name in names]
+        assert_allclose(getattr(noise.law, field), by_hand, rtol=1e-12, err_msg=field)
+        assert len(set(by_hand)) == (1 if field == "prnu" else 2), field
+    assert_allclose(noise.full_e, [(white if name == "W" else plain).headroom_e for name in names], rtol=1e-12)
+    assert white.law.shot == pytest.approx(8.0, rel=0.01)
+
+
+def test_a_patchs_samples_take_each_pixels_light_by_its_filter_and_share_it_by_crosstalk() -> None:
+    """A twentieth goes to each neighbour, and at the border stays; the filter is that of where the light fell."""
+    crossed = replace(RGBW, pixel=replace(RGBW.pixel, crosstalk=0.05))
+    responses, sharp = responses_e(RGBW, view_of("drawn", "D65")), lens_of(RGBW, False)
+    plain, spread = (sampling_of(sensor, responses, sharp) for sensor in (RGBW, crossed))
+    order = {name: number for number, name in enumerate(RGBW.channels)}
+    sites = np.array([order[RGBW.cfa[row % 2][column % 2]] for row in range(8) for column in range(8)])
+    for pixel in range(64):
+        assert_allclose(plain[pixel, pixel], responses[sites[pixel]], rtol=1e-12)
+    assert np.count_nonzero(plain.any(axis=2)) == 64
+    assert_allclose(spread.sum(axis=0), plain.sum(axis=0), rtol=1e-12)
+    row, column = 3, 4
+    from_pixel = spread[:, 8 * row + column, 0].reshape(8, 8) / responses[sites[8 * row + column], 0]
+    wanted = np.zeros((8, 8))
+    wanted[row, column] = 0.8
+    for down, across in ((-1, 0), (1, 0), (0, -1), (0, 1)):
+        wanted[row + down, column + across] = 0.05
+    assert_allclose(from_pixel, wanted, atol=1e-12)
+
+
+def test_a_time_that_is_given_is_taken_and_a_rules_is_that_of_the_frame_drawn_from_the_prior() -> None:
+    per_second_e = np.random.default_rng(2).uniform(1e5, 1e7, (16, 16, 4))
+    assert exposed(RGBW, per_second_e, 0.0125)[0] == 0.0125
+    rule_s = exposure_of_electrons_s("auto", per_second_e, RGBW)
+    assert exposed(RGBW, per_second_e, "auto")[0] == rule_s
+    assert rule_s != exposed(RGBW, per_second_e / 2, "auto")[0]
+    for prior in PRIORS:
+        frame = drawn_pixels(prior)
+        assert frame.shape[:2] == (64, 64)
+        assert drawn_pixels(prior) is frame, "every camera meters the same frame"

@@ -9,6 +9,7 @@ from refusal import refusal
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
+from studies.metrics import metric as metric_module
 from studies.metrics.appearance import appearance
 from studies.metrics.appearance import picture_quality as quality_of
 from studies.metrics.compare import ReferencePicture, _brightness, measure, reference_picture
@@ -111,5 +112,37 @@ def test_the_brightness_is_that_at_which_white_takes_as_much_from_both() -> None
     assert _brightness(picture, reference) == pytest.approx(2.0)
     assert _brightness(reference / 5.0, reference / 4.0) == pytest.approx(1.25)
     wider, dimmer = (np.pad(x, ((0, 0), (0, 4)), constant_values=y) for x, y in ((reference, 0.1), (picture, 0.04)))
+    # noise above white is evened out within its cell: rows of 0.1 and 1.5 by turns are 0.8, and nothing clips
+    stripes = np.where(np.arange(16)[:, None] % 2, 1.5, 0.1) * np.ones((16, 16))
+    assert _brightness(stripes, np.full((16, 16), 0.4)) == pytest.approx(0.5)
+    # cells are of 8 x 8: a cell of 1.6 is cut to 1, the same light in half of it and in half of its neighbour isn't
+    for first, shown in ((0, (1.0 + 0.0) / 2), (4, 0.8)):
+        lit = np.zeros((8, 16))
+        lit[:, first : first + 8] = 1.6
+        assert _brightness(np.full((8, 16), 0.25), lit) == pytest.approx(4 * shown), first
+        assert _brightness(np.full((16, 8), 0.25), lit.T) == pytest.approx(4 * shown), first
     # 8 columns of (1 + 0.5) / 2 each and 4 of 0.1: 8 (1 + 0.25 k) + 4 (0.04 k) = 8 x 1.5 + 4 x 0.1
     assert _brightness(dimmer, wider) == pytest.approx((8 * 1.5 + 4 * 0.1 - 8) / (8 * 0.25 + 4 * 0.04))
+
+
+def test_every_metric_is_told_by_its_name_digits_unit_and_direction() -> None:
+    """In the order of the tables; those of targets at their end."""
+    told = {
+        "psnr_db": ("PSNR", 1, "dB", True, 0.5),
+        "ssim": ("SSIM", 3, "", True, 0.02),
+        "delta_e_median": ("ΔE2000, median", 1, "", False, 1.0),
+        "delta_e_p95": ("ΔE2000, 95 %", 1, "", False, 1.0),
+        "s_cielab_median": ("S-CIELAB, median", 1, "", False, 1.0),
+        "s_cielab_p95": ("S-CIELAB, 95 %", 1, "", False, 1.0),
+        "flip_mean": ("FLIP", 3, "", False, 0.02),
+        "pu21_psnr_db": ("PU21-PSNR", 1, "dB", True, 0.5),
+        "mtf50_cy_per_px": ("MTF50", 3, "cy/px", True, 0.02),
+        "chart_delta_e_mean": ("ΔE2000 of the chart", 1, "", False, 1.0),
+        "patch_snr_db": ("SNR of the patches", 1, "dB", True, 0.5),
+    }
+    found = {x.key: (x.name, x.digits, x.unit, x.higher, x.threshold) for x in metric_module.METRICS}
+    assert list(found.items()) == list(told.items())
+    assert [x.key for x in metric_module.HEADLINE] == ["psnr_db", "delta_e_median", "flip_mean"]
+    assert [x.key for x in metric_module.DECIDING] == ["psnr_db", "ssim", "delta_e_median", "flip_mean"]
+    assert [x.key for x in metric_module.ON_TARGETS] == list(told)[8:]
+    assert set(metric_module.MEANINGS) == set(told)

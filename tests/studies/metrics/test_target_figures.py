@@ -223,3 +223,18 @@ def test_what_is_no_slanted_edge_is_refused() -> None:
         (np.ones((40, 40, 3)), r"shape \(40, 40, 3\)"),
     ]:
         refusal(edge_response, picture, match=f"^luminance: .*{told}")
+
+
+def test_an_edges_frequencies_are_those_of_quarter_pixels() -> None:
+    """Bins of a quarter of a pixel as far as the edge keeps from the sides, eight times as long, up to 1 cycle."""
+    found = edge_response(edge(0.0)[..., 0])
+    centre = 31.5 + np.tan(found.angle_deg * np.pi / 180) * (np.array([0.0, 57.0]) - 31.5)
+    step = found.frequency_cycles_per_px[1]
+    bins = 4 / (8 * step) + 2
+    assert bins == pytest.approx(round(bins), abs=1e-9)
+    assert bins == pytest.approx(8 * min(centre.min(), 63 - centre.max()) * np.cos(np.radians(5)), abs=4)
+    assert found.frequency_cycles_per_px == pytest.approx(step * np.arange(len(found.mtf)))
+    assert 1 - step < found.frequency_cycles_per_px[-1] <= 1.0
+    assert found.angle_deg == pytest.approx(5.0, abs=0.05)
+    turned = edge_response(edge(0.0)[..., 0].T)
+    assert turned.mtf == pytest.approx(found.mtf)

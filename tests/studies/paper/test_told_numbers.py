@@ -22,7 +22,8 @@ from scenes.levels import DEMO_LEVELS
 from sensor.capture import expose
 from sensor.device import draw_device
 from sensor.optics import form_image
-from sensor.response import expected_electrons
+from sensor.response import behind_filters, channel_electrons, expected_electrons
+from sensor.shake import held_lens, shaken
 from studies.metrics.flip import flip
 from studies.metrics.truth import light_in_bands, named_light
 from studies.paper import (
@@ -36,6 +37,7 @@ from studies.paper import (
     white_partly_full,
 )
 from studies.paper import paper as paper_module
+from studies.paper import setup as common
 from studies.paper.claims import Claim, ClaimCheck, PaperFigure, with_default, within
 from studies.paper.figure2 import SNR_EXPOSURE_S, bright_cd_m2, signal_ratios, snr_claims, snr_gains
 from studies.paper.numbers import measured_snr_db, number_claims, range_spans
@@ -44,7 +46,7 @@ from studies.paper.pixel_size import gain_db, half_snr_db
 from studies.paper.setup import READINGS, Camera, Setup, View, at_level, close_up, exposures, table1_sensor
 from studies.photograph.snr import channel_e
 from studies.study.study import OWN, Condition, SceneChoice
-from studies.sweep.cells import device_stream, exposure_stream
+from studies.sweep.cells import device_stream, exposure_stream, shake_stream
 
 NM = np.arange(390.0, 771.0, 20.0)
 LIGHT = light_in_bands(illuminant("D65"), NM, np.full(NM.size, 20.0))
@@ -186,6 +188,26 @@ def test_exposures_are_those_of_a_sweeps_chips_and_streams() -> None:
         wanted = expose(expected_e, camera.sensor, 0.02, device, stream, exact=True)
         np.testing.assert_array_equal(raw.dn, wanted.dn)
         assert raw.exposure_s == 0.02
+
+
+def test_in_the_hand_each_seed_has_a_path_of_its_own() -> None:
+    """A camera in a hand has its lens; each exposure's light moves on the path of its seed, before the filters."""
+    subject = view_of(np.random.default_rng(3).uniform(1.0, 9.0, (16, 20)))
+    still, held = Camera("table1_output", "interleaved"), Camera("table1_output", "interleaved", shake="hand")
+    assert still.sensor.lens.shake_um == 0.0
+    assert held.sensor.lens == held_lens(still.sensor.lens, "hand") != still.sensor.lens
+    sensor = held.sensor
+    electrons = channel_electrons(form_image(subject.radiance, sensor), sensor, 0.2)
+    condition = Condition(
+        scene=SceneChoice("grey"), spectrum=OWN, level="1cd/m2", exposure="200ms", sensor="table1_output"
+    )
+    moved = []
+    for seed, raw in enumerate(exposures(held, subject, "200ms", 2)):
+        moved.append(behind_filters(shaken(electrons, sensor, 0.2, shake_stream(seed)), sensor))
+        device = draw_device(sensor, (16, 20), device_stream("table1_output", "rgbw", seed))
+        stream = exposure_stream(condition, "rgbw", seed)
+        np.testing.assert_array_equal(raw.dn, expose(moved[-1], sensor, 0.2, device, stream, exact=True).dn)
+    assert np.abs(moved[0] - moved[1]).max() > 0.05 * moved[0].mean()
 
 
 def test_each_curve_over_light_is_of_its_own_measure(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -723,3 +745,40 @@ def test_the_two_limits_of_the_filter_are_of_single_pixels_and_of_5_x_5(monkeypa
     for claim, patch in ((pixels, 1), (windows, 5)):
         told = {check.condition: check.value for check in claim.checks}
         assert told == {f"{x}, {patch} × {patch}": pytest.approx(1e-3 * patch * at) for at, x in enumerate(readings, 1)}
+
+
+@pytest.mark.parametrize(("scene", "spp"), [("still_life", 100), ("lit_and_shadowed", 25), ("slanted_edge", 25)])
+def test_a_view_is_of_a_render_with_the_samples_of_its_scene(
+    scene: str, spp: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Two of the scenes take a quarter; the light is the first group's, or the one that is named."""
+    asked: list[Any] = []
+    first, second = (SimpleNamespace(spectrum=illuminant(name)) for name in ("D65", "A"))
+    light = SpectralRadiance(np.ones((4, 4, NM.size), np.float32), NM)
+
+    def transport_of(opened: Any, study: Any, model: Any, folder: Path, progress: Any) -> Any:
+        asked.append((study, model, folder))
+        progress(0.25, float("nan"))
+        made = SimpleNamespace(groups={"sun": first, "lamp": second}, wavelength_nm=NM, width_nm=np.full(NM.size, 20.0))
+        made.relight = lambda luminance_cd_m2: asked.append(luminance_cd_m2) or light
+        return made, None
+
+    steps: list[tuple[str, float]] = []
+    monkeypatch.setattr(common, "make_transport", transport_of)
+    monkeypatch.setattr(common, "shown_white_cd_m2", lambda made, level: (level or 50.0) / 2)
+    setup = Setup(tmp_path, size=24, spp=100, band_nm=40.0, step=lambda *told: steps.append(told))
+    for level, name, white in ((3.0, "3cd/m2", None), (None, "own", "lamp")):
+        found = common.view(setup, scene, level, white)
+        study, model, folder = asked[-2]
+        assert asked[-1] == level
+        assert (found.scene, found.level, found.white_cd_m2) == (scene, name, (level or 50.0) / 2)
+        assert found.radiance is light
+        lamp = (second if white else first).spectrum
+        wanted = light_in_bands(lamp, NM, np.full(NM.size, 20.0))
+        np.testing.assert_array_equal(found.light.spectrum, wanted.spectrum)
+        assert (study.render.size, study.render.spp, model.spp, len(model.width_nm)) == (24, spp, spp, 10)
+        assert folder == tmp_path / "renders"
+    assert {share for _, share in steps} == {0.25}
+    assert all(words.startswith(f"{scene}: ") for words, _ in steps)
+    common.view(Setup(tmp_path, size=24, spp=1), scene, 1.0)
+    assert asked[-2][0].render.spp == 1

@@ -14,6 +14,7 @@ from studies.metrics.truth import named_light
 from studies.score.contrast import accuracy
 from studies.score.contrast_chart import chart_accuracy, pair_accuracy
 from studies.score.even_field import even_field
+from studies.score.over_light import LUX
 
 EXPOSURE_S = 0.033
 
@@ -93,3 +94,9 @@ def test_a_picture_of_the_chart_has_the_accuracy_of_normal_noise() -> None:
 @pytest.mark.parametrize("shape", [(64, 65), (32, 32), (64, 64, 3)])
 def test_a_picture_that_is_not_the_chart_is_refused(shape: tuple[int, ...]) -> None:
     assert "luminance: shape" in refusal(lambda: chart_accuracy(np.zeros(shape)))
+
+
+def test_light_goes_in_thirds_of_a_decade_from_a_hundredth_of_a_lux_to_ten_thousand() -> None:
+    thirds = [(1.0, 2.15, 4.64)[step % 3] * 10.0 ** (step // 3) for step in range(-6, 13)]
+    assert pytest.approx(thirds) == LUX
+    assert (LUX[0], LUX[-1], len(LUX)) == (0.01, 10_000.0, 19)

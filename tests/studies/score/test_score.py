@@ -499,17 +499,38 @@ def camera(name: str) -> SensorConfig:
     return public.low_noise(mosaic) if mosaic else public.preset(preset)
 
 
+def busy_camera() -> SensorConfig:
+    """A camera at gain 4 with dark current, crosstalk, noise of rows and columns, glare and falloff."""
+    sensor = public.low_noise("bayer")
+    terms = {"dark_current_e_per_s": 3000.0, "column_gain_spread": 0.01, "column_offset_e": 3.0, "crosstalk": 0.03}
+    pixel = replace(sensor.pixel, read_noise_e=4.0, row_noise_e=1.0, **terms)
+    lens = replace(sensor.lens, veiling_glare=0.02, horizontal_view_deg=50.0, falloff_power=4.0)
+    return public.with_gain(replace(sensor, pixel=pixel, lens=lens), 4.0)
+
+
 def test_one_measurement_of_each_figure_is_near_its_closed_form() -> None:
     """Of all rows that no other quick test measures: within 5 %, or 0.02 where a figure is small; none lacks."""
-    sensor = public.low_noise("bayer")
-    lens = replace(sensor.lens, veiling_glare=0.02, horizontal_view_deg=50.0, falloff_power=4.0)
     only = set(GROUPS) - {"iso_19567", "iso_17321", "color_checker"}
     names = []
-    for definition in definitions(replace(sensor, lens=lens), "D65", EXPOSURE_S, sorted(only)):
+    for definition in definitions(busy_camera(), "D65", EXPOSURE_S, sorted(only)):
         for merit, value in zip(definition.merits, definition.measure(np.random.default_rng(1)), strict=True):
             assert value == pytest.approx(merit.computed, rel=0.05, abs=0.02), merit.name
             names.append(merit.name)
     assert len(names) == 30
+
+
+@pytest.mark.parametrize("exposure_s", [1e-6, 0.033])
+def test_readings_are_told_less_the_mean_of_their_dark_current(exposure_s: float) -> None:
+    """Of the dark current's 100 e- the noise stays; the mean is the light's, as in a raw image."""
+    field = even_field(busy_camera(), named_light("D65"), exposure_s, "G")
+    mean_e = np.array([2.0, 60.0, 1200.0])
+    for wanted, luminance in zip(mean_e, mean_e / field.electrons_per_cd_m2, strict=True):
+        electrons, chance = reading_distribution(field, luminance)
+        (reading,) = field.readings
+        if wanted + reading.dark_e < 0.8 * reading.full_well_e:
+            assert electrons @ chance == pytest.approx(wanted, abs=0.01)
+            variance = float(reading.law.variance(np.array([wanted]))[0])
+            assert (electrons - wanted) ** 2 @ chance == pytest.approx(variance, rel=0.01)
 
 
 @pytest.mark.thorough

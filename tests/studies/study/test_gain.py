@@ -30,7 +30,12 @@ def test_texts_of_gains_and_speeds() -> None:
     assert [gain_text(None, None), gain_text(8, None), gain_text(None, 400.0)] == ["own", "8", "ISO 400"]
     sensor = low_noise()
     assert at_gain(sensor, "own") is sensor
-    assert at_gain(sensor, "8").gain == 8.0
+    for gain in (1.0, 1.5, 8.0, 1024.0):
+        assert at_gain(sensor, f"{gain:g}").gain == gain
+    base = iso_speed(sensor)
+    assert base is not None
+    for iso in (0.986 * base, 1.0 * base, 1.5 * base, 1023.0 * base):
+        assert at_gain(sensor, f"ISO {iso!r}").gain == pytest.approx(max(iso / base, 1.0))
     assert iso_speed(at_gain(sensor, "ISO 400")) == pytest.approx(400.0)
     refusal(gain_text, 2.0, 400.0, match="gain: 2 beside iso 400; allowed: one of the two")
 
@@ -41,6 +46,11 @@ def test_texts_of_gains_and_speeds() -> None:
         ("ISO 20", ("iso: 20 is outside 51.57", "gain 1")),
         ("0.5", ("gain: 0.5 is outside",)),
         ("much", ("gain: 'much' is not known",)),
+        ("0", ("gain: '0' is not known",)),
+        ("-2", ("gain: '-2' is not known",)),
+        ("ASA 400", ("gain: 'ASA 400' is not known",)),
+        ("ISO 50.7", ("iso: 50.7 is outside 51.57",)),
+        ("ISO 52900", ("iso: 52900 is outside 51.57", "to 5.281e+04")),
         ("ISO", ("gain: 'ISO' is not known",)),
     ],
 )

@@ -1,5 +1,6 @@
 """Whatever a frame, a picture or a stream of noise depends on is in its key: each input changed alone changes it."""
 
+import hashlib
 import json
 from dataclasses import fields, replace
 from pathlib import Path
@@ -12,7 +13,7 @@ import sweep_sample as SAMPLE
 
 from isp.processors.catalogue import PROCESSORS
 from render.illuminants import illuminant
-from rodcone.digests import digest_inputs
+from rodcone.digests import digest, digest_inputs
 from sensor.exposure import auto_exposure_s
 from sensor.flicker.waveform import Waveform
 from sensor.lens.table import terms_of
@@ -33,6 +34,7 @@ from studies.sweep.cells import (
     cell_keys,
     device_stream,
     exposure_stream,
+    flicker_stream,
     labels,
     render_text,
     shake_stream,
@@ -176,6 +178,41 @@ def test_a_stream_of_noise_has_a_draw_of_its_own_for_each_of_its_coordinates() -
         assert len(set(draws)) == len(draws)
     again = exposure_stream(*exposures[0]), exposure_stream(*exposures[0])
     assert np.array_equal(again[0].random(3), again[1].random(3))
+
+
+def test_streams_are_seeded_by_the_hash_of_their_coordinates_as_json() -> None:
+    """Of the 128 bits as one number: with others all pictures that were made would be made anew, of other noise."""
+
+    def seeded(*parts: Any) -> int:
+        text = json.dumps(list(parts)).encode()
+        number = int.from_bytes(hashlib.sha256(text).digest()[:16], "big")
+        return int(np.random.default_rng(number).integers(2**63))
+
+    exposure = replace(CONDITION, white_balance="gray-world", frames=4)
+    named = ("still_life", "D65", 25.0, "cd/m2", 0.01, "low_noise", "rgbw", 5)
+    for stream, parts in (
+        (device_stream("low_noise", "rgbw", 5), ("device", "low_noise", "rgbw", 5)),
+        (device_stream("folder/mine.toml", "rgbw", 5), ("device", "mine.toml", "rgbw", 5)),
+        (exposure_stream(exposure, "rgbw", 5), ("exposure", *named)),
+        (exposure_stream(replace(exposure, exposure="auto:W"), "rgbw", 5), ("exposure", *named[:4], None, *named[5:])),
+        (shake_stream(5), ("shake", 5)),
+        (flicker_stream(5), ("flicker", 5)),
+    ):
+        assert int(stream.integers(2**63)) == seeded(*parts), parts
+
+
+def test_a_digest_is_of_values_whatever_holds_them_and_of_their_order_where_it_counts() -> None:
+    """Of a mapping's order nothing, of a list's all; arrays, tuples and lists of the same numbers are one."""
+    assert digest({"a": 1, "b": [2.5, None]}) == digest({"b": (2.5, None), "a": np.int64(1)})
+    assert digest([1, 2]) == digest(np.array([1, 2])) == digest((1, 2)) != digest([2, 1])
+    assert digest([1, 2]) == hashlib.sha256(b"[1, 2]").hexdigest()[:32]
+    assert digest(Waveform(100.0, 0.5)) == digest(vars(Waveform(100.0, 0.5)))
+    last = 2.0**-29  # of a float's thirty bits, the last one of 0.5 to 1 is 2^-30
+    assert digest_inputs([0.75]) == digest_inputs([0.75 + last / 8]) != digest_inputs([0.75 + last])
+    assert digest_inputs("0.25,0.5") == digest_inputs("0.25, 0.5") == digest_inputs([0.25, 0.5])
+    assert digest_inputs([-0.0, np.inf]) == digest_inputs([0.0, np.inf])
+    assert digest_inputs(np.array([1.0, 1e-12])) == digest_inputs(np.array([1.0, 0.0]))
+    assert digest_inputs([1.0, 1e-12]) != digest_inputs([1.0, 0.0]), "a list's floats by themselves"
 
 
 def test_the_files_of_a_data_sets_scene_are_made_anew_for_each_input_alone(
