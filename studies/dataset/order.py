@@ -77,6 +77,7 @@ def check_cameras(study: Study, order: SetOrder) -> None:
         sensor_side_um=study.sensor_side_um,
         shake=study.lens.shake,
         flicker=study.flicker or None,
+        moments=next((scene.moments for scene in study.scenes if scene.moments), None),
     )
     for name in study.sensors:
         sensor = preset(name)

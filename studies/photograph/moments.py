@@ -11,32 +11,10 @@ import numpy as np
 from render.error_estimates import Halves, SharedPaths
 from render.level import Irradiance, SceneMeans
 from render.transport import Transport
-from rodcone.errors import InputError, require_whole
+from rodcone.errors import InputError
 from rodcone.types import Floats, Planes
-from sensor.config import SensorConfig, row_starts_s
-
-
-def moments_s(exposure_s: float, count: int) -> Floats:
-    """Give the middles of `count` equal parts of an exposure that begins at 0, shape (count,) [s].
-
-    Parameters
-    ----------
-    exposure_s : float
-    count : int
-
-    Raises
-    ------
-    InputError
-        For a count that isn't a whole number, 1 or more.
-
-    Examples
-    --------
-    >>> import rodcone
-    >>> rodcone.moments_s(0.1, 2).tolist()
-    [0.025, 0.07500000000000001]
-    """
-    require_whole("count", count, 1, 1 << 16, "give times within the exposure")
-    return np.asarray((np.arange(count) + 0.5) * (exposure_s / count))
+from sensor.config import SensorConfig
+from studies.study.motion import moments_s, site_starts_s
 
 
 def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: int) -> tuple[Floats, Floats]:
@@ -63,8 +41,34 @@ def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: i
     shares : (time, row) float64
         A row's sum is 1.
     """
-    starts_s = np.repeat(row_starts_s(sensor, rows // sensor.sites), sensor.sites)
+    starts_s = site_starts_s(sensor, rows)
     whole_s = float(starts_s.max()) + exposure_s
+    return moments_s(whole_s, count), _shares(starts_s, exposure_s, whole_s, count)
+
+
+def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: float, count: int) -> Floats:
+    """Give what each row's exposure takes of the times of a longer one, in whose middle it lies.
+
+    Parameters
+    ----------
+    sensor, rows, exposure_s
+        As of `rolling_moments`.
+    whole_s : float
+        Of the longer one, from the first row's start to the last row's end; `count` times are spread over it.
+    count : int
+
+    Returns
+    -------
+    (time, row) float64
+        A row's sum is 1.
+    """
+    starts_s = site_starts_s(sensor, rows)
+    before_s = (whole_s - exposure_s - float(starts_s.max())) / 2
+    return _shares(before_s + starts_s, exposure_s, whole_s, count)
+
+
+def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> Floats:
+    """Shares of the middles of equal parts of a time from 0 on, for exposures that start at times within it."""
     times_s, step_s = moments_s(whole_s, count), whole_s / count
 
     def until(time_s: Floats) -> Floats:
@@ -76,7 +80,7 @@ def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: i
         tent[-1] = np.where(away[-1] > 0, tent[-1] + away[-1] ** 2 / 2, tent[-1])
         return np.asarray(tent * step_s)
 
-    return times_s, (until(starts_s + exposure_s) - until(starts_s)) / exposure_s
+    return np.asarray((until(starts_s + exposure_s) - until(starts_s)) / exposure_s)
 
 
 def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transport:

@@ -40,14 +40,15 @@ from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import held_lens
 from studies.photograph.camera import calibrate, with_notes
 from studies.photograph.lamps import flicker_of, lamp_parts
-from studies.photograph.moments import moments_s, rolling_average, rolling_moments, time_average
+from studies.photograph.moments import rolling_average, rolling_moments, time_average
 from studies.photograph.ready_light import Ready, find_ready
-from studies.study.cost import PictureCost
+from studies.study.cost import TABLE_S, PictureCost
 from studies.study.focus import in_focus
 from studies.study.gain import at_gain, gain_text
 from studies.study.levels import parse_exposure, parse_level
 from studies.study.lit_scene import asked_spectra, under
 from studies.study.model import samples_a_side
+from studies.study.motion import moments_s
 from studies.study.render_noise import monte_carlo_share, noise_note, speckle_sizes
 from studies.study.scene_source import (
     LIGHT,
@@ -65,7 +66,6 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
-_TABLE_S = 1.6e-6  # the same of a lens by data, whose places have images of their own: by 512 px
 # Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
 # of the light at its later times.
 _DEVICE, _FRAME, _START, _MOMENT = 0, 1, 2, 3
@@ -535,7 +535,7 @@ def check(order: Order) -> Checked:
 
 def _after_s(sensor: SensorConfig) -> float:
     """Processor seconds a pixel and band of what follows the light."""
-    return _AFTER_S + _TABLE_S * bool(sensor.lens.table)
+    return _AFTER_S + TABLE_S * bool(sensor.lens.table)
 
 
 def _opened(

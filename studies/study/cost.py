@@ -28,6 +28,8 @@ _WORK_S = 8.8e-3
 # A render of the same scene at another time, which is loaded and traced anew, and its light in each pixel, band and
 # group, which is kept and averaged.
 _ANOTHER_S = 0.8, 1.2e-7
+# A pixel and band of an exposure behind a lens by data, whose places have images of their own: by 512 px.
+TABLE_S = 1.6e-6
 KERNELS = Path.home() / ".drjit"
 
 
@@ -82,7 +84,7 @@ class PictureCost:
         """Time on this machine's cores, if they are idle; of a render until an error, for 64 samples."""
         spp = PILOT_FROM if self.spp is None else self.spp
         render = render_seconds(self.pixels, self.bands, self.groups, spp) * (1.5 if self.denoised else 1.0)
-        another = _ANOTHER_S[0] + _ANOTHER_S[1] * self.pixels * self.bands * self.groups
+        another = another_s(self.pixels, self.bands, self.groups)
         render = self.times * min(render, self.max_seconds or render) + (self.times - 1) * pace() * another
         compiled = _COMPILE_S * self.bands if spp and not kernels_kept() else 0.0
         return pace() * (START_S + compiled + self.after_s * self.pixels * self.bands) + render
@@ -123,6 +125,16 @@ def render_seconds(pixels: int, bands: int, groups: int, spp: float) -> float:
     samples = spp + (PILOT_SPP if spp > PILOT_FROM else 0)
     each_s = _RENDER_S * (_PATHS + (1 - _PATHS) * bands / 20)
     return pace() * each_s * pixels * groups * samples / cores()
+
+
+def another_s(pixels: float, bands: int, groups: int) -> float:
+    """Processor seconds of a render of the same scene at another time, beside its samples."""
+    return _ANOTHER_S[0] + averaged_s(pixels, bands, groups)
+
+
+def averaged_s(pixels: float, bands: int, groups: int) -> float:
+    """Processor seconds of a render that is read and averaged with others."""
+    return _ANOTHER_S[1] * pixels * bands * groups
 
 
 @cache

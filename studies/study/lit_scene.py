@@ -22,6 +22,7 @@ from render.scene import Scene, film_size
 from render.scene_range import check_range
 from render.spectrum import Spectrum
 from render.transport import Transport, replaceable_luminance
+from render.user_scene.scene_parts import SceneFile
 from rodcone.digests import digest_file, digest_inputs
 from rodcone.errors import InputError, require_absent, require_keys, require_name
 from rodcone.jit import backend
@@ -30,8 +31,9 @@ from sensor.config import check_frame
 from sensor.presets import preset
 from studies.study.equal_area import require_pixels
 from studies.study.focus import in_focus
-from studies.study.levels import parse_level
+from studies.study.levels import parse_exposure, parse_level
 from studies.study.model import RenderModel
+from studies.study.motion import longest_span_s, moments_s
 from studies.study.render_noise import render_quietly
 from studies.study.scene_source import (
     LIGHT,
@@ -62,6 +64,10 @@ class OpenedScene:
     identity : str
         Hash of all that the scene is.
     notes : tuple of str
+    moving : tuple of Scene
+        The scene at times that are spread over `whole_s`, in whose middle `scene` is; empty where it stands still.
+    whole_s : float
+        Time that all exposures of a moving scene lie within [s], each in the middle of it.
     """
 
     choice: SceneChoice
@@ -69,6 +75,8 @@ class OpenedScene:
     size: tuple[int, int]
     identity: str
     notes: tuple[str, ...] = ()
+    moving: tuple[Scene, ...] = ()
+    whole_s: float = 0.0
 
     @cached_property
     def white(self) -> AdoptedWhite:
@@ -94,7 +102,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         )
     if is_radiance_file(choice.source):
         place = f"for {choice.source}, a picture without surfaces"
-        options = ("extend", "chart", "define", "spp", "focus_m")
+        options = ("extend", "chart", "define", "spp", "focus_m", "moments")
         require_absent(place, **{name: getattr(choice, name) for name in options})
         check_radiance_file(choice.source, study.levels)
         if choice.spectra is not None:
@@ -111,10 +119,9 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             ]
         )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
+    # a scene that is rendered
     require_absent(f"for {choice.source!r}; allowed: with a photograph", spectra=choice.spectra)
-    opened = open_scene(
-        choice.source, extend=choice.extend, light=choice.light, chart=choice.chart, define=choice.define
-    )
+    opened = _at(choice, None if choice.moments is None else 0.0)
     scene = opened.scene
     for level in study.levels:
         asked_level(scene, level)
@@ -130,10 +137,30 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         check_frame(preset(name), size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
+    # as the lens sees it, and at its times
+    scenes, whole_s = [scene], 0.0
+    if choice.moments is not None:  # the middle, and the times
+        whole_s = _whole_s(study, size[0])
+        scenes = [_at(choice, float(at_s)).scene for at_s in (whole_s / 2, *moments_s(whole_s, choice.moments))]
     if choice.focus_m is not None:
-        scene = _in_focus(scene, choice, study, size)
-    identity = digest_inputs([digest_scene(scene), size])
-    return OpenedScene(choice=choice, scene=scene, size=size, identity=identity, notes=tuple(opened.notes))
+        scenes = [_in_focus(each, choice, study, size) for each in scenes]
+    scene, *times = scenes
+    of_motion = [whole_s, *map(digest_scene, times)] if times else []
+    identity = digest_inputs([digest_scene(scene), size, *of_motion])
+    return OpenedScene(choice, scene, size, identity, tuple(opened.notes), tuple(times), whole_s)
+
+
+def _whole_s(study: Study, rows: int) -> float:
+    """Time that all exposures of a scene that moves lie within [s]."""
+    exposures_s = [parse_exposure(exposure) or 0.0 for exposure in study.exposures]
+    return longest_span_s([preset(name) for name in study.sensors], rows, exposures_s)
+
+
+def _at(choice: SceneChoice, time_s: float | None) -> SceneFile:
+    """Open a scene as it is at a time; None for one that stands still."""
+    return open_scene(
+        choice.source, extend=choice.extend, light=choice.light, chart=choice.chart, define=choice.define, time_s=time_s
+    )
 
 
 def _in_focus(scene: Scene, choice: SceneChoice, study: Study, size: tuple[int, int]) -> Scene:

@@ -16,6 +16,7 @@ from rodcone.display import brief
 from rodcone.errors import (
     InputError,
     in_place,
+    require_absent,
     require_fields,
     require_keys,
     require_name,
@@ -75,6 +76,9 @@ class SceneChoice:
         Distance of focus: the scene is rendered through a thin lens of the sensors' f-number, which must be one.
     focal_length_mm : float, optional
         Of that lens; left out, that of a sensor as wide as the picture's pixels.
+    moments : int, optional
+        Times at which a scene that moves is rendered, spread over the longest exposure; each costs a render, and the
+        truth, which is the scene at the middle of all exposures, as many samples as all of them.
 
     Examples
     --------
@@ -92,13 +96,15 @@ class SceneChoice:
     spectra: str | None = None
     focus_m: Annotated[float | None, (1e-3, 1e6, "give metres")] = None
     focal_length_mm: Annotated[float | None, (1e-3, 1e5, "give millimetres")] = None
+    moments: Annotated[int | None, (1, 256, "give times within the exposure")] = None
 
     @property
     def label(self) -> str:
-        """Name in rows: of the scene, its file or its chart, and the lens that it is seen through."""
+        """Name in rows: of the scene, its file or its chart, the lens that it is seen through, and its times."""
         focal = "" if self.focal_length_mm is None else f"{self.focal_length_mm:g} mm "
         lens = "" if self.focus_m is None else f", {focal}focused at {self.focus_m:g} m"
-        return label(self.chart or self.source) + lens
+        moving = "" if self.moments is None else f", at {self.moments} times"
+        return label(self.chart or self.source) + lens + moving
 
     def __post_init__(self) -> None:
         source: object = self.source  # from Python it may be a Path
@@ -402,6 +408,7 @@ def _check_shares_and_sizes(study: Study) -> None:
         raise unknown("lens.shake", study.lens.shake, SHAKES)
     require_name("budget.model", budget.model, (AUTOMATIC, *STARTING_POINTS))
     require_range("budget.monte_carlo", budget.monte_carlo, 1e-6, budget.total, "give a share within budget.total")
+    _check_moments(study)
     if side_um is None:
         return
     for name in study.sensors:
@@ -411,3 +418,28 @@ def _check_shares_and_sizes(study: Study) -> None:
         require_whole(
             f"sensor_side_um: pixels across {label(name)}", across, 16, 8192, f"{side_um:g} um is given; {fix}"
         )
+
+
+def _check_moments(study: Study) -> None:
+    """Check that the exposures of scenes that move are times, and each a single one of a render that is kept whole."""
+    moving = [scene for scene in study.scenes if scene.moments is not None]
+    if not moving:
+        return
+    beside = f"beside scene {moving[0].label}, which moves"
+    for exposure in study.exposures:
+        if parse_exposure(exposure) is None:
+            raise InputError(
+                f"exposures: {exposure!r} {beside}; allowed: times, such as 100ms, because a rule needs the light that "
+                "the exposure itself blurs; give times"
+            )
+    limits, rolls = study.render, any(preset(name).row_time_us for name in study.sensors)
+    require_absent(
+        beside,
+        **{
+            "frames": None if study.frames == (1,) else list(study.frames),
+            "render.noise_share": limits.noise_share,
+            "render.max_seconds": limits.max_seconds,
+            "render.denoise": limits.denoise,
+            "sensor_side_um": study.sensor_side_um if rolls else None,  # whose rows aren't the render's
+        },
+    )

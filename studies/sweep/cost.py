@@ -12,9 +12,10 @@ from render.radiance_files.radiance_source import extent_of
 from render.reference import find_reference
 from rodcone.memory import Memory, memory
 from rodcone.progress import duration
+from sensor.presets import preset
 from studies.budget.ledger import Plan
 from studies.budget.starting_points import plan_from_settings, reference_plan
-from studies.study.cost import START_S, cores, pace, render_seconds
+from studies.study.cost import START_S, TABLE_S, another_s, averaged_s, cores, pace, render_seconds
 from studies.study.equal_area import sensor_shapes
 from studies.study.lit_scene import OpenedScene, film_of, open_all
 from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study_mosaics
@@ -50,7 +51,7 @@ class Estimate:
     ----------
     cells, kept, renders, workers : int
         `kept` cells at most are in the results database from a run of this code; `renders` counts scenes, not files of
-        radiance.
+        radiance, and of one that moves each time and the middle.
     seconds : float
         With so many workers on this machine's cores, if they are idle; first calls, imports, metrics and the report
         are counted, and renders and cells that exist already.
@@ -88,7 +89,10 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _Part:
-    """One scene of a sweep: its pixels, bands, light groups and samples, 0 of a picture file."""
+    """One scene of a sweep: its pixels, bands, light groups and samples, 0 of a picture file.
+
+    A scene that moves is rendered at `times` by so many samples, and at its middle by as many as all of them.
+    """
 
     pixels: int
     sensor_pixels: int
@@ -96,6 +100,12 @@ class _Part:
     groups: int
     spp: float
     denoised: bool = False
+    times: int = 0
+
+    @property
+    def renders(self) -> int:
+        """Number of renders."""
+        return self.times + 1 if self.spp else 0
 
 
 def estimated(
@@ -150,7 +160,7 @@ def estimate(
     return Estimate(
         cells=cells,
         kept=kept,
-        renders=sum(part.spp > 0 for part in parts),
+        renders=sum(part.renders for part in parts),
         workers=workers,
         seconds=at(cells, 1.0),
         half_size_seconds=at(cells, _HALF_SIZE),
@@ -164,7 +174,9 @@ def _memory(parts: Sequence[_Part], workers: int, *, ahead: bool) -> Memory:
     """Memory of the scene that needs most; with `ahead` a scene may be rendered beside the cells of any other."""
 
     def of(part: _Part, workers: int) -> Memory:
-        return memory(part.pixels, part.bands, part.groups, workers, spp=part.spp, denoised=part.denoised)
+        held = 2 if part.times else 0  # the middle's light, and the mean of the times that went before
+        sizes = part.pixels, part.bands, part.groups, workers
+        return memory(*sizes, spp=part.spp, denoised=part.denoised, held=held)
 
     needs = [of(part, workers) for part in parts]
     largest = max(need.largest for need in needs)
@@ -186,7 +198,8 @@ def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:
     groups, bands = len(opened.scene.groups), len(model.wavelength_nm)
     found = study.render.reference and find_reference(opened.scene, film) is not None
     spp = _LIVE_SPP if found else model.spp
-    return _Part(pixels, max(pixels, *map(prod, shapes.values()), 0), bands, groups, spp, model.denoise)
+    largest, times = max(pixels, *map(prod, shapes.values()), 0), len(opened.moving)
+    return _Part(pixels, largest, bands, groups, spp, model.denoise, times)
 
 
 def _seconds(
@@ -198,15 +211,20 @@ def _seconds(
     report_s, of_cell_s = (0.0, 0.0) if frames else _REPORT_S
     first_s = _FIRST_S + sum(costs[1] for costs in own)
     images = len(study.sensors) * len(study.spectra) * len(study_mosaics(study))
+    behind_tables = sum(bool(study.lens.table or preset(name).lens.table) for name in study.sensors)
+    shared_s = _SHARED_S + TABLE_S * behind_tables / len(study.sensors)
     seconds = START_S * (2 if workers > 1 else 1) + first_s * max(1.0, workers / cores()) + report_s
     lights = 0.0
     for part in parts:
         pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale
         light = render_seconds(1, part.bands, part.groups, part.spp) * pixels if part.spp else 0.0
-        lights += min(light, study.render.max_seconds or light)
+        lights += min(light, study.render.max_seconds or light) * max(1, 2 * part.times)
+        exposed = len(study.exposures) if part.times else 1  # each reads its times and has images of its own
+        of_light = pixels, part.bands, part.groups
+        seconds += part.times * (another_s(*of_light) + exposed * averaged_s(*of_light))
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
-        seconds += pixels * part.bands * (_SHARED_S * images + _READ_S * (part.spp == 0))
+        seconds += pixels * part.bands * (shared_s * images * exposed + _READ_S * (part.spp == 0))
         seconds += cells / len(parts) * (each / at_once + of_cell_s)
         seconds += planned * (_PILOT_S if part.spp else _PICTURE_PILOT_S)
     return lights + pace() * seconds

@@ -77,15 +77,24 @@ class UnitFrame:
 
 
 def frame_key(
-    render: str, opened: OpenedScene, spectrum: str, study: Study, preset: SensorConfig, sensor: SensorConfig
+    render: str,
+    opened: OpenedScene,
+    spectrum: str,
+    study: Study,
+    preset: SensorConfig,
+    sensor: SensorConfig,
+    exposure: str = "",
 ) -> str:
     """Key of a frame: the render's content, the scene's own lights, the spectrum, and what computes it.
 
-    The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux.
+    The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux. The
+    exposure is that of a scene that moves, which each blurs otherwise.
     """
     light = illuminant(spectrum) if is_curve_file(spectrum) else spectrum
     area = [] if study.equal_area is None else [study.equal_area]
-    return digest_inputs([render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area])
+    moving = [parse_exposure(exposure)] if exposure else []
+    terms = [render, opened.identity, light, in_lux(study.levels), versions(), preset, sensor, *area, *moving]
+    return digest_inputs(terms)
 
 
 def load_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
@@ -108,6 +117,7 @@ def make_frames(
     wanted: Mapping[str, tuple[SensorConfig, SensorConfig]],
     study: Study,
     samples: int = 1,
+    still: Transport | None = None,
 ) -> None:
     """Make and keep the frames of one lit scene.
 
@@ -123,18 +133,22 @@ def make_frames(
         Its levels, and the sensors' size.
     samples : int
         Samples of the light along each side of a pixel.
+    still : Transport, optional
+        The truth of a scene that moves: as it is at the exposures' middle.
     """
     if transport.denoised is None:
         views = (transport.relight(luminance_cd_m2=1.0), *transport.relight_halves(luminance_cd_m2=1.0))
     else:
         views = relight_denoised(transport, luminance_cd_m2=1.0)
-    white, area = shown_white_cd_m2(transport, 1.0), study.equal_area
-    picture = in_pixels(views[0], samples) if area is None else area.view(views[0], area.coarsest_um)
+    true = transport if still is None else still
+    white, area = shown_white_cd_m2(true, 1.0), study.equal_area
+    seen = views[0] if still is None else still.relight(luminance_cd_m2=1.0)
+    picture = in_pixels(seen, samples) if area is None else area.view(seen, area.coarsest_um)
     scene = {
         "light": {name: getattr(light, name).tolist() for name in ("wavelength_nm", "width_nm", "spectrum")},
         "lamp": (light.lamp.wavelength_nm.tolist(), light.lamp.values.tolist()),
         "white_cd_m2": white,
-        "lux_per_cd_m2": lux_per_cd_m2(transport, study.levels),
+        "lux_per_cd_m2": lux_per_cd_m2(true, study.levels),
         "truth": keep_array(folder, true_srgb(picture, light, white)),
     }
     for key, (preset, sensor) in wanted.items():

@@ -2,6 +2,7 @@
 
 import sqlite3
 import warnings
+from collections import defaultdict
 from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field, replace
@@ -45,6 +46,7 @@ from studies.study.study import Condition, Study, conditions, label, study_mosai
 from studies.sweep.cells import Cell, RenderRecord, cell_keys
 from studies.sweep.database import note_render, render_record
 from studies.sweep.frames import UnitFrame, colours_under, frame_key, kept_exposures, load_frame, make_frames
+from studies.sweep.moving import MovingLight, part_of
 from studies.sweep.provenance import provenance, versions
 
 # Folders beside the results database: the fourth of a plan's renders, the last two of a data set's planes and shards.
@@ -80,7 +82,8 @@ class StageClock(Protocol):
         """Add what is done within to a stage."""
 
 
-Imaged = tuple[str, str, LensConfig, str]  # spectrum, sensor, modelled lens and mosaic: what a frame belongs to
+# What a frame belongs to: spectrum, sensor, modelled lens, exposure of a scene that moves (else none) and mosaic.
+Imaged = tuple[str, str, LensConfig, str, str]
 Sensors = tuple[SensorConfig, SensorConfig]
 
 
@@ -109,9 +112,10 @@ def coloured(job: Job, opened: OpenedScene, cells: Sequence[Cell]) -> list[Cell]
     return [cell if cell.colours is not None else replace(cell, colours=fit(cell)) for cell in cells]
 
 
-def _image_of(job: Job, condition: Condition) -> tuple[str, str, LensConfig]:
+def _image_of(job: Job, condition: Condition) -> tuple[str, str, LensConfig, str]:
     """Return what a frame belongs to, but for the mosaic."""
-    return condition.spectrum, condition.sensor, job.plan.images[condition].lens
+    exposure = "" if condition.scene.moments is None else condition.exposure
+    return condition.spectrum, condition.sensor, job.plan.images[condition].lens, exposure
 
 
 def _portable(processor: str) -> str:
@@ -151,18 +155,28 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
     InputError, OSError
         As `scene_cells`.
     """
+    moments = _moments(job, opened)
     with clock.stage("renders"):
-        transport, assumed = scene_transport(job, opened, progress)
+        if moments is None:
+            transport, assumed = scene_transport(job, opened, progress)
+        else:
+            transport, assumed = moments.middle(part_of(progress, 0, 2))
+            content, seconds = moments.content(transport, part_of(progress, 1, 2))
     with clock.stage("what cells share"), warnings.catch_warnings():
         if job.plan.ledgers:  # they charge the error within bands
             warnings.simplefilter("ignore", WideBandsWarning)
+        facts = render_facts(transport, photographed(transport, 1.0))
+        if moments is None:
+            content = digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data)
+        else:
+            facts = replace(facts, seconds=seconds, spp=float(moments.model.spp))
         record = RenderRecord(
-            content=digest_bytes(np.ascontiguousarray((transport.denoised or transport).radiance).data),
-            facts=render_facts(transport, photographed(transport, 1.0)),
+            content=content,
+            facts=facts,
             brightest_share=None if job.study.render.noise_share is None else _brightest_share(job, opened, transport),
             notes=(*opened.notes, *assumed, *(FELL_BACK if backend() == "numpy" else ())),
         )
-        _make_files(job, opened, record, transport)
+        _make_files(job, opened, record, transport, moments)
         cells = _cells(job, opened, record)
         if cells is None:
             raise OSError(None, "files just written are gone", str(job.out / FRAMES))
@@ -179,6 +193,14 @@ def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[
     model, share = job.plan.renders.get(opened.choice), partial(_brightest_share, job, opened)
     samples = job.plan.samples_a_side(opened.choice)
     return make_transport(opened, job.study, model, job.out / RENDERS, progress, share, samples)
+
+
+def _moments(job: Job, opened: OpenedScene) -> MovingLight | None:
+    """Return the light of a scene that moves; None of one that stands still."""
+    if not opened.moving:
+        return None
+    samples = job.plan.samples_a_side(opened.choice)
+    return MovingLight(opened, job.study, job.plan.renders[opened.choice], job.out / RENDERS, samples)
 
 
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
@@ -211,35 +233,41 @@ def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
         unmodelled = job.study.lens.behind(preset(condition.sensor))
         lens = job.plan.images[condition].lens
         for mosaic in study_mosaics(job.study):
-            sensors[condition.spectrum, condition.sensor, lens, mosaic] = (
+            sensors[*_image_of(job, condition), mosaic] = (
                 unmodelled,
                 replace(vary(unmodelled, mosaic), lens=framed(lens, view_deg)),
             )
     return sensors
 
 
-def _make_files(job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport) -> None:
-    """Make what is missing of the files that the scene's cells share."""
+def _make_files(
+    job: Job, opened: OpenedScene, record: RenderRecord, transport: Transport, moments: MovingLight | None
+) -> None:
+    """Make what is missing of the files that the scene's cells share; of one that moves for each exposure."""
     folder = job.out / FRAMES
     folder.mkdir(parents=True, exist_ok=True)
     samples = job.plan.samples_a_side(opened.choice)
     for spectrum in job.study.spectra:
-        keyed = {
-            frame_key(record.content, opened, spectrum, job.study, *sensors): sensors
-            for (under_spectrum, *_), sensors in _imaged(job, opened).items()
-            if under_spectrum == spectrum
-        }
-        absent = {key: sensors for key, sensors in keyed.items() if load_frame(folder, key, sensors[1]) is None}
-        if absent:
-            light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
-            make_frames(folder, under(transport, spectrum), light, absent, job.study, samples)
+        light = light_in_bands(white_spectrum(opened, spectrum), transport.wavelength_nm, transport.width_nm)
+        absent = defaultdict[tuple[str, float], dict[str, Sensors]](dict)
+        for (under_spectrum, *_, exposure, _), sensors in _imaged(job, opened).items():
+            key = frame_key(record.content, opened, spectrum, job.study, *sensors, exposure)
+            if under_spectrum == spectrum and load_frame(folder, key, sensors[1]) is None:
+                absent[exposure, sensors[1].row_time_us if exposure else 0.0][key] = sensors
+        for (exposure, _), wanted in absent.items():
+            lit, still = under(transport, spectrum), None
+            if moments is not None:
+                (_, sensor), *_ = wanted.values()
+                exposed = moments.exposed(sensor, parse_exposure(exposure) or 0.0, transport)
+                lit, still = under(exposed, spectrum), lit
+            make_frames(folder, lit, light, wanted, job.study, samples, still)
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Cells of a scene whose files stand, without their colours; None where one is missing."""
     frames = dict[Imaged, UnitFrame]()
     for imaged, sensors in _imaged(job, opened).items():
-        key = frame_key(record.content, opened, imaged[0], job.study, *sensors)
+        key = frame_key(record.content, opened, imaged[0], job.study, *sensors, imaged[-2])
         frame = load_frame(job.out / FRAMES, key, sensors[1])
         if frame is None:
             return None
