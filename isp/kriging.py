@@ -7,6 +7,7 @@ chooses among samples that look alike, this is one filter for each pixel of the 
 channel by channel, near lamps.
 """
 
+from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache, lru_cache
 
@@ -30,6 +31,7 @@ LENGTH = 6.0  # of the exponential covariance [pixels]
 BESIDE_LAMPS = 1e3  # what a channel shows beside a lamp [standard deviations of noise]
 TOGETHER = 16  # rows of windows that are summed together: all at once would hold each sample 169 times
 OUTLYING = 8.0  # half widths of the middle two thirds, above which a sample is a lamp's
+STRIP_ROWS = 256  # that are estimated together: what lies between is no whole frame of every channel
 LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
 
 
@@ -41,6 +43,12 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
     the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
     """
+    estimates, noise_gains = zip(*(strip[1:] for strip in linear_strips(raw)), strict=True)
+    return Reconstruction(np.concatenate(estimates), np.concatenate(noise_gains), engine="numpy")
+
+
+def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
+    """Yield the rows of each strip of `reconstruct_linear`, its estimate [e-] and its noise gain; bits are the same."""
     names = raw.channels
     plain = replace(without_prnu(raw), noise_steps=())
     values = stabilise_raw(raw.electrons, plain)
@@ -48,19 +56,26 @@ def reconstruct_linear(raw: RawImage) -> Reconstruction:
     low, high = np.array([np.percentile(values[at], (15.9, 84.1)) for at in sampled]).T
     spread = (high - low) / 2
     deviation = np.sqrt(np.maximum(spread**2 - 1.0, LEAST_DEVIATION**2))
-    estimate, noise_gain = krige(values, raw.cfa, deviation)
     bright = raw.saturated | (values > np.select(sampled, list(high + OUTLYING * np.maximum(spread, 1.0))))
-    beside = scipy.ndimage.maximum_filter(bright, size=SIDE)[..., None]
-    if beside.any():
-        apart = krige(values, raw.cfa, np.full_like(deviation, BESIDE_LAMPS), 0.0, where=beside[..., 0])
-        estimate, noise_gain = np.where(beside, apart[0], estimate), np.where(beside, apart[1], noise_gain)
-    # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
-    # A channel that is read apart counts its own electrons, 1 over its factor of shot noise.
-    electrons = np.empty_like(estimate)
-    for index, noise in enumerate(map(raw.noise_of, names)):
-        counted = unstabilise(estimate[..., index], noise.dark_noise_e / noise.shot) - noise_gain[..., index] / 4
-        electrons[..., index] = counted * noise.shot
-    return Reconstruction(electrons, noise_gain, engine="numpy")
+    beside = scipy.ndimage.maximum_filter(bright, size=SIDE)
+    noises = [raw.noise_of(name) for name in names]
+    for first in range(0, len(values), STRIP_ROWS):
+        rows = range(first, min(first + STRIP_ROWS, len(values)))
+        strip = slice(rows.start, rows.stop)
+        estimate, noise_gain = krige(values, raw.cfa, deviation, rows=rows)
+        if beside[strip].any():
+            lone = np.full_like(deviation, BESIDE_LAMPS)
+            apart = krige(values, raw.cfa, lone, 0.0, rows=rows, where=beside)
+            estimate, noise_gain = (
+                np.where(beside[strip][..., None], *both) for both in zip(apart, (estimate, noise_gain), strict=True)
+            )
+        # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
+        # A channel that is read apart counts its own electrons, 1 over its factor of shot noise.
+        electrons = np.empty_like(estimate)
+        for index, noise in enumerate(noises):
+            counted = unstabilise(estimate[..., index], noise.dark_noise_e / noise.shot) - noise_gain[..., index] / 4
+            electrons[..., index] = counted * noise.shot
+        yield strip, electrons, noise_gain
 
 
 def krige(
@@ -69,6 +84,7 @@ def krige(
     deviation: Plane,
     correlation: float = CORRELATION,
     *,
+    rows: range | None = None,
     where: NDArray[np.bool_] | None = None,
 ) -> tuple[Plane, Plane]:
     """Estimate every channel at every pixel of a mosaic whose samples have noise of variance 1.
@@ -82,6 +98,8 @@ def krige(
         Standard deviation of what each channel shows, above 0.
     correlation : float
         Of two channels at one pixel.
+    rows : range, optional
+        That are estimated; all of them where left out.
     where : (h, w) bool, optional
         Pixels that are asked for, all by default; others may come out as 0.
 
@@ -92,19 +110,24 @@ def krige(
     """
     height, width = values.shape
     count = len(channels(tile))
+    asked = range(height) if rows is None else rows
     scales = (*deviation.tolist(), correlation)
-    estimate, noise_gain = np.zeros((2, count, height, width))
+    estimate, noise_gain = np.zeros((2, count, len(asked), width))
     blas = ThreadpoolController()
-    for rows in _alike(height, len(tile)):
+    for alike in _alike(height, len(tile)):
+        part = _within(alike, asked)
+        if not len(range(height)[part]):
+            continue
+        at = slice(part.start - asked.start, part.stop - asked.start, part.step)
         for columns in _alike(width, len(tile[0])):
-            if where is not None and not where[rows, columns].any():
+            if where is not None and not where[part, columns].any():
                 continue
-            first = rows.start, columns.start
+            first = alike.start, columns.start
             down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
             with blas.limit(limits=1, user_api="blas"):  # of BLAS: on a busy machine several wait for each other
                 weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
-                estimate[:, rows, columns] = _weighted(values, weights, rows, columns, (down, across))
-            noise_gain[:, rows, columns] = (weights**2).sum(axis=1)[:, None, None]
+                estimate[:, at, columns] = _weighted(values, weights, part, columns, (down, across))
+            noise_gain[:, at, columns] = (weights**2).sum(axis=1)[:, None, None]
     return np.moveaxis(estimate, 0, -1), np.moveaxis(noise_gain, 0, -1)
 
 
@@ -119,6 +142,12 @@ def _alike(side: int, period: int) -> list[slice]:
     border = [at for at in range(side) if at not in inside]
     phases = [slice(first, inside.stop, period) for first in inside[:period]]
     return [slice(at, at + 1, period) for at in border] + phases
+
+
+def _within(positions: slice, asked: range) -> slice:
+    """Those of `positions` that are asked for."""
+    first = positions.start + max(-(-(asked.start - positions.start) // positions.step), 0) * positions.step
+    return slice(first, max(min(positions.stop, asked.stop), first), positions.step)
 
 
 def _weighted(

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from isp.defects import interpolate_defects
-from isp.kriging import reconstruct_linear
+from isp.kriging import linear_strips
 from rodcone.errors import InputError
 from sensor.cfa import Tile, channels, is_bayer, is_rgbw, mask, plain
 from sensor.raw import RawImage
@@ -66,12 +66,17 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     """
     tile = bayer_tile(raw.cfa) if tile is None else tile
     raw = interpolate_defects(raw)
-    estimate_dn = reconstruct_linear(raw).estimate / raw.gain_e_per_dn + raw.black_dn
     dn = raw.dn.copy()
-    for index, channel in enumerate(raw.channels):
-        moved = mask(tile, channel, raw.shape) & ~mask(raw.cfa, channel, raw.shape)
-        top_dn = max(raw.white_dn, raw.noise_of(channel).full_well_e / raw.gain_e_per_dn + raw.black_dn)
-        dn[moved] = np.rint(np.clip(estimate_dn[moved, index], 0.0, top_dn)).astype(dn.dtype)
+    moved = {name: mask(tile, name, raw.shape) & ~mask(raw.cfa, name, raw.shape) for name in raw.channels}
+    top_dn = [
+        max(raw.white_dn, raw.noise_of(name).full_well_e / raw.gain_e_per_dn + raw.black_dn) for name in raw.channels
+    ]
+    for rows, estimate, _ in linear_strips(raw):
+        estimate_dn = estimate / raw.gain_e_per_dn + raw.black_dn
+        for index, channel in enumerate(raw.channels):
+            at = moved[channel][rows]
+            values = np.rint(np.clip(estimate_dn[at, index], 0.0, top_dn[index]))
+            dn[rows][at] = values.astype(dn.dtype)
     order = [raw.channels.index(channel) for channel in channels(tile)]
     colour = None if raw.colour is None else raw.colour.part(order)
     apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))

@@ -20,13 +20,14 @@ def combine(maps: Floats, planes: Planes) -> Planes:
     Parameters
     ----------
     maps : (group, band, band) float64
-        Factors from each group's bands (last axis) to those of the sum; where they are 0 nothing is read.
+        Factors from each group's bands (last axis) to those of the sum, which may be a few of them; where they are 0
+        nothing is read.
     planes : (group, band, h, w) float32
     """
-    groups, bands, height, width = planes.shape
-    pixels = height * width
-    flat = planes.reshape(groups * bands, pixels)
-    factors = np.moveaxis(maps, 0, 1).reshape(bands, groups * bands)
+    groups, read_bands, height, width = planes.shape
+    bands, pixels = maps.shape[1], height * width
+    flat = planes.reshape(groups * read_bands, pixels)
+    factors = np.moveaxis(maps, 0, 1).reshape(bands, groups * read_bands)
     read = [np.flatnonzero(row) for row in factors]
     if backend() == "numpy":
         result = np.empty((bands, pixels), dtype=np.float32)

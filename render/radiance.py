@@ -1,17 +1,19 @@
 """Spectral radiance of an image: what a camera looks at."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from render.illuminants import unit_luminance
-from render.spectrum import Spectrum, band_widths, luminance, tristimulus
+from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, band_widths, luminance, observer_weights, tristimulus
 from rodcone.colour_spaces import XYZ_TO_SRGB_ROUNDED
 from rodcone.display import Axes, brief, draw_line, preview_png
 from rodcone.doors import method
 from rodcone.errors import InputError, require_fields, require_range
-from rodcone.types import Floats, real_array
+from rodcone.types import Floats, Planes, real_array
 
 
 @dataclass(frozen=True)
@@ -163,8 +165,88 @@ class SpectralRadiance:
         )
 
 
-def check_values(name: str, values: NDArray[np.floating], signed: bool = False) -> None:
-    """Raise `InputError` at the first value of (h, w, band) that is NaN, infinite or, unless `signed`, negative."""
+@dataclass(frozen=True)
+class BandRadiance:
+    """Radiance of which one band at a time is made, whenever it's asked for: no array holds all bands.
+
+    Attributes
+    ----------
+    make : callable
+        Gives a band's values, (h, w) float32, by its number.
+    shape : (int, int)
+        Height and width in pixels.
+    wavelength_nm, widths_nm : (band,) float64
+    relative_mc_error, relative_level_error, signed, light, horizontal_view_deg
+        As of `SpectralRadiance`.
+    """
+
+    make: Callable[[int], Planes]
+    shape: tuple[int, int]
+    wavelength_nm: Floats
+    widths_nm: Floats
+    relative_mc_error: float = 0.0
+    relative_level_error: float | None = None
+    signed: bool = False
+    light: Spectrum | None = None
+    horizontal_view_deg: float | None = None
+
+    __repr__ = brief
+
+    def plane(self, band: int) -> Planes:
+        """Return a band's values, (h, w) float32; `InputError` for one that `SpectralRadiance` doesn't take."""
+        plane = self.make(band)
+        check_values("radiance", plane[..., None], self.signed, band)
+        return plane
+
+    @cached_property
+    def extents(self) -> Floats:
+        """Largest absolute value, its mean, and the mean of each band, shape (3, band)."""
+        planes = (self.plane(band) for band in range(self.wavelength_nm.size))
+        return np.transpose([(*_extent(plane), plane.mean(dtype=np.float64)) for plane in planes])
+
+    @property
+    def mean_luminance(self) -> float:
+        """Mean luminance of the picture [cd m^-2]."""
+        weights = observer_weights(self.wavelength_nm, self.widths_nm, self.light)[1]
+        return float(LUMINOUS_EFFICACY_LM_W * (self.extents[2] @ weights))
+
+    def whole(self) -> SpectralRadiance:
+        """Return all bands together."""
+        planes = np.stack([self.make(band) for band in range(self.wavelength_nm.size)])
+        return SpectralRadiance(
+            np.moveaxis(planes, 0, -1),
+            self.wavelength_nm,
+            relative_mc_error=self.relative_mc_error,
+            width_nm=self.widths_nm,
+            relative_level_error=self.relative_level_error,
+            signed=self.signed,
+            light=self.light,
+            horizontal_view_deg=self.horizontal_view_deg,
+        )
+
+
+def band_plane(radiance: SpectralRadiance | BandRadiance, band: int) -> NDArray[np.floating]:
+    """Return the values of one band, (h, w)."""
+    return radiance.plane(band) if isinstance(radiance, BandRadiance) else radiance.values[..., band]
+
+
+def band_extents(radiance: SpectralRadiance | BandRadiance) -> Floats:
+    """Return the largest absolute value of each band and its mean, shape (2, band)."""
+    if isinstance(radiance, BandRadiance):
+        return radiance.extents[:2]
+    return np.transpose([_extent(plane) for plane in np.moveaxis(radiance.values, -1, 0)])
+
+
+def _extent(plane: NDArray[np.floating]) -> tuple[float, float]:
+    size = np.abs(plane)
+    return float(size.max()), float(size.mean(dtype=np.float64))
+
+
+def check_values(name: str, values: NDArray[np.floating], signed: bool = False, first_band: int = 0) -> None:
+    """Raise `InputError` at the first value of (h, w, band) that is NaN, infinite or, unless `signed`, negative.
+
+    Where only a part of the bands is given, `first_band` is the number of its first one.
+    """
     # two passes without a temporary; NaN carries through
     least = float(values.min())
     most = float(values.max())
@@ -172,6 +254,6 @@ def check_values(name: str, values: NDArray[np.floating], signed: bool = False) 
         return
     row, column, band = (int(i) for i in np.argwhere(~(np.isfinite(values) & ((values >= 0) | signed)))[0])
     raise InputError(
-        f"{name}: {values[row, column, band]} at row {row}, column {column}, band {band}; "
+        f"{name}: {values[row, column, band]} at row {row}, column {column}, band {first_band + band}; "
         f"allowed: finite numbers{'' if signed else ' >= 0'}; repair or mask that pixel"
     )

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal, TypeAlias
 
 import numpy as np
@@ -14,7 +15,7 @@ from render.denoised.denoise import Denoised
 from render.error_estimates import Halves, SharedPaths, relative_error
 from render.illuminants import illuminant, spectral_luminance, unit_luminance
 from render.level import Irradiance, Level, SceneMeans
-from render.radiance import SpectralRadiance
+from render.radiance import BandRadiance, SpectralRadiance
 from render.scene import LightGroup
 from render.scene_range import warn_of_dark_ends
 from render.spectrum import Spectrum
@@ -35,7 +36,8 @@ class Transport:
     Attributes
     ----------
     light : Halves of (group, band, h, w)
-        Times a spectral emission it is radiance.
+        Times a spectral emission it is radiance. Of a large photograph its mean isn't an array yet, but makes one band
+        at a time (`render.radiance_files.photo.PhotoPlanes`).
     variance : (group, band, h, w) float32
         Variance of the light, from the difference of the halves, pooled over 3x3 pixels.
     coverage : Halves of (h, w)
@@ -93,7 +95,7 @@ class Transport:
     @property
     def radiance(self) -> Planes:
         """Mean of both halves, (group, band, h, w) float32: times a spectral emission it is radiance."""
-        return self.light.mean
+        return np.asarray(self.light.mean)
 
     @property
     def spp(self) -> float:
@@ -163,7 +165,7 @@ class Transport:
         return SpectralRadiance(
             values=np.moveaxis(planes, 0, -1),
             wavelength_nm=self.wavelength_nm,
-            relative_mc_error=relative_error(light.emitted, self.radiance, self.variance, self.shared),
+            relative_mc_error=relative_error(light.emitted, self.light.mean, self.variance, self.shared),
             width_nm=self.width_nm,
             relative_level_error=level_error,
             light=light.spectrum,
@@ -349,7 +351,7 @@ class Transport:
     def _curve_error(
         self, lights: Mapping[str, LightGroup], light: BandLight, responses: Mapping[str, Spectrum] | None = None
     ) -> dict[str, float]:
-        return curve_error(lights, light, self.radiance, self.wavelength_nm, self.width_nm, responses)
+        return curve_error(lights, light, self.light.mean, self.wavelength_nm, self.width_nm, responses)
 
     def _own_at(self, luminance_cd_m2: float) -> BandLight:
         """Emission of the scene's own lights brought to a level."""
@@ -386,6 +388,70 @@ class Transport:
     def _luminance_weights(self, light: BandLight) -> Floats:
         """Luminance of a transport of 1 in each group and band, shape (group, band)."""
         return light.luminance_weights(self.wavelength_nm, self.width_nm)
+
+
+def relight_by_band(
+    transport: Transport,
+    spectra: Spectra | None = None,
+    *,
+    luminance_cd_m2: float | None = None,
+    illuminance_lux: float | None = None,
+) -> BandRadiance:
+    """Return `Transport.relight` one band at a time, of the same bits; parameters, errors and warnings as of it."""
+    lights = transport._lights(spectra, None)
+    in_bands = transport._in_bands(lights)
+    light, level_error = transport._at_level(in_bands, luminance_cd_m2, illuminance_lux)
+    warn_of_wide_bands(transport._curve_error(lights, in_bands), transport.width_nm)
+
+    def plane(band: int) -> Planes:
+        values = _combined(light, band, transport.light.mean)
+        return np.maximum(values, np.float32(0), out=values) if light.mixed else values
+
+    mc_error = relative_error(light.emitted, transport.light.mean, transport.variance, transport.shared)
+    return replace(
+        _by_band(transport, light, plane), relative_mc_error=mc_error, relative_level_error=level_error, signed=False
+    )
+
+
+def halves_by_band(
+    transport: Transport,
+    spectra: Spectra | None = None,
+    *,
+    luminance_cd_m2: float | None = None,
+    illuminance_lux: float | None = None,
+) -> tuple[BandRadiance, BandRadiance]:
+    """Return `Transport.relight_halves` one band at a time, of the same bits; parameters and errors as of it."""
+    light, _ = transport._at_level(transport._emission(spectra), luminance_cd_m2, illuminance_lux)
+
+    def half(band: int, add: Callable[[Planes, Planes], Planes]) -> Planes:
+        return add(_combined(light, band, transport.light.mean), _combined(light, band, transport.light.difference))
+
+    even, odd = (partial(half, add=add) for add in (np.add, np.subtract))
+    return _by_band(transport, light, even), _by_band(transport, light, odd)
+
+
+def _by_band(transport: Transport, light: BandLight, plane: Callable[[int], Planes]) -> BandRadiance:
+    height, width = transport.counts.shape
+    return BandRadiance(
+        plane,
+        (height, width),
+        transport.wavelength_nm,
+        transport.width_nm,
+        signed=True,
+        light=light.spectrum,
+        horizontal_view_deg=transport.horizontal_view_deg,
+    )
+
+
+def _combined(light: BandLight, band: int, planes: Planes) -> Planes:
+    """Return one band of `combine`, (h, w), for which the planes that it takes are read alone."""
+    chosen = np.argwhere(light.maps[:, band]).tolist()
+    if not chosen:
+        return np.zeros(planes.shape[2:], np.float32)
+    read = [planes[group, of_band] for group, of_band in chosen]
+    taken = read[0][None] if len(read) == 1 else np.stack(read)
+    factors = np.array([light.maps[group, band, of_band] for group, of_band in chosen])
+    return combine(factors[None, None], taken[None])[0]
 
 
 def replaceable_luminance(group: LightGroup, place: str) -> float:

@@ -17,7 +17,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from render.radiance import SpectralRadiance, check_values
+from render.radiance import BandRadiance, SpectralRadiance, band_extents, band_plane, check_values
 from render.spectrum import Spectrum, band_widths, luminance, photons_per_joule
 from rodcone.display import brief
 from rodcone.errors import InputError, require_whole
@@ -159,7 +159,7 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
 
 
 def image_sums(
-    radiance: SpectralRadiance, weights: Floats, sensor: SensorConfig, samples_per_pixel: int = 1
+    radiance: SpectralRadiance | BandRadiance, weights: Floats, sensor: SensorConfig, samples_per_pixel: int = 1
 ) -> NDArray[np.float64]:
     """Weighted sums over bands of what `form_image` gives, shape (h, w, sum): as many inverse transforms as sums.
 
@@ -182,10 +182,12 @@ def image_sums(
     imaged = _imager(radiance, sensor, samples_per_pixel, _enough(radiance))
     largest = float(np.abs(weights).max(initial=0.0)) or 1.0
     # Electrons for each watt would leave the range of single precision.
-    return np.moveaxis(largest * imaged(weights / largest), 0, -1)
+    sums = imaged(weights / largest)
+    sums *= largest
+    return np.moveaxis(sums, 0, -1)
 
 
-def pixel_shape(radiance: SpectralRadiance, samples_per_pixel: int) -> tuple[int, int]:
+def pixel_shape(radiance: SpectralRadiance | BandRadiance, samples_per_pixel: int) -> tuple[int, int]:
     """Rows and columns of the pixels that the samples make.
 
     Raises
@@ -200,17 +202,17 @@ def pixel_shape(radiance: SpectralRadiance, samples_per_pixel: int) -> tuple[int
     return radiance.shape[0] // samples, radiance.shape[1] // samples
 
 
-def _enough(radiance: SpectralRadiance) -> type[np.floating]:
+def _enough(radiance: SpectralRadiance | BandRadiance) -> type[np.floating]:
     """Precision that a picture's light asks for."""
-    if radiance.values.dtype != np.float32:
+    if isinstance(radiance, SpectralRadiance) and radiance.values.dtype != np.float32:
         return np.float64
-    planes = (np.abs(plane) for plane in np.moveaxis(radiance.values, -1, 0))
-    even = all(plane.max() <= MOST_OVER_MEAN * plane.mean(dtype=np.float64) for plane in planes)
+    most, mean = band_extents(radiance)
+    even = bool(np.all(most <= MOST_OVER_MEAN * mean))
     return np.float32 if even else np.float64
 
 
 def _imager(
-    radiance: SpectralRadiance, sensor: SensorConfig, samples: int, real: type[np.floating]
+    radiance: SpectralRadiance | BandRadiance, sensor: SensorConfig, samples: int, real: type[np.floating]
 ) -> Callable[[Floats], NDArray[np.float64]]:
     """Function of weights (sum, band) that gives these sums behind a lens, (sum, h, w); bands without weight are free.
 
@@ -256,14 +258,17 @@ def _imager(
         if scattered is not None:
             light = scattered(light)
             light = light if radiance.signed else np.maximum(light, 0.0)  # rounding beside a lamp
-        return np.asarray((1 - lens.veiling_glare) * light + lens.veiling_glare * light.mean())
+        mean = light.mean()
+        light = (1 - lens.veiling_glare) * light
+        light += lens.veiling_glare * mean
+        return np.asarray(light)
 
     def imaged(weights: Floats) -> NDArray[np.float64]:
         sums = np.zeros((len(weights), height, width), real)
         beside = np.zeros(sums.shape if spread is not None else len(weights))
         with ThreadPoolExecutor(threads) as pool:
             for band in np.flatnonzero(weights.any(axis=0)):
-                nm, light = float(radiance.wavelength_nm[band]), radiance.values[..., band]
+                nm, light = float(radiance.wavelength_nm[band]), band_plane(radiance, band)
                 light = (light if moved is None else moved(light.astype(np.float64), nm)) * per_radiance
                 if spread is not None:
                     beside += weights[:, band, None, None] * spread(light, nm)
@@ -271,7 +276,10 @@ def _imager(
                     light = scipy.fft.dctn(light, type=2, overwrite_x=True, workers=threads)
                 of_band = weights[:, band].astype(real), light, nm
                 list(pool.map(lambda rows, of_band=of_band: add(rows, sums, *of_band), strips))
-        return np.stack([behind_lens(*planes) for planes in zip(sums, beside, strict=True)])
+        result = np.empty((len(sums), *pixels))
+        for plane, *planes in zip(result, sums, beside, strict=True):
+            plane[:] = behind_lens(*planes)
+        return result
 
     return imaged
 

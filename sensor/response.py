@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from render.band_weights import band_weights
-from render.radiance import SpectralRadiance
+from render.radiance import BandRadiance, SpectralRadiance
 from render.spectrum import VISIBLE_NM, Spectrum, per_joule, photons_per_joule, spectrum_by_bits
 from rodcone.digests import ByBits, by_bits
 from rodcone.errors import InputError
@@ -109,14 +109,18 @@ def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, expo
 
 
 def imaged_electrons(
-    radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float, samples_per_pixel: int = 1
+    radiance: SpectralRadiance | BandRadiance, sensor: SensorConfig, exposure_s: float, samples_per_pixel: int = 1
 ) -> NDArray[np.float64]:
     """`channel_electrons` of `form_image`, shape (h, w, channel), in a quarter of the time behind a lens that spreads.
 
     Where no undershoot is cut off it is within 1e-6 of the pixel's own light and the picture's mean together
-    (`sensor.optics.image_sums`). Parameters as of these two.
+    (`sensor.optics.image_sums`). Parameters as of these two. Behind a lens that spreads, radiance that comes band by
+    band is never held as a whole.
     """
+    if isinstance(radiance, BandRadiance) and not spreads(sensor.lens):
+        radiance = radiance.whole()
     if samples_per_pixel == 1 and not spreads(sensor.lens):
+        assert isinstance(radiance, SpectralRadiance)
         return channel_electrons(form_image(radiance, sensor), sensor, exposure_s)
     weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, exposure_s, radiance.light)
     return image_sums(radiance, weights, sensor, samples_per_pixel)

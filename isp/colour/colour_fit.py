@@ -278,7 +278,8 @@ def relative_noise(
     Parameters
     ----------
     estimate, noise_gain : (h, w, channel) array
-        Of `isp.interleaved.reconstruction.reconstruct_with_noise`; the median gain counts.
+        Of `isp.interleaved.reconstruction.reconstruct_with_noise`; the median gain counts. A gain (channel,) is that
+        of every pixel.
     gains : (channel,) float64
         White balance.
 
@@ -292,8 +293,11 @@ def relative_noise(
     kept = ~saturated if not saturated.all() else np.ones(raw.shape, dtype=bool)
     rows = np.asarray(rows_at(estimate, kept), dtype=np.float64)
     mean = np.maximum(np.einsum("nc->c", rows) / len(rows), 0.0)
-    noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept)[::MEDIAN_STEP].T)
-    variance = channel_variance(raw, mean) * np.median(noise_gains, axis=1, overwrite_input=True) * gains**2
+    medians = noise_gain
+    if noise_gain.ndim > 1:
+        noise_gains = np.ascontiguousarray(rows_at(noise_gain, kept)[::MEDIAN_STEP].T)
+        medians = np.median(noise_gains, axis=1, overwrite_input=True)
+    variance = channel_variance(raw, mean) * medians * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
     # A frame without any signal is all noise: there W alone decides, whatever the ratio.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -11,6 +11,8 @@ from numpy.typing import ArrayLike, NDArray
 from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
 from rodcone.errors import InputError, require_name
 
+STRIP_ROWS = 128  # that are encoded together
+
 
 @dataclass(frozen=True)
 class Encoding:
@@ -42,10 +44,16 @@ def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float
         For an encoding that is not in `ENCODINGS`.
     """
     require_name("encoding", encoding, ENCODINGS)
-    if encoding == "srgb":
-        return encode_srgb(linear_srgb)
     from_srgb = np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ SRGB_TO_XYZ
-    return encode_srgb(linear_srgb @ from_srgb.T)
+    linear_srgb = np.asarray(linear_srgb)
+    if not linear_srgb.ndim:
+        return encode_srgb(linear_srgb)
+    encoded = np.empty(linear_srgb.shape)
+    for first in range(0, len(encoded), STRIP_ROWS):
+        rows = slice(first, first + STRIP_ROWS)
+        linear = linear_srgb[rows]
+        encoded[rows] = encode_srgb(linear if encoding == "srgb" else linear @ from_srgb.T)
+    return encoded
 
 
 def quantise(encoded: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
@@ -69,12 +77,16 @@ def quantise(encoded: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
     if wrong := given.size - int(np.isfinite(given).sum()):
         raise InputError(f"picture: {wrong} of {given.size} values are NaN or infinite; allowed: 0 to 1; mend them")
     most = 2**bits - 1
-    samples = np.rint(np.multiply(given, most, dtype=np.float64))
-    if outside := int(((samples < 0) | (samples > most)).sum()):
+    outside, samples = 0, np.empty(given.shape, f"u{bits // 8}")
+    for first in range(0, len(given), STRIP_ROWS):
+        rows = slice(first, first + STRIP_ROWS)
+        levels = np.rint(np.multiply(given[rows], most, dtype=np.float64))
+        outside += int(((levels < 0) | (levels > most)).sum())
+        samples[rows] = np.clip(levels, 0, most)
+    if outside:
         warnings.warn(
             f"picture: {outside} of {given.size} values lie outside 0 to 1 and are clipped; linear light is encoded "
             "first: give the Picture itself, or encode_srgb(linear / white)",
             stacklevel=3,
         )
-    samples = np.clip(samples, 0, most).astype(f"u{bits // 8}")
     return samples if given.ndim == 3 else np.repeat(samples[..., None], 3, axis=2)

@@ -7,6 +7,7 @@ otherwise. A sample is of the lamp where it is lit, or lies in a rectangle with 
 most a tile apart: so the dark blue sites of a sodium lamp of 2x2 pixels are.
 """
 
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -56,18 +57,49 @@ def clip_highlights(
         A pixel of `white_lamps` has its brightest colour's value in every channel, the level at least where its own
         sample is a colour's. Where nothing is held, the array itself.
     """
-    colours = "".join(raw.colour_channels)
-    level = highlight_level(raw, gains)
-    clipped = saturated_nearby(raw, colours, reach)
-    if not clipped.any():
-        return balanced
-    limited = balanced.copy()
-    limited[clipped] = np.minimum(rows_at(balanced, clipped), level)
-    white = white_lamps(raw, gains)
-    brightest = limited[white][:, [raw.channels.index(name) for name in colours]].max(axis=-1)
-    own = mask(raw.cfa, colours, raw.shape)[white]
-    limited[white] = np.where(own, np.maximum(brightest, level), brightest)[:, None]
-    return limited
+    return Highlights.of(raw, gains, reach).held(balanced)
+
+
+@dataclass(frozen=True)
+class Highlights:
+    """Where and how a frame's highlights are held, so that its rows can be held one strip after the other.
+
+    Attributes
+    ----------
+    level : float
+        `highlight_level`.
+    colours : list of int
+        Places of the colours among the channels.
+    clipped, white, own : (h, w) bool
+        Pixels near a saturated colour sample, `white_lamps`, and sites of colours.
+    """
+
+    level: float
+    colours: list[int]
+    clipped: NDArray[np.bool_]
+    white: NDArray[np.bool_]
+    own: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, raw: RawImage, gains: NDArray[np.float64], reach: int | None = None) -> "Highlights":
+        """Look for a frame's highlights; parameters as of `clip_highlights`."""
+        names = "".join(raw.colour_channels)
+        clipped = saturated_nearby(raw, names, reach)
+        white = white_lamps(raw, gains) if clipped.any() else clipped
+        colours = [raw.channels.index(name) for name in names]
+        return cls(highlight_level(raw, gains), colours, clipped, white, mask(raw.cfa, names, raw.shape))
+
+    def held(self, balanced: NDArray[np.float64], rows: slice = slice(None)) -> NDArray[np.float64]:
+        """Return what `clip_highlights` does of some rows, (row, w, channel)."""
+        clipped, white = self.clipped[rows], self.white[rows]
+        if not clipped.any() and not white.any():
+            return balanced
+        limited = balanced.copy()
+        limited[clipped] = np.minimum(rows_at(balanced, clipped), self.level)
+        brightest = limited[white][:, self.colours].max(axis=-1)
+        own = self.own[rows][white]
+        limited[white] = np.where(own, np.maximum(brightest, self.level), brightest)[:, None]
+        return limited
 
 
 def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:

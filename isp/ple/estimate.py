@@ -247,13 +247,13 @@ def _solve_by_light(
     for first, last in pairwise(bounds.tolist()):
         index = order[first:last]
         part_pilot = None if pilot is None else PatchPilot(pilot.means[index], pilot.variance[index])
-        _solve_one_light(table(prior, sampling, int(steps[index[0]])), y[index], part_pilot, index, patches)
+        _solve_one_light(table(prior, sampling, int(steps[index[0]])), y, part_pilot, index, patches)
 
 
 def _solve_one_light(
     components: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
 ) -> None:
-    """Estimate the patches `index`, whose samples are y, from the prior's components at one light.
+    """Estimate the patches `index` of all, whose samples are y, from the prior's components at one light.
 
     With i_d the pilot's innovation in direction d (`Whitening.reads`), s_d its variance without the pilot's own noise
     n, and c_d its covariance with the patch's values,
@@ -265,11 +265,13 @@ def _solve_one_light(
     noise = None
     # Patches whose linear estimate falls under black: `on_the_curve` estimates them again.
     below = [np.empty(0, np.intp)]
-    parts = [y, np.ones((len(y), 1), np.float32)]  # what the table's matrices take: samples, 1, the pilot's means
+    # What the table's matrices take: samples, 1, the pilot's means.
+    own = y.shape[1]
+    evidence = np.empty((len(index), own + 1 if pilot is None else own + 5), np.float32)
+    evidence[:, :own], evidence[:, own] = y[index], 1.0
     if pilot is not None:
         noise = (INFLATE * pilot.variance + components.pilot_floor) / (PILOT_VARIANCE + components.pilot_floor)
-        parts.append(pilot.means)
-    evidence = np.concatenate(parts, axis=1)
+        evidence[:, own + 1 :] = pilot.means
     component, misfit = pick(components, evidence, noise)
     block, values = (np.empty((BLOCK, width), np.float32) for width in (evidence.shape[1], patches.values.shape[1]))
     order = np.argsort(component, kind="stable")

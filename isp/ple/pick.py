@@ -65,7 +65,7 @@ def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.
 def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
     """Return which components may be the likeliest, (component, patch), by their likelihood in a few directions."""
     size = len(components.rows)
-    quick = np.empty((len(components.quick), len(evidence)), np.float32)
+    candidates = np.empty((len(components.quick), len(evidence)), np.bool_)
     count = components.directions.shape[1]
     starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
     products = np.empty((components.quick.shape[1], BLOCK), np.float32)
@@ -79,10 +79,10 @@ def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
         features[starts[-1] : starts[-1] + count] = coordinates
         features[-2] = np.einsum("ij,ij->i", off, off) - np.einsum("ij,ij->j", coordinates, coordinates)
         features[-1] = 1.0
-        quick[:, first : first + BLOCK] = components.quick @ features
-    candidates = np.asarray(quick > quick.max(axis=0) - components.margin)
-    crowded = np.flatnonzero(candidates.sum(axis=0, dtype=np.int8) > MOST)
-    least = np.full(len(evidence), -np.inf, np.float32)
-    least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
-    candidates &= quick >= least
+        quick = components.quick @ features
+        likely = quick > quick.max(axis=0) - components.margin
+        crowded = np.flatnonzero(likely.sum(axis=0, dtype=np.int8) > MOST)
+        least = np.full(len(rows), -np.inf, np.float32)
+        least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
+        candidates[:, first : first + BLOCK] = likely & (quick >= least)
     return candidates

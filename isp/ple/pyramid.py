@@ -83,6 +83,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
     index = list(cells.index)
     planes = estimates.planes[..., index]
     noise = estimates.noise[index]
+    del estimates, scale, levels, sums  # as much as the planes, and nothing needs them from here on
     plain = raw.plain_noise
     apart = [(c, i) for c, i in enumerate(index) if any(x.channel == LETTERS[i] for x in raw.channel_noise)]
 

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from isp.colour.colour_fit import ColourFit, relative_noise
-from isp.colour.highlights import clip_highlights
+from isp.colour.highlights import Highlights
 from isp.colour.white_balance import WhiteBalance
 from isp.picture import Picture
 from isp.ple.mosaic import SIDES
@@ -24,7 +24,7 @@ from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
 from rodcone.errors import InputError
-from rodcone.types import Floats, Image
+from rodcone.types import Floats, Singles
 from sensor.cfa import RGBW, Tile, channels, is_rgbw
 from sensor.raw import RawImage
 
@@ -32,6 +32,7 @@ from sensor.raw import RawImage
 # than the truth by what noise hides; a matrix that counts all of the variance takes colours off a second time. To count
 # none would cost strong colours 0.1 dB. It was chosen on pictures that judge nothing (docs/decisions/0062).
 INDEPENDENT = 0.25
+STRIP_ROWS = 128  # of planes that become a picture together
 OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
 
 
@@ -98,14 +99,14 @@ class PiecewisePicture:
     Attributes
     ----------
     picture : Picture
-    planes : (h, w, channel) float64
+    planes : (h, w, channel) float32
         Of every channel at every pixel [e-].
     gains : (channel,) float64
         White balance.
     """
 
     picture: Picture
-    planes: Image
+    planes: Singles
     gains: Floats
 
 
@@ -124,17 +125,19 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
                 stacklevel=2,
             )
         white_e[index] = balance.neutral / balance.neutral[names.index(unit)] * prior.neutral_e[LETTERS.index(unit)]
-    estimate, variance = reconstruct(raw, prior, white_e)
-    planes = estimate.astype(np.float64)
+    planes, variance = reconstruct(raw, prior, white_e)
     gains, sources = balance.gains(raw, planes)
-    noise = relative_noise(raw, planes, np.broadcast_to(INDEPENDENT * variance, planes.shape), gains, colours)
-    if {"R", "G", "B"} <= set(names):
-        # Where pixels exchange charge, W tells how much of it is in the colours.
-        used = len(names) if raw.crosstalk and colours.plain is None else 3
-        matrix = colours.matrix(names[:used], noise[:used])
-        rgb = clip_highlights(raw, planes[..., :used] * gains[:used], gains) @ matrix.T
-    else:
-        rgb = rgb_of_channels(raw, clip_highlights(raw, planes * gains, gains), colours, noise)
+    noise = relative_noise(raw, planes, INDEPENDENT * variance, gains, colours)
+    coloured = {"R", "G", "B"} <= set(names)
+    # Where pixels exchange charge, W tells how much of it is in the colours.
+    used = 3 if coloured and not (raw.crosstalk and colours.plain is None) else len(names)
+    matrix = colours.matrix(names[:used], noise[:used]) if coloured else None
+    highlights = Highlights.of(raw, gains)
+    rgb = np.empty((*raw.shape, 3))
+    for first in range(0, len(rgb), STRIP_ROWS):
+        rows = slice(first, first + STRIP_ROWS)
+        balanced = highlights.held(planes[rows, :, :used].astype(np.float64) * gains[:used], rows)
+        rgb[rows] = rgb_of_channels(raw, balanced, colours, noise) if matrix is None else balanced @ matrix.T
     return PiecewisePicture(Picture(rgb, sources), planes, gains)
 
 

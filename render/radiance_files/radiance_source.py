@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 
@@ -17,11 +18,13 @@ from render.radiance_files.exr import exr_holds_reflectance, read_exr, read_exr_
 from render.radiance_files.iset import read_iset_illuminant, read_iset_scene
 from render.reference import open_reference
 from render.scene import LightGroup
-from render.spectrum import DEFAULT_WAVELENGTH_NM, LONGEST_NM, SHORTEST_NM, Spectrum
+from render.spectrum import DEFAULT_WAVELENGTH_NM, LONGEST_NM, SHORTEST_NM, Spectrum, band_widths
 from render.transport import Transport
 from rodcone.errors import unknown
 from rodcone.memory import file_extent
+from rodcone.types import Floats, Planes
 
+MOST_WHOLE_BYTES = 1 << 28  # of a photograph's bands together, beyond which they are made one at a time
 WHITE_CD_M2 = 100.0  # luminance of a reflectance of 1, where no level is asked for
 _READERS = {
     ".exr": read_exr,
@@ -131,6 +134,12 @@ def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACE
     if is_reference(path):
         return open_reference(path).transport
     is_photo = Path(path).suffix.lower() in photo.EXTENSIONS
+    if is_photo and spectra == photo.SURFACES and 4 * np.prod(extent_of(path)[:2]) > MOST_WHOLE_BYTES:
+        planes = photo.PhotoPlanes(*photo.read_upsampled(path))
+        means = np.array([[planes[0, band].mean(dtype=np.float64) for band in range(planes.shape[1])]])
+        nm = DEFAULT_WAVELENGTH_NM
+        of_file = _transport(cast(Planes, planes), means, nm, band_widths(nm), "scene")
+        return replace(of_file, groups={"light": LightGroup((), light, WHITE_CD_M2)})
     radiance = photo.read_photo(path, spectra) if is_photo else _read(path)
     if is_reflectance(path):
         return _lit(radiance, light, WHITE_CD_M2)
@@ -174,24 +183,35 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
         Of the light group. Its spectrum stands for the factor on the file's own light: 1 in every band.
     """
     planes = np.ascontiguousarray(np.moveaxis(radiance.values, -1, 0), dtype=np.float32)[None]
-    nm, width = radiance.wavelength_nm, radiance.widths_nm
+    means = planes.mean(axis=(2, 3), dtype=np.float64)
+    of_file = _transport(planes, means, radiance.wavelength_nm, radiance.widths_nm, name)
+    error = radiance.relative_mc_error
+    if not error:
+        return of_file
+    most = np.finfo(np.float32).max
+    variance = np.empty_like(planes)
+    for plane, squares in zip(planes[0], variance[0], strict=True):
+        squares[:] = np.minimum((error * plane.astype(np.float64)) ** 2, most)
+    return replace(of_file, variance=variance, relative_mc_error=error)
+
+
+def _transport(planes: Planes, means: Floats, nm: Floats, width: Floats, name: str) -> Transport:
+    """Transport without noise of planes (1, band, h, w), whose means are known, as `as_transport` gives it."""
     ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
     whole = Spectrum(ends, np.ones(2))
     none = np.broadcast_to(np.float32(0), planes.shape)
-    means = planes.mean(axis=(2, 3), dtype=np.float64)
-    error = radiance.relative_mc_error
-    variance = np.minimum((error * planes.astype(np.float64)) ** 2, np.finfo(np.float32).max).astype(np.float32)
+    shape = planes.shape[2:]
     return Transport(
         light=Halves(planes, none),
-        variance=variance if error else none,
-        relative_mc_error=error,
-        coverage=Halves.zeros(*radiance.shape),
-        seen=(Halves.zeros(1, *radiance.shape),),
+        variance=none,
+        relative_mc_error=0.0,
+        coverage=Halves.zeros(*shape),
+        seen=(Halves.zeros(1, *shape),),
         scene_means=SceneMeans(means, 1.0, np.zeros((means.size + 1,) * 2)),
         groups={name: LightGroup((), whole)},
         wavelength_nm=nm,
         width_nm=width,
-        counts=np.zeros(radiance.shape, np.uint32),
+        counts=np.zeros(shape, np.uint32),
         stopped_by="samples",
         seconds=0.0,
         integrator="file",

@@ -12,6 +12,8 @@ does, takes the least share that brings it back: the colour stays what it is. Fr
 keep their last value.
 """
 
+from collections.abc import Iterator
+from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
@@ -53,25 +55,86 @@ def surface_reflectances(linear_srgb: Floats) -> tuple[NDArray[np.float32], Floa
         0 where the clusters hold the colour, up to 1.
     """
     colours = np.asarray(linear_srgb, dtype=np.float32).reshape(-1, 3)
-    maps = _maps()
-    basis = srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
-    result = np.empty((len(colours), len(basis)), np.float32)
+    result = np.empty((DEFAULT_WAVELENGTH_NM.size, len(colours)), np.float32)  # band by band, as light transport is
     share = np.zeros(len(colours))
     for first in range(0, len(colours), STRIP):
         strip = slice(first, first + STRIP)
-        number = cluster_of(colours[strip] @ SRGB_TO_XYZ.T.astype(np.float32))
-        for cluster in np.flatnonzero(np.bincount(number)):
-            within = np.flatnonzero(number == cluster)
-            of_cluster = colours[strip][within].T
-            spectra = _mixed(maps[cluster], of_cluster)
-            beyond = np.flatnonzero((spectra.min(axis=0) < 0) | (spectra.max(axis=0) > 1))
-            if beyond.size:
-                mixed, taken = _brought_back(spectra[:, beyond], _mixed(basis, of_cluster[:, beyond]))
-                spectra[:, beyond] = mixed
-                share[strip][within[beyond]] = taken
-            result[strip][within] = spectra.T
+        for _, within, spectra, taken in _by_cluster(colours[strip]):
+            result[:, strip][:, within] = spectra
+            share[strip][within] = taken
     shape = np.shape(linear_srgb)[:-1]
-    return result.reshape(*shape, -1), share.reshape(shape)
+    return np.moveaxis(result.reshape(-1, *shape), 0, -1), share.reshape(shape)
+
+
+@dataclass(frozen=True)
+class Upsampled:
+    """Reflectances of colours that are made one band at a time, of the same bits as `surface_reflectances`.
+
+    Attributes
+    ----------
+    colours : (colour, 3) float32
+        Linear sRGB.
+    cluster : (colour,) uint8
+    share : (colour,) float32
+        What each reflectance holds of sRGB's basis.
+    """
+
+    colours: Spectra
+    cluster: NDArray[np.uint8]
+    share: Spectra
+
+    @classmethod
+    def of(cls, colours: Spectra) -> "Upsampled":
+        """Find the clusters and shares of linear sRGB (colour, 3)."""
+        cluster, share = np.empty(len(colours), np.uint8), np.zeros(len(colours), np.float32)
+        for first in range(0, len(colours), STRIP):
+            strip = slice(first, first + STRIP)
+            for number, within, _, taken in _by_cluster(colours[strip]):
+                cluster[strip][within] = number
+                share[strip][within] = taken
+        return cls(colours, cluster, share)
+
+    def at(self, band: int, places: NDArray[np.intp]) -> Spectra:
+        """Reflectances of one band at some colours, (place,)."""
+        return _of_band(band, self.colours[places], self.cluster[places], self.share[places])
+
+    def plane(self, band: int) -> Spectra:
+        """Reflectances of one band, (colour,)."""
+        result = np.empty(len(self.colours), np.float32)
+        for first in range(0, len(result), STRIP):
+            strip = slice(first, first + STRIP)
+            result[strip] = _of_band(band, self.colours[strip], self.cluster[strip], self.share[strip])
+        return result
+
+
+def _of_band(band: int, colours: Spectra, cluster: NDArray[np.uint8], share: Spectra) -> Spectra:
+    """Reflectances of one band, (colour,): in the order of `_mixed` and `_brought_back`, so of the same bits."""
+    amounts = colours.T
+    values = _mixed_at(_maps()[:, band][cluster].T, amounts)
+    beyond = np.flatnonzero(share)
+    inside = _mixed_at(_basis()[band, :, None], amounts[:, beyond])
+    values[beyond] += share[beyond] * (inside - values[beyond])
+    return np.clip(values, 0, 1, out=values)
+
+
+def _mixed_at(curves: Spectra, amounts: Spectra) -> Spectra:
+    return np.asarray(curves[0] * amounts[0] + curves[1] * amounts[1] + curves[2] * amounts[2])
+
+
+def _by_cluster(colours: Spectra) -> Iterator[tuple[int, NDArray[np.intp], Spectra, Spectra]]:
+    """Each cluster's number, the places of its colours, their spectra (band, place) and shares of sRGB's basis."""
+    number = cluster_of(colours @ SRGB_TO_XYZ.T.astype(np.float32))
+    for cluster in np.flatnonzero(np.bincount(number)).tolist():
+        within = np.flatnonzero(number == cluster)
+        of_cluster = colours[within].T
+        spectra = _mixed(_maps()[cluster], of_cluster)
+        share = np.zeros(within.size, np.float32)
+        beyond = np.flatnonzero((spectra.min(axis=0) < 0) | (spectra.max(axis=0) > 1))
+        if beyond.size:
+            spectra[:, beyond], share[beyond] = _brought_back(
+                spectra[:, beyond], _mixed(_basis(), of_cluster[:, beyond])
+            )
+        yield cluster, within, spectra, share
 
 
 def _mixed(curves: Spectra, amounts: Spectra) -> Spectra:
@@ -117,6 +180,12 @@ def _selector() -> tuple[list[tuple[float, int]], NDArray[np.intp]]:
             row = -following
         cluster[above] = following
     return [(float(value), int(axis)) for value, axis in tree[:, :2]], cluster
+
+
+@cache
+def _basis() -> Spectra:
+    """`srgb_basis` in the bands of `DEFAULT_WAVELENGTH_NM`, shape (band, 3)."""
+    return srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
 
 
 @cache

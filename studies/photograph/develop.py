@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
-from isp.colour.encoding import encode
+from isp.colour.encoding import STRIP_ROWS, encode
 from isp.picture import Picture
 from isp.processors.catalogue import default_processor
 from isp.processors.own import processor_of, require_consent
@@ -152,8 +152,8 @@ def develop_file(
             f"{paths[0]}: it holds no colour calibration; allowed: what rodcone capture notes; capture anew"
         )
     picture = develop(raw, processor=isp, white_balance=white_balance, trust_code=trust_code)
-    linear = _scaled(picture.rgb / raw.full_well_e, height, width)
     stops = stops_to_white(raw) if ev is None else ev
+    size = _size(picture.rgb, height, width)
     facts = {
         "raw": str(paths[0]) if len(paths) == 1 else [str(file) for file in paths],
         "isp": isp or default_processor(raw.cfa),
@@ -167,19 +167,24 @@ def develop_file(
         "encoding": encoding,
         **file_facts,
     }
-    return Developed(encode(linear * 2.0**stops, encoding), facts)
+    if size != raw.shape:
+        from skimage.transform import resize_local_mean  # imported here: it takes as long as a small picture
+
+        scaled = np.asarray(resize_local_mean(picture.rgb / raw.full_well_e, size, channel_axis=-1))
+        return Developed(encode(scaled * 2.0**stops, encoding), facts)
+    encoded = np.empty(picture.rgb.shape)
+    for first in range(0, size[0], STRIP_ROWS):
+        rows = slice(first, first + STRIP_ROWS)
+        encoded[rows] = encode(picture.rgb[rows] / raw.full_well_e * 2.0**stops, encoding)
+    return Developed(encoded, facts)
 
 
-def _scaled(linear: NDArray[np.float64], height: int | None, width: int | None) -> NDArray[np.float64]:
-    """Picture of fewer pixels, each the mean of its area."""
+def _size(linear: NDArray[np.float64], height: int | None, width: int | None) -> tuple[int, int]:
+    """Height and width of the picture that is asked for, whose pixels are each the mean of their area."""
     raw_size = linear.shape[0], linear.shape[1]
     size = asked_size(raw_size, height, width)
     if size[0] > raw_size[0] or size[1] > raw_size[1]:
         raise InputError(
             f"height, width: {size} is more than the raw file's {raw_size}; allowed: as many or fewer; give less"
         )
-    if size == raw_size:
-        return linear
-    from skimage.transform import resize_local_mean  # imported here: it takes as long as a small picture
-
-    return np.asarray(resize_local_mean(linear, size, channel_axis=-1))
+    return size

@@ -1,7 +1,8 @@
 """One photograph as raw files: a scene or a stored radiance in, digital negatives out."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -12,11 +13,11 @@ from isp.converters import converter_note, write_with_bayer
 from render.cache import kept_beside
 from render.engine import render
 from render.illuminants import illuminant
-from render.radiance import SpectralRadiance
+from render.radiance import BandRadiance, SpectralRadiance
 from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
 from render.scene import Scene, film_size
 from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
-from render.transport import Transport
+from render.transport import Transport, halves_by_band, relight_by_band
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
@@ -26,7 +27,7 @@ from rodcone.time_text import parse_time
 from rodcone.types import Floats
 from sensor.capture import expose_channels
 from sensor.config import SensorConfig, check_frame
-from sensor.device import Device, draw_device
+from sensor.device import draw_device
 from sensor.exposure import AUTO, AUTO_INFORMATION, AUTO_W, exposed_by_rule, warn_if_dark
 from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
@@ -266,81 +267,98 @@ def carry_out(checked: Checked, step: Step | None = None) -> Taken:
         return _taken(checked, step, kept)
 
 
+@dataclass(frozen=True)
+class _Subject:
+    """What is photographed.
+
+    Attributes
+    ----------
+    transport : callable
+        Gives its light, which may be rendered here, and notes on that.
+    spectra, level : dict
+        As `Transport.relight` takes them.
+    light : Spectrum
+        That the camera's colours are set to, unless another is asked for.
+    notes : tuple of str
+    """
+
+    transport: Callable[[], tuple[Transport, list[str]]]
+    spectra: dict[str, Spectrum]
+    level: dict[str, Any]
+    light: Spectrum
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Electrons:
+    """What the chip is exposed to.
+
+    Attributes
+    ----------
+    per_second_e : (h, w, channel) float64
+        Behind every filter.
+    halves_e : tuple of (h, w) float64
+        Of the raw image's pixels in the exposure, by each half of a render's samples; empty for a stored picture.
+    exposure_s : float
+    sensor : SensorConfig
+        At the gain that the exposure takes.
+    """
+
+    per_second_e: NDArray[np.float64]
+    halves_e: tuple[NDArray[np.float64], ...]
+    exposure_s: float
+    sensor: SensorConfig
+
+
 def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     """Photograph and write as `carry_out`, with a folder for the render meanwhile."""
-    order, sensor, opened, ready = checked.order, checked.sensor, checked.opened, checked.ready
+    order, samples = checked.order, checked.samples
     require_memory(checked.cost.memory, order.force)
     out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
-
-    # what is looked at, and the light that the camera's colours are set to
-    if opened is None:
-        light_name = order.light[0] if order.light else None
-        light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
-        white = file_white(order.source, light_of_file)
-        white = white if light_name else replace(white, named=False)  # a white balance names no lamp
-        transport, notes = open_radiance_file(order.source, white)
-        light = white.spectrum
-        if is_reference(order.source):
-            light = light if light_of_file else first_light(transport.groups, light)
-            transport = under(transport, light_name) if light_name else transport
-        spectra: dict[str, Spectrum] = {}
-        level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
-    else:
-        spectra = asked_spectra(opened.scene, order.light)
-        name, first = next(iter(opened.scene.groups.items()))
-        light, notes = spectra.get(name, first_light(opened.scene.groups, illuminant(LIGHT))), [*opened.notes]
-        if balance is None and first.coloured:
-            assumed = f"scene {opened.scene.name}: light group {name!r} has colours of its own; white balance is set to"
-            notes.insert(0, f"{assumed} {LIGHT}, --white-balance sets it otherwise")
-        level = asked_level(opened.scene, order.level)
-    colour = calibrate(sensor, balance or light)
+    subject = _of_file(checked, balance) if checked.opened is None else _of_scene(checked, balance, step, kept)
+    colour = calibrate(checked.sensor, balance or subject.light)
     check_place(out)  # before the render: it may take minutes
-    if opened is not None:
-        if ready:
-            transport, notes = ready.transport, [*notes, ready.line]
-        else:
-            transport = _rendered(checked, opened, spectra, step, kept)
-            notes += filter(None, [compile_note(transport.compile_s)])
+    transport, more_notes = subject.transport()
+    notes = [*subject.notes, *more_notes]
+    spectra, level = subject.spectra, subject.level
 
     # The exposure.
     if step:
         step("exposure", 0.9)
-    radiance = transport.relight(spectra, **level)
-    luminance_cd_m2 = float(radiance.luminance().mean())
+    radiance = relight_by_band(transport, spectra, **level)
+    luminance_cd_m2 = radiance.mean_luminance
     if luminance_cd_m2 > _LAMPS_IN_VIEW * level.get("luminance_cd_m2", luminance_cd_m2):
         notes += [
             f"level: {order.level} is the mean of what is no lamp; with the lamps in view the picture's is "
             f"{luminance_cd_m2:.3g} cd/m2"
         ]
-    samples = checked.samples
-    per_second_e = imaged_electrons(radiance, sensor, 1.0, samples)
-    exposure_s, sensor = _exposure(checked, per_second_e)
-    device = draw_device(sensor, per_second_e.shape[:2], np.random.default_rng([order.seed, _DEVICE]))
+    errors = {"relative_mc_error": radiance.relative_mc_error, "relative_level_error": radiance.relative_level_error}
+    spp = transport.spp
+    lit = _electrons(checked, radiance, partial(halves_by_band, transport, spectra, **level))
+    sensor, exposure_s = lit.sensor, lit.exposure_s
     lamps = lamp_parts(transport, spectra, level, checked.flicker)
-    taken = _frames(checked, radiance, per_second_e * exposure_s, lamps, sensor, exposure_s, device)
+    whole = radiance.whole() if lamps else None
+    del subject, transport, radiance  # all bands of the light, which nothing needs from here on
+    taken = _frames(checked, lit, whole, lamps)
     notes += [_ALL_ROWS] * bool(lamps and sensor.row_time_us == 0)
+    del whole, lamps
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)
-    if opened is not None:
-        # The render's error is half the difference of its halves: how far one lies from their mean, the frame. Beside
-        # a lamp a lens that is sampled once a pixel undershoots; a frame has no light there (`form_image`).
-        expected_e = _mosaic(per_second_e * exposure_s, sensor)
-        even = imaged_electrons(transport.relight_halves(spectra, **level)[0], sensor, exposure_s, samples)
-        error_e = np.where(expected_e > 0, _mosaic(even, sensor) - expected_e, 0.0)
-        frame = error_e, expected_e, sensor, exposure_s
-        notes += filter(None, [noise_note(monte_carlo_share(*frame), transport.spp, speckle_sizes(*frame))])
+    if lit.halves_e:
+        even, odd = lit.halves_e
+        # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
+        frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
+        notes += filter(None, [noise_note(monte_carlo_share(*frame), spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
         notes += [f"{saturated:.0%} of the pixels are saturated at {exposure_s:g} s; shorten or omit --exposure"]
+    del lit
 
     # The files.
-    places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
-    numbers = [None] if order.frames == 1 else range(1, order.frames + 1)
-    parts = zip(raws, places, numbers, strict=True)
-    paths = tuple(path for frame, place, number in parts for path in write_with_bayer(frame, place, frame=number))
+    paths = _written(raws, order)
     if out.suffix.lower() == ".dng":
-        notes += filter(None, [converter_note(raw, places[0])])
+        notes += filter(None, [converter_note(raw, paths[0])])
     facts = {
         "paths": [str(path) for path in paths],
         "source": str(order.source),
@@ -353,30 +371,88 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
         "iso": raw.iso,
         "engine": raw.engine,
         "luminance_cd_m2": luminance_cd_m2,
-        "relative_mc_error": radiance.relative_mc_error,
-        "relative_level_error": radiance.relative_level_error,
+        **errors,
         "saturated": saturated,
         "left_out": [x for x in left_out(sensor, samples) if order.focus_m is None or not x.startswith("defocus: a")],
     }
     return Taken(paths, facts, tuple(notes))
 
 
+def _of_file(checked: Checked, balance: Spectrum | None) -> _Subject:
+    """Open a stored picture."""
+    order = checked.order
+    light_name = order.light[0] if order.light else None
+    light_of_file = light_name or (None if balance is None or is_reflectance(order.source) else order.white_balance)
+    white = file_white(order.source, light_of_file)
+    white = white if light_name else replace(white, named=False)  # a white balance names no lamp
+    transport, notes = open_radiance_file(order.source, white)
+    light = white.spectrum
+    if is_reference(order.source):
+        light = light if light_of_file else first_light(transport.groups, light)
+        transport = under(transport, light_name) if light_name else transport
+    level: dict[str, Any] = {"luminance_cd_m2": parse_level(order.level)[0]} if order.level else {}
+    return _Subject(lambda: (transport, []), {}, level, light, tuple(notes))
+
+
+def _of_scene(checked: Checked, balance: Spectrum | None, step: Step | None, kept: Path) -> _Subject:
+    """Find the lights of a scene, which is rendered when its light is asked for."""
+    order, opened, ready = checked.order, checked.opened, checked.ready
+    assert opened is not None
+    spectra = asked_spectra(opened.scene, order.light)
+    name, first = next(iter(opened.scene.groups.items()))
+    light, notes = spectra.get(name, first_light(opened.scene.groups, illuminant(LIGHT))), [*opened.notes]
+    if balance is None and first.coloured:
+        assumed = f"scene {opened.scene.name}: light group {name!r} has colours of its own; white balance is set to"
+        notes.insert(0, f"{assumed} {LIGHT}, --white-balance sets it otherwise")
+
+    def transport() -> tuple[Transport, list[str]]:
+        if ready:
+            return ready.transport, [ready.line]
+        rendered = _rendered(checked, opened, spectra, step, kept)
+        return rendered, [*filter(None, [compile_note(rendered.compile_s)])]
+
+    return _Subject(transport, spectra, asked_level(opened.scene, order.level), light, tuple(notes))
+
+
+def _written(raws: Sequence[RawImage], order: Order) -> tuple[Path, ...]:
+    """Write the order's exposures, each with its Bayer negative where there is one."""
+    out = Path(order.out)
+    places = [out] if order.frames == 1 else [out.with_stem(f"{out.stem}_{n}") for n in range(1, order.frames + 1)]
+    numbers = [None] if order.frames == 1 else range(1, order.frames + 1)
+    parts = zip(raws, places, numbers, strict=True)
+    return tuple(path for frame, place, number in parts for path in write_with_bayer(frame, place, frame=number))
+
+
+def _electrons(
+    checked: Checked, radiance: BandRadiance, halves: Callable[[], tuple[BandRadiance, BandRadiance]]
+) -> _Electrons:
+    """Image the light, and choose the exposure; the light's bands are made one at a time."""
+    samples = checked.samples
+    per_second_e = imaged_electrons(radiance, checked.sensor, 1.0, samples)
+    exposure_s, sensor = _exposure(checked, per_second_e)
+    if checked.opened is None:
+        return _Electrons(per_second_e, (), exposure_s, sensor)
+    halves_e = tuple(_frame_e(half, sensor, exposure_s, samples) for half in halves())
+    return _Electrons(per_second_e, halves_e, exposure_s, sensor)
+
+
 def _frames(
     checked: Checked,
-    radiance: SpectralRadiance,
-    channels_e: NDArray[np.float64],
+    lit: _Electrons,
+    radiance: SpectralRadiance | None,
     parts: Sequence[tuple[Waveform, SpectralRadiance | None]],
-    sensor: SensorConfig,
-    exposure_s: float,
-    device: Device,
 ) -> list[RawImage]:
-    """Exposures of the order; `channels_e` are of `radiance` in the exposure time, and `parts` of `lamp_parts`."""
+    """Exposures of the order; `parts` are of `lamp_parts`, and `radiance` is all light where there are any."""
     seed, frames = checked.order.seed, checked.order.frames
+    sensor, exposure_s = lit.sensor, lit.exposure_s
+    device = draw_device(sensor, lit.per_second_e.shape[:2], np.random.default_rng([seed, _DEVICE]))
     rng = np.random.default_rng([seed, _FRAME])
-    if not parts:
+    if radiance is None:
+        channels_e = lit.per_second_e
+        channels_e *= exposure_s  # in place: nothing needs them again
         return [expose_channels(channels_e, sensor, exposure_s, device, rng) for _ in range(frames)]
     image = form_image(radiance, sensor, checked.samples)
-    imaged = [(lamp, image if lit is None else form_image(lit, sensor, checked.samples)) for lamp, lit in parts]
+    imaged = [(lamp, image if part is None else form_image(part, sensor, checked.samples)) for lamp, part in parts]
     starts_s = frame_starts_s(sensor, device.shape, exposure_s, np.random.default_rng([seed, _START]), frames)
     return photograph_flickering(image, imaged, sensor, exposure_s, device, rng, starts_s)
 
@@ -442,9 +518,9 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
     return find_ready(opened.scene, opened.size, asked, lights)
 
 
-def _mosaic(channels_e: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
-    """Expected electrons of the raw image's pixels, shape (h, w), of those behind every filter."""
-    return sensor.pixel_sums(behind_filters(channels_e, sensor))
+def _frame_e(radiance: BandRadiance, sensor: SensorConfig, exposure_s: float, samples: int) -> NDArray[np.float64]:
+    """Expected electrons of the raw image's pixels, shape (h, w)."""
+    return sensor.pixel_sums(behind_filters(imaged_electrons(radiance, sensor, exposure_s, samples), sensor))
 
 
 def check(order: Order) -> Checked:
