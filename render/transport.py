@@ -451,7 +451,7 @@ def _combined(light: BandLight, band: int, planes: Planes) -> Planes:
     read = [planes[group, of_band] for group, of_band in chosen]
     taken = read[0][None] if len(read) == 1 else np.stack(read)
     factors = np.array([light.maps[group, band, of_band] for group, of_band in chosen])
-    return combine(factors[None, None], taken[None])[0]
+    return np.asarray(combine(factors[None, None], taken[None])[0])
 
 
 def replaceable_luminance(group: LightGroup, place: str) -> float:

@@ -267,7 +267,7 @@ def _imager(
         sums = np.zeros((len(weights), height, width), real)
         beside = np.zeros(sums.shape if spread is not None else len(weights))
         with ThreadPoolExecutor(threads) as pool:
-            for band in np.flatnonzero(weights.any(axis=0)):
+            for band in np.flatnonzero(weights.any(axis=0)).tolist():
                 nm, light = float(radiance.wavelength_nm[band]), band_plane(radiance, band)
                 light = (light if moved is None else moved(light.astype(np.float64), nm)) * per_radiance
                 if spread is not None:

@@ -23,7 +23,7 @@ from render.illuminants import illuminant
 from render.spectrum import DEFAULT_WAVELENGTH_NM, band_widths, tristimulus
 from rodcone.colour_spaces import SRGB_TO_XYZ
 from rodcone.optional import quietly_imported
-from rodcone.types import Floats
+from rodcone.types import Floats, Singles
 
 Spectra = NDArray[np.float32]
 STRIP = 1 << 15  # pixels that are worked on together, to stay in a core's cache
@@ -39,12 +39,12 @@ def srgb_basis(wavelength_nm: Floats) -> Floats:
     return np.stack([np.interp(wavelength_nm, basis.wavelengths, basis.values[:, index]) for index in range(3)])
 
 
-def surface_reflectances(linear_srgb: Floats) -> tuple[NDArray[np.float32], Floats]:
+def surface_reflectances(linear_srgb: Floats | Singles) -> tuple[NDArray[np.float32], Floats]:
     """Reflectances of colours in the bands of `DEFAULT_WAVELENGTH_NM`, and how much of each is of sRGB's basis.
 
     Parameters
     ----------
-    linear_srgb : (..., 3) float64
+    linear_srgb : (..., 3) float32 or float64
         0 to 1, under D65.
 
     Returns
