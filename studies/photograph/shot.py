@@ -297,15 +297,17 @@ class _Electrons:
     ----------
     per_second_e : (h, w, channel) float64
         Behind every filter.
-    halves_e : tuple of (h, w) float64
-        Of the raw image's pixels in the exposure, by each half of a render's samples; empty for a stored picture.
+    error_e, expected_e : (h, w) float64, or None
+        One draw of a render's error, and the mean, of the raw image's pixels in the exposure; None for a stored
+        picture.
     exposure_s : float
     sensor : SensorConfig
         At the gain that the exposure takes.
     """
 
     per_second_e: NDArray[np.float64]
-    halves_e: tuple[NDArray[np.float64], ...]
+    error_e: NDArray[np.float64] | None
+    expected_e: NDArray[np.float64] | None
     exposure_s: float
     sensor: SensorConfig
 
@@ -345,10 +347,8 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     raws = [with_notes(frame, sensor, colour, order.sensor) for frame in taken]
     raw = raws[0]
     warn_if_dark(raw)
-    if lit.halves_e:
-        even, odd = lit.halves_e
-        # Beside a lamp a lens that is sampled once a pixel undershoots; a picture has no light there (`form_image`).
-        frame = (even - odd) / 2, np.maximum((even + odd) / 2, 0.0), sensor, exposure_s
+    if lit.error_e is not None and lit.expected_e is not None:
+        frame = lit.error_e, lit.expected_e, sensor, exposure_s
         notes += filter(None, [noise_note(monte_carlo_share(*frame), spp, speckle_sizes(*frame))])
     saturated = float(raw.saturated.mean())
     if saturated > MOST_SATURATED:
@@ -431,9 +431,13 @@ def _electrons(
     per_second_e = imaged_electrons(radiance, checked.sensor, 1.0, samples)
     exposure_s, sensor = _exposure(checked, per_second_e)
     if checked.opened is None:
-        return _Electrons(per_second_e, (), exposure_s, sensor)
-    halves_e = tuple(_frame_e(half, sensor, exposure_s, samples) for half in halves())
-    return _Electrons(per_second_e, halves_e, exposure_s, sensor)
+        return _Electrons(per_second_e, None, None, exposure_s, sensor)
+    # The render's error is half the difference of its halves: how far one lies from their mean, the frame. Beside a
+    # lamp a lens that is sampled once a pixel undershoots; a frame has no light there (`form_image`).
+    expected_e = _mosaic(per_second_e * exposure_s, sensor)
+    even_e = _mosaic(imaged_electrons(halves()[0], sensor, exposure_s, samples), sensor)
+    error_e = np.where(expected_e > 0, even_e - expected_e, 0.0)
+    return _Electrons(per_second_e, error_e, expected_e, exposure_s, sensor)
 
 
 def _frames(
@@ -518,9 +522,9 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
     return find_ready(opened.scene, opened.size, asked, lights)
 
 
-def _frame_e(radiance: BandRadiance, sensor: SensorConfig, exposure_s: float, samples: int) -> NDArray[np.float64]:
-    """Expected electrons of the raw image's pixels, shape (h, w)."""
-    return sensor.pixel_sums(behind_filters(imaged_electrons(radiance, sensor, exposure_s, samples), sensor))
+def _mosaic(channels_e: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
+    """Expected electrons of the raw image's pixels, shape (h, w), of those behind every filter."""
+    return sensor.pixel_sums(behind_filters(channels_e, sensor))
 
 
 def check(order: Order) -> Checked:
