@@ -68,6 +68,10 @@ def test_the_gain_of_a_straight_line_and_the_errors_of_its_frames():
     assert found.levels_dn == pytest.approx(np.outer(signals, (1.0, 1.5)))
     assert (found.black_dn, found.white_dn, found.frames) == (BLACK_DN, WHITE_DN, (4, 4, 4, 4, 4))
     assert any("this is not told from 0" in note for note in found.notes)
+    for point, signal in zip(found.points, signals, strict=True):
+        assert point.signal_dn == pytest.approx([signal, 1.5 * signal])
+        assert point.gain == pytest.approx([K, K])
+        assert (point.mean_dn - point.dark_dn).tolist() == point.signal_dn.tolist()
 
 
 def test_a_gain_that_changes_with_light_is_told_and_its_interval_holds_both_ends():
