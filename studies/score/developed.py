@@ -89,21 +89,22 @@ def developed_figures(
 
     unit = fields[camera.channels.index(camera.unit_channel)]
     dark = unit.temporal_dark_e / unit.electrons_per_cd_m2 / white_cd_m2
-    even_e = unit.frame_e * white_cd_m2
+    even_e = np.tile(unit.frame_e, (camera.sites,) * 2) * white_cd_m2
 
     def measure_range(rng: np.random.Generator) -> list[float]:
         seed = int(rng.integers(2**63))
 
         def shoot(level: float, frame: int) -> Plane:
-            side = EDGE_PX if level < 0.1 else RANGE_PX
+            side = (EDGE_PX if level < 0.1 else RANGE_PX) * camera.sites
             chip, light = (np.random.default_rng((seed, number)) for number in (0, frame + 1))
             return luminance_of_srgb(_inner(developed(level * even_e[:side, :side], chip, light)))
 
         return [picture_range(shoot, dark)]
 
     def accuracy_at(lux: float, rng: np.random.Generator) -> float:
-        light_e = (lux * GREY / pi / white_cd_m2) * even_e[:EDGE_PX, :EDGE_PX]
-        sides = np.repeat([1 + CONTRAST, 1 - CONTRAST], EDGE_PX // 2)
+        side = EDGE_PX * camera.sites
+        light_e = (lux * GREY / pi / white_cd_m2) * even_e[:side, :side]
+        sides = np.repeat([1 + CONTRAST, 1 - CONTRAST], side // 2)
         luminance = luminance_of_srgb(developed(light_e * sides, rng, rng))
         bright, dark = (luminance[BORDER_PX:-BORDER_PX, columns] for columns in (BRIGHT_SIDE, DARK_SIDE))
         return pair_accuracy(bright, dark)

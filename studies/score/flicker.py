@@ -58,7 +58,8 @@ def flicker(plain: EvenField, light: str) -> Definition:
         chip = field.draw_chip(rng)
         dark = field.samples_e(field.shoot(0.0, chip, rng)).mean()
         phases = rng.random(FRAMES)
-        light_of = [row_weights(lamp, field.sensor, 1, EXPOSURE_S, x * lamp.period_s)[0] for x in phases.tolist()]
+        rows = field.sensor.sites  # of photodiodes, exposed together
+        light_of = [row_weights(lamp, field.sensor, rows, EXPOSURE_S, x * lamp.period_s)[0] for x in phases.tolist()]
         frames = (field.shoot(mean_cd_m2 * float(x), chip, rng) for x in light_of)
         seen = np.array([field.samples_e(raw).mean() - dark for raw in frames])
         turns = 2 * np.pi * phases

@@ -242,6 +242,28 @@ def test_one_measurement_of_a_developed_picture_is_near_the_pixels_own_closed_fo
         assert value == pytest.approx(merit.computed, abs=0.02), merit.name
 
 
+def test_a_camera_that_bins_is_measured_on_pictures_of_its_own_pixels(tmp_path: Path) -> None:
+    """Grey samples passed on as they are: range, contrast and flicker are those of the closed forms; 1280 pixels."""
+    path = tmp_path / "mine.py"
+    path.write_text(AS_READ, "utf-8")
+    sensor, rng = binned(public.low_noise("mono"), "charge"), np.random.default_rng(3)
+    closed = list(definitions(sensor, "D65", 0.01, ["iso_15739", "ieee_2020", "flicker"]))
+    computed = {merit.name.partition(".")[2]: merit.computed for one in closed for merit in one.merits}
+    found = {}
+    for definition in developed_figures(sensor, "D65", 0.01, f"{path}:develop", trust_code=True):
+        names = [merit.name.removeprefix("developed.") for merit in definition.merits]
+        if names[0] in ("dynamic_range", "cta_0.1_lux"):
+            found |= dict(zip(names, definition.measure(rng), strict=True))
+    assert found.pop("dynamic_range") == pytest.approx(computed["dynamic_range"], abs=0.3)
+    assert len(found) == 4
+    for name, value in found.items():
+        assert value == pytest.approx(computed[name], abs=0.03), name
+    (flicker,) = (one for one in closed if one.merits[0].name.startswith("flicker"))
+    index, share = flicker.measure(rng)
+    assert index == pytest.approx(computed["modulation_index"], rel=0.01)
+    assert share == pytest.approx(computed["mitigation_probability"], abs=0.2)  # of 40 frames
+
+
 def test_one_measurement_of_a_developed_chart_is_near_the_cameras_closed_form() -> None:
     """A linear processor takes the matrix that the closed form takes: 1.4, and noise adds a tenth."""
     sensor = public.low_noise("bayer")
