@@ -249,3 +249,18 @@ def test_a_sweeps_cost_is_that_of_the_study_as_stated_unless_everything_is_model
     ):
         estimated(asked, tmp_path / "out", 3, **options)
         assert told.pop() == (asked, plan, "scenes", 3, 0, passed)
+
+
+@pytest.mark.parametrize(("asked", "there", "spp"), [(True, "light", 64), (True, None, 512), (False, "light", 512)])
+def test_a_scene_with_reference_light_is_rendered_with_sixty_four_samples(
+    asked: bool, there: Any, spp: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Which tell whether its light is still this code's; without it, or where it isn't asked for, with all."""
+    film = SimpleNamespace(size=(16, 20))
+    monkeypatch.setattr(sweep_cost, "film_of", lambda opened, model, samples: film)
+    monkeypatch.setattr(sweep_cost, "find_reference", lambda scene, of: there if of is film else None)
+    study: Any = SimpleNamespace(render=SimpleNamespace(reference=asked), equal_area=None, sensors=())
+    opened: Any = SimpleNamespace(choice="a", size=(8, 10), scene=SimpleNamespace(groups={"sun": 1, "sky": 2}))
+    model = SimpleNamespace(wavelength_nm=np.arange(7), spp=512, denoise=True)
+    plan: Any = SimpleNamespace(renders={"a": model}, samples_a_side=lambda choice: 2)
+    assert sweep_cost._part(study, plan, opened) == _Part(320, 320, 7, 2, spp, True)
