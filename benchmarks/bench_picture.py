@@ -2,6 +2,7 @@
 
     python benchmarks/bench_picture.py                     (the table of docs/how_to/what_a_picture_costs.md: minutes)
     python benchmarks/bench_picture.py --sides 256 512
+    python benchmarks/bench_picture.py --stored 1 2    (captures of stored pictures, by megapixels, and a development)
 
 Each command runs in a process of its own, whose processor time and peak memory the system tells. A render is made with
 two numbers of samples: their difference is the cost of a sample, and the table's render of 64 samples is computed from
@@ -14,10 +15,16 @@ import os
 import subprocess
 import sys
 import tempfile
+from multiprocessing import get_context
 from pathlib import Path
 
+import numpy as np
 from environment import print_environment
+from PIL import Image
 
+from render.radiance import SpectralRadiance
+from render.radiance_files.exr import write_exr
+from render.spectrum import VISIBLE_NM, even_bands
 from rodcone.memory import memory
 
 SIDES = 256, 512, 1024  # 0.07, 0.26 and 1 Mpx
@@ -32,8 +39,12 @@ def main() -> None:
     options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     options.add_argument("--scene", default="still_life")
     options.add_argument("--sides", type=int, nargs="+", default=SIDES)
+    options.add_argument("--stored", type=float, nargs="+", help="megapixels of stored pictures")
     given = options.parse_args()
     print_environment()
+    if given.stored:
+        stored(given.stored)
+        return
     print(f"\n{given.scene}, {BANDS} bands, processor seconds; memory is the most that one of the commands holds\n")
     print(f"| size | render, {SAMPLES} samples per pixel | capture | develop | memory |\n|---|---|---|---|---|")
     with tempfile.TemporaryDirectory() as folder:
@@ -43,6 +54,40 @@ def main() -> None:
             print(row(side, *found), flush=True)
     times = (seconds * (LARGE / side) ** 2 for seconds in found[:3])
     print(row(LARGE, *times, memory(LARGE**2, BANDS, 1, spp=SAMPLES).total) + " computed")
+
+
+def stored(megapixels: list[float]) -> None:
+    """Print the table of captures of a photograph and of a file of radiance, and of the photograph's development."""
+    print("\n| size | photograph: capture | develop | 20 bands: capture |\n|---|---|---|---|")
+    for size in megapixels:
+        height = round((size * 1e6 * 3 / 4) ** 0.5) // 4 * 4
+        shape = height, height * 4 // 3 // 4 * 4
+        with tempfile.TemporaryDirectory() as folder:
+            photograph, light, raw = (str(Path(folder) / name) for name in ("a.png", "a.exr", "a.dng"))
+            # In a process of its own: Linux counts this one's peak as that of those that it starts.
+            writer = get_context("spawn").Process(target=write_pictures, args=(shape, photograph, light))
+            writer.start()
+            writer.join()
+            cells = [run(*words) for words in (("capture", photograph, "-o", raw), ("develop", raw))]
+            cells.append(run("capture", light, "-o", raw))
+        words = " | ".join(f"{seconds:.3g} s, {most / 1e9:.2g} GB" for seconds, most in cells)
+        print(f"| {shape[1]} x {shape[0]}, {shape[0] * shape[1] / 1e6:.2g} Mpx | {words} |", flush=True)
+
+
+def write_pictures(shape: tuple[int, int], photograph: str, light: str) -> None:
+    """Write a photograph, and radiance in 20 bands, of waves and some noise."""
+    rng = np.random.default_rng(1)
+    y, x = (axis.astype(np.float32) for axis in np.ogrid[: shape[0], : shape[1]])
+
+    def wave(number: int) -> np.ndarray:
+        noise = rng.standard_normal(shape, dtype=np.float32)
+        return 0.5 + 0.4 * np.sin(x / (37 + number) + number) * np.cos(y / (53 + number)) + 0.02 * noise
+
+    pixels = np.stack([np.clip(255 * wave(9 * channel), 0, 255).astype(np.uint8) for channel in range(3)], axis=-1)
+    Image.fromarray(pixels).save(photograph)
+    nm, width = even_bands(VISIBLE_NM, BANDS)
+    planes = np.stack([0.02 * np.maximum(wave(band), 0.01) for band in range(BANDS)])
+    write_exr(SpectralRadiance(np.moveaxis(planes, 0, -1), nm, width_nm=width), light, scene="waves")
 
 
 def costs(scene: str, side: int, folder: Path) -> tuple[float, float, float, float]:

@@ -10,7 +10,7 @@ from rodcone.errors import InputError
 
 GB = 1e9
 # Counted from the arrays held at once, and held against peaks that were measured (`tests/rodcone/test_memory.py`).
-_TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
+TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by group and band
 _DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
 _DENOISER_BYTES = 1300  # per pixel, by Open Image Denoise
 _DENOISER_LIBRARY_BYTES = 200e6  # by its library, and by what Dr.Jit keeps of the folds' launches
@@ -26,6 +26,9 @@ _RENDER_BYTES = 120  # per pixel, whatever the number of bands: its order, its r
 # What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
 # from, an image forming of one of them with its copy for the lens.
 _VIEW_ARRAYS = 10
+# Per pixel of a capture, which makes its light's bands one at a time: electrons behind every filter, their sums while
+# an image forms, a photograph's colours, and what the raw files are made of.
+_CAPTURE_BYTES = 150
 _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
@@ -69,6 +72,7 @@ def memory(
     spp: float | None = None,
     denoised: bool = False,
     held: int = 0,
+    light_arrays: int | None = None,
 ) -> Memory:
     """Memory that a render of so many light groups needs, or what comes after it where that needs more.
 
@@ -84,6 +88,9 @@ def memory(
         Whether the render is denoised.
     held : int
         Other renders of this size whose light is held meanwhile.
+    light_arrays : int, optional
+        Of a capture, which makes the bands that it images one at a time: how many arrays of all bands each group's
+        light is. Left out, the light is a render's and all of its bands are looked at together.
     """
     plane = 4.0 * pixels * bands  # of float32, all bands
     per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
@@ -97,9 +104,11 @@ def memory(
     drawing = _RENDERER_BYTES + _RENDER_BYTES * pixels + (_LAUNCHES + other_sizes) * launch
     drawing += (_MEANS_ARRAYS * groups + 1) * plane + (_SUMS_ARRAYS * groups + _COPIES - 1) * sums
     # Looking at what was drawn, and developing it: the render is let go of before the first cell
-    viewing = _VIEWER_BYTES + (_TRANSPORT_ARRAYS * groups + _VIEW_ARRAYS) * plane
+    arrays = TRANSPORT_ARRAYS if light_arrays is None else light_arrays
+    viewing = _VIEWER_BYTES + arrays * groups * plane
+    viewing += _VIEW_ARRAYS * plane if light_arrays is None else _CAPTURE_BYTES * pixels
     rendering = max(drawing * (groups > 0 and spp != 0), viewing) + of_denoiser
-    rendering += held * _TRANSPORT_ARRAYS * groups * plane
+    rendering += held * TRANSPORT_ARRAYS * groups * plane
     worker = _WORKER_BYTES + _CELL_BYTES * pixels
     if workers <= 1:
         peak_bytes = max(rendering, workers * worker)

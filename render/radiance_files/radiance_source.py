@@ -87,6 +87,14 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
     return sum(pixels), bands[0], groups[0]
 
 
+def comes_by_band(path: str | Path) -> bool:
+    """Whether a file is a photograph so large that its bands are made one at a time."""
+    if Path(path).suffix.lower() not in photo.EXTENSIONS:
+        return False
+    pixels, bands, _ = extent_of(path)
+    return 4 * pixels * bands > MOST_WHOLE_BYTES
+
+
 def load_radiance(path: str | Path, light: str | None = None, spectra: str = photo.SURFACES) -> SpectralRadiance:
     """Read spectral OpenEXR (``.exr``), an ISETCam scene (``.mat``), a cube, a photograph, reference light (``.npz``).
 
@@ -134,7 +142,7 @@ def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACE
     if is_reference(path):
         return open_reference(path).transport
     is_photo = Path(path).suffix.lower() in photo.EXTENSIONS
-    if is_photo and spectra == photo.SURFACES and 4 * np.prod(extent_of(path)[:2]) > MOST_WHOLE_BYTES:
+    if spectra == photo.SURFACES and comes_by_band(path):
         planes = photo.PhotoPlanes(*photo.read_upsampled(path))
         means = np.array([[planes[0, band].mean(dtype=np.float64) for band in range(planes.shape[1])]])
         nm = DEFAULT_WAVELENGTH_NM

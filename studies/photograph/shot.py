@@ -14,14 +14,20 @@ from render.cache import kept_beside
 from render.engine import render
 from render.illuminants import illuminant
 from render.radiance import BandRadiance, SpectralRadiance
-from render.radiance_files.radiance_source import extent_of, is_radiance_file, is_reference, is_reflectance
+from render.radiance_files.radiance_source import (
+    comes_by_band,
+    extent_of,
+    is_radiance_file,
+    is_reference,
+    is_reflectance,
+)
 from render.scene import Scene, film_size
 from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
 from render.transport import Transport, halves_by_band, relight_by_band
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
-from rodcone.memory import require_memory
+from rodcone.memory import TRANSPORT_ARRAYS, require_memory
 from rodcone.progress import Step, compile_note, render_words
 from rodcone.time_text import parse_time
 from rodcone.types import Floats
@@ -33,7 +39,7 @@ from sensor.flicker.photograph import frame_starts_s, photograph_flickering
 from sensor.flicker.rows import check_flicker, steady_exposure_s
 from sensor.flicker.waveform import Waveform
 from sensor.lens.table import with_lens
-from sensor.optics import form_image, left_out
+from sensor.optics import form_image, left_out, spreads
 from sensor.presets import preset
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import check_ending
@@ -66,6 +72,7 @@ from studies.study.study import AS_SHOT, GRAY_WORLD, MOST_FRAMES
 MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly meant
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
+_FILE_ARRAYS = 2  # of all bands: a file's light, and its variance or what it is read from
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
 # Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
 # of the light at its later times.
@@ -586,7 +593,8 @@ def check(order: Order) -> Checked:
             )
         check_radiance_file(order.source, () if order.level is None else (order.level,))
         pixels, bands, groups = extent_of(order.source)
-        cost = PictureCost((1, pixels), bands, groups, 0, _after_s(sensor))
+        arrays = _light_arrays(order, sensor, 0 if comes_by_band(order.source) else _FILE_ARRAYS)
+        cost = PictureCost((1, pixels), bands, groups, 0, _after_s(sensor), light_arrays=arrays)
         return Checked(order, sensor, None, exposure_s, None, 1, cost, flicker_of(order.flicker, ()))
     # A scene, rendered or there already.
     opened, moving, shares = _opened(order, exposure_s, sensor)
@@ -608,9 +616,21 @@ def check(order: Order) -> Checked:
     spp, times = 0 if ready else order.spp or _SPP, max(len(moving), 1)
     rendered = (samples * size[0], samples * size[1])
     cost = PictureCost(
-        rendered, centres.size, len(opened.scene.groups), spp, _after_s(sensor), through=through, times=times
+        rendered,
+        centres.size,
+        len(opened.scene.groups),
+        spp,
+        _after_s(sensor),
+        through=through,
+        times=times,
+        light_arrays=_light_arrays(order, sensor, TRANSPORT_ARRAYS),
     )
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving, shares)
+
+
+def _light_arrays(order: Order, sensor: SensorConfig, held: int) -> int | None:
+    """Arrays of all bands that are held; None where an image of each band is formed, and all of them are too."""
+    return held if spreads(sensor.lens) and not order.flicker else None
 
 
 def _after_s(sensor: SensorConfig) -> float:

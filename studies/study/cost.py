@@ -55,6 +55,8 @@ class PictureCost:
         The lens that the scene is rendered through, in words; none for a pinhole.
     times : int
         Renders of so many samples each, of a scene that moves, whose mean is taken.
+    light_arrays : int, optional
+        Of what makes the light's bands one at a time, as `rodcone.memory.memory` takes it.
     """
 
     size: tuple[int, int]
@@ -66,6 +68,7 @@ class PictureCost:
     max_seconds: float | None = None
     through: str = ""
     times: int = 1
+    light_arrays: int | None = None
 
     @property
     def pixels(self) -> int:
@@ -77,7 +80,15 @@ class PictureCost:
         """Memory at the peak."""
         groups = self.groups if self.spp != 0 else 1
         mean = int(self.times > 1)  # the light of the times that went before
-        return memory(self.pixels, self.bands, groups, spp=self.spp, denoised=self.denoised, held=mean)
+        return memory(
+            self.pixels,
+            self.bands,
+            groups,
+            spp=self.spp,
+            denoised=self.denoised,
+            held=mean,
+            light_arrays=self.light_arrays,
+        )
 
     @property
     def seconds(self) -> float:

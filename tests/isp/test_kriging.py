@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from builders import RGBW_PHASES, behind, mosaic_of, raw_image
 
+from isp import kriging
 from isp.kriging import RADIUS, krige, reconstruct_linear
 from isp.remosaic import bayer_tile, remosaic
 from sensor.calibration import ColourCalibration
@@ -197,3 +198,17 @@ def test_samples_of_a_quad_that_lie_where_the_plain_mosaic_has_them_stay() -> No
     assert agree.mean() == 6 / 16
     np.testing.assert_array_equal(made.dn[agree], noisy.dn[agree])
     assert np.any(made.dn[~agree] != noisy.dn[~agree])
+
+
+@pytest.mark.parametrize("name", ["rgbw", "quad_rgbw"])
+def test_strips_of_rows_hold_the_bits_of_the_whole_frame(name, monkeypatch):
+    tile = MOSAICS[name]
+    dn = np.random.default_rng(1).poisson(400.0, (37, 24)) + 100
+    dn[4:6, 9:11] = 15_100  # a lamp: the strips beside it are estimated channel by channel there
+    found = []
+    for rows in (1000, 8, 5):
+        monkeypatch.setattr(kriging, "STRIP_ROWS", rows)
+        found.append(reconstruct_linear(raw_image(dn, tile)))
+    for other in found[1:]:
+        assert np.array_equal(other.estimate, found[0].estimate)
+        assert np.array_equal(other.noise_gain, found[0].noise_gain)

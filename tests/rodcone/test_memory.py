@@ -8,8 +8,10 @@ import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 from command_line import COST, call, check_refusals
+from PIL import Image
 
 from rodcone.memory import Limit, file_extent, memory, memory_limits
 
@@ -128,6 +130,17 @@ def test_a_render_and_what_follows_it_count_by_their_arrays() -> None:
     assert many == most
 
 
+def test_a_capture_counts_its_light_and_what_each_pixel_takes_once() -> None:
+    pixels = 4000 * 3000
+    scene, photograph = (
+        memory(pixels, bands, 1, spp=0, light_arrays=arrays).total for bands, arrays in ((20, 2), (40, 0))
+    )
+    assert scene - photograph == 2 * 4 * 20 * pixels
+    assert photograph < 3e9, "a photograph's bands are never held together"
+    assert scene < 4e9
+    assert photograph == memory(pixels, 20, 1, spp=0, light_arrays=0).total
+
+
 def test_a_picture_file_counts_by_its_bytes_and_needs_no_render(tmp_path: Path) -> None:
     (tmp_path / "a.exr").write_bytes(bytes(160_000_000))  # a megapixel of 40 bands, were it not packed
     needed = memory(*file_extent(tmp_path / "a.exr")).total
@@ -179,11 +192,28 @@ def peak_of(arguments: list[str], folder: Path) -> int:
 def test_a_run_needs_no_more_than_its_estimate_which_is_at_most_1_35_times_it(name: str, tmp_path: Path) -> None:
     arguments, pixels, bands, groups, spp = MEASURED[name]
     estimated, peak = (
-        memory(pixels, bands, groups, spp=spp, denoised="--denoise" in arguments).total,
+        memory(
+            pixels,
+            bands,
+            groups,
+            spp=spp,
+            denoised="--denoise" in arguments,
+            light_arrays=3 if arguments[0] == "capture" else None,
+        ).total,
         peak_of(arguments, tmp_path),
     )
     print(f"{name}: estimated {estimated / 1e9:.2f} GB, peak {peak / 1e9:.2f} GB, ratio {estimated / peak:.2f}")
     assert 1.0 <= estimated / peak < 1.35  # four groups of few samples take 1.33, the others 1.23 at most
+
+
+@pytest.mark.slow
+def test_a_large_photograph_needs_no_more_than_its_estimate_which_is_at_most_1_35_times_it(tmp_path: Path) -> None:
+    pixels = np.random.default_rng(1).integers(60, 200, (1224, 1632, 3), dtype=np.uint8)
+    Image.fromarray(pixels).save(tmp_path / "a.png")
+    estimated = memory(1224 * 1632, 40, 1, spp=0, light_arrays=0).total
+    peak = peak_of(["capture", "a.png", "-o", "a.dng"], tmp_path)
+    print(f"estimated {estimated / 1e9:.2f} GB, peak {peak / 1e9:.2f} GB, ratio {estimated / peak:.2f}")
+    assert 1.0 <= estimated / peak < 1.35
 
 
 @pytest.mark.slow

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from outside_truth import colour_science
 
-from isp.colour.encoding import encode
+from isp.colour import encoding
+from isp.colour.encoding import encode, quantise
 from rodcone.colour_spaces import encode_srgb
 
 COLOURS = np.random.default_rng(0).uniform(-0.1, 1.2, (40, 3))
@@ -26,3 +27,15 @@ def test_p3_holds_a_green_that_srgb_clips() -> None:
     green = np.array([-0.2, 1.0, -0.05])
     assert encode(green, "srgb") == pytest.approx([0.0, 1.0, 0.0])
     assert np.all((encode(green, "display-p3") > 0) & (encode(green, "display-p3") < 1))
+
+
+@pytest.mark.parametrize("name", ["srgb", "display-p3"])
+def test_strips_of_rows_are_encoded_and_quantised_as_the_whole_picture(
+    name: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    linear = np.random.default_rng(1).uniform(-0.1, 1.3, (9, 5, 3))
+    whole = encode(linear, name)
+    samples = quantise(whole, 16)
+    monkeypatch.setattr(encoding, "STRIP_ROWS", 4)
+    assert np.array_equal(encode(linear, name), whole)
+    assert np.array_equal(quantise(whole, 16), samples)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import BAYER_PHASES, RGBW_PHASES, mosaic_of, raw_image
 
-from isp.colour.highlights import white_lamps
+from isp.colour.highlights import Highlights, clip_highlights, white_lamps
 from isp.processors.catalogue import PROCESSORS
 
 WELL_E, FIELD_E = 15_000.0, 20.0
@@ -62,3 +62,13 @@ def test_white_lamps_come_out_grey_and_sodium_lamps_orange():
             red, green, blue = PROCESSORS[name].develop(raw, np.eye(3), balance=balance).rgb[inside].mean(axis=0)
             assert min(red, green) > 0.6 * WELL_E, (name, tile)  # planes take in the dark at the lamp's edges
             assert blue < 0.6 * green, (name, tile)
+
+
+@pytest.mark.parametrize("height", [1, 7])
+def test_highlights_held_in_strips_of_rows_are_those_of_the_frame(height):
+    raw, inside = lamp(WHITE, 1e5, (5, 6), RGBW_PHASES[0])
+    balanced = np.random.default_rng(1).uniform(0.0, 3 * WELL_E, (*raw.shape, 4))
+    held, highlights = clip_highlights(raw, balanced, gains_of(raw)), Highlights.of(raw, gains_of(raw))
+    strips = [slice(first, first + height) for first in range(0, 16, height)]
+    assert np.array_equal(np.concatenate([highlights.held(balanced[rows], rows) for rows in strips]), held)
+    assert not np.array_equal(held[inside], balanced[inside])
