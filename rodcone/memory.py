@@ -28,7 +28,7 @@ _RENDER_BYTES = 120  # per pixel, whatever the number of bands: its order, its r
 _VIEW_ARRAYS = 10
 # Per pixel of a capture, which makes its light's bands one at a time: electrons behind every filter, their sums while
 # an image forms, a photograph's colours, and what the raw files are made of.
-_CAPTURE_BYTES = 150
+_CAPTURE_BYTES = 155
 _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
