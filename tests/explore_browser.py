@@ -21,7 +21,7 @@ SETTLED = """new Promise((done, fail) => { const start = Date.now(); (function l
   const root = document.querySelector(".explore"), { asked, painted, failed, last, figures } = root?.dataset ?? {};
   if (asked && failed === asked) done("failed");
   else if (asked && painted === asked && (last === "true" || !%s) && (figures === asked || !%s)) done("painted");
-  else if (Date.now() - start > 25000) fail(new Error(document.body.innerText.slice(0, 500)));
+  else if (Date.now() - start > 60000) fail(new Error(document.body.innerText.slice(0, 500)));
   else setTimeout(look, 5);
 })() })"""
 # Moves one control to a random place, as its own events do; says which.

@@ -156,7 +156,7 @@ def noise_share(exposed: Exposure, controls: Controls, memo: Memo) -> float:
     errors_e = []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())
-        camera = (controls.sensor, controls.mosaic, tuple(sorted(controls.lens.items())))
+        camera = (controls.sensor, controls.mosaic, tuple(sorted(controls.lens.items())), controls.lens_table)
         errors_e.append(memo.of("error", (name, lamp.spectrum, lamp.table, camera), _error_e, exposed, name))
     powers = [exposed.transport.groups[name].power for name in exposed.frames]
     error_e = behind_filters(np.tensordot(powers, errors_e, axes=1), exposed.sensor) * exposed.scale

@@ -14,7 +14,6 @@ from numpy.typing import NDArray
 
 from isp.picture import Picture
 from isp.processors.catalogue import PROCESSORS
-from render.radiance import SpectralRadiance
 from render.transport import Transport
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import require_keys
@@ -167,9 +166,10 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
         controls.shot_noise,
         controls.row_time_us,
         controls.flicker_depth > 0,
+        controls.lens_table,
     )
     camera = (controls.sensor, controls.mosaic, *terms)
-    optics = (controls.sensor, controls.mosaic, _items(controls.lens))
+    optics = (controls.sensor, controls.mosaic, _items(controls.lens), controls.lens_table)
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
     # Light
@@ -187,7 +187,10 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
             radiance = memo.of("radiance", spectrum, only_group(lit, name).relight)
-            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, radiance, sensor)
+            # one image for both cameras' mosaics: of a lens by data it takes seconds
+            seen_so = (spectrum, sensor.site_pitch_um, sensor.lens)
+            image = memo.of("image", seen_so, form_image, radiance, sensor)
+            frames[name] = memo.of("frame", (spectrum, optics), _group_frame, image, sensor)
     powers = tuple(lit.groups[name].power for name in frames)
     lit_so = (spectra, powers, optics)
     white_1 = memo.of("white", (spectra, powers), _white, lit, spectra, memo)
@@ -269,8 +272,7 @@ def _in_time(expected_e: Image, controls: Controls, sensor: SensorConfig, exposu
     return flickering(expected_e, [(lamp, expected_e) for lamp in lamps], sensor, exposure_s, start_s)
 
 
-def _group_frame(radiance: SpectralRadiance, sensor: SensorConfig) -> GroupFrame:
-    irradiance = form_image(radiance, sensor)
+def _group_frame(irradiance: SpectralIrradiance, sensor: SensorConfig) -> GroupFrame:
     return GroupFrame(irradiance, channel_electrons(irradiance, sensor, 1.0))
 
 

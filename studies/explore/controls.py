@@ -24,6 +24,7 @@ from sensor.config import LONGEST_S, MOST_GAIN, MOST_ROW_US, SensorConfig
 from sensor.exposure import AUTO_INFORMATION, RULES
 from sensor.flicker.rows import check_flicker
 from sensor.flicker.waveform import Waveform
+from sensor.lens.table import shipped, with_lens
 from sensor.presets import VARIATIONS, preset_names
 from sensor.raw import ISO_RANGE
 from studies.metrics.truth import Light, light_in_bands
@@ -33,6 +34,7 @@ from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure rule, this means the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
+OF_TABLE = ("f_number", "defocus_um", "diffraction")  # what a lens by data states itself
 PIXEL = (
     *("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "column_gain_spread", "column_offset_e"),
     *("hot_pixel_share", "hot_pixel_dark_current_e_per_s", "crosstalk", "full_well_e"),
@@ -85,6 +87,8 @@ class Controls:
         A name of `sensor.cfa.MOSAICS` or `sensor.presets.VARIATIONS`, or ``own``, the sensor's own.
     lens, pixel : mapping of str to float
         Fields of `LensConfig` (`LENS`) and `PixelConfig` (`PIXEL`) that differ from the preset's.
+    lens_table : str
+        A shipped lens by data (`sensor.lens.table.shipped`) in front of the sensor, or ``own``, the sensor's own.
     bits : int or None
         Of the converter; None takes the preset's.
     gain : float or None
@@ -125,6 +129,7 @@ class Controls:
     mosaic: str = "rgbw"
     lens: Mapping[str, float] = field(default_factory=dict)
     pixel: Mapping[str, float] = field(default_factory=dict)
+    lens_table: str = OWN
     bits: int | None = None
     gain: Annotated[float | None, (1.0, MOST_GAIN, "give a factor, 1 where a full well reads the top")] = None
     iso: Annotated[float | None, (*ISO_RANGE, "give a speed such as 400")] = None
@@ -150,6 +155,12 @@ class Controls:
             require_fields(lamp, f"lamps[{name!r}].")
         gain_text(self.gain, self.iso)
         require_keys("lens", self.lens, LENS)
+        require_name("lens_table", self.lens_table, (OWN, *shipped()))
+        if self.lens_table != OWN and (stated := set(OF_TABLE) & set(self.lens)):
+            raise InputError(
+                f"lens: {', '.join(sorted(stated))} beside the lens {self.lens_table!r}, whose table has its own; "
+                "allowed: veiling_glare; leave the others out"
+            )
         require_keys("pixel", self.pixel, PIXEL)
         if self.settings and self.processor not in ADJUSTABLE:
             raise InputError(
@@ -317,6 +328,8 @@ def camera_of(controls: Controls, base: SensorConfig) -> SensorConfig:
             f"shot_noise: False with {controls.sensor!r}, whose readings are merged by it; allowed: True; switch it on"
         )
     terms: Mapping[str, Any] = controls.lens
+    if controls.lens_table != OWN:
+        base = with_lens(base, controls.lens_table)
     camera = replace(
         base,
         lens=replace(base.lens, **terms),

@@ -22,10 +22,11 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.config_file import OF_TABLES
 from sensor.exposure import RULES
+from sensor.lens.table import read_lens, shipped
 from sensor.photodiodes import with_gain
 from sensor.presets import preset, tile_named
 from sensor.presets import preset_names as sensors
-from studies.explore.controls import ADJUSTABLE, LENS, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
+from studies.explore.controls import ADJUSTABLE, LENS, OF_TABLE, PIXEL, SETTINGS, TIME, Controls, mosaics_of, to_json
 from studies.explore.slow import is_slow
 from studies.explore.source import Source
 from studies.explore.views import VIEWS, Bytes
@@ -65,6 +66,7 @@ def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[
         "white_balances": list(WHITE_BALANCES),
         "levels": {level.name: float(f"{level.luminance_cd_m2:.4g}") for level in DEMO_LEVELS},
         "scenes": list(scenes),
+        "lenses": {name: lens_terms(name) for name in shipped()},
         "sensors": {name: sensor_terms(preset(name)) for name in named},
         "processors": {
             name: {
@@ -80,6 +82,12 @@ def first_message(source: Source, scenes: Iterable[str] = (), dropped: Iterable[
         "views": list(VIEWS),
         "assumed": list(source.notes),
     }
+
+
+def lens_terms(name: str) -> Header:
+    """Return a shipped lens's name and f-number as the page shows them, and which sliders of a lens it takes away."""
+    table = read_lens(name)
+    return {"text": f"{name.replace('_', ' ')}, f/{table.f_number:.3g}", "states": list(OF_TABLE)}
 
 
 def sensor_terms(sensor: SensorConfig) -> Header:

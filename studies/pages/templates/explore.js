@@ -2,7 +2,7 @@
 // time, the next with the newest values as soon as the answer is painted, so that pictures follow a slider that moves.
 // `render` is what a notebook's widget calls, and the page too.
 
-const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "pixel", "bits", "gain", "iso", "processor", "settings",
+const CAMERA = ["exposure", "exposure_s", "sensor", "mosaic", "lens", "lens_table", "pixel", "bits", "gain", "iso", "processor", "settings",
   "white_balance", "shot_noise", "seed", "exposure_number", "frames", "row_time_us"];
 const TITLES = {
   picture: "Picture", truth: "Reference", raw: "Raw mosaic", noise: "Noise only", "luminance error": "Error of luminance",
@@ -46,6 +46,7 @@ const TERMS = {
   flicker_hz: "Twice the mains' frequency: 100 or 120 Hz.",
   row_time_us: "From one row's exposure to the next one's; 0: all rows together. Under lamps that flicker rows that roll show bands.",
   seed: "Of the chip's fixed patterns and of the noise: the same seed makes the same bits.",
+  lens_table: "A lens whose point spread by image height, falloff, distortion and lateral colour were traced from a published prescription, at its own f-number; own: the sensor's. Its first picture takes some ten seconds, the next lamp's some three. A distance of focus isn't here, as each is a render of its own: capture --focus-m and studies have it.",
   f_number: "Focal length over the diameter of the aperture: light falls with its square.",
   defocus_um: "Diameter of the disc on the sensor that a point out of focus becomes.",
   diffraction: "Width of a point's image over that of an ideal round aperture; 0: without diffraction.",
@@ -370,7 +371,12 @@ function render({ model, el }) {
         slider(["Row time", 0, 2000, "cube", "µs"], camera.row_time_us ?? preset.row_time_us, value => set("row_time_us", value === preset.row_time_us ? null : value), "row_time_us", true),
         numberBox("Seed", camera.seed, value => set("seed", value), "seed"),
         make("div", { class: "row" }, button("Another exposure (E)", another), make("small", {}, `number ${camera.exposure_number}`))),
-      group("Lens", ...terms("lens", LENS, preset.lens)),
+      group("Lens",
+        choice("Lens", [["own", "the sensor's own"], ...Object.entries(hello.lenses).map(([name, { text }]) => [name, text])], camera.lens_table, value => {
+          hello.lenses[value]?.states.forEach(term => delete camera.lens[term]);
+          set("lens_table", value, true);
+        }, "lens_table"),
+        ...terms("lens", LENS, hello.lenses[camera.lens_table] ? pick(preset.lens, Object.keys(preset.lens).filter(term => !hello.lenses[camera.lens_table].states.includes(term))) : preset.lens)),
       group("Sensor",
         choice("Preset", [...Object.keys(hello.sensors).map(each => [each, each.split(/[\\/]/).pop()]), ["file", "from a file …"]], camera.sensor, value => {
           if (value === "file") { buildControls(); return sensorFile.click(); }

@@ -13,16 +13,18 @@ from refusal import refusal
 
 import rodcone as public
 import studies.explore.chain as CHAIN
+import studies.explore.controls as CONTROLS
 from isp.processors.catalogue import PROCESSORS, default_processor, libraries
 from isp.processors.piecewise import takes
 from render.spectrum import luminance
 from rodcone.jit import backend, dr
 from sensor.cfa import MOSAICS
+from sensor.lens.table import with_lens
 from sensor.optics import form_image
 from sensor.presets import preset, preset_file
 from studies.explore.answers import noise_share, python_of
 from studies.explore.chain import development_of, expose_scene, photograph, true_picture_of
-from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, camera_of, controls_from, mosaics_of
+from studies.explore.controls import LENS, PIXEL, TIME, Controls, Lamp, camera_of, controls_from, mosaics_of, only_group
 from studies.explore.memo import Memo, never_cancel
 from studies.explore.slow import is_slow, stand_in
 from studies.explore.source import GIVEN, RenderOptions, of_transport, open_source
@@ -49,7 +51,7 @@ MOVED = {
     "lamps": {"sun": Lamp("A", 2.0)}, "level_cd_m2": 3.0, "exposure": "auto:W", "exposure_s": 0.001,
     "sensor": "table1_output", "mosaic": "rgbw_4x4", "bits": 10, "shot_noise": False, "seed": 3, "exposure_number": 4,
     "frames": 2, "reference_light": "A", "processor": "ple_rgbw", "white_balance": "gray-world",
-    "settings": {"sigma_s": 2.0}, "gain": 4.0, "iso": 200.0, "pixel": {}, "lens": {},
+    "settings": {"sigma_s": 2.0}, "gain": 4.0, "iso": 200.0, "pixel": {}, "lens": {}, "lens_table": "cooke_triplet",
     "flicker_depth": 0.2, "flicker_hz": 9.0, "row_time_us": 300.0,
 }  # fmt: skip
 PIXEL_MOVED = {
@@ -57,11 +59,21 @@ PIXEL_MOVED = {
     "column_offset_e": 30.0, "hot_pixel_share": 0.1, "hot_pixel_dark_current_e_per_s": 1e5, "crosstalk": 0.1,
     "full_well_e": 3000.0,
 }  # fmt: skip
-LIGHT_AND_LENS = {"lamps", "sensor", "mosaic", "lens", "level_cd_m2"}
+LIGHT_AND_LENS = {"lamps", "sensor", "mosaic", "lens", "lens_table", "level_cd_m2"}
 LENS_MOVED = {"f_number": 8.0, "defocus_um": 10.0, "diffraction": 2.0, "veiling_glare": 0.1}
 
 
-def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
+@pytest.fixture
+def bent(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A lens by data without a point spread, which the page's menu would hold: quick."""
+    path = tmp_path / "bent.toml"
+    terms = "distortion = [0.0, -0.1]", "relative_illumination = [1.0, 0.5]"
+    path.write_text("\n".join(("f_number = 4.0", "field = [0.0, 1.0]", *terms)))
+    monkeypatch.setattr(CONTROLS, "shipped", lambda: (str(path),))
+    return str(path)
+
+
+def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it(bent):
     """Whatever is kept from the settings before: exposure, chip, light, truth and what develops the raw image."""
     hot = {"hot_pixel_share": 0.05, "hot_pixel_dark_current_e_per_s": 1e4}  # so that each term of a pair is seen
     # Lamps too slow for a rule to cut its time to their periods, so that depth and frequency are seen.
@@ -71,7 +83,7 @@ def test_a_control_changed_alone_gives_what_a_fresh_session_gives_with_it():
     first = expose_scene(transport, start, memo)
     true_picture_of(first, start, memo)
     assert {x.name for x in fields(Controls)} == set(MOVED), "a control without a line in MOVED"
-    moved = [{name: value} for name, value in MOVED.items() if value != {}]
+    moved = [{name: bent if name == "lens_table" else value} for name, value in MOVED.items() if value != {}]
     moved += [{"lamps": {name: Lamp("A")}} for name in transport.groups]
     moved += [{"pixel": hot | {name: PIXEL_MOVED[name]}} for name in PIXEL]
     moved += [{"lens": {name: LENS_MOVED[name]}} for name in LENS]
@@ -175,6 +187,20 @@ def test_rows_that_roll_under_lamps_that_flicker_have_bands_and_whole_periods_no
     cut = expose_scene(transport, rule, Memo())
     assert (cut.exposure_s * 120.0) % 1 == pytest.approx(0.0, abs=1e-9)
     refusal(expose_scene, transport, replace(flickering, sensor="staggered", mosaic="rgbw"), Memo(), match="flicker: ")
+
+
+def test_a_lens_by_data_images_each_light_as_a_capture_does_and_brings_its_f_number(bent):
+    transport, controls = small_transport(), Controls(lens_table=bent, lens={"veiling_glare": 0.05})
+    sensor = with_lens(preset("low_noise"), bent)
+    sensor = replace(sensor, lens=replace(sensor.lens, veiling_glare=0.05))
+    exposed = expose_scene(transport, controls, Memo())
+    assert exposed.sensor.lens == sensor.lens
+    for name, frame in exposed.frames.items():
+        image = form_image(only_group(exposed.transport, name).relight(), sensor)
+        assert np.array_equal(frame.irradiance.values, image.values), name
+    refusal(Controls, lens_table="tessar", match="lens_table: 'tessar'")
+    refusal(Controls, lens_table=bent, lens={"f_number": 4.0}, match="lens: f_number beside the lens")
+    refusal(controls_from, {"lens_table": "mine.toml"}, match="lens_table: 'mine.toml'")
 
 
 @pytest.mark.sample(2)

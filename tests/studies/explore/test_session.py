@@ -25,6 +25,7 @@ from isp.settings import PAPER
 from rodcone.errors import InputError
 from scenes.catalogue import load
 from scenes.levels import DEMO_LEVELS
+from sensor.lens.table import read_lens, shipped
 from sensor.photodiodes import with_gain
 from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.raw_files.raw_file import read_raw
@@ -231,6 +232,9 @@ def test_the_page_is_told_every_sensors_and_processors_own_terms():
         assert terms["tile"] == list(sensor.cfa)
         assert terms["row_time_us"] == sensor.row_time_us
         assert set(terms) == {"lens", "pixel", "bits", "gain", "row_time_us", "iso", "tile"}
+    assert {name: lens["text"].rsplit("f/")[1] for name, lens in said["lenses"].items()} == {
+        name: f"{read_lens(name).f_number:.3g}" for name in shipped()
+    }
     offered = {name for processor in said["processors"].values() for name in processor["mosaics"]}
     assert offered - set(said["mosaics"]) == {"own"}
     for name, mosaic in said["mosaics"].items():
