@@ -241,3 +241,14 @@ def test_a_bench_of_another_seed_holds_another_chip(exact):
     np.testing.assert_array_equal(one(0.0, 0.01), same(0.0, 0.01))
     np.testing.assert_array_equal(one(0.0, 0.01), one(0.0, 0.01))
     assert np.mean(one(0.0, 0.01) == other(0.0, 0.01)) < 0.2
+
+
+@pytest.mark.parametrize("gain", [1e-4, 1e-3, 1.0])
+def test_linearity_is_told_of_a_camera_of_few_digital_numbers(gain):
+    """A line of a tenth of a DN to a thousand; where it isn't above 0 nothing is told."""
+    light = np.linspace(50.0, 1000.0, 20)
+    share, mean = emva.linearity(Transfer(light, 20 + gain * light, light), 20.0, 1000.0)
+    assert share[light <= 950.0] == pytest.approx(0.0, abs=1e-9)
+    assert mean == pytest.approx(0.0, abs=1e-9)
+    share, _ = emva.linearity(Transfer(light, 20 - gain * light, light), 20.0, 1000.0)
+    assert np.isnan(share).all()

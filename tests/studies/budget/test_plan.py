@@ -483,3 +483,12 @@ def test_a_picture_files_pilot_has_a_longer_side_of_128_pixels_at_most(side: int
     pilot = make_pilot(opened, study, [3])
     assert pilot.transport.counts.shape[1] == seen
     assert not pilot.rendered
+
+
+@pytest.mark.parametrize(("name", "count"), [("fast", 8), ("default", 20), ("reference", 40)])
+def test_bands_of_each_starting_point_fill_the_visible_range_side_by_side(name: str, count: int) -> None:
+    ((model,),) = (starting_point(SMALL, name).renders.values(),)
+    nm, width_nm = np.array(model.wavelength_nm), np.array(model.width_nm)
+    assert nm.size == width_nm.size == count
+    assert width_nm == pytest.approx(np.full(count, 400.0 / count))
+    assert nm == pytest.approx(380.0 + 400.0 / count * (np.arange(count) + 0.5))
