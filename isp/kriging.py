@@ -29,7 +29,6 @@ SIDE = 2 * RADIUS + 1  # of the window
 CORRELATION = 0.93  # of two channels' values at one pixel
 LENGTH = 6.0  # of the exponential covariance [pixels]
 BESIDE_LAMPS = 1e3  # what a channel shows beside a lamp [standard deviations of noise]
-TOGETHER = 16  # rows of windows that are summed together: all at once would hold each sample 169 times
 OUTLYING = 8.0  # half widths of the middle two thirds, above which a sample is a lamp's
 STRIP_ROWS = 256  # that are estimated together: what lies between is no whole frame of every channel
 LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
@@ -157,11 +156,9 @@ def _weighted(
     (top, bottom), (left, right) = window
     around = values[rows.start + top : rows.stop - 1 + bottom, columns.start + left : columns.stop - 1 + right]
     windows = sliding_window_view(around, (bottom - top, right - left))[:: rows.step, :: columns.step]
-    height, width = windows.shape[:2]
-    total = np.empty((len(weights), height, width))
-    for first in range(0, height, TOGETHER):
-        samples = windows[first : first + TOGETHER].reshape(-1, weights.shape[1])
-        total[:, first : first + TOGETHER] = (weights @ samples.T).reshape(len(weights), -1, width)
+    total = np.empty((len(weights), *windows.shape[:2]))
+    for row, samples in enumerate(windows):  # by itself: BLAS's last bits depend on how many it takes together
+        total[:, row] = weights @ samples.reshape(-1, weights.shape[1]).T
     return total
 
 

@@ -169,7 +169,10 @@ def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
     sizes, bands, groups, spp = [(30, 40), (20, 40)], [20, 30], [1, 3], [64, 256]
     scenes = {
         choice: SimpleNamespace(
-            choice=choice, size=size, scene=SimpleNamespace(groups=dict.fromkeys(range(count)), max_depth=8, rr_depth=5)
+            choice=choice,
+            size=size,
+            moving=(),
+            scene=SimpleNamespace(groups=dict.fromkeys(range(count)), max_depth=8, rr_depth=5),
         )
         for choice, size, count in zip(choices, sizes, groups, strict=True)
     }
@@ -260,7 +263,9 @@ def test_a_scene_with_reference_light_is_rendered_with_sixty_four_samples(
     monkeypatch.setattr(sweep_cost, "film_of", lambda opened, model, samples: film)
     monkeypatch.setattr(sweep_cost, "find_reference", lambda scene, of: there if of is film else None)
     study: Any = SimpleNamespace(render=SimpleNamespace(reference=asked), equal_area=None, sensors=())
-    opened: Any = SimpleNamespace(choice="a", size=(8, 10), scene=SimpleNamespace(groups={"sun": 1, "sky": 2}))
+    opened: Any = SimpleNamespace(
+        choice="a", size=(8, 10), moving=(), scene=SimpleNamespace(groups={"sun": 1, "sky": 2})
+    )
     model = SimpleNamespace(wavelength_nm=np.arange(7), spp=512, denoise=True)
     plan: Any = SimpleNamespace(renders={"a": model}, samples_a_side=lambda choice: 2)
     assert sweep_cost._part(study, plan, opened) == _Part(320, 320, 7, 2, spp, True)

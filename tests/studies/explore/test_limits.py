@@ -36,7 +36,7 @@ NUMBERS: dict[str, tuple[float | None, float, float]] = {
 }  # fmt: skip
 OTHERS: dict[str, Any] = {
     "lamps": {}, "reference_light": "D65", "exposure": "auto:information", "sensor": "low_noise", "mosaic": "rgbw",
-    "lens": {}, "pixel": {}, "bits": None, "shot_noise": True, "processor": "ple", "settings": {},
+    "lens": {}, "lens_table": "own", "pixel": {}, "bits": None, "shot_noise": True, "processor": "ple", "settings": {},
     "white_balance": "as-shot",
 }  # fmt: skip
 OPTIONS: dict[str, tuple[float | None, float, float]] = {
@@ -92,7 +92,7 @@ def test_the_first_message_holds_everything_that_the_page_offers() -> None:
         assert bool(told["settings"]) == (name in ("interleaved", "interleaved_paper"))
     assert set(said) == {
         *("title", "controls", "groups", "illuminants", "rules", "white_balances", "levels", "scenes", "sensors"),
-        *("processors", "mosaics", "views", "assumed"),
+        *("processors", "mosaics", "views", "assumed", "lenses"),
     }
 
 
