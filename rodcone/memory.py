@@ -22,7 +22,7 @@ _LAUNCHES = 2.5  # how many launches' channels Dr.Jit keeps: one launch's, their
 _OTHER_LAUNCHES = 1.0  # as many more for each further group, whose launches differ in size in a render of many samples
 _MANY_SPP = 32  # samples per pixel from which on a render has many
 _RENDERER_BYTES = 224e6  # libraries and compiled kernels
-_RENDER_BYTES = 120  # per pixel, whatever the number of bands: its order, its rate
+_RENDER_BYTES = 140  # per pixel, whatever the number of bands: its order, its rate
 # What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
 # from, an image forming of one of them with its copy for the lens.
 _VIEW_ARRAYS = 10

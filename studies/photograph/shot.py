@@ -441,7 +441,7 @@ def _electrons(
         return _Electrons(per_second_e, None, None, exposure_s, sensor)
     # The render's error is half the difference of its halves: how far one lies from their mean, the frame. Beside a
     # lamp a lens that is sampled once a pixel undershoots; a frame has no light there (`form_image`).
-    expected_e = _mosaic(per_second_e * exposure_s, sensor)
+    expected_e = _mosaic(per_second_e, sensor) * exposure_s
     even_e = _mosaic(imaged_electrons(halves()[0], sensor, exposure_s, samples), sensor)
     error_e = np.where(expected_e > 0, even_e - expected_e, 0.0)
     return _Electrons(per_second_e, error_e, expected_e, exposure_s, sensor)
