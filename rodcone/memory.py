@@ -76,6 +76,8 @@ def memory(
 ) -> Memory:
     """Memory that a render of so many light groups needs, or what comes after it where that needs more.
 
+    Kernels that no earlier render has left in `~/.drjit` are compiled, which takes up to 3 MB a band more.
+
     Parameters
     ----------
     pixels, bands, groups : int
