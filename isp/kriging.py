@@ -104,8 +104,9 @@ def krige(
 
     Returns
     -------
-    estimate, noise_gain : (h, w, channel) float64
-        Channels in the order of `sensor.cfa.channels`; sum of the squared weights, the noise's variance in it.
+    estimate, noise_gain : (row, w, channel) float64
+        Of the rows that are asked for, channels in the order of `sensor.cfa.channels`. The gain is the sum of the
+        squared weights, the noise's variance in the estimate.
     """
     height, width = values.shape
     count = len(channels(tile))

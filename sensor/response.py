@@ -114,14 +114,12 @@ def imaged_electrons(
     """`channel_electrons` of `form_image`, shape (h, w, channel), in a quarter of the time behind a lens that spreads.
 
     Where no undershoot is cut off it is within 1e-6 of the pixel's own light and the picture's mean together
-    (`sensor.optics.image_sums`). Parameters as of these two. Behind a lens that spreads, radiance that comes band by
-    band is never held as a whole.
+    (`sensor.optics.image_sums`). Parameters as of these two. Radiance that comes band by band is held as a whole
+    only where a pixel is one sample and the lens doesn't spread.
     """
-    if isinstance(radiance, BandRadiance) and not spreads(sensor.lens):
-        radiance = radiance.whole()
     if samples_per_pixel == 1 and not spreads(sensor.lens):
-        assert isinstance(radiance, SpectralRadiance)
-        return channel_electrons(form_image(radiance, sensor), sensor, exposure_s)
+        whole = radiance.whole() if isinstance(radiance, BandRadiance) else radiance
+        return channel_electrons(form_image(whole, sensor), sensor, exposure_s)
     weights = electrons_per_irradiance(sensor, radiance.wavelength_nm, radiance.widths_nm, exposure_s, radiance.light)
     return image_sums(radiance, weights, sensor, samples_per_pixel)
 

@@ -64,7 +64,8 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
         name: np.median([row.develop_s for of in places.values() for row in of[name] if row.develop_s is not None])
         for name in (OURS, *names)
     }
-    lines, counted = [], dict[str, list[str]]()
+    lines = []
+    counted: dict[str, list[str]] = {}
     for name in names:
         outcomes = [
             [lead[place, name, metric.key].outcome for place in places if place[0] == balance]
@@ -104,13 +105,12 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
     header = ["white balance", "scene", "sensor", "level", "processor", *keys]
     header += [f"{key}: {word}" for key in keys for word in ("lead of ple_rgbw", "half its interval", "outcome")]
     head = ["opponent", *(f"{metric.name.partition(',')[0]}, `{balance}`" for metric, balance in columns), "time"]
-    set_up = (
-        f"The numbers are those of rodcone {version}, {len(places) // len(balances)} conditions under each balance."
-    )
-    conditions, bayer_counts = len(places) // len(balances), iter(counted["no worse than every Bayer camera"])
+    conditions = len(places) // len(balances)
+    set_up = f"The numbers are those of rodcone {version}, {conditions} conditions under each balance."
+    of_bayer = list(zip(columns, counted["no worse than every Bayer camera"], strict=True))
     by_metric = [
         f"in {metric.name.partition(',')[0]} in "
-        + " and ".join(f"{next(bayer_counts)} under `{balance}`" for balance in balances)
+        + " and ".join(f"{count} under `{balance}`" for (of, balance), count in of_bayer if of is metric)
         for metric in METRICS
     ]
     summary = (
