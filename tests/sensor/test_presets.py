@@ -21,7 +21,7 @@ from sensor.curves import Responses, complementary, matched_transmittance, neutr
 from sensor.photodiodes import binned
 from sensor.pixel import PixelConfig
 from sensor.presets import VARIATIONS, low_noise, preset, preset_file, preset_names, table1_output, table1_pixel, vary
-from studies.commands import new as new_command
+from studies.study.study_file import EXAMPLES
 
 LEAST = "[pixel]\npitch_um = 2.2\nfill_factor = 0.9\nfull_well_e = 15000\nread_noise_e = 3\ndsnu_e = 4\nprnu = 0.01\n"
 LENS = "[lens]\nf_number = 2.8\n"
@@ -284,7 +284,7 @@ def test_what_cannot_be_made_is_refused() -> None:
     refusal(complementary, Responses(bright), match=r"responses: C reaches 1.2 electrons a photon")
 
 
-SENSORS = Path(new_command.__file__).parents[1] / "configs" / "sensors"
+SENSORS = EXAMPLES / "sensors"
 
 
 @loop(("name", "factor"), [("narrow", 0.5), ("wide", 2.0)])

@@ -1,7 +1,6 @@
 """Spectral studies: lights at equal illuminance, electrons per lux as an integral, the near infrared."""
 
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,14 +21,14 @@ from sensor.presets import preset
 from sensor.response import expected_electrons
 from studies.budget.bands import band_groups, possible_counts
 from studies.budget.starting_points import plan_from_settings
-from studies.commands import new as new_command
 from studies.metrics.target_figures import patch_masks
 from studies.study.lit_scene import level_luminance, open_choice, under
 from studies.study.study import RenderLimits, SceneChoice, Study
+from studies.study.study_file import EXAMPLES
 from studies.sweep.frames import colours_under
 
 LIGHTS = ("D65", "moonlight", "A", "LED-B3", "sodium_high", "sodium_low")
-SENSORS = Path(new_command.__file__).parents[1] / "configs" / "sensors"
+SENSORS = EXAMPLES / "sensors"
 LUX = 100.0
 
 

@@ -16,7 +16,8 @@ from command_line import COST, call
 from render.radiance_files.radiance_source import extent_of
 from rodcone.memory import memory
 from rodcone.progress import duration
-from studies.commands import cli, develop, expect
+from studies.commands import cli, expect
+from studies.commands import render as render_command
 from studies.photograph import shot
 from studies.study import cost
 from studies.study.cost import START_S, PictureCost, pace, render_seconds
@@ -87,7 +88,7 @@ def test_its_line_says_time_memory_and_samples_and_half_of_it() -> None:
 
 def test_a_dry_run_computes_nothing_and_says_what_would_be(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(develop, "render_transport", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(render_command, "render_transport", lambda *_, **__: pytest.fail("rendered"))
     monkeypatch.setattr(shot, "render", lambda *_, **__: pytest.fail("rendered"))
     code, out, err = call(["render", "still_life", "--width", "4000", "--spp", "4096", "-o", "a.exr", "--dry-run"])
     assert (code, err, out.count("\n")) == (0, "", 1)
@@ -118,7 +119,7 @@ def test_the_line_comes_before_all_else_and_memory_is_refused_after_it(
     assert "days" in first
     assert second.startswith("rodcone: memory: the run needs about")
     assert stopped.value.code == cli.BAD_INPUT
-    assert "studies.commands.develop" in sys.modules
+    assert "studies.commands.render" in sys.modules
 
 
 def test_a_sweeps_time_counts_first_calls_of_each_process_metrics_and_the_report(tmp_path: Path) -> None:

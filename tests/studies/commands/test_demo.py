@@ -11,9 +11,8 @@ from command_line import call, check_refusals
 from refusal import refusal
 
 from scenes.levels import DEMO_LEVELS
-from studies.commands.demo import STUDY
 from studies.study.levels import parse_level
-from studies.study.study_file import read_study
+from studies.study.study_file import DEMO_STUDY, read_study
 from studies.sweep.export import read_rows
 
 SMALL = ["--size", "48", "--spp", "16", "--sensor", "low_noise", "--level", "0.5cd/m2", "--level", "500lux"]
@@ -34,7 +33,7 @@ def results(folder: Path) -> dict[str, Any]:
 
 def test_seven_levels_run_from_moonlight_to_daylight() -> None:
     """In order, as tests/scenes/test_catalogue.py has them."""
-    levels = [parse_level(level) for level in read_study(STUDY).levels]
+    levels = [parse_level(level) for level in read_study(DEMO_STUDY).levels]
     assert levels == [(level.luminance_cd_m2, "cd/m2") for level in DEMO_LEVELS]
 
 

@@ -12,8 +12,8 @@ from sensor.cameras.library import VARIABLE
 from sensor.cfa import BAYER
 from sensor.config_file import read_sensor
 from sensor.presets import preset, preset_file, preset_names
-from studies.commands import new as new_command
-from studies.study.study_file import read_study
+from studies.commands.new.study import study as study_command
+from studies.study.study_file import EXAMPLES, read_study
 
 
 def test_the_copy_is_the_preset_with_its_comments_and_reads_as_it(tmp_path):
@@ -44,22 +44,21 @@ def test_a_file_that_exists_is_left_alone(tmp_path):
     assert path.read_text("utf-8") == "mine"
 
 
-CONFIGS = Path(new_command.__file__).parents[1] / "configs"
-EXAMPLES = sorted(path.stem for path in CONFIGS.glob("*.toml"))
+NAMES = sorted(path.stem for path in EXAMPLES.glob("*.toml"))
 
 
 def test_an_example_comes_with_all_that_it_names_and_the_help_names_it(tmp_path):
-    for name in EXAMPLES:
+    for name in NAMES:
         folder = tmp_path / name
         folder.mkdir()
         path = folder / f"{name}.toml"
         assert call(["new", "study", name, "-o", path]) == (0, f"{path}\n", "")
         for file in (file for file in folder.rglob("*") if file.is_file()):
-            assert file.read_bytes() == (CONFIGS / file.relative_to(folder)).read_bytes(), file
+            assert file.read_bytes() == (EXAMPLES / file.relative_to(folder)).read_bytes(), file
         study = read_study(path)  # checks every sensor, whose curves lie beside it
         assert study.name == name.replace("_", " ")
         assert all(Path(sensor).parent == folder / "sensors" for sensor in study.sensors if sensor.endswith(".toml"))
-        assert name in " ".join(new_command.study.__doc__.split()), name
+        assert name in " ".join(study_command.__doc__.split()), name
     # by night Gray World takes a sodium lamp for a grey wall
     assert read_study(tmp_path / "light_levels" / "light_levels.toml").white_balances == ("as-shot",)
 

@@ -15,10 +15,9 @@ from render.reference import FOLDER, SHIPPED, find_reference, require_agreement,
 from rodcone.progress import duration
 from scenes.catalogue import load
 from studies.budget.starting_points import plan_from_settings
-from studies.commands import demo
-from studies.commands.demo import STUDY
+from studies.commands import reference
 from studies.study.lit_scene import film_of, open_choice
-from studies.study.study_file import read_study
+from studies.study.study_file import DEMO_STUDY, read_study
 
 pytestmark = pytest.mark.thorough
 DEMO = ["demo", "--size", "32", "--sensor", "low_noise", "--level", "100cd/m2", "--processor", "bayer"]
@@ -26,7 +25,7 @@ DEMO = ["demo", "--size", "32", "--sensor", "low_noise", "--level", "100cd/m2", 
 
 def stored(size: int = 32):  # type: ignore[no-untyped-def]
     """Reference of the demo's scene."""
-    study = read_study(STUDY)
+    study = read_study(DEMO_STUDY)
     study = replace(study, render=replace(study.render, size=size))
     opened, model = open_choice(study.scenes[0], study), plan_from_settings(study).renders[study.scenes[0]]
     return find_reference(load("still_life"), film_of(opened, model))
@@ -44,7 +43,7 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(folder, monke
     monkeypatch.setenv(FOLDER, str(folder))
     first = stored().certificate
     assert first["samples"] == pytest.approx(512, rel=0.15)
-    assert list(first["shares"]["low_noise"]) == list(read_study(STUDY).levels)
+    assert list(first["shares"]["low_noise"]) == list(read_study(DEMO_STUDY).levels)
     assert first["share"] == max(first["shares"]["low_noise"].values())
     assert first["halves"]["chance"] > 1e-3
     assert {"mitsuba", "drjit", "rodcone"} <= set(first["versions"])
@@ -67,7 +66,7 @@ def test_the_file_has_its_certificate_and_the_same_command_goes_on(folder, monke
 
 def test_a_dry_run_says_what_the_first_samples_cost_or_how_far_the_light_has_come(tmp_path, monkeypatch):
     monkeypatch.setenv(FOLDER, str(tmp_path / "none"))
-    monkeypatch.setattr(demo, "render", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(reference, "render", lambda *_, **__: pytest.fail("rendered"))
     code, out, told = call(["reference", "still_life", "--size", "64", "--dry-run"])
     assert (code, told) == (0, "")
     assert re.match(r"about .+ GB: 64 x 64 pixels, 512 samples per pixel, 20 bands;", out)

@@ -13,7 +13,7 @@ from command_line import call, check_refusals
 
 from render.illuminants import illuminant
 from render.radiance_files.exr import read_exr
-from studies.commands import develop as render_command
+from studies.commands import render as render_command
 
 BANDS = ["--bands", "400:720:80"]
 QUICK = ["--spp", "8", *BANDS]

@@ -25,18 +25,17 @@ from scenes.levels import DEMO_LEVELS
 from sensor.config import SensorConfig
 from sensor.presets import preset, vary
 from studies.commands import dataset as dataset_command
-from studies.commands import demo as reference_command
 from studies.commands import expect as expect_command
-from studies.commands import export as export_command
 from studies.commands import plot as plot_command
+from studies.commands import reference as reference_command
 from studies.commands import score as score_command
-from studies.commands.demo import STUDY
+from studies.commands import table as table_command
 from studies.dataset.order import SetOrder
 from studies.design.expect import ExpectedError
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 from studies.score.sharpness import edge_coverage
-from studies.study.study_file import read_study
+from studies.study.study_file import DEMO_STUDY, read_study
 
 
 def printed(*words: object) -> str:
@@ -235,7 +234,7 @@ def test_reference_asks_for_samples_by_the_share_so_far_and_certifies_each_step(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """The share at one level is 600 over samples and luminance; 512 samples are the first step, and the most added."""
-    study, renders, kept = read_study(STUDY), [], []
+    study, renders, kept = read_study(DEMO_STUDY), [], []
     luminances = [level.luminance_cd_m2 for level in DEMO_LEVELS if level.name in study.levels]
     assert len(luminances) == len(study.levels)
 
@@ -291,7 +290,7 @@ def test_table_tells_the_mean_over_seeds_and_students_interval(tmp_path: Path, m
         for level, values in psnr.items()
         for seed, db in enumerate(values)
     ]
-    monkeypatch.setattr(export_command, "read_rows", lambda folder: rows if folder == tmp_path else [])
+    monkeypatch.setattr(table_command, "read_rows", lambda folder: rows if folder == tmp_path else [])
     out = printed(
         "table", tmp_path, "--by", "processor,level", "--show", "psnr_db,electrons_W", "--where", "processor=ple"
     )  # fmt: skip

@@ -14,7 +14,8 @@ from render.illuminants import illuminant
 from render.loader import Film
 from render.reference import SHIPPED, find_reference, ready_light
 from scenes.catalogue import load
-from studies.commands import cli, develop
+from studies.commands import cli
+from studies.commands import render as render_command
 from studies.explore.memo import never_cancel
 from studies.explore.source import RenderOptions, open_source
 from studies.photograph import shot
@@ -104,7 +105,7 @@ def test_render_takes_it_too_and_each_limit_of_a_render_asks_for_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr(develop, "render_transport", lambda *_, **__: pytest.fail("rendered"))
+    monkeypatch.setattr(render_command, "render_transport", lambda *_, **__: pytest.fail("rendered"))
     code, out, err = call(["render", "color_checker", "-o", "small.exr", "--width", "128", "--light", "A", "--json"])
     facts = json.loads(out)
     assert (code, facts["size"]) == (0, [85, 128])
@@ -144,7 +145,7 @@ def test_a_render_is_kept_where_what_follows_it_fails(monkeypatch: pytest.Monkey
     for command, name in (("capture", "shot.tif"), ("render", "seen.exr")):
         arguments = [command, "flat_field", *["--height", "8", "--width", "8", "--spp", "2"], "-o", name]
         with monkeypatch.context() as patch:
-            for module, written in ((shot, "write_with_bayer"), (develop, "write_exr")):
+            for module, written in ((shot, "write_with_bayer"), (render_command, "write_exr")):
                 patch.setattr(module, written, lambda *_, **__: full())
             code, _, err = call(arguments)
             assert (code, err.count(f"the render is kept in .{name}.render")) == (cli.BAD_INPUT, 1)

@@ -1,16 +1,10 @@
-"""`rodcone new`: files to start from."""
+"""The command `rodcone new preset`: a sensor as a TOML file."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from types import MappingProxyType
 
-from cyclopts import App
-
-from rodcone.curve_file import is_curve_file
-from rodcone.errors import InputError, require_absent, require_keys, require_range
+from rodcone.errors import InputError, require_absent, require_range
 from rodcone.files import check_place, require_ending, write_files
-from rodcone.toml_file import read_toml
 from sensor.cameras.emva_report import numbers_at_gains, numbers_of, read_report
 from sensor.cameras.library import measured_camera
 from sensor.cameras.noise_files import dng_numbers
@@ -26,14 +20,12 @@ from sensor.cameras.numbers import (
 from sensor.presets import preset as read_preset
 from sensor.presets import preset_file
 from studies.commands.console import require_new, say
+from studies.commands.new.example_files import copy_example
+from studies.study.study_file import EXAMPLES
 
-app = App(help_format="markdown", name="new", help="Write files to start from.")
-_STUDIES = Path(__file__).parent.parent / "configs"
-_EYE = _STUDIES / "sensors" / "eye.toml"  # its receptors make no colour matrix, so it is no preset of `sensor.presets`
-_CLUSTER = Path(__file__).parent.parent / "data" / "dask.yaml"
+_EYE = EXAMPLES / "sensors" / "eye.toml"  # its receptors make no colour matrix, so it is no preset of `sensor.presets`
 
 
-@app.command
 def preset(
     name: str | None = None,
     /,
@@ -74,9 +66,9 @@ def preset(
             raise InputError("name: none is given; allowed: a preset's name, --camera or --noise; give one")
         require_absent(f"for {name!r}; allowed: with --camera or --noise", anchor=anchor, more_gain=more_gain)
         if name == _EYE.stem:
-            _copy(_EYE, out, ".toml", _beside({out.parent / "receptors.csv": _EYE.with_name("receptors.csv")}))
+            copy_example(_EYE, out, ".toml", {out.parent / "receptors.csv": _EYE.with_name("receptors.csv")})
         else:
-            _copy(preset_file(name), out, ".toml")
+            copy_example(preset_file(name), out, ".toml")
         return
     require_new(out, ".toml")
     curves_file = out.parent / f"{out.stem}_curves.csv"
@@ -112,69 +104,6 @@ def preset(
     print(out)
 
 
-@app.command
-def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
-    """Copy an example of a study to a TOML file to change, for `rodcone sweep`; sensors that it names come with it.
-
-    Parameters
-    ----------
-    name
-        light_levels (moonlight to daylight), spectra (one scene under several lights at equal lux), metamers (pairs
-        that look alike under D65), infrared_cut (a filter in or out), responses (broad filters or narrow ones),
-        exposures (exposure times and fixed patterns on Table 1's pixel), isos (speeds of a phone's pixel), flicker
-        (exposure times under lamps of 100 Hz), motion (exposure times of a walker by night), glare (a street's lamps
-        through a lens that scatters), opponents (every processor), white_pixel (one method with and without W),
-        white_pixel_lights (the same under four lights), real_cameras (five cameras that exist beside the paper's
-        pixel), eye (rods and cones, interleaved and in blocks), benchmark (the frozen list of rodcone judge), demo
-        (what rodcone demo makes), or paper_1b and paper_6 (of the paper's figures).
-    out
-        File to write, ending in .toml; one that exists is left alone. Sensors and their curves go into the folder
-        sensors beside it, where files of the same content are kept.
-    """
-    if out is None:
-        file = name if name.endswith(".toml") else "mine.toml"
-        example = "" if name.endswith(".toml") else f" {name}"
-        raise InputError(f"out: none is given; allowed: a new .toml file; write rodcone new study{example} -o {file}")
-    examples = {path.stem: path for path in sorted(_STUDIES.glob("*.toml"))}
-    require_keys("study", [name], examples)
-    beside = {out.parent / file_name: _STUDIES / file_name for file_name in _named(examples[name])}
-    _copy(examples[name], out, ".toml", _beside(beside))
-
-
-@app.command
-def cluster(*, out: Path) -> None:
-    """Copy settings of dask.distributed that suit sweeps, with the commands that start a cluster.
-
-    Parameters
-    ----------
-    out
-        File to write, ending in .yaml; one that exists is left alone.
-    """
-    _copy(_CLUSTER, out, ".yaml")
-
-
-def _named(study_file: Path) -> list[str]:
-    """Files that an example names, and those that its sensors name, relative to its folder."""
-    files = []
-    for name in read_toml(study_file).get("sensors", ()):
-        if name.endswith(".toml"):
-            responses = read_toml(study_file.parent / name).get("responses", {}).values()
-            curves = [value for value in responses if isinstance(value, str) and is_curve_file(value)]
-            files += [name, *(str(Path(name).parent / curve) for curve in curves)]
-    return list(dict.fromkeys(files))
-
-
-def _beside(files: Mapping[Path, Path]) -> Mapping[Path, Path]:
-    """Files to copy by their new paths, or `InputError` where another file has one of these."""
-    for target, source in files.items():
-        if target.exists() and target.read_bytes() != source.read_bytes():
-            raise InputError(
-                f"out: {str(target)!r} exists and differs from the example's; allowed: no such file, or the same; "
-                "choose another folder"
-            )
-    return files
-
-
 def _numbers(noise: Path | None, more_gain: Path | None) -> PixelNumbers:
     if more_gain is not None:
         if noise is None or noise.suffix.lower() != ".toml":
@@ -199,13 +128,3 @@ def _anchor(text: str) -> tuple[float, float]:
     require_range("anchor", value, 1e-6, 1.0, "give electrons per photon, such as 0.5@530")
     require_range("anchor", at_nm, 300.0, 1100.0, "give the wavelength in nm, such as 0.5@530")
     return value, at_nm
-
-
-def _copy(source: Path, out: Path, ending: str, beside: Mapping[Path, Path] = MappingProxyType({})) -> None:
-    """Copy a file to a new one, after the files that belong beside it, and print its path."""
-    require_new(out, ending)
-    for target, other in {**beside, out: source}.items():
-        if target != out:
-            target.parent.mkdir(exist_ok=True)
-        write_files({target: other.read_bytes()})
-    print(out)

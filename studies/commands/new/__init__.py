@@ -1,0 +1,1 @@
+"""The commands `rodcone new preset`, `study` and `cluster`: files to start from."""
