@@ -15,10 +15,11 @@ import numpy as np
 import scipy
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
 from isp.anscombe import stabilise_raw, unstabilise, without_prnu
+from isp.blas import one_thread
 from isp.settings import Reconstruction
+from isp.strips import strips
 from rodcone.types import Plane
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
@@ -58,9 +59,8 @@ def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
     bright = raw.saturated | (values > np.select(sampled, list(high + OUTLYING * np.maximum(spread, 1.0))))
     beside = scipy.ndimage.maximum_filter(bright, size=SIDE)
     noises = [raw.noise_of(name) for name in names]
-    for first in range(0, len(values), STRIP_ROWS):
-        rows = range(first, min(first + STRIP_ROWS, len(values)))
-        strip = slice(rows.start, rows.stop)
+    for strip in strips(len(values), STRIP_ROWS):
+        rows = range(strip.start, strip.stop)
         estimate, noise_gain = krige(values, raw.cfa, deviation, rows=rows)
         if beside[strip].any():
             lone = np.full_like(deviation, BESIDE_LAMPS)
@@ -113,7 +113,6 @@ def krige(
     asked = range(height) if rows is None else rows
     scales = (*deviation.tolist(), correlation)
     estimate, noise_gain = np.zeros((2, count, len(asked), width))
-    blas = ThreadpoolController()
     for alike in _alike(height, len(tile)):
         part = _within(alike, asked)
         if not len(range(height)[part]):
@@ -124,7 +123,7 @@ def krige(
                 continue
             first = alike.start, columns.start
             down, across = (_reach(at, side) for at, side in zip(first, values.shape, strict=True))
-            with blas.limit(limits=1, user_api="blas"):  # of BLAS: on a busy machine several wait for each other
+            with one_thread():
                 weights = _weights(tile, (first[0] % len(tile), first[1] % len(tile[0])), down, across, scales)
                 estimate[:, at, columns] = _weighted(values, weights, part, columns, (down, across))
             noise_gain[:, at, columns] = (weights**2).sum(axis=1)[:, None, None]

@@ -86,7 +86,7 @@ class Picture:
         """
         level = (white_of(self.rgb) or 1.0) if white is None else white
         require_range("white", level, 1e-12, 1e12, "give electrons of green")
-        return encode(self.rgb / level, encoding)
+        return encode(self.rgb, encoding, white=level)
 
     @method
     def plot_line(self, row: int | None = None, axes: Axes | None = None) -> Axes:

@@ -8,6 +8,7 @@ from types import MappingProxyType
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from isp.strips import strips
 from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
 from rodcone.errors import InputError, require_name
 
@@ -35,8 +36,10 @@ ENCODINGS: Mapping[str, Encoding] = MappingProxyType(
 )
 
 
-def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float64]:
-    """Encode linear sRGB (..., 3) for a display, clipped to [0, 1] in its own primaries.
+def encode(
+    linear_srgb: NDArray[np.floating], encoding: str, *, white: float = 1.0, gain: float = 1.0
+) -> NDArray[np.float64]:
+    """Encode ``linear_srgb / white * gain`` (..., 3) for a display, clipped to [0, 1] in its own primaries.
 
     Raises
     ------
@@ -47,11 +50,10 @@ def encode(linear_srgb: NDArray[np.floating], encoding: str) -> NDArray[np.float
     from_srgb = np.linalg.inv(rgb_to_xyz(ENCODINGS[encoding].primaries_xy)) @ SRGB_TO_XYZ
     linear_srgb = np.asarray(linear_srgb)
     if not linear_srgb.ndim:
-        return encode_srgb(linear_srgb)
+        return encode_srgb(linear_srgb / white * gain)
     encoded = np.empty(linear_srgb.shape)
-    for first in range(0, len(encoded), STRIP_ROWS):
-        rows = slice(first, first + STRIP_ROWS)
-        linear = linear_srgb[rows]
+    for rows in strips(len(encoded), STRIP_ROWS):
+        linear = linear_srgb[rows] / white * gain
         encoded[rows] = encode_srgb(linear if encoding == "srgb" else linear @ from_srgb.T)
     return encoded
 
@@ -78,8 +80,7 @@ def quantise(encoded: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
         raise InputError(f"picture: {wrong} of {given.size} values are NaN or infinite; allowed: 0 to 1; mend them")
     most = 2**bits - 1
     outside, samples = 0, np.empty(given.shape, f"u{bits // 8}")
-    for first in range(0, len(given), STRIP_ROWS):
-        rows = slice(first, first + STRIP_ROWS)
+    for rows in strips(len(given), STRIP_ROWS):
         levels = np.rint(np.multiply(given[rows], most, dtype=np.float64))
         outside += int(((levels < 0) | (levels > most)).sum())
         samples[rows] = np.clip(levels, 0, most)

@@ -30,6 +30,7 @@ from isp.interleaved.kernel.edges import (
 )
 from isp.interleaved.panchromatic import at_pixels
 from isp.settings import WhiteReading
+from isp.strips import strips
 from rodcone.jit import backend
 from rodcone.types import Floats
 from sensor.cfa import mask
@@ -112,9 +113,8 @@ def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain
     electrons, sites = (np.pad(values, border, mode="reflect") for values in (raw.electrons, site))
     parts = list[Floats]()
     shares = at_pixels(white.shares, raw).astype(np.float64)
-    for first in range(0, raw.shape[0], STRIP_ROWS):
-        rows = slice(first, first + STRIP_ROWS + 2 * FAR)
-        own = slice(first, first + STRIP_ROWS)
+    for own in strips(raw.shape[0], STRIP_ROWS):
+        rows = slice(own.start, own.stop + 2 * FAR)
         around = padded[rows], electrons[rows], sites[rows]
         parts.append(_sharpen(raw, gains, nu, shares[own], noise_gain[own], *around))
     return np.concatenate(parts).astype(np.float32)

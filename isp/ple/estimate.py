@@ -16,7 +16,6 @@ channels. *Light* is a patch's mean brightness, in electrons that a G sample col
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cache
 from itertools import pairwise
 from os import cpu_count
 from typing import Any
@@ -24,8 +23,8 @@ from typing import Any
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
-from threadpoolctl import ThreadpoolController
 
+from isp.blas import one_thread
 from isp.ple.curve import TOGETHER, on_the_curve
 from isp.ple.overlap import STRIDE, Patches, overlapped
 from isp.ple.pick import BLOCK, blocks, pick
@@ -139,8 +138,7 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
     cells = np.zeros(variance.shape[:2], np.float32)
     noise = []
-    # BLAS's own threads would wait for each other.
-    with _blas().limit(limits=1), ThreadPoolExecutor(cpu_count()) as threads:
+    with one_thread(), ThreadPoolExecutor(cpu_count()) as threads:
         # Tables first, each once: strips would make the same ones at the same time.
         list(threads.map(lambda key: table(prior, *key), _table_keys(scale.samplings, steps)))
         for first, (values, weights, inner, count, patch_noise) in zip(
@@ -161,12 +159,6 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
     frame = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
     return ScaleEstimate(inside, variance[frame], np.median(np.concatenate(noise), axis=0))
-
-
-@cache
-def _blas() -> ThreadpoolController:
-    """BLAS as loaded here; looking for it takes milliseconds."""
-    return ThreadpoolController().select(user_api="blas")
 
 
 def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:

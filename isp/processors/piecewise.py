@@ -23,6 +23,7 @@ from isp.ple.prior import LETTERS, Prior, mixed_prior, own_prior
 from isp.ple.pyramid import reconstruct
 from isp.processors.any_mosaic import rgb_of_channels
 from isp.processors.demosaic import require_bayer
+from isp.strips import strips
 from rodcone.errors import InputError
 from rodcone.types import Floats, Singles
 from sensor.cfa import RGBW, Tile, channels, is_rgbw
@@ -134,8 +135,7 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
     matrix = colours.matrix(names[:used], noise[:used]) if coloured else None
     highlights = Highlights.of(raw, gains)
     rgb = np.empty((*raw.shape, 3))
-    for first in range(0, len(rgb), STRIP_ROWS):
-        rows = slice(first, first + STRIP_ROWS)
+    for rows in strips(len(rgb), STRIP_ROWS):
         balanced = highlights.held(planes[rows, :, :used].astype(np.float64) * gains[:used], rows)
         rgb[rows] = rgb_of_channels(raw, balanced, colours, noise) if matrix is None else balanced @ matrix.T
     return PiecewisePicture(Picture(rgb, sources), planes, gains)

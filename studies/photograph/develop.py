@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from isp.colour.calibrated_colours import fit_of_calibration, neutral_under
-from isp.colour.encoding import STRIP_ROWS, encode
+from isp.colour.encoding import encode
 from isp.picture import Picture
 from isp.processors.catalogue import default_processor
 from isp.processors.own import processor_of, require_consent
@@ -171,12 +171,8 @@ def develop_file(
         from skimage.transform import resize_local_mean  # imported here: it takes as long as a small picture
 
         scaled = np.asarray(resize_local_mean(picture.rgb / raw.full_well_e, size, channel_axis=-1))
-        return Developed(encode(scaled * 2.0**stops, encoding), facts)
-    encoded = np.empty(picture.rgb.shape)
-    for first in range(0, size[0], STRIP_ROWS):
-        rows = slice(first, first + STRIP_ROWS)
-        encoded[rows] = encode(picture.rgb[rows] / raw.full_well_e * 2.0**stops, encoding)
-    return Developed(encoded, facts)
+        return Developed(encode(scaled, encoding, gain=2.0**stops), facts)
+    return Developed(encode(picture.rgb, encoding, white=raw.full_well_e, gain=2.0**stops), facts)
 
 
 def _size(linear: NDArray[np.float64], height: int | None, width: int | None) -> tuple[int, int]:

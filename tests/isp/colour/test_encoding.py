@@ -34,6 +34,7 @@ def test_strips_of_rows_are_encoded_and_quantised_as_the_whole_picture(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     linear = np.random.default_rng(1).uniform(-0.1, 1.3, (9, 5, 3))
+    assert np.array_equal(encode(linear, name, white=3.0, gain=0.7), encode(linear / 3.0 * 0.7, name))
     whole = encode(linear, name)
     samples = quantise(whole, 16)
     monkeypatch.setattr(encoding, "STRIP_ROWS", 4)
