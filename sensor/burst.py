@@ -15,7 +15,7 @@ from sensor.cfa import mask
 from sensor.config import SensorConfig
 from sensor.pixel import Chip, PixelConfig, Reading, pixel_of_readings
 from sensor.raw import RawImage
-from sensor.readings.noise import CLEAR_SIGMAS
+from sensor.readings.best_estimate import CLEAR_SIGMAS
 
 BURST_WHITE_DN = 65_535.0  # of a merged burst, whose samples are no whole numbers
 _Dark = TypeVar("_Dark", PixelConfig, Reading)

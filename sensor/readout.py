@@ -14,10 +14,10 @@ from sensor.device import Device
 from sensor.pixel import bent_e
 from sensor.random import NoiseTerm, draw_key, normals, poisson
 from sensor.raw import RawImage
+from sensor.readings.best_estimate import merged_variance, merged_variances
 from sensor.readings.channels import join
 from sensor.readings.clipping import Moments, clipped_frame
 from sensor.readings.merge import merge
-from sensor.readings.noise import merged_variance, merged_variances
 from sensor.readings.resolve import PlainReading, at_channel, by_site, law_by_site, light_of, resolve, several
 
 # Digital numbers of one exposure from expected electrons, camera, chip, exposure time [s], key, and the reading's
@@ -150,8 +150,8 @@ def read_out(
             f"expected_e: shape {expected.shape} is not the device's {device.shape}; "
             "draw the device with the frame's shape"
         )
-
-    return read(expected, resolve(sensor, expected, exposure_s), device, rng, draw=draw, engine=engine)
+    readings = resolve(sensor, expected, exposure_s)
+    return read(expected, readings, device, rng, draw=draw, engine=engine)
 
 
 def read(

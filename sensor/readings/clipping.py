@@ -22,14 +22,12 @@ import scipy
 
 from rodcone.types import Floats
 from sensor.cfa import mask
-from sensor.noise_law import total
 from sensor.pixel import bent_e, bent_slope
 from sensor.readings.resolve import PlainReading
 
 FAR = 7.0  # standard deviations; a sample farther from a bound never clips there
 LOW = 4.9  # the same for black: the default black level is five deviations high and clips nothing
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(24)
-_COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources that the well clips
 
 
 @dataclass(frozen=True)
@@ -80,13 +78,13 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     well_e, top_e = sensor.pixel.full_well_e / share - dark_e, reading.headroom_e
     if sensor.pixel.response_bend:
         mean, slope, black_e = _bent(mean + dark_e, dark_e, reading)
-        variance = variance + (slope**2 - 1) * total(reading.sources[name] for name in _COUNTED).variance(light)
+        variance = variance + (slope**2 - 1) * reading.counted_law.variance(light)
         well_e, top_e = well_e + dark_e - black_e, top_e + dark_e - black_e
 
     # Clip at the well and at the converter's top.
     near = mean + FAR * np.sqrt(variance) > top_e
     if near.any():
-        counted = total(reading.sources[name] for name in _COUNTED).variance(light[near]) * slope[near] ** 2
+        counted = reading.counted_law.variance(light[near]) * slope[near] ** 2
         after_e = np.sqrt(np.maximum(variance[near] - counted, 0.0))
         first, second, open_ = _over_reading(mean[near], counted, after_e, well_e, top_e)
         mean[near] += first
@@ -95,7 +93,7 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
     # Clip at black: only the noise of reading takes samples there, for counts aren't negative; rounding clips none.
     bottom_e = -sensor.black_dn * sensor.gain_e_per_dn / share - black_e
     rounding_e2 = reading.sources["quantisation"].dark_e ** 2
-    after_e2 = law.variance(np.zeros(1)) - total(reading.sources[name] for name in _COUNTED).variance(np.zeros(1))
+    after_e2 = law.variance(np.zeros(1)) - reading.counted_law.variance(np.zeros(1))
     low = ~near & (mean - LOW * np.sqrt(np.maximum(after_e2 - rounding_e2, 0.0)) < bottom_e)
     if low.any():
         first, second, open_ = censored(-mean[low], variance[low] - rounding_e2, -bottom_e)

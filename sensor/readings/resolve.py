@@ -26,6 +26,7 @@ from sensor.noise_law import NoiseLaw, total
 from sensor.pixel import ChannelReading, Chip, PixelConfig
 
 Values: TypeAlias = NDArray[Any]
+_COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources of noise in the electrons that a well holds
 _STEPS = 16.0  # steps per octave of a metered time, so that frames of one scene take the same time
 
 
@@ -102,6 +103,11 @@ class PlainReading:
     def law(self) -> NoiseLaw:
         """Law of a sample's noise over chips and exposures, in the raw image's electrons; without clipping."""
         return total(self.sources.values())
+
+    @cached_property
+    def counted_law(self) -> NoiseLaw:
+        """Part of `law` that is in the electrons counted, which the well clips."""
+        return total(self.sources[name] for name in _COUNTED)
 
 
 def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0) -> dict[str, NoiseLaw]:

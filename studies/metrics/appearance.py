@@ -63,16 +63,11 @@ def picture_quality(picture: NDArray[np.float64], truth: "NDArray[np.float64] | 
     InputError
         For a value that is NaN or infinite.
     """
-    if isinstance(truth, TruePicture):
-        encoded, lab, moments = truth.encoded, truth.lab, truth.moments
-        require_finite(picture=picture)
-    else:
-        require_finite(picture=picture, truth=truth)
-        encoded, lab, moments = truth, skimage.color.rgb2lab(truth), local_moments(truth)
+    psnr = psnr_db(picture, truth.encoded if isinstance(truth, TruePicture) else truth)
+    lab = truth.lab if isinstance(truth, TruePicture) else skimage.color.rgb2lab(truth)
+    moments = truth.moments if isinstance(truth, TruePicture) else local_moments(truth)
     delta_e = skimage.color.deltaE_ciede2000(skimage.color.rgb2lab(picture), lab)
-    return Quality(
-        psnr_db(picture, encoded), ssim(picture, moments), float(np.median(delta_e)), float(np.percentile(delta_e, 95))
-    )
+    return Quality(psnr, ssim(picture, moments), float(np.median(delta_e)), float(np.percentile(delta_e, 95)))
 
 
 @dataclass(frozen=True)

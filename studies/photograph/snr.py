@@ -10,7 +10,7 @@ import numpy as np
 from rodcone.errors import require_name
 from rodcone.types import Floats
 from sensor.config import SensorConfig
-from sensor.readings.noise import dark_electrons, merged_variance
+from sensor.readings.best_estimate import dark_electrons, merged_variance
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, resolve, several
 from sensor.readout import frame_moments
 from studies.metrics.truth import GREY, Light, named_light, neutral_electrons

@@ -14,7 +14,7 @@ from sensor.device import Device, draw_device
 from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import camera_equation, form_image
 from sensor.raw import RawImage
-from sensor.readings.noise import collected_share
+from sensor.readings.best_estimate import collected_share
 from sensor.readings.resolve import PlainReading, at_channel, chip_readings, several
 from sensor.readout import sources_of
 from sensor.response import expected_electrons

@@ -15,7 +15,7 @@ from rodcone.types import Floats
 from sensor.config import MOST_GAIN
 from sensor.photodiodes import with_gain
 from sensor.raw import RawImage
-from sensor.readings.noise import merged_variance, seams
+from sensor.readings.best_estimate import merged_variance, seams
 from sensor.readings.resolve import several
 from studies.photograph.snr import electrons_at_snr, snr
 from studies.score.even_field import EvenField

@@ -14,7 +14,7 @@ from sensor.device import draw_device
 from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency
 from sensor.lens.illumination import EVEN_LIGHT
 from sensor.optics import form_image, least_samples
-from sensor.readings.noise import collected_share
+from sensor.readings.best_estimate import collected_share
 from sensor.readings.resolve import at_channel, chip_readings, several
 from sensor.response import electrons_per_irradiance, expected_electrons
 from studies.metrics.mtf import EdgeResponse, edge_response

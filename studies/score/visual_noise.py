@@ -17,7 +17,7 @@ from rodcone.colour_spaces import SRGB_TO_XYZ
 from rodcone.errors import InputError, one_line
 from rodcone.types import Floats
 from sensor.config import SensorConfig
-from sensor.readings.noise import merged_variances
+from sensor.readings.best_estimate import merged_variances
 from sensor.readings.resolve import several
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE, XYZ_TO_OPPONENT, eye_xyz, transfer
 from studies.metrics.truth import GREY, named_light

@@ -1,6 +1,7 @@
 """Where a cell's numbers come from: the render's variant, engines and versions. Cells that differ are not averaged."""
 
 import json
+import platform
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields
@@ -117,6 +118,21 @@ def in_words(made_by: Provenance) -> dict[str, str]:
         "engine of development": made_by.development_engine,
         **json.loads(made_by.versions),
     }
+
+
+def require_same(stated: Provenance, processor: str, on_backend: bool, user_versions: Mapping[str, str]) -> None:
+    """Raise `InputError` where this process has other code, versions or engines than the sweep that a cell is of.
+
+    Parameters are as `provenance` takes them.
+    """
+    exact = stated.readout_engine == "numpy"
+    local = in_words(provenance(stated.variant, processor, on_backend, user_versions, exact))
+    for name, version in in_words(stated).items():
+        if local.get(name) != version:
+            raise InputError(
+                f"worker on {platform.node()}: its {name} is {local.get(name)}, the sweep's is {version}; allowed: the "
+                "same; install the same rodcone with the same packages and start the worker again"
+            )
 
 
 def made_by(row: Row) -> Provenance:

@@ -10,11 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from isp.colour.encoding import quantise
-from isp.processors.catalogue import Processor
 from isp.processors.own import own_version, processor_of
 from rodcone.colour_spaces import encode_srgb
 from rodcone.errors import InputError
-from rodcone.types import Image, Mosaic
+from rodcone.types import Image
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import block_sums, mask
@@ -36,7 +35,7 @@ from studies.study.gain import iso_speed
 from studies.study.render_noise import monte_carlo_bound
 from studies.study.study import AS_SHOT, label
 from studies.sweep.cells import Cell, device_stream, exposure_stream, flicker_stream, labels, render_text, shake_stream
-from studies.sweep.provenance import in_words, provenance, threads
+from studies.sweep.provenance import require_same, threads
 from studies.sweep.row import Row
 from studies.sweep.stored import is_whole, keep
 
@@ -53,7 +52,7 @@ def run_cell(cell: Cell) -> Row:
         Where the picture can't be written.
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
-    _check_provenance(cell, processor)
+    require_same(cell.made_by, cell.processor, processor.on_backend, own_version(cell.processor))
     frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
@@ -74,7 +73,9 @@ def run_cell(cell: Cell) -> Row:
         hand = shake_stream(cell.seed)
         raws = []
         for start_s in frame_starts_s(sensor, shape, cell.exposure_s, flicker_stream(cell.seed), frames):
-            frame_e = _under_lamps(cell, expected_e, start_s)
+            frame_e = expected_e
+            if cell.flicker is not None:
+                frame_e = flickering(expected_e, [(cell.flicker, expected_e)], sensor, cell.exposure_s, start_s)
             if sensor.lens.shake_um:
                 frame_e = behind_filters(shaken(unmoved_e, sensor, cell.exposure_s, hand), sensor)
             raws.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
@@ -148,25 +149,6 @@ def run_cell(cell: Cell) -> Row:
         machine=machine(),
         worker=threading.get_native_id(),
     )
-
-
-def _under_lamps(cell: Cell, expected_e: Mosaic, start_s: float) -> Mosaic:
-    """Expected electrons of an exposure that starts at a time of the lamps' clock."""
-    if cell.flicker is None:
-        return expected_e
-    return flickering(expected_e, [(cell.flicker, expected_e)], cell.frame.sensor, cell.exposure_s, start_s)
-
-
-def _check_provenance(cell: Cell, processor: Processor) -> None:
-    exact = cell.made_by.readout_engine == "numpy"
-    name = cell.processor
-    local = in_words(provenance(cell.made_by.variant, name, processor.on_backend, own_version(name), exact))
-    for name, version in in_words(cell.made_by).items():
-        if local.get(name) != version:
-            raise InputError(
-                f"worker on {platform.node()}: its {name} is {local.get(name)}, the sweep's is {version}; allowed: the "
-                "same; install the same rodcone with the same packages and start the worker again"
-            )
 
 
 def _truth(path: Path, binned: bool) -> tuple[TruePicture, bytes]:

@@ -23,7 +23,7 @@ from sensor.emva1288.photon_transfer import light_bench
 from sensor.photodiodes import binned
 from sensor.pixel import PixelConfig, Reading
 from sensor.raw import noise_at_sites
-from sensor.readings.noise import collected_share, dark_electrons
+from sensor.readings.best_estimate import collected_share, dark_electrons
 from sensor.readings.resolve import chip_readings
 from sensor.readout import noise_sources, noise_variance, read_out
 from studies.photograph.snr import electrons_at_snr

@@ -128,7 +128,7 @@ STATED = {
         "studies.dataset.judge": {"_NEARER_DB": 3.0, "_OVERSHOOT": 0.01},
     },
     "docs of the sensor: a reading counts 6 deviations under its well": {
-        "sensor.readings.noise": {"CLEAR_SIGMAS": 6.0}
+        "sensor.readings.best_estimate": {"CLEAR_SIGMAS": 6.0}
     },
 }
 

@@ -23,7 +23,7 @@ from sensor.presets import low_noise, preset, preset_file, vary
 from sensor.random import poisson
 from sensor.raw import RawImage, noise_at_sites
 from sensor.raw_files.raw_file import read_raw, write_raw
-from sensor.readings.noise import collected_share, covariances, seams, shares
+from sensor.readings.best_estimate import collected_share, covariances, seams, shares
 from sensor.readings.resolve import at_channel, chip_readings, resolve, unsaturated
 from sensor.readout import draw_frame, noise_sources, noise_variance, read_out
 from studies.photograph.camera import calibrate

@@ -13,8 +13,8 @@ from sensor.device import draw_device
 from sensor.photodiodes import with_gain
 from sensor.pixel import ChannelReading
 from sensor.presets import low_noise, preset
+from sensor.readings.best_estimate import collected_share
 from sensor.readings.clipping import clipped
-from sensor.readings.noise import collected_share
 from sensor.readings.resolve import at_channel, by_site, chip_readings, law_by_site, light_of, resolve, unsaturated
 from sensor.readout import frame_moments, light_variance, noise_sources
 

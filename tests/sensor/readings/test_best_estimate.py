@@ -1,4 +1,4 @@
-"""Joint noise of several readings against closed forms worked out on paper."""
+"""The best estimate from several readings, and its noise, against closed forms worked out on paper."""
 
 from dataclasses import replace
 
@@ -16,8 +16,15 @@ from sensor.device import draw_device
 from sensor.exposure import exposure_of_electrons_s
 from sensor.pixel import Reading
 from sensor.presets import low_noise, preset, preset_file
-from sensor.readings.merge import merged_noise_steps
-from sensor.readings.noise import best_weights, collected_share, covariances, merged_variance, merged_variances, seams
+from sensor.readings.best_estimate import (
+    best_weights,
+    collected_share,
+    covariances,
+    merged_noise_steps,
+    merged_variance,
+    merged_variances,
+    seams,
+)
 from sensor.readings.resolve import chip_readings, resolve
 from sensor.readout import noise_sources, noise_variance, unclipped_variance
 from studies.photograph.snr import electrons_at_snr, snr
