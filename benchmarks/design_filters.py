@@ -8,7 +8,7 @@ from design_slope import error_slopes
 from scipy.optimize import minimize
 
 from isp.design.expected_error import Noise
-from isp.design.spectral_prior import load_prior
+from isp.design.spectral_prior import load_spectral_prior
 from render.spectrum import Spectrum
 from rodcone.progress import Step
 from rodcone.types import Floats
@@ -47,7 +47,7 @@ def best_filters(goal: Goal, given: SensorConfig, tile: Tile, progress: Step) ->
         Called with the score and the share that is done.
     """
     # What all rounds share.
-    prior, seen, names = load_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
+    prior, seen, names = load_spectral_prior(goal.prior), view_of(goal.prior, goal.light), channels(tile)
     reference_db = camera_db(goal, vary(given, goal.never_worse_than))
     places = sites_of(tile)
     spread = spread_of(given.pixel.crosstalk)

@@ -37,7 +37,7 @@ from sensor.exposure import AUTO_INFORMATION, exposed_by_rule
 from sensor.presets import low_noise, vary
 from studies.metrics.truth import named_light, neutral_electrons
 from studies.photograph.camera import colour_fit
-from studies.training.pictures import NM, PHOTOGRAPHS, KnownLight, dead_leaves, draw_illuminant, draw_surface, gratings
+from studies.training.pictures import NM, PHOTOGRAPHS, KnownLight, draw_illuminant, draw_surface, gratings, leaf_picture
 
 HELD = "coffee"
 CROP = 128  # pixels of a frame
@@ -50,7 +50,7 @@ HELD_KINDS = ("leaves", HELD, "gratings", HELD)
 HELD_CD_M2 = (0.05, 0.5, 5.0, 100.0)
 NEAR = 2.0  # by which a group's light differs at most, so that it shares `ple`'s tables
 MOSAICS = ("rgbw", "bayer")
-DRAWN = {"leaves": dead_leaves, "gratings": gratings}
+DRAWN = {"leaves": leaf_picture, "gratings": gratings}
 LIGHTER = (1.0, 1.0, 1.5)  # factors on the exposure, so that W is full too
 TRUTH_LETTERS = "RGBW"
 

@@ -181,7 +181,8 @@ def _weights(
 
     # Covariance between samples, and of samples with what is asked for.
     between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
-    near, at = _nearness(), (RADIUS + rows) * SIDE + RADIUS + columns
+    near = _nearness()
+    at = (RADIUS + rows) * SIDE + RADIUS + columns
     covariance = between[channel[:, None], channel] * near[at[:, None], at] + np.eye(rows.size)
     target_covariance = between[:, channel] * near[len(near) // 2, at]
 

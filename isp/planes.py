@@ -118,7 +118,9 @@ def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
 def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
     """Sums of `count` rows that follow each other, from sums of a power of two of them."""
     rows = len(values) - count + 1
-    start, power, total = 0, 1, None
+    start = 0
+    power = 1
+    total = None
     while True:
         if count & power:
             part = values[start : start + rows]

@@ -279,7 +279,8 @@ def check_of(name: str, parameter: str, hint: Any) -> Check:
 
 def _by_type(hint: Any) -> Check:  # noqa: PLR0911  one for each kind of type
     """Return the check that belongs to a type; raise `KeyError` for a type that has none."""
-    origin, parts = get_origin(hint), [x for x in get_args(hint) if x is not NoneType]
+    origin = get_origin(hint)
+    parts = [x for x in get_args(hint) if x is not NoneType]
     if origin is Annotated:
         return _range(*hint.__metadata__[0])
     if origin in (Union, UnionType):

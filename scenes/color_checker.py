@@ -54,15 +54,15 @@ def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light
     view = camera(20.0, (0, 0, 0.72), (0, 0, 0), CHART_SIZE)
     scene = under_sky(name, view, {"card": panel(FACING, 4.0, 4.0, matte(surround))}, light, reference_plane="card")
     board = Spectrum(surround.wavelength_nm, np.full(surround.values.shape, BOARD))
-    return replace(scene, geometry=scene.geometry | chart(translate(0, 0, 0.0002) @ FACING, curves, board))
+    return replace(scene, geometry=scene.geometry | chart_nodes(translate(0, 0, 0.0002) @ FACING, curves, board))
 
 
 def color_checker_nodes(pose: Floats) -> dict[str, Node]:
     """Nodes of a ColorChecker centred on `pose` and facing its +z, 380-780 nm."""
-    return chart(pose, [curve for _, curve in patches()], grey(BOARD))
+    return chart_nodes(pose, [curve for _, curve in patches()], grey(BOARD))
 
 
-def chart(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
+def chart_nodes(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
     """Nodes of a chart's board and up to 24 patches, row by row, centred on `pose` and facing its +z."""
     step = PATCH_M + GAP_M
     nodes = {"chart_board": panel(pose, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}

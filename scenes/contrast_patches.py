@@ -42,7 +42,7 @@ class PatchPair:
     side: float
 
 
-def pairs() -> list[PatchPair]:
+def patch_pairs() -> list[PatchPair]:
     """Return the chart's pairs, row by row from the top."""
     rows = 0.5 + (np.arange(len(MEANS)) - (len(MEANS) - 1) / 2) * ROW_M / SIDE_M
     columns = 0.5 + (np.arange(len(CONTRASTS)) - (len(CONTRASTS) - 1) / 2) * PAIR_M / SIDE_M
@@ -64,7 +64,7 @@ def contrast_patches(light: str = "D65") -> Scene:
     """
     facing = look_at((0, 0, 0), (0, 0, 1))
     shapes = {"card": panel(translate(0, 0, -0.0002) @ facing, 4.0, 4.0, matte(grey(GROUND)))}
-    for index, pair in enumerate(pairs()):
+    for index, pair in enumerate(patch_pairs()):
         for name, column, sign in (("bright", pair.bright_column, 1), ("dark", pair.dark_column, -1)):
             place = translate((column - 0.5) * SIDE_M, (0.5 - pair.row) * SIDE_M, 0)
             surface = matte(grey(pair.mean * (1 + sign * pair.contrast)))

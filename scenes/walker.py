@@ -36,7 +36,8 @@ def walker(time_s: float = 0.0) -> Scene:
 
 def _figure(time_s: float) -> dict[str, Node]:
     """Legs and arms that swing once a stride, a coat, a pale scarf, a head with a cap."""
-    x, phase = _START_M + SPEED_M_S * time_s, 2 * pi * SPEED_M_S * time_s / STRIDE_M
+    x = _START_M + SPEED_M_S * time_s
+    phase = 2 * pi * SPEED_M_S * time_s / STRIDE_M
     swing = radians(_SWING_DEG) * sin(phase)
     trousers, skin = matte(grey(0.05)), matte(edge(590, 60, 0.20, 0.55))
     coat = matte(edge(600, 15, 0.04, 0.45))

@@ -68,7 +68,8 @@ def photograph_radiance(
     numpy_runs = exact or backend() == "numpy"
     formed = isinstance(radiance, SpectralIrradiance)
     scaled = samples_per_pixel == 1 and not spreads(sensor.lens) and not formed
-    metered_s, channels_e = exposure_s or 1.0, None
+    metered_s = exposure_s or 1.0
+    channels_e = None
     if isinstance(radiance, SpectralRadiance) and (numpy_runs or not scaled or sensor.lens.shake_um):
         channels_e = imaged_electrons(radiance, sensor, metered_s, samples_per_pixel)
     elif isinstance(radiance, SpectralIrradiance) and (numpy_runs or sensor.lens.shake_um):

@@ -14,7 +14,7 @@ from rodcone.toml_file import read_toml, strict_converter, structured
 from sensor.cfa import Tile, channels, tile_of
 from sensor.config import LensConfig, SensorConfig
 from sensor.curves import RelativeResponsesWarning, Responses, built_in, read_csv, read_curve, rgbw
-from sensor.lens.table import table_of, terms_of
+from sensor.lens.table import lens_table, terms_of
 from sensor.photodiodes import binned
 from sensor.pixel import MERGED, ChannelReading, Chip, PixelConfig, Reading, pixel_of_readings
 
@@ -147,7 +147,7 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
     fallen = set(channels(tile_of(table.cfa))) - set(channels(tile)) if table.channels else set()
     apart = tuple(x for x in table.channels if x.channel not in fallen)
     if table.lens.table:
-        table_of(table.lens)
+        lens_table(table.lens)
     sensor = SensorConfig(
         pixel_of_readings(table.pixel, table.readings) if table.readings else table.pixel,
         table.lens,
@@ -197,7 +197,8 @@ def _responses(table: ResponsesTable, folder: Path) -> Responses:
 
 def _check_channels(tile: Tile, responses: Responses, name: str) -> None:
     """Raise `InputError` where a channel of the mosaic has no column in the file of responses."""
-    needed, columns = channels(tile), list(responses.curves)
+    needed = channels(tile)
+    columns = list(responses.curves)
     if set(needed) - set(columns):
         raise InputError(
             f"responses: {name!r} has the columns {', '.join(columns)}; allowed: one for each channel of the mosaic, "

@@ -128,7 +128,8 @@ def sampled_otf(
         return total
 
     def of_band(wavelength_nm: float, at: slice = slice(None)) -> NDArray[Any]:
-        limit, first = step_um * limit_per_um(wavelength_nm, lens), slice(0, 1)
+        limit = step_um * limit_per_um(wavelength_nm, lens)
+        first = slice(0, 1)
         total = sum_of_copies(limit, at, slice(None))
         total /= sum_of_copies(limit, first, first)[0, 0]
         return total

@@ -27,7 +27,7 @@ from sensor.diffraction import defocus_otf, diffraction_otf, half_frequency, lim
 from sensor.lens.illumination import darkens, falloff
 from sensor.lens.patches import mover, spreader
 from sensor.lens.scatter import scatterer, scatters
-from sensor.lens.table import Kernels, table_of
+from sensor.lens.table import Kernels, lens_table
 from sensor.shake import SHAKES, blur_variance
 
 # For the costs that `left_out` states.
@@ -136,7 +136,9 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     >>> image.values.shape
     (8, 8, 4)
     """
-    shape, samples, lens = pixel_shape(radiance, samples_per_pixel), int(samples_per_pixel), sensor.lens
+    shape = pixel_shape(radiance, samples_per_pixel)
+    samples = int(samples_per_pixel)
+    lens = sensor.lens
     values_type = radiance.values.dtype.type
     if samples == 1 and not spreads(lens):
         values = radiance.values * values_type(camera_equation(lens))
@@ -220,11 +222,13 @@ def _imager(
     """
     # What the lens does.
     pixels, lens, (height, width) = pixel_shape(radiance, samples), sensor.lens, radiance.shape
-    view, step_um = radiance.horizontal_view_deg, sensor.site_pitch_um / samples
+    view = radiance.horizontal_view_deg
+    step_um = sensor.site_pitch_um / samples
     threads = os.cpu_count() or 1
     moved, spread = None, None
     if lens.table:
-        table, real = table_of(lens), np.float64
+        table = lens_table(lens)
+        real = np.float64
         lens = replace(lens, diffraction=0.0 if isinstance(table.point_spread, Kernels) else 1.0)
         moved = mover(table, radiance.shape, step_um)
         if table.point_spread is not None:
@@ -250,7 +254,8 @@ def _imager(
             plane += beside
         blurred = otf is not None or spread is not None
         if blurred and plane.min() < 0 and not radiance.signed:  # undershoot becomes 0, the sum of the light stays
-            total, plane = plane.sum(dtype=np.float64), np.maximum(plane, 0)
+            total = plane.sum(dtype=np.float64)
+            plane = np.maximum(plane, 0)
             plane *= real(total / plane.sum(dtype=np.float64) if total > 0 else 0.0)
         light = plane.astype(np.float64)
         if samples > 1:
@@ -268,7 +273,8 @@ def _imager(
         beside = np.zeros(sums.shape if spread is not None else len(weights))
         with ThreadPoolExecutor(threads) as pool:
             for band in np.flatnonzero(weights.any(axis=0)).tolist():
-                nm, light = float(radiance.wavelength_nm[band]), band_plane(radiance, band)
+                nm = float(radiance.wavelength_nm[band])
+                light = band_plane(radiance, band)
                 light = (light if moved is None else moved(light.astype(np.float64), nm)) * per_radiance
                 if spread is not None:
                     beside += weights[:, band, None, None] * spread(light, nm)
@@ -289,7 +295,8 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
 
     MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
     """
-    lens, nyquist = sensor.lens, np.array(0.5 / sensor.site_pitch_um)
+    lens = sensor.lens
+    nyquist = np.array(0.5 / sensor.site_pitch_um)
     lines = []
     if not lens.diffraction and not lens.table:
         ideal = LensConfig(lens.f_number, magnification=lens.magnification, diffraction=1.0)
@@ -351,7 +358,8 @@ def _edge_words(sensor: SensorConfig) -> str:
 
 def _axis_mtfs(sensor: SensorConfig) -> tuple[Floats, Floats, Floats]:
     """Frequencies along an axis up to Nyquist [1/px], and the MTF of lens and pixel there: the true and the imaged."""
-    lens, steps = sensor.lens, np.arange(64) / 128
+    lens = sensor.lens
+    steps = np.arange(64) / 128
     ideal = diffraction_otf(steps / sensor.site_pitch_um, WAVELENGTH_NM, lens) if lens.diffraction else 1.0
     ideal = ideal * defocus_otf(steps / sensor.site_pitch_um, lens.defocus_um)
     imaged = sampled_otf((1, 64), sensor.site_pitch_um, lens, folded=False)(WAVELENGTH_NM)[0]

@@ -45,7 +45,8 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
     2
     """
     require_name("binning", way, BINNINGS)
-    pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
+    pixel = sensor.pixel
+    share = sensor.pixel.hot_pixel_share
     tile = binned_tile(sensor.cfa)
     if way == DIGITAL and sensor.bits > MOST_BITS_SUMMED:
         raise InputError(

@@ -198,7 +198,8 @@ def shaken(
     """
     if not sensor.lens.shake_um:
         return electrons
-    key, scale_px = draw_key(rng), sensor.lens.shake_um / sensor.site_pitch_um
+    key = draw_key(rng)
+    scale_px = sensor.lens.shake_um / sensor.site_pitch_um
     if exposure_s == 0:
         return electrons
     height, width = electrons.shape[:2]

@@ -22,7 +22,16 @@ from studies.metrics.confidence import half_width
 from studies.metrics.metric import DELTA_E, METRICS, ON_TARGETS, PSNR, Metric
 from studies.metrics.truth import light_in_bands
 from studies.pages.plots import CHART, COLOURS, INK, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
-from studies.pages.report_text import duration, fixed, lead_text, level_text, percent, plain_name, significant, table
+from studies.pages.report_text import (
+    duration_text,
+    fixed,
+    lead_text,
+    level_text,
+    markdown_table,
+    percent,
+    plain_name,
+    significant,
+)
 from studies.pages.verdict import leads
 from studies.photograph.snr import channel_e, snr
 from studies.study.equal_area import EqualArea
@@ -108,7 +117,7 @@ def parts(swept: LastRun) -> Parts:
     worst = max(row.mc_share for row in swept.rows)
     set_up = (
         f"Here: scene `{scene}`, {area.side_um:g} µm, f/{rgbw.sensor.lens.f_number:g}, at most "
-        f"{duration(study['longest_exposure_s'])}, compared at {area.coarsest_um:g} µm. Green's filter passes "
+        f"{duration_text(study['longest_exposure_s'])}, compared at {area.coarsest_um:g} µm. Green's filter passes "
         f"{percent(float(green.values.max() / at_peak))}. The render's own noise, which counts as texture, has at most "
         f"{percent(worst)} of the sensor's variance."
     )
@@ -156,8 +165,8 @@ def parts(swept: LastRun) -> Parts:
     content = {
         "set-up": set_up,
         "sensors": sensors_table(entries, area),
-        "summary": table(["by PSNR", "first", "second", "the paper's pixel"], summary),
-        "white pixel": table(["lead in PSNR [dB]", *map(level_text, levels)], white_pixel),
+        "summary": markdown_table(["by PSNR", "first", "second", "the paper's pixel"], summary),
+        "white pixel": markdown_table(["lead in PSNR [dB]", *map(level_text, levels)], white_pixel),
     }
     return content, svg_text(_figure(entries, levels)), csv_text(head, rows)
 
@@ -194,7 +203,7 @@ def sensors_table(entries: Sequence[Entry], area: EqualArea) -> str:
             ]
         )
     head = ["sensor", "pitch [µm]", "pixels across", "quantum efficiency", "read noise [e⁻]", "clip [e⁻]"]
-    return table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
+    return markdown_table([*head, "clip [e⁻/µm²]", "DSNU [e⁻]", "PRNU [%]"], rows)
 
 
 def _efficiency(sensor: SensorConfig, figures: Mapping[str, float]) -> str:

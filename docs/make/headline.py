@@ -43,8 +43,7 @@ from rodcone.errors import InputError
 from rodcone.files import write_files
 from rodcone.types import Floats
 from studies.metrics.confidence import half_width
-from studies.pages.report_text import level_text
-from studies.pages.report_text import table as markdown
+from studies.pages.report_text import level_text, markdown_table
 from studies.sweep.export import read_rows
 from studies.sweep.prepare import PICTURES
 from studies.sweep.row import Row
@@ -248,7 +247,7 @@ def page_table(found: Mapping[tuple[str, str, str, str], Lead], out: int) -> str
         count = len(ofs[0].sample)
         rows.append([f"{count} {kind}" if count > 1 else f"`{kind}`", lead, name, *cells])
     sample = found["photographs", "mosaic", "psnr_db", LEVELS[0]]
-    text = markdown(["", "lead", "", *(level_text(level) for level in LEVELS)], rows)
+    text = markdown_table(["", "lead", "", *(level_text(level) for level in LEVELS)], rows)
     return (
         f"{len(sample.sample)} photographs, {len(sample.held)} more held out, {out} out by the rule. Each cell: mean "
         "± half the 95 % interval of the mean (± half the 95 % interval of one more picture; how many of those held "

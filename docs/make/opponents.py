@@ -11,7 +11,7 @@ from page_parts import RESULTS, Parts, csv_text, run, write_swept
 from rodcone.errors import InputError
 from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
 from studies.pages.plots import light_charts, svg_text
-from studies.pages.report_text import significant, table
+from studies.pages.report_text import markdown_table, significant
 from studies.pages.verdict import OUTCOMES, leads
 from studies.sweep.row import Row
 
@@ -117,7 +117,7 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
         f"Of {conditions} conditions under each white balance `{OURS}` is no worse than every Bayer camera "
         f"{', '.join(by_metric)}."
     )
-    content = {"set-up": set_up, "summary": summary, "ranks": table(head, lines)}
+    content = {"set-up": set_up, "summary": summary, "ranks": markdown_table(head, lines)}
     return content, svg_text(light_charts(light, charts)), csv_text(header, cells)
 
 

@@ -12,7 +12,7 @@ from sensor.cameras.numbers import PixelNumbers, missing
 from sensor.config import LensConfig, SensorConfig
 from sensor.emva1288.characterise import characterise
 from sensor.pixel import PixelConfig
-from studies.pages.report_text import MISSING, table
+from studies.pages.report_text import MISSING, markdown_table
 
 PAGE = RESULTS.parent / "real_cameras.md"
 REPORTS = PAGE.parents[1] / "sensor" / "cameras" / "reports"
@@ -118,8 +118,10 @@ def results(reports: Mapping[str, EmvaReport]) -> Parts:
     ]
     beyond = [[line[0], line[1], line[3], *line[5:]] for line in cells if line[-1].startswith("no")]
     parts = {
-        "cameras": table(("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview),
-        "beyond": table(("camera", "figure", "published", "recovered", "off", "within?"), beyond),
+        "cameras": markdown_table(
+            ("camera", "figures published", "of them no input", "beyond 3.5 % or 0.3 dB"), overview
+        ),
+        "beyond": markdown_table(("camera", "figure", "published", "recovered", "off", "within?"), beyond),
     }
     return parts, "", csv_text(("camera", *HEAD), cells)
 

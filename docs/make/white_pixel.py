@@ -23,7 +23,7 @@ from studies.metrics.metric import DELTA_E, FLIP, PSNR, Metric
 from studies.pages.headline import WHITE_PIXEL
 from studies.pages.plots import light_charts, svg_text
 from studies.pages.report_compare import DRAWN
-from studies.pages.report_text import fixed, lead_text, level_text, significant, table
+from studies.pages.report_text import fixed, lead_text, level_text, markdown_table, significant
 from studies.sweep.row import Row
 
 PAGE = RESULTS.parent / "white_pixel.md"
@@ -76,8 +76,11 @@ def parts(rows: Iterable[Row], version: str) -> Parts:
     content = {
         "set-up": f"rodcone {version}, {len(scenes)} scenes, each once a balance and level. Exposure times, by "
         f"`auto:information`, in the median over scenes, RGBW and Bayer: {exposures(places, balances[0], levels)}.",
-        **{f"leads {balance}": table(["", *head], lead_rows(places, balance, scenes, levels)) for balance in balances},
-        "best": table(["", *head], best_rows(places, balances[0], scenes, levels)),
+        **{
+            f"leads {balance}": markdown_table(["", *head], lead_rows(places, balance, scenes, levels))
+            for balance in balances
+        },
+        "best": markdown_table(["", *head], best_rows(places, balances[0], scenes, levels)),
     }
     charts = {
         f"PSNR, dB: lead, {kind}": {

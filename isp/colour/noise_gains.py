@@ -44,7 +44,7 @@ class NoiseGains:
         return np.array([np.interp(db, self.snr_db, column) for column in self.gains.T])
 
 
-def measured() -> Mapping[str, NoiseGains]:
+def measured_gains() -> Mapping[str, NoiseGains]:
     """Gains by processor, as they were measured."""
     table = read_toml(TABLE)
     return {

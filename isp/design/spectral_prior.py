@@ -39,7 +39,7 @@ class SpectralPrior:
 
 
 @cache
-def load_prior(name: str) -> SpectralPrior:
+def load_spectral_prior(name: str) -> SpectralPrior:
     """Prior of `PRIORS` by name."""
     with np.load(PRIORS[name], allow_pickle=False) as file:
         arrays = {key: np.asarray(file[key], dtype=np.float64) for key in file.files if key != "source"}

@@ -142,7 +142,7 @@ def _sharpen(
     plane = window[..., REACH, REACH]
     near = window[..., inner, inner].reshape(height, width, 4, 9)
 
-    # What the window holds.
+    # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides.
     mean = window.mean(axis=(3, 4))
     away = window - mean[..., None, None]
     covariance = np.einsum("...cij,...dij->...cd", away, away) / away[0, 0, 0].size
@@ -165,7 +165,7 @@ def _sharpen(
     shading = contrast[..., None] * light[..., :, None] * light[..., None, :]
     covariance = SPREAD[0] * covariance + SPREAD[1] * shading
 
-    # The best linear estimate.
+    # The best linear estimate E.
     value = np.take_along_axis(near, site[..., None, :], axis=2)[:, :, 0]
     to_samples = np.take_along_axis(covariance, site[..., None, :], axis=3)  # (h, w, channel, sample)
     among_samples = np.take_along_axis(to_samples, site[..., None], axis=2)  # (h, w, sample, sample)
@@ -176,7 +176,7 @@ def _sharpen(
     weights = np.linalg.solve(CORRELATION * among_samples + counted[..., None] * np.eye(9), residual[..., None])
     estimate = mean + ((CORRELATION[4] * to_samples) @ weights)[..., 0]
 
-    # Brighter or darker than all planes of the window only as far as the samples tell it from noise.
+    # E_W brighter or darker than all P_W of the window by d, only as far as the samples tell it from noise.
     squares = (sample - value) ** 2 / sample_noise
     of_white = window[:, :, 3]
     within = np.clip(estimate[..., 3], of_white.min(axis=(2, 3)), of_white.max(axis=(2, 3)))
@@ -184,14 +184,14 @@ def _sharpen(
     seen = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
     estimate = estimate + (beyond / seen)[..., None] * light
 
-    # Where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    # F: where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
-    # A colour that noise hides is the surroundings'.
+    # F_c less A_c - r_c A_W: a colour that noise hides is the surroundings'.
     even = plane + np.maximum(1.0 - contrast, 0.0) * (sharp - plane)
     sharp -= hidden * (even - tint * even[..., 3:])
 
-    # Light of unknown colour.
+    # F': light of unknown colour; q is `hue`, q_c is 1 where `full`, and l is `between`.
     full = (is_full[..., None] & (site[..., None] == np.arange(4))).any(axis=2)
     lit = np.maximum(of_white, 0.0)
     least = np.min([lit[..., i::2, j::2].mean(axis=(2, 3)) for i in (0, 1) for j in (0, 1)], axis=0)
@@ -203,7 +203,7 @@ def _sharpen(
     unknown = np.where(full, 1.0, hue)
     sharp += unknown * ((sharp * gains).max(axis=2, keepdims=True) / gains - sharp)
 
-    # Light that fills less than two fifths of the window: the sample's own, in the colour around.
+    # F'': light that fills less than two fifths of the window is the sample's own, in the colour around; L is `small`.
     no_hue = is_full[..., 4] & (is_full & (site != 3)).any(axis=2)
     shares = np.where(no_hue[..., None], gains[3] / gains, shares)
     own = np.take_along_axis(shares, site[..., 4:5], axis=2)[..., 0]

@@ -1,7 +1,18 @@
 """The interleaved reconstruction as the paper writes it, in NumPy and double precision.
 
-Parmar & Wandell, "Interleaved imaging", Proc. SPIE 7250, 2009, eqs. (1)-(6). Slow and plain: what the kernel is tested
-against, and what runs where Dr.Jit can't.
+Parmar & Wandell, "Interleaved imaging", Proc. SPIE 7250, 2009. Channel i at a pixel x is a weighted mean of its samples
+g_i(y) in the neighbourhood Omega of x, where S_i(y) is 1 at the sites of i and 0 elsewhere,
+
+    f_i(x) = (1 / W_y) sum_{y in Omega} G(beta_d, sigma_d) G(beta_s, sigma_s) S_i(y) g_i(y),        (1)
+    G(beta, sigma) = exp(-beta^2 / (2 sigma^2)),                                                    (2)
+    W_y = sum_{y in Omega} G(beta_d, sigma_d) G(beta_s, sigma_s) S_i(y),                            (3)
+    beta_d = ||x - y||,                                                                             (4)
+    beta_s = alpha(y) ||h_i(x) - h_i(y)|| + (1 - alpha(y)) ||h_W(x) - h_W(y)||,                     (5)
+
+with h_i(x) the patch around x of channel i's filled plane, and alpha of eq. (6) (`isp.interleaved.saturation`). With
+one guide for all channels h is that guide's patch, and alpha is 0.
+
+Slow and plain: the kernel is tested against it, and it runs where Dr.Jit can't.
 """
 
 from dataclasses import dataclass
@@ -24,28 +35,24 @@ LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the fi
 
 @dataclass(frozen=True)
 class _Inputs:
-    """What eqs. (1)-(6) read.
+    """What eqs. (1)-(6) read."""
 
-    Electrons, the channel sampled at each pixel, padded planes a channel or one for all, alpha, up to where samples
-    count, W's plane.
-    """
-
-    electrons: Mosaic
-    channel: NDArray[np.intp]
-    h: Plane
-    alpha: Plane
-    brightest: Plane
-    white: int
+    electrons: Mosaic  # g_i(y) of the channel i that is sampled at y
+    channel: NDArray[np.intp]  # that channel's number: where it is i, S_i(y) is 1
+    h: Plane  # planes that patches are read from, padded by half a patch: one per channel, or one guide for all
+    alpha: Plane  # of eq. (6)
+    brightest: Plane  # electrons up to which a sample counts (`isp.interleaved.brightest`)
+    white: int  # number of h_W among the planes
 
 
 @dataclass(frozen=True)
 class ReferenceSums:
-    """Sums over y for each (x, channel), in units of exp(largest log weight so far)."""
+    """Sums over y for each (x, channel), in units of the largest weight so far."""
 
-    largest: Plane
-    weight: Plane
-    square: Plane
-    value: Plane
+    largest: Plane  # logarithm of the largest weight G G so far
+    weight: Plane  # sum of G G S_i, W_y of eq. (3)
+    square: Plane  # sum of (G G S_i)^2: over W_y^2 the noise gain
+    value: Plane  # sum of G G S_i g_i, of eq. (1)
 
 
 def reference_with_noise(
@@ -70,7 +77,7 @@ def reference_with_noise(
 
 
 def sum_weights(raw: RawImage, settings: Settings, guide: NDArray[Any] | None = None) -> ReferenceSums:
-    """Sums of eqs. (1) and (3) in float64, one offset of the neighbourhood after the other."""
+    """Compute the sums of eqs. (1) and (3) in float64, one offset y - x of the neighbourhood after the other."""
     inputs = _inputs(raw, settings, guide)
     shape = (*raw.shape, len(raw.channels))
     sums = ReferenceSums(np.full(shape, -np.inf), np.zeros(shape), np.zeros(shape), np.zeros(shape))
@@ -100,22 +107,23 @@ def _add_offset(sums: ReferenceSums, inputs: _Inputs, settings: Settings, offset
     shape = inputs.electrons.shape
     x = tuple(np.arange(max(-d, 0), size - max(d, 0)) for d, size in zip(offset, shape, strict=True))
     y = tuple(line + d for line, d in zip(x, offset, strict=True))
-    distance = [_distance(plane, settings, x, offset) for plane in inputs.h]
-    log_spatial = -(offset[0] ** 2 + offset[1] ** 2) / (2.0 * settings.sigma_d**2)  # eqs. (2), (4)
+    distance2 = [_squared_distance(h_i, settings, x, offset) for h_i in inputs.h]
+    beta_d2 = offset[0] ** 2 + offset[1] ** 2  # eq. (4)
+    log_spatial = -beta_d2 / (2.0 * settings.sigma_d**2)  # eq. (2)
     phase = tuple(d % size for d, size in zip(offset, inputs.brightest.shape[:2], strict=True))
     bound = inputs.brightest[phase][np.ix_(*x)]
     channel, alpha, electrons = (a[np.ix_(*y)] for a in (inputs.channel, inputs.alpha, inputs.electrons))
     for i in range(sums.weight.shape[2]):
         at = np.nonzero(channel == i)  # S_i(y) of eq. (1)
-        own = distance[min(i, len(distance) - 1)][at]
-        beta_s = alpha[at] * np.sqrt(own) + (1.0 - alpha[at]) * np.sqrt(distance[inputs.white][at])  # eq. (5)
-        log_weight = log_spatial - beta_s**2 / (2.0 * settings.sigma_s**2)
+        own = distance2[min(i, len(distance2) - 1)][at]
+        beta_s = alpha[at] * np.sqrt(own) + (1.0 - alpha[at]) * np.sqrt(distance2[inputs.white][at])  # eq. (5)
+        log_weight = log_spatial - beta_s**2 / (2.0 * settings.sigma_s**2)  # eq. (2)
         log_weight[electrons[at] > bound[at]] = LEFT_OUT
         _accumulate(sums, (x[0][at[0]], x[1][at[1]], np.full(at[0].shape, i)), log_weight, electrons[at])
 
 
-def _distance(h: Plane, settings: Settings, x: tuple[NDArray[np.intp], ...], offset: tuple[int, int]) -> Plane:
-    """Squared distance of h_i(x) and h_i(x + offset) for a grid of x."""
+def _squared_distance(h: Plane, settings: Settings, x: tuple[NDArray[np.intp], ...], offset: tuple[int, int]) -> Plane:
+    """Return ||h_i(x) - h_i(x + offset)||^2 for a grid of x."""
     half = settings.patch // 2
     # The patch around (r, c) of the frame is [r, r + patch) x [c, c + patch) of the padded plane.
     grown = [np.arange(line[0], line[-1] + 2 * half + 1) for line in x]
@@ -128,7 +136,8 @@ def _distance(h: Plane, settings: Settings, x: tuple[NDArray[np.intp], ...], off
 def _accumulate(sums: ReferenceSums, at: tuple[NDArray[np.intp], ...], log_weight: Plane, value: Plane) -> None:
     """Add one weighted sample to the sums of eqs. (1) and (3); the largest weight stays 1, so W_y is never 0."""
     largest = np.maximum(sums.largest[at], log_weight)
-    old, new = np.exp(sums.largest[at] - largest), np.exp(log_weight - largest)
+    old = np.exp(sums.largest[at] - largest)
+    new = np.exp(log_weight - largest)
     sums.value[at] = sums.value[at] * old + new * value
     sums.weight[at] = sums.weight[at] * old + new
     sums.square[at] = sums.square[at] * old**2 + new**2

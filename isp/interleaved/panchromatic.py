@@ -33,7 +33,7 @@ from sensor.cfa import mask
 from sensor.raw import RawImage
 
 
-def white_of(raw: RawImage) -> str:
+def white_channel(raw: RawImage) -> str:
     """Return the channel that stands for W: W itself, or the mosaic's unit."""
     return "W" if "W" in raw.channels else raw.unit_channel
 
@@ -71,7 +71,7 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
     neutral : (channel,) float64
         Response to a neutral in any unit, in the order of `sensor.cfa.channels`.
     """
-    white = raw.channels.index(white_of(raw))
+    white = raw.channels.index(white_channel(raw))
     ratios = np.asarray(neutral, np.float64) / neutral[white]
     raw = with_full_white(raw, ratios)
     if backend() == "numpy":

@@ -1,4 +1,7 @@
-"""What guides the paper's similarity at each pixel, W or the channel itself: alpha of eq. (6)."""
+"""Which plane the paper's similarity compares at each pixel, W's or the channel's own: alpha of eq. (6).
+
+alpha(y) = saturated pixels in h_W(y) / all pixels in h_W(y)                                    (6)
+"""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,8 +43,7 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
         lines = np.flatnonzero(full.any(axis=1 - axis))
         box.append(slice(max(int(lines[0]) - margin, 0) // step * step, int(lines[-1]) + margin + 1))
     saturated = fill(full[box[0], box[1]].astype(np.float32), tile, "W") > 0.0
-    # Alpha is the number of saturated pixels in the window over the number of its pixels within the frame. Both are
-    # small whole numbers, so 0 and 1 are exact.
+    # Eq. (6). Numerator and denominator are small whole numbers, so 0 and 1 are exact.
     half = window // 2
     count = box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
     pixels = [np.arange(size) for size in saturated.shape]

@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from isp.colour.colour_fit import ColourFit
-from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured
+from isp.colour.noise_gains import NoiseGains, colours_in_noise, measured_gains
 from isp.colour.white_balance import WhiteBalance
 from isp.defects import interpolate_defects
 from isp.interleaved.pipeline import picture_bayer, picture_interleaved, picture_interleaved_paper
@@ -156,7 +156,7 @@ _PLAIN: Mapping[str, Processor] = MappingProxyType(
         "ple_bayer": Processor("bayer", picture_ple_bayer, _PIECEWISE),
     }
 )
-_GAINS = measured()
+_GAINS = measured_gains()
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
     {name: replace(processor, noise_gains=_GAINS.get(name)) for name, processor in _PLAIN.items()}
 )

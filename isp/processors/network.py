@@ -17,7 +17,7 @@ from zipfile import ZipFile
 import numpy as np
 from numpy.typing import NDArray
 
-from isp.colour.noise_gains import measured
+from isp.colour.noise_gains import measured_gains
 from isp.processors.bayer_denoised import picture_demosaicked_first
 from isp.processors.catalogue import Processor
 from isp.processors.convolution import convolve
@@ -63,7 +63,7 @@ def network_processor(name: str, wheel: bytes) -> Processor:
     network = partial(demosaic, weights=read_weights(wheel))
     picture = partial(picture_demosaicked_first, demosaic=network, denoise=denoise)
     # What BM3D leaves hardly depends on what demosaicked.
-    return Processor("bayer", picture, SOURCE, extra=extra, noise_gains=measured()[gains])
+    return Processor("bayer", picture, SOURCE, extra=extra, noise_gains=measured_gains()[gains])
 
 
 def read_weights(wheel: bytes) -> Weights:

@@ -108,7 +108,7 @@ def open_set(path: Path) -> Iterator[FrameSet]:
         yield _read_index(path)
 
 
-def read_pixels(frame: Frame, frames: FrameSet) -> Pixels:
+def read_frame_pixels(frame: Frame, frames: FrameSet) -> Pixels:
     """Read a frame as it is; a developed picture of several channels is refused.
 
     Raises
@@ -126,7 +126,8 @@ def read_pixels(frame: Frame, frames: FrameSet) -> Pixels:
     if ending in _PICTURES and not frame.with_suffix(".json").exists():
         kinds = (OSError, ValueError, SyntaxError)
         with read_errors(f"{frame}: can't be read", "give a grey PNG or TIFF", kinds), Image.open(frame) as picture:
-            mode, dn = picture.mode, np.asarray(picture)
+            mode = picture.mode
+            dn = np.asarray(picture)
         if mode not in ("L", "I", "I;16", "I;16B", "F"):
             raise InputError(
                 f"{frame}: its pixels are {mode}; allowed: one grey channel of 8 or 16 bits; give raw data"
@@ -200,13 +201,16 @@ def _read_index(path: Path) -> FrameSet:
 def _read_descriptor(path: Path) -> FrameSet:
     """Read the reference sets' text: v release, n bits width height, b ns photons, d ns, i file."""
     lights: list[LightFrames] = []
-    bits, shape, skipped = 0, (0, 0), set()
+    bits = 0
+    shape = (0, 0)
+    skipped = set()
     for number, line in enumerate(_text(path).splitlines(), 1):
         words = line.split()
         if not words or words[0].startswith("#"):
             continue
         place = f"{path}: line {number}"
-        key, values = words[0], words[1:]
+        key = words[0]
+        values = words[1:]
         if key == "i":
             if not lights:
                 raise InputError(f"{place}: a frame before its light; allowed: after a line b or d; move it")
@@ -220,7 +224,8 @@ def _read_descriptor(path: Path) -> FrameSet:
                     raise ValueError("too few")
             if key == "n":
                 require_range(f"{place}: bits", numbers[0], 1, 16, "give the converter's bits")
-                bits, shape = int(numbers[0]), (int(numbers[2]), int(numbers[1]))
+                bits = int(numbers[0])
+                shape = (int(numbers[2]), int(numbers[1]))
             else:
                 photons = numbers[1] if key == "b" else 0.0
                 lights.append(LightFrames((), key == "b", numbers[0] * 1e-9, photons))
@@ -255,7 +260,7 @@ def _read_list(path: Path) -> FrameSet:
     )
 
 
-def white_of(pixels: Sequence[Pixels]) -> tuple[float, str]:
+def white_level(pixels: Sequence[Pixels]) -> tuple[float, str]:
     """White level of frames that don't say it: the top of the fewest bits that hold their greatest reading."""
     most = max(float(np.max(one.dn)) for one in pixels)
     bits = max(int(most).bit_length(), 1)

@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from rodcone.errors import InputError
-from sensor.cameras.frame_sets import FrameSet, LightFrames, open_set, read_pixels, white_of
+from sensor.cameras.frame_sets import FrameSet, LightFrames, open_set, read_frame_pixels, white_level
 from sensor.cameras.numbers import PixelNumbers, SourcedValue, bits_of
 from sensor.cfa import Tile
 from sensor.emva1288.from_frames import (
@@ -90,21 +90,22 @@ def measure_set(frames: FrameSet, window: int | None = None) -> FrameFigures:
         if not lights:
             raise InputError(f"{name} frames: none has two or more of one light; allowed: two or more; take others")
     # What all have in common
-    ends = [read_pixels(lights[-1].frames[0], frames) for lights in (darks, flats)]
+    ends = [read_frame_pixels(lights[-1].frames[0], frames) for lights in (darks, flats)]
     notes = list(frames.notes)
     white_dn = ends[1].white_dn
     if isnan(white_dn):
-        white_dn, note = white_of([read_pixels(light.frames[0], frames) for light in flats])
+        white_dn, note = white_level([read_frame_pixels(light.frames[0], frames) for light in flats])
         notes.append(note)
     if len(pairs) < len(frames.lights):
         notes.append(f"{len(frames.lights) - len(pairs)} lights with a single frame are left out")
-    shape, tile = ends[0].dn.shape, ends[0].cfa
+    shape = ends[0].dn.shape
+    tile = ends[0].cfa
     if min(shape[0] // len(tile), shape[1] // len(tile[0])) < LEAST_SIDE:
         raise InputError(f"frames: {shape[0]} x {shape[1]} pixels are too few; allowed: {LEAST_SIDE} tiles a side")
 
     def stacks(lights: Sequence[LightFrames]) -> Iterator[LightStack]:
         for light in lights:
-            read = [read_pixels(frame, frames) for frame in light.frames]
+            read = [read_frame_pixels(frame, frames) for frame in light.frames]
             for frame, one in zip(light.frames, read, strict=True):
                 if one.dn.shape != shape or one.cfa != tile:
                     name = frame if isinstance(frame, Path) else "array"

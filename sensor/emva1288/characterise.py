@@ -203,7 +203,8 @@ def measure_camera(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> 
 
 def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
     """Each figure without measurement error; saturation is the converter's top, as if all pixels clipped at once."""
-    pixel, share = sensor.pixel, sensor.pixel.hot_pixel_share
+    pixel = sensor.pixel
+    share = sensor.pixel.hot_pixel_share
     hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s
     dark_e = pixel.dark_current_e_per_s * exposure_s + share * hot_e
     dark_noise_e = sqrt(sensor.read_noise_e**2 + dark_e)

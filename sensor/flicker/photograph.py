@@ -104,10 +104,12 @@ def held_under_lamps(
     fine_shares = row_shares(starts_s, exposure_s, step_s, fine.size)
     between = np.maximum(1 - np.abs(fine[:, None] / _FINER - np.arange(count)), 0.0)
 
-    steady_e, result = channels_e, np.zeros_like(channels_e)
+    steady_e = channels_e
+    result = np.zeros_like(channels_e)
     for lamp, part_e in parts_e:
         weights = (fine_shares * lamp.mean(start_s + (fine - 0.5) * step_s, step_s)) @ between
-        sums, light = weights.sum(axis=1), row_weights(lamp, sensor, rows, exposure_s, start_s)
+        sums = weights.sum(axis=1)
+        light = row_weights(lamp, sensor, rows, exposure_s, start_s)
         weights = np.where(sums[:, None] > 0, weights, shares) * (light / np.where(sums > 0, sums, 1.0))[:, None]
         result += moved_by_rows(part_e, places_px, weights)
         steady_e = steady_e - part_e

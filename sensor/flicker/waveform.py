@@ -116,11 +116,13 @@ class Waveform:
         exposure_s : float
             Its length, above 0 [s].
         """
-        start, periods = np.asarray(start_s, np.float64) * self.frequency_hz, exposure_s * self.frequency_hz
+        start = np.asarray(start_s, np.float64) * self.frequency_hz
+        periods = exposure_s * self.frequency_hz
         if self.depth:
             return np.asarray(1 + self.depth * np.sinc(periods) * np.cos(2 * pi * (start + periods / 2)))
         # Whole periods apart from the rest: long after time 0 the difference of two integrals would cancel.
-        whole, first = np.floor(periods), start - np.floor(start)
+        whole = np.floor(periods)
+        first = start - np.floor(start)
         last = first + (periods - whole)
         return np.asarray((whole + self._integral(last) - self._integral(first)) / periods)
 
@@ -218,7 +220,8 @@ def waveform(text: str) -> Waveform:
     match = _FORM.match(text)
     if match is None or (match[1] == PWM) != (match[3] is not None):
         raise InputError(f"flicker: {text!r} is no waveform; allowed: LAMP@FREQUENCYHz, pwm@FREQUENCYHz:DUTY; {_FIX}")
-    name, hertz = match[1], float(match[2])
+    name = match[1]
+    hertz = float(match[2])
     with in_place("flicker"):
         if name == PWM:
             return pwm(hertz, float(match[3]))

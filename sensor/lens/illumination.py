@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.config import LensConfig
-from sensor.lens.table import table_of
+from sensor.lens.table import lens_table
 
 # Terms of a lens that lights the whole picture evenly, and is the same everywhere in it.
 EVEN_LIGHT: Mapping[str, Any] = MappingProxyType(
@@ -58,7 +58,7 @@ def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
 
 def darkens(lens: LensConfig) -> bool:
     """Whether the lens gives the corners less light than the middle."""
-    if lens.table and table_of(lens).darkens():
+    if lens.table and lens_table(lens).darkens():
         return True
     return lens.horizontal_view_deg > 0 or lens.falloff_power > 0 or lens.vignetting > 0
 
@@ -85,7 +85,8 @@ def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = N
     InputError
         For a `falloff_power` and an angle of view that isn't known.
     """
-    half_width, places = shape[1] / 2, [np.arange(size) - (size - 1) / 2 for size in shape]
+    half_width = shape[1] / 2
+    places = [np.arange(size) - (size - 1) / 2 for size in shape]
     view = view_deg(lens, of_scene, "falloff_power") if lens.falloff_power else lens.horizontal_view_deg
     tangent = tan(radians(view / 2)) / half_width
     rows, columns = (place * tangent for place in places)
@@ -94,7 +95,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = N
     if lens.vignetting:
         light *= pupil_share(height, lens)
     if lens.table:
-        light *= table_of(lens).illumination(height)
+        light *= lens_table(lens).illumination(height)
     return light
 
 

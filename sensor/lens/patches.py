@@ -46,7 +46,8 @@ def patches(shape: tuple[int, int], rings: int, beyond: int = 0) -> tuple[Patch,
 
     `beyond` samples at each side of the picture belong to the border's places; slices count from the first of them.
     """
-    half, found = [(side - 1) / 2 for side in shape], []
+    half = [(side - 1) / 2 for side in shape]
+    found = []
     step = max(hypot(*shape) / 2 / max(rings - 1, LEAST_STEPS), 1.0)
     axes = [_windows(side, step, beyond) for side in shape]
     for row, rows, down in axes[0]:
@@ -62,7 +63,8 @@ def _windows(side: int, step: float, beyond: int) -> list[tuple[float, slice, Fl
     places = max(ceil((side - 1) / 2 / step), 1)
     nodes = np.linspace(0, side - 1, 2 * places + 1) if side > 2 else np.arange(float(side))
     samples = np.clip(np.arange(-beyond, side + beyond), 0, side - 1)
-    apart, found = (nodes[1] - nodes[0] if side > 1 else 1.0), []
+    apart = nodes[1] - nodes[0] if side > 1 else 1.0
+    found = []
     for node in nodes:
         window = np.maximum(1 - np.abs(samples - node) / apart, 0.0)
         covered = np.flatnonzero(window)

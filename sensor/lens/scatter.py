@@ -45,7 +45,8 @@ def veil_per_sr(angle_deg: Floats, lens: LensConfig) -> Floats:
         shoulder = sin(radians(lens.scatter_shoulder_deg))
         sine = np.sin(np.radians(np.minimum(angle, 90.0)))
         return np.asarray(_peak_per_sr(lens) * (1 + (sine / shoulder) ** 2) ** (-lens.scatter_slope / 2))
-    theta, p = np.maximum(angle, EYE_FROM_DEG), lens.eye_pigmentation
+    theta = np.maximum(angle, EYE_FROM_DEG)
+    p = lens.eye_pigmentation
     ageing = 1 + (lens.eye_age_years / 62.5) ** 4
     glare = 10 / theta**3 + (5 / theta**2 + 0.1 * p / theta) * ageing + 0.0025 * p
     return np.asarray(np.where(angle < EYE_FROM_DEG, 0.0, glare))
@@ -53,7 +54,8 @@ def veil_per_sr(angle_deg: Floats, lens: LensConfig) -> Floats:
 
 def _peak_per_sr(lens: LensConfig) -> float:
     """P of a lens at the lamp itself: the share over the integral 2 pi b (1 + (b / l)^2)^(-s / 2) db from 0 to 1."""
-    shoulder2, left = sin(radians(lens.scatter_shoulder_deg)) ** 2, 1 - lens.scatter_slope / 2
+    shoulder2 = sin(radians(lens.scatter_shoulder_deg)) ** 2
+    left = 1 - lens.scatter_slope / 2
     rise = log(1 + 1 / shoulder2)
     integral = rise if abs(left) < 1e-9 else ((1 + 1 / shoulder2) ** left - 1) / left
     return lens.scatter / (pi * shoulder2 * integral)

@@ -223,7 +223,7 @@ def terms_of(table: str) -> dict[str, Any]:
     return {"table": table, "table_digest": digest_of_own, "f_number": read.f_number}
 
 
-def table_of(lens: LensConfig) -> LensTable:
+def lens_table(lens: LensConfig) -> LensTable:
     """Read the table of a lens by data, and check that the rest of the lens goes with it.
 
     Raises
@@ -264,7 +264,8 @@ def read_lens(lens: str) -> LensTable:
         For a file that can't be read, or what no lens has: negative energy, gaps, nodes that don't rise.
     """
     path = lens_file(lens)
-    given, spread = _given(path, _stamp(path)), None
+    given = _given(path, _stamp(path))
+    spread = None
     if given.point_spread:
         spread = path.parent / given.point_spread
         with in_place(f"lens file {str(path)!r}"):

@@ -105,7 +105,8 @@ def transfer(table: LensTable, height: float, wavelength_nm: float, radial: Floa
     """
     radial, across = np.broadcast_arrays(np.asarray(radial, np.float64), np.asarray(across, np.float64))
     if isinstance(table.point_spread, Kernels):
-        kernel, step_um = table.kernel(height, wavelength_nm), table.point_spread.step_um
+        kernel = table.kernel(height, wavelength_nm)
+        step_um = table.point_spread.step_um
         places = (np.arange(len(kernel)) - len(kernel) // 2) * step_um
         found = [
             np.exp(-2j * np.pi * f * places) @ kernel @ np.exp(-2j * np.pi * g * places)
@@ -173,7 +174,8 @@ def sampled_kernel(
     """
     cosine, sine = np.cos(azimuth), np.sin(azimuth)
     if isinstance(table.point_spread, Kernels):
-        kernel, own_um = table.kernel(height, wavelength_nm), table.point_spread.step_um
+        kernel = table.kernel(height, wavelength_nm)
+        own_um = table.point_spread.step_um
         times = max(2, 2 * ceil(step_um / own_um / 2))
         down, over = np.meshgrid(*[np.fft.fftfreq(2 * reach * times, step_um / times)] * 2, indexing="ij")
         found = _of_kernel(kernel, own_um, down * cosine + over * sine, over * cosine - down * sine)

@@ -107,7 +107,8 @@ def _bent(collected_e: Floats, dark_e: float, reading: PlainReading) -> tuple[Fl
 
     Beyond the well, where samples clip, the response goes on straight.
     """
-    pixel, share = reading.sensor.pixel, reading.share
+    pixel = reading.sensor.pixel
+    share = reading.share
     own_e = np.minimum(collected_e * share, pixel.full_well_e)
     slope = bent_slope(own_e, pixel)
     black_e = bent_e(dark_e * share, pixel) / share

@@ -8,7 +8,7 @@ from rodcone.files import write_files
 from studies.commands.console import say
 from studies.commands.report_mark import REPORT, RESULTS, marked
 from studies.pages.report import render_report
-from studies.pages.report_compare import CAMERA, first_comparison, markdown
+from studies.pages.report_compare import CAMERA, comparison_markdown, first_comparison
 from studies.pages.report_sweep import sweep_report
 from studies.sweep.database import last_run
 from studies.sweep.export import MOST_ROWS, axis_values, results_json
@@ -63,7 +63,7 @@ def _markdown(folder: Path, out: Path, camera: str | None, where: list[str] | No
         raise InputError("study: there is nothing to compare; allowed: two cameras or more, or two sensors")
     command = f"rodcone report {folder} -o {out.name}" + (f" --camera {camera}" if camera else "")
     command += "".join(f" --where {text}" for text in where or ())
-    return markdown(data, command, of.a if camera is None else data.cameras.index(camera))
+    return comparison_markdown(data, command, of.a if camera is None else data.cameras.index(camera))
 
 
 def write_results(folder: Path) -> Path:
@@ -77,7 +77,8 @@ def write_results(folder: Path) -> Path:
         As `write_report`.
     """
     run = last_run(folder)
-    page, count = render_report(*sweep_report(folder, run=run)), len(run.rows)
+    page = render_report(*sweep_report(folder, run=run))
+    count = len(run.rows)
     results = None if count > MOST_ROWS else results_json(run)
     files = {folder / REPORT: marked(folder, page, results, run.content)}
     if results is None:  # none stays that says less than the sweep

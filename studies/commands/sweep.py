@@ -140,7 +140,8 @@ def sweep(
     if not told(sizes, dry_run=order.dry_run, json=json):
         return 0
     require_enough(task, sizes, force=workforce.force)
-    runner, ahead = workforce.runner(), workforce.processes != 1
+    runner = workforce.runner()
+    ahead = workforce.processes != 1
     swept, report = make_all(task, order.out, partial(order.plan, task), runner, clock, ahead=ahead)
     say(f"its report is {report}")
     ledger = swept.out / FILE

@@ -77,7 +77,8 @@ def make_set(
     scenes = open_all(study)
     folder = out / SET
     for opened in scenes.values() if order.crop else ():
-        file, white = opened.choice.source, opened.white
+        file = opened.choice.source
+        white = opened.white
         _windows(opened.size if opened.scene else open_radiance_file(file, white)[0].counts.shape, order.crop)
     identity = _identity(study, scenes.values(), order)
     with locked_folder(out), progress_bar(step) as show, open_results(out) as base:

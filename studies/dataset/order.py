@@ -102,7 +102,8 @@ def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order:
         if opened.scene is None:
             (pixels, _, _), groups, bands = extent_of(opened.choice.source), 1, 0
         else:
-            pixels, groups = prod(opened.size), len(opened.scene.groups)
+            pixels = prod(opened.size)
+            groups = len(opened.scene.groups)
             bands = len(plan.renders[opened.choice].wavelength_nm)
         total += 3 * 4 * plan.samples_a_side(opened.choice) ** 2 * pixels * bands * groups
         for sensor in _cameras(study):

@@ -93,7 +93,8 @@ class Sample:
 
 def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     """Arrays of a sample by name, the raw frame first, and its facts as JSON holds them."""
-    cell, frame = sample.cell, sample.cell.frame
+    cell = sample.cell
+    frame = sample.cell.frame
     row, column, height, width = sample.window
     place = np.s_[row : row + height, column : column + width]
     light = cell.luminance_cd_m2 * cell.exposure_s
@@ -121,7 +122,8 @@ def _facts(
     expected_e: NDArray[np.float64],
     errors_e: NDArray[Any],
 ) -> dict[str, Any]:
-    cell, sensor = sample.cell, sample.cell.frame.sensor
+    cell = sample.cell
+    sensor = sample.cell.frame.sensor
     variance_e2, light_e2 = frame_variance(expected_e, readings), light_variance(expected_e, readings)
     # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
     shares = uniform_filter(errors_e[0] * errors_e[-1] / light_e2, 3)
@@ -240,7 +242,8 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
         return {name: keep_array(job.out / PLANES, plane) for name, plane in planes.items()}
 
     facts: dict[str, Any] = {"hash": scene_hash(opened), "illuminants": {}, "objects": (), "materials": (), "files": {}}
-    surfaces, samples = {}, job.plan.samples_a_side(opened.choice)
+    surfaces = {}
+    samples = job.plan.samples_a_side(opened.choice)
     if opened.scene is not None:
         seen = see_surfaces(opened.scene, opened.size)
         ids = np.stack([seen.object_id, seen.material_id], axis=-1)

@@ -10,7 +10,7 @@ import scipy
 from numpy.typing import NDArray
 
 from isp.design.expected_error import Noise, expected_error, sampled, single_gaussian
-from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_prior
+from isp.design.spectral_prior import PATCH, PRIORS, SpectralPrior, load_spectral_prior
 from render.spectrum import tristimulus
 from rodcone.colour_spaces import D65_XY, adapt_to_d65, encode_srgb, xyz_from_xy, xyz_to_srgb
 from rodcone.errors import InputError, require_name
@@ -81,7 +81,7 @@ class LitPrior:
 @cache
 def view_of(prior_name: str, light_name: str) -> LitPrior:
     """The prior's coefficients under an illuminant, in bands of 1 nm."""
-    prior = load_prior(prior_name)
+    prior = load_spectral_prior(prior_name)
     light = named_light(light_name)
     basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, light.wavelength_nm) - 1, 0, len(prior.spectra) - 1)]
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm)
@@ -184,7 +184,7 @@ def expect(
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
     if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # else a patch's middle lacks sites
         raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")
-    spectral = load_prior(prior)
+    spectral = load_spectral_prior(prior)
     forms = _forms(prior, light)
     responses = responses_e(sensor, view_of(prior, light))
     lens = lens_of(sensor, blur)
@@ -219,7 +219,7 @@ def expect(
 @cache
 def _forms(prior: str, light: str) -> Floats:
     """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
-    spectral = load_prior(prior)
+    spectral = load_spectral_prior(prior)
     seen = view_of(prior, light)
     return np.array([[r.swapaxes(-1, -2) @ r for r in metric_rows(spectral, seen, m)] for m in spectral.reflectances])
 
@@ -227,7 +227,7 @@ def _forms(prior: str, light: str) -> Floats:
 @cache
 def drawn_pixels(prior: str) -> Floats:
     """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
-    spectral = load_prior(prior)
+    spectral = load_spectral_prior(prior)
     rng = np.random.default_rng(0)
     shape = (METERED, METERED)
     component = rng.choice(len(spectral.patches.weights), shape, p=spectral.patches.weights)

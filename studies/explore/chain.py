@@ -277,7 +277,8 @@ def _group_frame(irradiance: SpectralIrradiance, sensor: SensorConfig) -> GroupF
 
 
 def _truth(exposed: Exposure, controls: Controls, memo: Memo) -> tuple[Image, NDArray[np.uint8]]:
-    groups, light = exposed.transport.groups, exposed.light
+    groups = exposed.transport.groups
+    light = exposed.light
     planes = []
     for name in exposed.frames:
         lamp = controls.lamps.get(name, Lamp())

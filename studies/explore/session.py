@@ -60,7 +60,9 @@ class Session:
         self._begin_page("")
         self._begin_source(source)
         self._asked_s = -REST_S  # when the last picture was asked for
-        self._turns, self._alone, self._closed = 0, False, False
+        self._turns = 0
+        self._alone = False
+        self._closed = False
         self._changed = threading.Condition()
         self._thread = threading.Thread(target=self._work, daemon=True, name="explorer")
         self._thread.start()
@@ -69,7 +71,8 @@ class Session:
         """Answer another connection from now on, and tell the one before."""
         with self._changed:
             self._send({"kind": "taken over"}, ())
-            self._send, self._alone = send, False
+            self._send = send
+            self._alone = False
             self._begin_page("")
             self._changed.notify()
 
@@ -113,7 +116,9 @@ class Session:
         self._folder.cleanup()
 
     def _begin_source(self, source: Source) -> None:
-        self._source, self._states, self._memo = source, source.states(self._between_runs), Memo(self._check)
+        self._source = source
+        self._states = source.states(self._between_runs)
+        self._memo = Memo(self._check)
         self._rendered: RenderState | None = None
         self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
 
@@ -138,7 +143,8 @@ class Session:
 
     def _turn(self, message: Header | None, act: Callable[[], None]) -> None:
         """Answer a message or do a task; an error becomes one line on the page, which goes on."""
-        self._turns, self._message = self._turns + 1, message
+        self._turns = self._turns + 1
+        self._message = message
         if self._turns % TRIM_AFTER == 0:
             release_memory()
         with warnings.catch_warnings(record=True) as warned:
@@ -213,7 +219,9 @@ class Session:
             words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
             self._failure = "" if self._rendering else words
             raise
-        self._rendered, self._rendering, self._memo = rendered, not rendered.last, Memo(self._check)
+        self._rendered = rendered
+        self._rendering = not rendered.last
+        self._memo = Memo(self._check)
         with self._changed:
             if self._shown is not None:
                 self._pending.setdefault("show", self._shown)
@@ -261,14 +269,17 @@ class Session:
         with self._changed:
             sent: list[Bytes] = []
             if message.get("page", "") == self._page:
-                self._shown, sent = message, self._sent
+                self._shown = message
+                sent = self._sent
         header, pictures, waiting = shown(cameras, views, rendered, self._memo, self._drops)
         self._slow_wanted |= waiting
         return header | {"last": not self._rendering}, unsent(pictures, sent)
 
     def _begin_slow(self) -> None:
         """Start the slow processors of the shown views."""
-        self._slow_wanted, message, rendered = False, self._shown, self._rendered
+        self._slow_wanted = False
+        message = self._shown
+        rendered = self._rendered
         if message is None or rendered is None:
             return
         for controls in self._cameras(message):

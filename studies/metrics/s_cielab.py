@@ -29,7 +29,7 @@ SPREADS = (
 )
 
 
-def transfer(plane: int, cycles_per_degree: Floats) -> Floats:
+def eye_transfer(plane: int, cycles_per_degree: Floats) -> Floats:
     """Factor on the contrast of a grating of each frequency in opponent plane 0, 1 or 2; 1 at frequency 0."""
     return np.asarray(_gaussians(plane, cycles_per_degree) @ _weights(plane))
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from studies.metrics.metric import DELTA_E, HEADLINE, METRICS, PSNR, Metric
 from studies.pages.report_data import ReportCell
-from studies.pages.report_text import NBSP, camera_name, duration, fixed, lead_text, significant
+from studies.pages.report_text import NBSP, camera_name, duration_text, fixed, lead_text, significant
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 
@@ -191,7 +191,9 @@ def pair_words(group: Group) -> str:
     for ours, theirs in zip(group.ours, group.theirs, strict=True):
         times = [cell.first.exposure_s for cell in (ours, theirs) if cell.first]
         if len(times) == 2 and max(times) > SAME_TIME * min(times):
-            differ.append(f"{group.pair.levels[ours.level]} {duration(times[0])} against {duration(times[1])}")
+            differ.append(
+                f"{group.pair.levels[ours.level]} {duration_text(times[0])} against {duration_text(times[1])}"
+            )
     cameras = tuple(cells[0].camera for cells in (group.ours, group.theirs))
     reference = "bayer" in cameras and _balances(*group.ours, *group.theirs) == {GRAY_WORLD}
     sentences = ["Bayer (bilinear) with Gray World is the paper's reference."] if reference else []

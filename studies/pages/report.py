@@ -63,15 +63,15 @@ def cell_view(cell: ReportCell, level: ReportLevel, group: str) -> dict[str, Any
             if isfinite(mean := cell.mean(metric.key))
             for half in [cell.half(metric.key)]
         },
-        "exposure": text.duration(row.exposure_s if row else None),
+        "exposure": text.duration_text(row.exposure_s if row else None),
         "saturated": text.percent(cell.mean("saturated")),
         "substitution": "" if cell.substitution is None else text.substitution_text(cell.substitution),
         "balance": balance_text(cell.balance),
         "mc_share": text.percent(share),
         "over": share > MOST_SHARE,
         "electrons": " ".join(f"{name}\N{NBSP}{text.significant(mean)}" for name, mean in electrons.items()),
-        "capture": text.duration(row.capture_s if row else None),
-        "develop": text.duration(row.develop_s if row else None),
+        "capture": text.duration_text(row.capture_s if row else None),
+        "develop": text.duration_text(row.develop_s if row else None),
         "file": f"pictures/{row.picture}" if row else "",
         "alt": f"{text.camera_name(cell.camera)} picture, {level.name}, {group}",
     }

@@ -218,7 +218,7 @@ def shown_metrics(cells: Sequence[ReportCell]) -> list[Metric]:
     return [metric for metric in METRICS if any(isfinite(cell.mean(metric.key)) for cell in cells)]
 
 
-def markdown(report: ReportData, command: str, a: int) -> str:
+def comparison_markdown(report: ReportData, command: str, a: int) -> str:
     """Return the page of one value of what the report compares first, beside all the others.
 
     Parameters
@@ -262,7 +262,9 @@ def lead_table(report: ReportData, axis: int, a: int, metric: Metric) -> str:
             title = f"{code(names[other])}, {code(group.title)}" if group.title else code(names[other])
             rows.append([title, *lead_cells(metric, group.pair.leads[metric.key]), last])
     unit = f" [{metric.unit}]" if metric.unit else ""
-    return text.table([f"{metric.name}{unit}", *(code(level.name) for level in report.levels), "counted"], rows)
+    return text.markdown_table(
+        [f"{metric.name}{unit}", *(code(level.name) for level in report.levels), "counted"], rows
+    )
 
 
 def lead_cells(metric: Metric, lead: Leads) -> list[str]:

@@ -63,7 +63,8 @@ def sweep_report(
         run's cells is made yet, they were made by different versions, variants or engines, or a picture is gone.
     """
     run = run or last_run(folder)
-    rows, brightness = run.rows, {row.level: row.luminance_cd_m2 for row in reversed(run.rows)}
+    rows = run.rows
+    brightness = {row.level: row.luminance_cd_m2 for row in reversed(run.rows)}
     require_alike(rows)
     levels = sorted(run.study["levels"], key=lambda level: brightness.get(level, np.inf))
     study, thinned = shown_part({**run.study, "levels": levels, "ways": _ways(run.study)}, where or {})
@@ -116,7 +117,8 @@ def _cells(study: Mapping[str, Any], row_list: Sequence[Row], scenes: Sequence[s
         for way in [(r.exposure, r.frames, r.gain)]
     }
     light = {(r.scene, r.spectrum, r.level): (r.luminance_cd_m2, r.illuminance_lux) for r in row_list}
-    levels, sensors = study["levels"], [label(name) for name in study["sensors"]]
+    levels = study["levels"]
+    sensors = [label(name) for name in study["sensors"]]
     axes = (study["spectra"], sensors, study["ways"], study["white_balances"], levels, study["processors"])
     cells = []
     for place in product(scenes, *axes):

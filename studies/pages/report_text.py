@@ -61,7 +61,7 @@ def percent(value: float | None) -> str:
     return significant(None if value is None else 100 * value, "%", 2)
 
 
-def duration(seconds: float | None) -> str:
+def duration_text(seconds: float | None) -> str:
     """Write a time in ms below one second, else in s."""
     if seconds is not None and 0 < abs(seconds) < 1:
         return significant(1000 * seconds, "ms", 3)
@@ -111,7 +111,7 @@ def exposure_name(exposure: str) -> str:
     """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"; after a comma what goes on."""
     time, comma, balance = exposure.partition(", ")
     seconds = parse_exposure(time)
-    return (AUTOMATIC[time] if seconds is None else duration(seconds)) + comma + balance
+    return (AUTOMATIC[time] if seconds is None else duration_text(seconds)) + comma + balance
 
 
 def way_name(exposure: str, frames: int = 1, gain: str = OWN) -> str:
@@ -120,6 +120,6 @@ def way_name(exposure: str, frames: int = 1, gain: str = OWN) -> str:
     return exposure + burst + ("" if gain == OWN else f", {gain}" if gain.startswith(ISO) else f", gain {gain}")
 
 
-def table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
+def markdown_table(head: Sequence[str], rows: Sequence[Sequence[object]]) -> str:
     """Return a Markdown table."""
     return "\n".join(f"| {' | '.join(map(str, line))} |" for line in (head, ["---"] * len(head), *rows))

@@ -26,14 +26,14 @@ def twin_page(twin: Twin, title: str, version: str) -> str:
         comparisons=twin.comparisons,
         alike=sum(one.alike for one in twin.comparisons),
         notes=(*twin.figures.notes, f"response_bend is {bend.value:.4f}: {bend.source}"),
-        transfer=svg_address(transfer_svg(twin)),
+        transfer=svg_address(twin_svg(twin)),
         dark=svg_address(pair_svg(twin.dark, "Dark")),
         bright=svg_address(pair_svg(twin.bright, "Flat")),
     )
 
 
 @rc_context(STYLE)
-def transfer_svg(twin: Twin) -> str:
+def twin_svg(twin: Twin) -> str:
     """Draw both photon transfers, and the ratio of the temporal noises."""
     figure = blank(2 * CHART[0], CHART[1])
     left, right = figure.subplots(1, 2)

@@ -27,7 +27,8 @@ from studies.paper.setup import (
     view,
 )
 
-BRIGHT_CD_M2, PITCH_UM = 200.0, 3
+BRIGHT_CD_M2 = 200.0
+PITCH_UM = 3
 
 
 @dataclass(frozen=True)

@@ -91,7 +91,8 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
     light = _in_bands(spectrum, sensor.window_nm)
     nm, width = light.wavelength_nm, light.width_nm
-    behind_filters_e, mixing = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp), mixing_of(sensor)
+    behind_filters_e = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
+    mixing = mixing_of(sensor)
     electrons = mixing @ behind_filters_e
     response = electrons / (photons_per_joule(nm) * width)  # inside the camera's window
     names = sensor.channels
@@ -330,7 +331,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     """
     sensor = preset("low_noise") if sensor is None else sensor
     sensor = at_gain(replace(sensor, lens=held_lens(sensor.lens, shake)), gain_text(gain, iso))
-    shape, per_second_e = pixel_shape(radiance, samples_per_pixel), None
+    shape = pixel_shape(radiance, samples_per_pixel)
+    per_second_e = None
     if exposure_s is None:
         per_second_e = imaged_electrons(radiance, sensor, 1.0, samples_per_pixel)
         exposure_s, sensor = exposed_by_rule(AUTO_INFORMATION, per_second_e, sensor)

@@ -69,7 +69,8 @@ def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: 
 
 def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> Floats:
     """Shares of the middles of equal parts of a time from 0 on, for exposures that start at times within it."""
-    times_s, step_s = moments_s(whole_s, count), whole_s / count
+    times_s = moments_s(whole_s, count)
+    step_s = whole_s / count
 
     def until(time_s: Floats) -> Floats:
         # Integral from 0 on of the tent about each time, 2 steps wide; the first and the last go on to the ends.
@@ -176,13 +177,16 @@ def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -
         return first + (last - first) / np.asarray(k, np.asarray(first).dtype)
 
     def of_errors(first: Any, last: Any, k: float | Floats = count) -> Any:
-        real, rest = np.asarray(first).dtype, np.asarray(1 / np.asarray(k, np.float64))
+        real = np.asarray(first).dtype
+        rest = np.asarray(1 / np.asarray(k, np.float64))
         return first * ((1 - rest) ** 2).astype(real) + last * (rest**2).astype(real)
 
     def halves(first: Halves, last: Halves) -> Halves:
         return Halves(mixed(first.mean, last.mean, parts), mixed(first.difference, last.difference, parts))
 
-    variance, means, last = of_errors(mean.variance, each.variance, parts), mean.scene_means, each.scene_means
+    variance = of_errors(mean.variance, each.variance, parts)
+    means = mean.scene_means
+    last = each.scene_means
     shared = None
     if mean.shared is not None and each.shared is not None:
         covariance = of_errors(_covariance(mean.shared, mean), _covariance(each.shared, each), parts)

@@ -323,7 +323,8 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     """Photograph and write as `carry_out`, with a folder for the render meanwhile."""
     order, samples = checked.order, checked.samples
     require_memory(checked.cost.memory, order.force)
-    out, balance = Path(order.out), None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
+    out = Path(order.out)
+    balance = None if order.white_balance == AS_SHOT else illuminant(order.white_balance)
     subject = _of_file(checked, balance) if checked.opened is None else _of_scene(checked, balance, step, kept)
     colour = calibrate(checked.sensor, balance or subject.light)
     check_place(out)  # before the render: it may take minutes
@@ -407,7 +408,8 @@ def _of_scene(checked: Checked, balance: Spectrum | None, step: Step | None, kep
     assert opened is not None
     spectra = asked_spectra(opened.scene, order.light)
     name, first = next(iter(opened.scene.groups.items()))
-    light, notes = spectra.get(name, first_light(opened.scene.groups, illuminant(LIGHT))), [*opened.notes]
+    light = spectra.get(name, first_light(opened.scene.groups, illuminant(LIGHT)))
+    notes = [*opened.notes]
     if balance is None and first.coloured:
         assumed = f"scene {opened.scene.name}: light group {name!r} has colours of its own; white balance is set to"
         notes.insert(0, f"{assumed} {LIGHT}, --white-balance sets it otherwise")
@@ -613,7 +615,8 @@ def check(order: Order) -> Checked:
         opened = replace(opened, scene=scene)
         moving = tuple(in_focus(each, sensor, size, *lens)[0] for each in moving)
     centres = ready.transport.wavelength_nm if ready else _bands(opened, spectra)[0]
-    spp, times = 0 if ready else order.spp or _SPP, max(len(moving), 1)
+    spp = 0 if ready else order.spp or _SPP
+    times = max(len(moving), 1)
     rendered = (samples * size[0], samples * size[1])
     cost = PictureCost(
         rendered,
@@ -661,7 +664,8 @@ def _opened(
         )
     if order.frames > 1:
         raise InputError(f"frames: {order.frames} beside moments = {order.moments}; allowed: 1; leave one of them out")
-    times_s, shares = moments_s(exposure_s, order.moments), None
+    times_s = moments_s(exposure_s, order.moments)
+    shares = None
     still = at(exposure_s / 2)
     if sensor.row_time_us and exposure_s:
         rows = _size(order, still)[0]

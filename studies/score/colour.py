@@ -31,7 +31,8 @@ GREYS = 6  # the chart's last row
 SIDE_PX, CHIPS = 64, 8  # side of a patch [pixels], and number of chips that see it in one measurement
 # A chip takes several frames if its read noise is above this share of the converter's top, so many that their mean's
 # noise comes down to it; and the most frames that it takes.
-FRAMES_SHARE, MOST_FRAMES = 0.003, 16
+FRAMES_SHARE = 0.003
+MOST_FRAMES = 16
 ACROSS, BORDER = 5, 2  # patches in a row, and the border of a patch that crosstalk reaches [pixels]
 WHITE_SHARE = 0.7  # share of the converter's top at which the most sensitive channel reads a perfect white
 INDEX_FACTOR = 5.5  # ISO 17321-1
@@ -136,7 +137,8 @@ def _signals(sensor: SensorConfig, light: Light, surfaces: Floats) -> Floats:
 def _chart_e(sensor: SensorConfig, light: Light, surfaces: Floats, exposure_s: float) -> Floats:
     """Return the photo-electrons of a chart of 5 x 5 even patches, of which the last is white."""
     rows, columns = (len(line) * sensor.sites for line in (sensor.cfa, sensor.cfa[0]))
-    repeats, patches = (SIDE_PX // rows, SIDE_PX // columns), []
+    repeats = (SIDE_PX // rows, SIDE_PX // columns)
+    patches = []
     for reflectance in (*surfaces, np.ones_like(light.spectrum)):
         values = np.broadcast_to(reflectance * light.spectrum, (rows, columns, light.spectrum.size)).copy()
         radiance = SpectralRadiance(values, light.wavelength_nm, width_nm=light.width_nm, light=light.lamp)

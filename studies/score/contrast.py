@@ -68,19 +68,22 @@ def accuracy(field: EvenField, mean_cd_m2: float) -> float:
 
 def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floats, Floats]:
     """Return the readings that a pixel may give [e-], and the probability of each."""
-    sensor, expected_e = field.sensor, luminance_cd_m2 * field.electrons_per_cd_m2
+    sensor = field.sensor
+    expected_e = luminance_cd_m2 * field.electrons_per_cd_m2
     readings = at_channel(resolve(sensor, np.array([expected_e]), field.exposure_s, field.channel), field.channel)
     if several(readings):
         return np.empty(0), np.empty(0)
     (reading,) = readings
     seen, share = reading.sensor, reading.share
-    law, gain = reading.law.over(1 / share), seen.gain_e_per_dn
+    law = reading.law.over(1 / share)
+    gain = seen.gain_e_per_dn
     mean_e, dark_e = expected_e * share, seen.pixel.dark_current_e_per_s * reading.exposure_s
     temporal_e2 = max(law.dark_e**2 - gain**2 / 12 - dark_e, 0.0)
     # Beside Poisson's count, light raises what the columns' gains make of it and of the dark current together.
     lit_e2 = (law.prnu * mean_e) ** 2 + (law.shot - 1) * mean_e
     rest_e = float(np.sqrt(temporal_e2 + law.fixed_e**2 + lit_e2))
-    counts, weights = np.array([mean_e + dark_e]), np.ones(1)
+    counts = np.array([mean_e + dark_e])
+    weights = np.ones(1)
     if mean_e < COUNTED_E:
         counts = np.arange(int(poisson.ppf(1 - TAIL, mean_e + dark_e)) + 1.0)
         weights = poisson.pmf(counts, mean_e + dark_e)

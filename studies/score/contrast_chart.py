@@ -10,7 +10,7 @@ import numpy as np
 
 from rodcone.errors import InputError
 from rodcone.types import Floats, Plane
-from scenes.contrast_patches import PatchPair, pairs
+from scenes.contrast_patches import PatchPair, patch_pairs
 from studies.score.contrast import CONTRAST, EQUAL, TOLERANCE
 
 MARGIN = 0.15  # of a patch's side, left off on each side
@@ -58,14 +58,15 @@ def chart_accuracy(luminance: Plane, tolerance: float = TOLERANCE) -> list[PairA
             "more; crop it to the chart's square"
         )
     found = []
-    for pair in pairs():
+    for pair in patch_pairs():
         bright, dark = (_patch(luminance, pair, column) for column in (pair.bright_column, pair.dark_column))
         found.append(PairAccuracy(pair, pair_accuracy(bright, dark, pair.contrast, tolerance)))
     return found
 
 
 def _patch(luminance: Plane, pair: PatchPair, column: float) -> Plane:
-    side, half = luminance.shape[0], (0.5 - MARGIN) * pair.side
+    side = luminance.shape[0]
+    half = (0.5 - MARGIN) * pair.side
     down, across = (slice(int(np.ceil((at - half) * side)), int((at + half) * side)) for at in (pair.row, column))
     return luminance[down, across]
 
@@ -77,7 +78,8 @@ def pair_accuracy(bright: Floats, dark: Floats, contrast: float = CONTRAST, tole
     and pairs aren't formed.
     """
     lowest, highest = (contrast * (1 + sign * tolerance) + sign * EQUAL for sign in (-1, 1))
-    values, known = np.sort(np.ravel(dark)), np.ravel(bright)
+    values = np.sort(np.ravel(dark))
+    known = np.ravel(bright)
     known = known[known > 0]  # beside a value that isn't, none that makes a sum above 0 is darker
     darkest, brightest = (known * (1 - c) / (1 + c) for c in (highest, lowest))
     right = np.searchsorted(values, brightest, side="right") - np.searchsorted(values, darkest, side="left")

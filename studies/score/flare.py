@@ -52,7 +52,8 @@ def flare(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> 
     if merit.missing:
         return Definition((merit,), not_measured)
     plain = replace(sensor, lens=replace(sensor.lens, **EVEN_LIGHT, shake_um=0.0, diffraction=0.0, defocus_um=0.0))
-    bands, side = bands_of(light, sensor.window_nm), SIDE_PX * sensor.sites
+    bands = bands_of(light, sensor.window_nm)
+    side = SIDE_PX * sensor.sites
     start, stop = (at * sensor.sites for at in ((SIDE_PX - PATCH_PX) // 2, (SIDE_PX + PATCH_PX) // 2))
     reflectance = np.ones((side, side))
     reflectance[start:stop, start:stop] = 0.0
@@ -85,7 +86,8 @@ def corner_illumination(sensor: SensorConfig, light: str, exposure_s: float, cha
     and what a rim takes multiplies it.
     """
     lens, (height, width) = sensor.lens, VIEW_PX
-    across, half_diagonal = tan(radians(lens.horizontal_view_deg / 2)), np.hypot(*VIEW_PX) / 2
+    across = tan(radians(lens.horizontal_view_deg / 2))
+    half_diagonal = np.hypot(*VIEW_PX) / 2
     tangents = ((np.arange(side) - (side - 1) / 2) * 2 * across / width for side in VIEW_PX)
     power = lens.falloff_power or NATURAL_POWER
     light_share = (1 + np.add.outer(*(tangent**2 for tangent in tangents))) ** (-power / 2)

@@ -43,7 +43,8 @@ def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: 
     yield _conversion(field, light)
 
     def noise_speed(ratio: int, quality: str) -> Named:
-        name, title = f"iso_12232.noise_speed_{ratio}", f"noise-based speed, S/N {ratio}, {quality}"
+        name = f"iso_12232.noise_speed_{ratio}"
+        title = f"noise-based speed, S/N {ratio}, {quality}"
         stated = Merit(name, title, "ISO", "ISO 12232:2019, 6.3: 10 / H", words, nan)
         return stated, lambda luminance: ISO_NOISE_LUX_S / (luminance * field.lux_s_per_cd_m2)
 
@@ -144,7 +145,8 @@ def _expected_e(field: EvenField, collected_e: Floats) -> Floats:
     if several(field.readings):
         return collected_e
     (reading,) = field.readings
-    pixel, share = reading.sensor.pixel, reading.share
+    pixel = reading.sensor.pixel
+    share = reading.share
     dark_e = pixel.dark_current_e_per_s * reading.exposure_s
     read_e: Floats = (bent_e(collected_e * share + dark_e, pixel) - bent_e(dark_e, pixel)) / share
     return read_e

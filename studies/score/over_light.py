@@ -53,7 +53,8 @@ def over_light(
     colours = _colours(sensor, light, exposure_s)
     rows = []
     for number, each in enumerate(lux):
-        luminance, rng = each * GREY / pi, np.random.default_rng((seed, number))
+        luminance = each * GREY / pi
+        rng = np.random.default_rng((seed, number))
         samples = field.samples_e(field.shoot(luminance, field.draw_chip(rng), rng))
         electrons = luminance * field.electrons_per_cd_m2
         expected = snr(np.array([electrons]), field.sensor, exposure_s, field.channel)

@@ -198,10 +198,12 @@ def _steps(field: EvenField, top_e: float) -> Floats:
 def _bits_of(field: EvenField, noise_e: Callable[[EvenField, float], float]) -> float:
     if len(_colours(field)) < 3:
         return nan
-    white_cd_m2, bits = _white_cd_m2(field), 0.0
+    white_cd_m2 = _white_cd_m2(field)
+    bits = 0.0
     for name in _colours(field):
         one = replace(field, channel=name)
-        top_e, total = white_cd_m2 * one.electrons_per_cd_m2, 0.0
+        top_e = white_cd_m2 * one.electrons_per_cd_m2
+        total = 0.0
         for number, (start, end) in enumerate(pairwise(_steps(one, top_e).tolist())):
             nodes, weights = np.polynomial.legendre.leggauss(NODES[min(number, 1)])
             places = (start + end) / 2 + (end - start) / 2 * nodes

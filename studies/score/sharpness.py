@@ -179,7 +179,8 @@ def _windowed(transfer: Floats) -> tuple[Floats, Floats]:
     turns = 2 * reach * GRID
     window = 1.08 * np.sinc(turns) + 0.46 * (np.sinc(turns - 1) + np.sinc(turns + 1))
     shown = fftconvolve(transfer, window, mode="same")
-    middle, last = GRID.size // 2, GRID.size // 2 + round(1 / (GRID[1] - GRID[0]))
+    middle = GRID.size // 2
+    last = GRID.size // 2 + round(1 / (GRID[1] - GRID[0]))
     return GRID[middle : last + 1], np.abs(shown[middle : last + 1] / shown[middle])
 
 

@@ -25,7 +25,8 @@ WHITE_SHARE = 0.6  # of the well, for a perfect white
 
 def texture(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:
     """Define the figures of dead leaves that one channel sees at every pixel."""
-    seen, bands = every_pixel(sensor, channel), bands_of(light, sensor.window_nm)
+    seen = every_pixel(sensor, channel)
+    bands = bands_of(light, sensor.window_nm)
     samples = max(least_samples(seen), LEAST_SAMPLES)
     frequency: Floats = np.asarray(np.fft.fftfreq(SIDE_PX), np.float64)
     expected = expected_response(transfer_at(seen, bands, exposure_s, frequency[:, None], frequency))

@@ -19,7 +19,7 @@ from rodcone.types import Floats
 from sensor.config import SensorConfig
 from sensor.readings.best_estimate import merged_variances
 from sensor.readings.resolve import several
-from studies.metrics.s_cielab import PIXELS_PER_DEGREE, XYZ_TO_OPPONENT, eye_xyz, transfer
+from studies.metrics.s_cielab import PIXELS_PER_DEGREE, XYZ_TO_OPPONENT, eye_transfer, eye_xyz
 from studies.metrics.truth import GREY, named_light
 from studies.photograph.camera import calibrate
 from studies.score.even_field import SIDE_PX, EvenField, even_field
@@ -95,7 +95,8 @@ def expected_noise(fields: Sequence[EvenField], matrix: Floats, white_cd_m2: flo
 
 def _variances(field: EvenField, electrons: float) -> Floats:
     """Return the variances that each pixel has by itself, that a column's pixels share, and that a row's do [e-^2]."""
-    light_e, readings = np.array([electrons]), field.readings
+    light_e = np.array([electrons])
+    readings = field.readings
     if several(readings):
         by_source = {name: float(values[0]) for name, values in merged_variances(light_e, readings).items()}
     else:
@@ -113,7 +114,7 @@ def _expected(variances: Floats, matrix: Floats, side: int) -> float:
     that don't change down a column, that of rows at those that don't change along a row.
     """
     cycles = np.arange(side) / (2 * side) * PIXELS_PER_DEGREE
-    passed = np.stack([transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
+    passed = np.stack([eye_transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
     passed[0, 0] = 0.0  # the mean isn't noise
     every = np.einsum("hwi,hwj->ij", passed, passed) / side**2
     kept = (every, passed[0].T @ passed[0] / side, passed[:, 0].T @ passed[:, 0] / side)

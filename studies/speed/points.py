@@ -66,7 +66,8 @@ def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
 
     Of equal ones the first is.
     """
-    flags, least = [False] * len(pairs), np.inf
+    flags = [False] * len(pairs)
+    least = np.inf
     for index in sorted(range(len(pairs)), key=lambda place: pairs[place]):
         flags[index] = pairs[index][1] < least
         least = min(least, pairs[index][1])

@@ -157,7 +157,8 @@ def pace() -> float:
 def _work_s() -> float:
     """Processor seconds of a loop in Python and of transforms and exponentials in NumPy, a third each or so."""
     begun = process_time()
-    total, picture = 0, np.linspace(0.1, 1.0, 1 << 16, dtype=np.float32).reshape(256, 256)
+    total = 0
+    picture = np.linspace(0.1, 1.0, 1 << 16, dtype=np.float32).reshape(256, 256)
     for number in range(100_000):
         total += number * number
     for _ in range(3):

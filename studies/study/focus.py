@@ -32,7 +32,8 @@ def in_focus(
     InputError
         For a camera without perspective, and a distance within the focal length.
     """
-    camera, f_number = scene.geometry["sensor"], sensor.lens.f_number
+    camera = scene.geometry["sensor"]
+    f_number = sensor.lens.f_number
     thin_lens(camera, 1.0, focus_m)  # refuses a camera that has no angle of view
     view_deg = horizontal_view_deg(camera, size)
     if focal_length_mm is None:

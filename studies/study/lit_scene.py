@@ -138,7 +138,8 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
     # as the lens sees it, and at its times
-    scenes, whole_s = [scene], 0.0
+    scenes = [scene]
+    whole_s = 0.0
     if choice.moments is not None:  # the middle, and the times
         whole_s = _whole_s(study, size[0])
         scenes = [_at(choice, float(at_s)).scene for at_s in (whole_s / 2, *moments_s(whole_s, choice.moments))]

@@ -205,7 +205,8 @@ def render_quietly(
     **options
         Of `render.engine.render`: bands, seed, cache, progress.
     """
-    transport, most_samples = None, min(FIRST_SPP, max_spp)
+    transport = None
+    most_samples = min(FIRST_SPP, max_spp)
     while True:
         transport = render(scene, size, max_spp=most_samples, max_seconds=max_seconds, resume=transport, **options)
         now = share(transport)

@@ -28,7 +28,7 @@ from sensor.config import LONGEST_S
 from sensor.exposure import AUTO_INFORMATION
 from sensor.flicker.rows import check_flicker
 from sensor.flicker.waveform import waveform
-from sensor.lens.table import table_of
+from sensor.lens.table import lens_table
 from sensor.presets import preset, vary
 from sensor.shake import SHAKES
 from studies.study.equal_area import EqualArea
@@ -387,7 +387,7 @@ def _check_cameras(study: Study) -> None:
         sensor = preset(name)
         if study.lens.table:
             with in_place("lens.table"):
-                table_of(study.lens.on(sensor.lens))
+                lens_table(study.lens.on(sensor.lens))
         if study.flicker:
             with in_place(f"sensor {label(name)}"):
                 check_flicker(replace(sensor, lens=study.lens.on(sensor.lens)))
@@ -432,7 +432,8 @@ def _check_moments(study: Study) -> None:
                 f"exposures: {exposure!r} {beside}; allowed: times, such as 100ms, because a rule needs the light that "
                 "the exposure itself blurs; give times"
             )
-    limits, rolls = study.render, any(preset(name).row_time_us for name in study.sensors)
+    limits = study.render
+    rolls = any(preset(name).row_time_us for name in study.sensors)
     require_absent(
         beside,
         **{

@@ -53,7 +53,8 @@ class Ahead(Generic[Result]):
 
     def __init__(self, call: Callable[[Spans, Progress], Result]) -> None:
         self._spans, self._stopped = Spans(), Event()
-        self.share, self._error = 0.0, float("inf")
+        self.share = 0.0
+        self._error = float("inf")
         self._future: Future[Result] = Future()
         # no worker of a pool, which Python waits for at its end: a second Ctrl-C leaves at once
         Thread(target=self._make, args=(call,), daemon=True).start()

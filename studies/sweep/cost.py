@@ -127,11 +127,12 @@ def estimated(
     """
     everything = reference or study.budget.model == REFERENCE
     plan = reference_plan(study) if everything else plan_from_settings(study)
-    code, kept = versions()["rodcone"], 0
+    code = versions()["rodcone"]
+    kept = 0
     if (out / FILE).is_file():
         with read_results(out) as base:
             kept = sum(count for text, count in made_with(base).items() if _code_of(text) == code)
-    return estimate(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
+    return estimate_cost(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
 
 
 def _code_of(versions_text: Any) -> Any:
@@ -142,7 +143,7 @@ def _code_of(versions_text: Any) -> Any:
         return None
 
 
-def estimate(
+def estimate_cost(
     study: Study,
     plan: Plan,
     scenes: Mapping[SceneChoice, OpenedScene],
@@ -191,14 +192,17 @@ def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:
     if opened.scene is None:
         pixels, bands, groups = extent_of(opened.choice.source)
         return _Part(pixels, pixels, bands, groups, 0)
-    model, samples = plan.renders[opened.choice], plan.samples_a_side(opened.choice)
+    model = plan.renders[opened.choice]
+    samples = plan.samples_a_side(opened.choice)
     film = film_of(opened, model, samples)
     pixels = prod(film.size)
     shapes = {} if study.equal_area is None else sensor_shapes(study.equal_area, study.sensors, opened.size)
-    groups, bands = len(opened.scene.groups), len(model.wavelength_nm)
+    groups = len(opened.scene.groups)
+    bands = len(model.wavelength_nm)
     found = study.render.reference and find_reference(opened.scene, film) is not None
     spp = _LIVE_SPP if found else model.spp
-    largest, times = max(pixels, *map(prod, shapes.values()), 0), len(opened.moving)
+    largest = max(pixels, *map(prod, shapes.values()), 0)
+    times = len(opened.moving)
     return _Part(pixels, largest, bands, groups, spp, model.denoise, times)
 
 

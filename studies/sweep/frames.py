@@ -141,7 +141,8 @@ def make_frames(
     else:
         views = relight_denoised(transport, luminance_cd_m2=1.0)
     true = transport if still is None else still
-    white, area = shown_white_cd_m2(true, 1.0), study.equal_area
+    white = shown_white_cd_m2(true, 1.0)
+    area = study.equal_area
     seen = views[0] if still is None else still.relight(luminance_cd_m2=1.0)
     picture = in_pixels(seen, samples) if area is None else area.view(seen, area.coarsest_um)
     scene = {
@@ -176,7 +177,8 @@ def exposure_of(
 
     `exposure` and `gain` are as `studies.study.study.Condition` has them.
     """
-    asked_s, sensor = parse_exposure(exposure), at_gain(frame.sensor, gain)
+    asked_s = parse_exposure(exposure)
+    sensor = at_gain(frame.sensor, gain)
     if asked_s is not None:
         return asked_s, sensor
     less = frame.sensor.gain / sensor.gain  # the frame's times fill the converter's range at its own gain

@@ -56,7 +56,9 @@ class MovingLight:
 
     def content(self, middle: Transport, progress: Progress) -> tuple[str, float]:
         """Render all times; return a hash of their light with the middle's, and the seconds of all renders."""
-        found, seconds, count = [_digest(middle)], middle.seconds, len(self.opened.moving)
+        found = [_digest(middle)]
+        seconds = middle.seconds
+        count = len(self.opened.moving)
         for number in range(count):
             light = self.at(number, part_of(progress, number, count))
             found.append(_digest(light))

@@ -190,7 +190,8 @@ def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
 
 def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
     """Transport of a scene, rendered or out of the folder of renders; with what had to be assumed of a file."""
-    model, share = job.plan.renders.get(opened.choice), partial(_brightest_share, job, opened)
+    model = job.plan.renders.get(opened.choice)
+    share = partial(_brightest_share, job, opened)
     samples = job.plan.samples_a_side(opened.choice)
     return make_transport(opened, job.study, model, job.out / RENDERS, progress, share, samples)
 
@@ -205,14 +206,17 @@ def _moments(job: Job, opened: OpenedScene) -> MovingLight | None:
 
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
     """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
-    study, samples, shares = job.study, job.plan.samples_a_side(opened.choice), []
+    study = job.study
+    samples = job.plan.samples_a_side(opened.choice)
+    shares = []
     for (spectrum, *_), (_, sensor) in _imaged(job, opened).items():
         lit = under(transport, spectrum)
         lux = lux_per_cd_m2(lit, study.levels)
         brightest = max(level_luminance(level, lux) for level in study.levels)
         most = max(study.frames)
         for exposure in study.exposures:
-            time_s, longest_s = parse_exposure(exposure), study.longest_exposure_s * most
+            time_s = parse_exposure(exposure)
+            longest_s = study.longest_exposure_s * most
             whole_s = None if time_s is None else time_s * most
             burst = merged_sensor(sensor, most)
             shares.append(render_share(lit, burst, brightest, longest_s, whole_s, samples=samples))
@@ -255,7 +259,8 @@ def _make_files(
             if under_spectrum == spectrum and load_frame(folder, key, sensors[1]) is None:
                 absent[exposure, sensors[1].row_time_us if exposure else 0.0][key] = sensors
         for (exposure, _), wanted in absent.items():
-            lit, still = under(transport, spectrum), None
+            lit = under(transport, spectrum)
+            still = None
             if moments is not None:
                 (_, sensor), *_ = wanted.values()
                 exposed = moments.exposed(sensor, parse_exposure(exposure) or 0.0, transport)
@@ -264,7 +269,8 @@ def _make_files(
 
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
-    """Cells of a scene whose files stand, without their colours; None where one is missing."""
+    """Return the cells of a scene whose files are there, without their colours; None where a file is missing."""
+    # Frames that the cells share, by what they image.
     frames = dict[Imaged, UnitFrame]()
     for imaged, sensors in _imaged(job, opened).items():
         key = frame_key(record.content, opened, imaged[0], job.study, *sensors, imaged[-2])
@@ -274,8 +280,10 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         frames[imaged] = frame
     # Processors, balances and seeds share exposures: of each frame, by rule and gain, one for each level.
     exposures = dict[tuple[str, str, str], list[tuple[float, SensorConfig]]]()
-    cells, lamps = [], waveform(job.study.flicker) if job.study.flicker else None
-    seeds, pictures = job.study.seeds, (job.out / PICTURES).resolve()
+    cells = []
+    lamps = waveform(job.study.flicker) if job.study.flicker else None
+    seeds = job.study.seeds
+    pictures = (job.out / PICTURES).resolve()
     for condition in conditions(job.study, opened.choice):
         image = job.plan.images[condition]
         for name, software in job.software.items():

@@ -53,7 +53,9 @@ def run_cell(cell: Cell) -> Row:
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
     require_same(cell.made_by, cell.processor, processor.on_backend, own_version(cell.processor))
-    frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
+    frame = cell.frame
+    sensor = frame.sensor
+    engine = cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
@@ -85,9 +87,8 @@ def run_cell(cell: Cell) -> Row:
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
     # The neutral of the scene's light, as a raw file would note it, sets the scale; as shot, the balance too.
-    as_shot = names["white_balance"] == AS_SHOT
     neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
-    options = {"balance": neutral} if as_shot else {}
+    options = {"balance": neutral} if names["white_balance"] == AS_SHOT else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.fit, sensor, neutral, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # each has other kernels

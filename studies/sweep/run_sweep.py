@@ -181,7 +181,8 @@ def sweep(
         cell_lists = [known_cells(job, opened) for opened in scenes.values()]
         count = len(conditions(study)) * len(study.processors) * len(study.seeds) // len(scenes)
         want(base, chain.from_iterable([cell.key for cell in cells or ()] or [None] * count for cells in cell_lists))
-        count_made, shares = 0, Shares(show, len(scenes))
+        count_made = 0
+        shares = Shares(show, len(scenes))
         notes = dict[str, None]()
         with closing(_scenes(job, list(scenes.values()), cell_lists, shares, ahead=ahead)) as coming:
             for index, (opened, cells) in enumerate(zip(scenes.values(), coming, strict=True)):
@@ -219,7 +220,8 @@ def _scenes(
     following = known[0]
     try:
         for index, opened in enumerate(scenes):
-            cells, rendered = following, partial(shares.rendered, index)
+            cells = following
+            rendered = partial(shares.rendered, index)
             if coming is not None:
                 (record, cells), waited_s = coming.result(rendered)
                 coming = None

@@ -114,7 +114,7 @@ def draw_surface(rng: np.random.Generator) -> Floats:
     return np.asarray(curve.band_average(NM, width))
 
 
-def dead_leaves(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
+def leaf_picture(rng: np.random.Generator, light: KnownLight, shapes: int = 900) -> Floats:
     """Draw shapes that cover one another, sizes as the power law of natural pictures, shape (SIDE, SIDE, channel)."""
     side = SIDE * _FINE
     picture = np.empty((side, side, len(light.weights)))
@@ -207,7 +207,7 @@ def draw_pictures(
     for kind, rng in zip(kinds, np.random.default_rng(seed).spawn(len(kinds)), strict=True):
         light = light_of(rng)
         if kind == "leaves":
-            picture = dead_leaves(rng, light)
+            picture = leaf_picture(rng, light)
         elif kind == "gratings":
             picture = gratings(rng, light)
         else:

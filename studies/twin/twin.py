@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from rodcone.types import Floats
-from sensor.cameras.frame_sets import FrameSet, LightFrames, read_pixels
+from sensor.cameras.frame_sets import FrameSet, LightFrames, read_frame_pixels
 from sensor.cameras.frames import frame_numbers, measure_set
 from sensor.cameras.numbers import PixelNumbers, SourcedValue
 from sensor.capture import expose
@@ -205,7 +205,7 @@ def _mean_image(frames: Sequence[NDArray[Any]]) -> Floats:
 
 
 def _pixels(light: LightFrames, frames: FrameSet) -> list[NDArray[Any]]:
-    return [read_pixels(frame, frames).dn for frame in light.frames]
+    return [read_frame_pixels(frame, frames).dn for frame in light.frames]
 
 
 def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFrames:
@@ -213,7 +213,7 @@ def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFr
     ranked = []
     for light in frames.lights:
         if light.lit is lit and len(light.frames) > 1:
-            mean = float(read_pixels(light.frames[0], frames).dn.mean())
+            mean = float(read_frame_pixels(light.frames[0], frames).dn.mean())
             if mean <= most_dn:
                 ranked.append((len(light.frames), mean, light))
     return max(ranked, key=lambda one: one[:2])[2]

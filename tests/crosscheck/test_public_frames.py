@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sensor.cameras.frame_sets import open_set, read_pixels
+from sensor.cameras.frame_sets import open_set, read_frame_pixels
 from sensor.cameras.frames import measure_place
 from sensor.emva1288.from_frames import figures_of_stacks, stack_of
 
@@ -31,7 +31,7 @@ def test_half_of_the_ccds_lights_holds_the_reference_gain_and_that_of_the_other_
     with open_set(place(CCD)) as frames:
         stacks = {True: [], False: []}
         for light in frames.lights:
-            dn = [read_pixels(frame, frames).dn for frame in light.frames]
+            dn = [read_frame_pixels(frame, frames).dn for frame in light.frames]
             stacks[light.lit].append(stack_of(dn, ("W",), frames.white_dn, light.exposure_s, light.photons))
     rng, inside = np.random.default_rng(61), {"reference": 0, "other half": 0}
     for _ in range(DRAWS):

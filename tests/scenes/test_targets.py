@@ -17,7 +17,7 @@ from render.geometry import look_at, to_world
 from render.spectrum import Spectrum, luminance
 from scenes import lit_and_shadowed, night_street, still_life_outdoor
 from scenes.catalogue import load
-from scenes.contrast_patches import pairs
+from scenes.contrast_patches import patch_pairs
 from scenes.cornell_box import paint
 from scenes.dead_leaves import chart
 from scenes.oecf import grey_scale
@@ -83,7 +83,7 @@ def test_the_contrast_patches_have_the_reflectances_of_their_pairs():
     """In the middle of each patch; 64 pixels, each patch 9 wide."""
     made = render(load("contrast_patches"), (64, 64), wavelength_nm=BANDS_NM, spp=16, seed=7)
     picture = made.radiance[0].mean(axis=0, dtype=np.float64)
-    for pair in pairs():
+    for pair in patch_pairs():
         for column, sign in ((pair.bright_column, 1), (pair.dark_column, -1)):
             seen = picture[int(pair.row * 64), int(column * 64)]
             assert seen == pytest.approx(pair.mean * (1 + sign * pair.contrast), rel=1e-3)  # the sky is even

@@ -48,7 +48,8 @@ def sharpen_frame(
     white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any], scales: Floats
 ) -> NDArray[np.float32]:
     """As `isp.interleaved.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
-    jit, raw = arrays(), white.raw
+    jit = arrays()
+    raw = white.raw
     names, (height, width) = raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
     # Mirrored at the borders: row r stands at FAR + r.
@@ -73,7 +74,8 @@ def sharpen_frame(
     starts = places(range(FAR - REACH, FAR + REACH + 1))
     window = [dr.gather(jit.Array4f, frame, start) for line in starts for start in line]
     far = [dr.gather(jit.Array4f, frame, start) for line in places(range(0, 2 * FAR + 1, STEP)) for start in line]
-    near, plane = range(REACH - 1, REACH + 2), window[len(window) // 2]
+    near = range(REACH - 1, REACH + 2)
+    plane = window[len(window) // 2]
     sample = [dr.gather(jit.Float, electrons, starts[i][j]) for i in near for j in near]
     beside = range(FAR - 1, FAR + 2)
     row_cell, column_cell = lines(row_cells, row, beside), lines(column_cells, column, beside)
@@ -81,7 +83,8 @@ def sharpen_frame(
 
     # What the window holds: m, C, N, e (contrast), r (tint), <D^2> (apart), and the share that noise hides.
     mean, covariance = _moments(window)
-    light, noise = larger(mean, 0.0), larger(shot * larger(mean, 0.0) + dark, TINY)
+    light = larger(mean, 0.0)
+    noise = larger(shot * larger(mean, 0.0) + dark, TINY)
     variance = jit.Array4f([larger(covariance[c][c], 0.0) for c in range(4)])
     contrast = dr.sum(variance / noise) / (1.0 + dr.sum(dr.square(light) / noise))
     faint = dr.sqrt(nu[3] * noise[3])
@@ -91,16 +94,16 @@ def sharpen_frame(
     covariance = [SPREAD[0] * covariance[c] + SPREAD[1] * contrast * light[c] * light for c in range(4)]
 
     # The best linear estimate.
-    to_samples = [pick(covariance, s) for s in site]
+    to_samples = [at_site(covariance, s) for s in site]
     among_samples = [
-        [float(CORRELATION[y, z]) * pick([*to_samples[y]], site[z]) for z in range(y + 1)] for y in range(9)
+        [float(CORRELATION[y, z]) * at_site([*to_samples[y]], site[z]) for z in range(y + 1)] for y in range(9)
     ]
-    value = [pick([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
-    noises = [(pick([*shot], s), pick([*dark], s)) for s in site]
+    value = [at_site([*window[SIDE * i + j]], s) for (i, j), s in zip(product(near, near), site, strict=True)]
+    noises = [(at_site([*shot], s), at_site([*dark], s)) for s in site]
     sample_noise = [larger(k * larger(v, 0.0) + d, TINY) for v, (k, d) in zip(value, noises, strict=True)]
-    is_full = [e >= pick([*full_e], s) for e, s in zip(sample, site, strict=True)]
+    is_full = [e >= at_site([*full_e], s) for e, s in zip(sample, site, strict=True)]
     counted = [dr.select(f, UNKNOWN, n) for f, n in zip(is_full, sample_noise, strict=True)]
-    residual = [e - pick([*mean], s) for e, s in zip(sample, site, strict=True)]
+    residual = [e - at_site([*mean], s) for e, s in zip(sample, site, strict=True)]
     weights = _solve(among_samples, counted, residual)
     terms = [float(CORRELATION[4, y]) * weights[y] * to_samples[y] for y in range(9)]
     estimate = mean + sum(terms[1:], terms[0])
@@ -134,7 +137,7 @@ def sharpen_frame(
     tile_row, tile_column = (divide(line, divisor(int(size)))[0] for line, size in ((row, down), (column, across)))
     of_tile = tile_row * dr.opaque(jit.UInt, white.shares.shape[1]) + tile_column
     shares = dr.select(no_hue, balance[3] / balance, dr.gather(jit.Array4f, share_planes, of_tile))
-    small = _own_light(sample[4], pick([*shares], site[4]), plane[3], noises[4]) * shares
+    small = _own_light(sample[4], at_site([*shares], site[4]), plane[3], noises[4]) * shares
     few = dr.minimum(FEW * reduce(larger, [*dr.gather(jit.Array4f, noise_gains, pixel)]), 1.0)
     sharp += few * (1.0 - 1.0 / (1.0 + dr.square(dr.square(contrast / SMALL)))) * (small - sharp)
     result = dr.empty(jit.Float, planes.size)
@@ -190,7 +193,7 @@ def _own_light(sample: Any, share: Any, of_white: Any, noise: tuple[Any, Any]) -
     return of_white + seen * difference
 
 
-def pick(values: list[Any], site: Any) -> Any:
+def at_site(values: list[Any], site: Any) -> Any:
     """That of four values whose number is `site`."""
     *rest, result = values
     for number, value in enumerate(rest):

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from isp.anscombe import stabilise_channel
 from isp.interleaved.kernel.accumulate import larger
-from isp.interleaved.kernel.edges import TINY, channel_noise, pick
+from isp.interleaved.kernel.edges import TINY, at_site, channel_noise
 from isp.interleaved.kernel.layout import packet_width
 from isp.planes import tent
 from rodcone.device_arrays import divide, divisor, upload
@@ -169,7 +169,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
 
     # Samples as a neutral's light, and beside the light around.
     neutral = opaque(frame.ratios)
-    plain = electrons / pick(neutral, site)
+    plain = electrons / at_site(neutral, site)
     dr.eval(plain, site)
     wide = [range(-radius, radius + 1) for radius in tent_radii(raw.cfa)]
     tents = np.outer(*(tent(radius) / tent(radius).sum() for radius in tent_radii(raw.cfa))).ravel()
@@ -182,8 +182,8 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
 
     # The sample's own word v, and its weight.
     of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
-    own = pick(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
-    shots, darks = pick(opaque(shot), site), pick(opaque(dark), site)
+    own = at_site(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
+    shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
 
     def variance(light: Any) -> Any:
         """Variance of a sample read as W [e-^2], at some light."""

@@ -5,7 +5,7 @@ import pytest
 from builders import mosaic_of, raw_image
 
 from isp.colour.colour_fit import LEAST_SIGNAL, ColourFit, fit_colours
-from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise, mean_snr, measured
+from isp.colour.noise_gains import TABLE, NoiseGains, colours_in_noise, mean_snr, measured_gains
 from isp.colour.white_balance import WhiteBalance
 from isp.processors.catalogue import PROCESSORS
 from isp.processors.network import NAMES
@@ -83,7 +83,7 @@ def test_the_table_holds_what_bilinear_interpolation_leaves_of_noise_in_the_dark
 
 
 def test_the_table_is_in_order_and_of_processors_that_are_there() -> None:
-    for name, gains in measured().items():
+    for name, gains in measured_gains().items():
         assert name in NAMES or PROCESSORS[name].noise_gains is not None
         assert gains.gains.shape == (len(gains.snr_db), 3)
         assert (np.diff(gains.snr_db) > 0).all()
@@ -96,7 +96,7 @@ def test_the_processor_takes_the_gains_and_the_papers_reference_does_not(fit: Co
     plain, fair = (
         PROCESSORS[name].develop(raw, fit, neutral=NEUTRAL, balance=NEUTRAL) for name in ("bayer", "bayer_bilinear")
     )
-    colours = colours_in_noise(raw, fit, WhiteBalance(NEUTRAL, NEUTRAL), "G", measured()["bayer_bilinear"])
+    colours = colours_in_noise(raw, fit, WhiteBalance(NEUTRAL, NEUTRAL), "G", measured_gains()["bayer_bilinear"])
     # the matrix is the last step: back through one and on through the other
     expected = plain.rgb @ np.linalg.inv(fit.matrix()).T @ colours.matrix().T
     assert fair.rgb == pytest.approx(expected, abs=1e-9)

@@ -13,7 +13,7 @@ from sensor.config import LensConfig
 from sensor.config_file import read_sensor
 from sensor.lens.illumination import darkens, falloff
 from sensor.lens.patches import mover, patches, spreader
-from sensor.lens.table import read_lens, shipped, table_of, with_lens
+from sensor.lens.table import lens_table, read_lens, shipped, with_lens
 from sensor.lens.wavefront import orders, reach_of, sampled_kernel, transfer, zernike
 from sensor.optics import form_image, image_sums, spreads
 from sensor.presets import low_noise
@@ -281,17 +281,17 @@ def test_bad_tables_are_refused_in_one_line(write, tmp_path):
     )
     refusal(read_lens, write(csv=few.replace(few.splitlines()[1], "0.0,450.0,-1,-1,0.9")), match="energy: sums from")
     refusal(
-        table_of,
+        lens_table,
         LensConfig(2.8, table=write()),
         match="f_number: 2.8 with the lens .*allowed: 4, where its table holds",
     )
-    refusal(table_of, LensConfig(4.0, table=write(), defocus_um=3.0), match="defocus_um: 3 with the lens")
+    refusal(lens_table, LensConfig(4.0, table=write(), defocus_um=3.0), match="defocus_um: 3 with the lens")
 
 
 def test_shipped_lenses_are_whole_and_a_sensor_file_finds_its_lens_beside_it(write, tmp_path):
     assert shipped() == ("cooke_triplet", "double_gauss")
     for name in shipped():
-        table = table_of(with_lens(low_noise(), name).lens)
+        table = lens_table(with_lens(low_noise(), name).lens)
         seen = [float(np.abs(transfer(table, height, 550.0, 0.05, 0.0))) for height in (0.0, 0.5, 1.0)]
         assert 0.1 < min(seen) <= max(seen) < 0.9
         assert table.relative_illumination[-1] < 0.9
@@ -310,8 +310,8 @@ def test_shipped_lenses_are_whole_and_a_sensor_file_finds_its_lens_beside_it(wri
 def test_files_that_change_under_a_camera_are_refused_and_their_hash_goes_with_the_table(write, tmp_path):
     path = write(csv=wavefronts())
     sensor = with_lens(low_noise(), path)
-    assert table_of(sensor.lens).digest == sensor.lens.table_digest
+    assert lens_table(sensor.lens).digest == sensor.lens.table_digest
     write(csv=wavefronts({"Z4": 10.0}))
-    refusal(table_of, sensor.lens, match="lens.toml.*has changed since the camera was made; .*make the camera anew")
-    assert table_of(with_lens(low_noise(), path).lens).point_spread.noll == (4,)
+    refusal(lens_table, sensor.lens, match="lens.toml.*has changed since the camera was made; .*make the camera anew")
+    assert lens_table(with_lens(low_noise(), path).lens).point_spread.noll == (4,)
     assert replace(sensor.lens, table="").table_digest == ""

@@ -24,7 +24,7 @@ from studies.study.cost import START_S, PictureCost, pace, render_seconds
 from studies.study.study import BudgetShares, RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep import cost as sweep_cost
-from studies.sweep.cost import Estimate, _code_of, _memory, _Part, estimate, estimated
+from studies.sweep.cost import Estimate, _code_of, _memory, _Part, estimate_cost, estimated
 
 PICTURE = PictureCost((200, 300), bands=20, groups=2, spp=64, after_s=1e-7)
 
@@ -184,7 +184,7 @@ def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
     plan = SimpleNamespace(renders=models, samples_a_side=lambda choice: 1 + (choice is choices[1]))
 
     def told(workers: int, **options: bool) -> Estimate:
-        return estimate(study, plan, scenes, workers, 5, **options)  # type: ignore[arg-type]
+        return estimate_cost(study, plan, scenes, workers, 5, **options)  # type: ignore[arg-type]
 
     pixels = [1200, 4 * 800]  # the second takes four samples of light a pixel
     light = [
@@ -206,7 +206,7 @@ def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
     two = whole + START_S - 3 * sum(cell) / 2
     assert told(2).seconds == pytest.approx(two, rel=1e-9)
     limited = replace(study, render=replace(study.render, max_seconds=min(light) / 2))
-    shorter = estimate(limited, plan, scenes, 1, 0)  # type: ignore[arg-type]
+    shorter = estimate_cost(limited, plan, scenes, 1, 0)  # type: ignore[arg-type]
     assert shorter.seconds == pytest.approx(whole - sum(light) + min(light), rel=1e-9)
     needs = [memory(area, n, count, 1, spp=of) for area, n, count, of in zip(pixels, bands, groups, spp, strict=True)]
     assert estimates.bytes == max(need.total for need in needs)
@@ -240,7 +240,7 @@ def test_a_sweeps_cost_is_that_of_the_study_as_stated_unless_everything_is_model
     monkeypatch.setattr(sweep_cost, "plan_from_settings", lambda study: "as stated")
     monkeypatch.setattr(sweep_cost, "reference_plan", lambda study: "everything")
     monkeypatch.setattr(sweep_cost, "open_all", lambda study: "scenes")
-    monkeypatch.setattr(sweep_cost, "estimate", lambda *asks, **more: told.append((*asks, more)))
+    monkeypatch.setattr(sweep_cost, "estimate_cost", lambda *asks, **more: told.append((*asks, more)))
     study = SAMPLE.small_study(tmp_path)
     whole = replace(study, budget=BudgetShares(model="reference"))
     none = {"planned": False, "frames": False}

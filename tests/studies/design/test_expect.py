@@ -8,7 +8,7 @@ import pytest
 from numpy.testing import assert_allclose
 
 from isp.design.expected_error import Noise, expected_error, sampled, single_gaussian
-from isp.design.spectral_prior import PRIORS, load_prior
+from isp.design.spectral_prior import PRIORS, load_spectral_prior
 from isp.ple.prior import mixture, own_prior
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
@@ -57,7 +57,7 @@ def psnr_db(sensor: SensorConfig, prior: str = "drawn") -> np.ndarray:
 
 def test_a_white_surface_gives_the_electrons_of_a_neutral() -> None:
     for light in ["D65", "A"]:
-        prior, seen = load_prior("drawn"), view_of("drawn", light)
+        prior, seen = load_spectral_prior("drawn"), view_of("drawn", light)
         white = np.linalg.lstsq(prior.spectra, np.ones(len(prior.spectra)), rcond=None)[0]
         # White lies in the span of the basis to a thousandth.
         assert_allclose(responses_e(RGBW, seen) @ white, neutral_electrons(RGBW, seen.light, 1.0), rtol=2e-3)
@@ -71,7 +71,7 @@ def test_gain_agrees_with_that_under_the_prior_that_ple_ships() -> None:
     They agree within 0.15 dB; the brightness of a patch is unknown in both.
     """
     green_e = np.array([2.0, 5.0, 20.0, 100.0, 500.0])  # from white
-    held, seen = load_prior("drawn"), view_of("drawn", "D65")
+    held, seen = load_spectral_prior("drawn"), view_of("drawn", "D65")
     matrix = np.asarray(calibrate(RGBW, illuminant("D65")).to_srgb)[:, :3]
     responses, noise = responses_e(RGBW, seen), Noise(NoiseLaw(shot=1.0, dark_e=1.8), full_e=np.inf)
     white = np.linalg.lstsq(held.spectra, np.ones(len(held.spectra)), rcond=None)[0]
@@ -132,7 +132,7 @@ def test_slopes_of_srgb_and_lab_are_those_of_the_nearest_line_over_a_component()
     """Covariance over variance of 200 000 draws; of the commonest component, and of the one whose blue is the least."""
     import colour
 
-    prior, seen, reflectance = load_prior("drawn"), view_of("drawn", "D65"), 0.3
+    prior, seen, reflectance = load_spectral_prior("drawn"), view_of("drawn", "D65"), 0.3
     patches, rng, white = prior.patches, np.random.default_rng(1), np.array([0.9505, 1.0, 1.089])
     rows, direction = metric_rows(prior, seen, reflectance), rng.standard_normal(seen.xyz.shape[1])
     blue = np.einsum("c,kc->k", colour.XYZ_to_sRGB(seen.xyz.T, apply_cctf_encoding=False)[:, 2], patches.means[:, 18])
@@ -174,7 +174,7 @@ def test_a_turned_or_mirrored_tile_has_the_same_error() -> None:
 
 
 def test_a_tile_and_a_prior_turned_or_mirrored_together_have_the_same_error() -> None:
-    seen, sharp, patches = view_of("drawn", "D65"), lens_of(RGBW, False), load_prior("drawn").patches
+    seen, sharp, patches = view_of("drawn", "D65"), lens_of(RGBW, False), load_spectral_prior("drawn").patches
     pixels, forms = np.arange(64).reshape(8, 8), np.broadcast_to(np.eye(8), (1, 48, 16, 8, 8))
 
     def error(moved: np.ndarray, tile: Tile) -> float:
@@ -231,7 +231,7 @@ def test_no_mosaic_is_given_a_patchs_brightness() -> None:
     clear, bayer = (expect(vary(preset("low_noise"), name), [25.0], blur=True)[0] for name in ("rccb", "bayer"))
     assert 20 * np.log10(clear.colour / bayer.colour) > 3.0
     dark = expect(BAYER, [1e-6])[0]  # without light what is unknown is the brightness, and more
-    assert dark.lightness > load_prior("drawn").patches.brightness * 116 / 3 * 0.2 ** (1 / 3)
+    assert dark.lightness > load_spectral_prior("drawn").patches.brightness * 116 / 3 * 0.2 ** (1 / 3)
 
 
 def test_cones_pay_by_day_and_interleaved_ones_more_than_clumped() -> None:
@@ -255,7 +255,7 @@ def test_quads_lose_and_white_wins_in_the_dark(prior: str) -> None:
 
 def test_exposure_meters_no_surface_that_reflects_more_than_all_light() -> None:
     for prior in PRIORS:
-        reflectances = drawn_pixels(prior) @ load_prior(prior).spectra.T
+        reflectances = drawn_pixels(prior) @ load_spectral_prior(prior).spectra.T
         assert reflectances.max() == pytest.approx(1.0)  # some would, and are taken down to that
 
 
@@ -275,7 +275,7 @@ def test_more_light_never_costs_and_the_ladders_time_is_the_forecasts_own_best(c
 @pytest.mark.parametrize("name", list(PRIORS))
 def test_a_coefficients_reflectance_stands_in_the_band_that_its_edges_name(name: str) -> None:
     """Colours of surfaces with an edge, by the prior's basis, beside those by the reflectance itself in 1 nm."""
-    prior, seen = load_prior(name), view_of(name, "D65")
+    prior, seen = load_spectral_prior(name), view_of(name, "D65")
     middles_nm = (prior.edges_nm[:-1] + prior.edges_nm[1:]) / 2
     for row, nm in zip(prior.spectra, middles_nm, strict=True):
         index = int(np.argmin(abs(seen.light.wavelength_nm - nm)))
@@ -297,7 +297,7 @@ def test_a_coefficients_reflectance_stands_in_the_band_that_its_edges_name(name:
 @pytest.mark.parametrize("name", list(PRIORS))
 def test_the_mean_patch_reflects_as_much_luminance_as_its_file_states(name: str) -> None:
     """The file's unit is a mean luminous reflectance of 1 under equal energy; a band off, it is 0.94 or 1.06."""
-    prior, light = load_prior(name), view_of(name, "E").light
+    prior, light = load_spectral_prior(name), view_of(name, "E").light
     spectrum = prior.spectra @ (prior.patches.weights @ prior.patches.means.mean(axis=1))
     reflectance = Spectrum((prior.edges_nm[:-1] + prior.edges_nm[1:]) / 2, spectrum).band_average(
         light.wavelength_nm, np.full(light.wavelength_nm.size, 1.0)
@@ -311,7 +311,7 @@ def test_a_metered_channel_has_the_noise_of_the_time_that_its_frame_needs() -> N
     """Forecast as the camera whose W takes that share of the time whatever the light is."""
     metered = with_channel_readings(low_noise(), [ChannelReading("W", metered=True)])
     level, time_s = 300.0, 0.02
-    white = level / load_prior("drawn").reflectances.mean()
+    white = level / load_spectral_prior("drawn").reflectances.mean()
     light_e = np.maximum(drawn_pixels("drawn") @ responses_e(metered, view_of("drawn", "D65")).T, 0.0) * white * time_s
     share = resolve(metered, behind_filters(light_e, metered), time_s)[1].time_share
     assert share < 0.8
@@ -322,7 +322,7 @@ def test_a_metered_channel_has_the_noise_of_the_time_that_its_frame_needs() -> N
 
 def test_each_figure_is_that_of_its_own_metric_and_estimate() -> None:
     """Counted again from the closed form's parts; the linear estimate is worse, and no two figures are alike."""
-    spectral, seen, level = load_prior("drawn"), view_of("drawn", "D65"), 2.0
+    spectral, seen, level = load_spectral_prior("drawn"), view_of("drawn", "D65"), 2.0
     row = expect(BAYER, [level], exposure=0.02)[0]
     sampling = sampling_of(BAYER, responses_e(BAYER, seen), lens_of(BAYER, False))
     # a scene's level is the mean over its patches' reflectances

@@ -8,7 +8,7 @@ import report_sample as SAMPLE
 
 from studies.metrics.metric import METRICS
 from studies.pages.headline import Pair, answer, in_light
-from studies.pages.report_compare import CAMERA, SENSOR, code, comparisons, markdown
+from studies.pages.report_compare import CAMERA, SENSOR, code, comparison_markdown, comparisons
 from studies.pages.report_data import ReportData
 from studies.sweep.row import Row
 
@@ -262,7 +262,7 @@ def table_of(page: str, metric: str) -> list[list[str]]:
 def test_the_table_has_leads_with_their_sign_interval_mark_and_count() -> None:
     """Student's t of three seeds is 4.303: a scatter of 0.1 dB is 0.25 dB of interval, of 6 dB 14.9."""
     report = SAMPLE.sample_report(compared, 4, sensors=SAMPLE.SENSORS[:1], seeds=SEEDS)
-    page = markdown(report, "rodcone report x -o y.md", 1)
+    page = comparison_markdown(report, "rodcone report x -o y.md", 1)
     assert page.startswith(
         "# `What is seen?`\n\n    rodcone report x -o y.md\n\nrodcone 0.1.0, study `sample`, 3 seeds."
     )
@@ -274,8 +274,8 @@ def test_the_table_has_leads_with_their_sign_interval_mark_and_count() -> None:
     _, row = table_of(page, "FLIP")
     assert row[1:] == ["+0.050 ± 0.000", "**−0.030 ± 0.000**", "(−0.001 ± 0.000)", "(0.000 ± 0.000)", "1 / 2 / 1"]
     alone = SAMPLE.sample_report(compared, 4, sensors=SAMPLE.SENSORS[:1], seeds=SEEDS[:1])
-    assert "study `sample`, 1 seed." in markdown(alone, "", 1)
-    other = table_of(markdown(report, "", 0), "PSNR [dB]")[1]
+    assert "study `sample`, 1 seed." in comparison_markdown(alone, "", 1)
+    other = table_of(comparison_markdown(report, "", 0), "PSNR [dB]")[1]
     assert other[1:] == ["**−2.0 ± 0.2**", "+1.0 ± 0.2", "(−0.1 ± 0.2)", "(−9.0 ± 14.9)", "1 / 1 / 1"]
 
 
@@ -287,7 +287,9 @@ def test_several_places_have_an_answer_each_and_scenes_a_mean() -> None:
         made = compared(row)
         return replace(made, psnr_db=made.psnr_db + 2.0 * (row.scene == "two") * (row.processor == "bayer"))
 
-    page = markdown(SAMPLE.sample_report(twice, 2, scenes=scenes, sensors=SAMPLE.SENSORS[:1], seeds=SEEDS), "", 1)
+    page = comparison_markdown(
+        SAMPLE.sample_report(twice, 2, scenes=scenes, sensors=SAMPLE.SENSORS[:1], seeds=SEEDS), "", 1
+    )
     answers = [line for line in page.replace("\N{NO-BREAK SPACE}", " ").splitlines() if line.startswith("- ")]
     assert [line.split()[1] for line in answers] == ["`one`", "`two`"]
     assert "PSNR +4.0 dB" in answers[1]

@@ -327,7 +327,7 @@ def test_numbers_of_the_pair_and_words_beside_charts_are_recounted_from_the_rows
         of_a, of_b = (np.mean([getattr(row, metric.key) for row in cell.rows]) for cell in (ours, theirs))
         gain = (of_b - of_a) if metric.key in LOWER else (of_a - of_b)
         assert (a, b, lead) == pytest.approx((of_a, of_b, gain), abs=0.51 * 10**-metric.digits), metric.key
-    times = [text.duration(cell.first.exposure_s) for cell in (ours, theirs) if cell.first]
+    times = [text.duration_text(cell.first.exposure_s) for cell in (ours, theirs) if cell.first]
     assert rows["Exposure"][:2] == times
     assert rows["Saturated"][:2] == [text.percent(cell.mean("saturated")) for cell in (ours, theirs)]
     said = page.evaluate("byId('status').textContent")

@@ -8,7 +8,7 @@ from studies.pages import report_text as text
 WRITTEN = {
     partial(text.lead_text, figures.PSNR): {0.04: "0.0", -0.04: "0.0", 0.06: "+0.1", -11.94: "−11.9"},
     text.significant: {0.0999: "0.0999", 80: "80", 1234.0: "1 230", 99.96: "100", 0: "0", None: "—", -2: "−2"},
-    text.duration: {0.066: "66 ms", 0.00012: "0.12 ms", 41.23: "41.2 s", 0.0: "0 s"},
+    text.duration_text: {0.066: "66 ms", 0.00012: "0.12 ms", 41.23: "41.2 s", 0.0: "0 s"},
     text.level_text: {"0.036cd/m2": "0.036 cd/m²", "500lux": "500 lux"},
     text.substitution_text: {
         None: "not applicable",

@@ -9,7 +9,7 @@ from refusal import refusal
 from scipy.stats import norm
 
 import rodcone as public
-from scenes.contrast_patches import pairs
+from scenes.contrast_patches import patch_pairs
 from studies.metrics.truth import named_light
 from studies.score.contrast import accuracy
 from studies.score.contrast_chart import chart_accuracy, pair_accuracy
@@ -69,7 +69,7 @@ def chart_picture(side: int, error: float, rng: np.random.Generator) -> np.ndarr
     """Draw the chart from its pairs, with normal noise in proportion to each row's mean."""
     picture = np.full((side, side), 0.18)
     middles = (np.arange(side) + 0.5) / side
-    for pair in pairs():
+    for pair in patch_pairs():
         rows = np.abs(middles - pair.row) < pair.side / 2
         for column, sign in ((pair.bright_column, 1), (pair.dark_column, -1)):
             inside = np.ix_(rows, np.abs(middles - column) < pair.side / 2)

@@ -32,7 +32,7 @@ from studies.study.lit_scene import (
 )
 from studies.study.scene_source import file_white, open_radiance_file
 from studies.study.study import OWN, RenderLimits, SceneChoice, Study
-from studies.sweep.cost import estimate
+from studies.sweep.cost import estimate_cost
 
 NM = np.arange(385.0, 780.0, 10.0)
 STUDY = Study((SceneChoice("still_life"),), ("25cd/m2",))
@@ -229,7 +229,7 @@ def test_a_render_of_fewer_pixels_than_a_sensor_is_refused_and_memory_counts_the
     )
     refusal(open_all, asked, match=r"render\.size: 64, and low_noise has 100 pixels on 220 um; allowed: 100")
     need = [
-        estimate(study, plan_from_settings(study), open_all(study), 1, 0).largest_bytes
+        estimate_cost(study, plan_from_settings(study), open_all(study), 1, 0).largest_bytes
         for study in (replace(asked, render=RenderLimits(size=size)) for size in (100, 400))
     ]
     assert need[1] > need[0]

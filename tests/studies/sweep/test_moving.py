@@ -22,7 +22,7 @@ from studies.study.lit_scene import OpenedScene, open_all
 from studies.study.study import RenderLimits, SceneChoice, Study
 from studies.study.study_file import read_study
 from studies.sweep import moving as moving_module
-from studies.sweep.cost import estimate
+from studies.sweep.cost import estimate_cost
 from studies.sweep.database import open_results
 from studies.sweep.prepare import Job, known_cells, scene_cells
 
@@ -157,7 +157,7 @@ def test_the_estimate_counts_every_time_and_the_middle(tmp_path: Path) -> None:
     still = replace(study, scenes=(replace(study.scenes[0], moments=None),))
 
     def of(each: Study) -> Any:
-        return estimate(each, SAMPLE.stated(each), open_all(each), workers=1, kept=0)
+        return estimate_cost(each, SAMPLE.stated(each), open_all(each), workers=1, kept=0)
 
     alone, many = of(still), of(study)
     assert (alone.renders, many.renders) == (1, 1 + TIMES)

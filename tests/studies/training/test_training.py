@@ -114,7 +114,7 @@ def test_a_spectral_prior_trained_on_little_is_read_back_and_says_from_what(tmp_
     monkeypatch.setattr(spectral_prior, "PRIORS", {"drawn": tmp_path / "a.npz"})
     monkeypatch.setattr(spectral, "DIRECTIONS", 24)
     source = spectral.train_spectral_prior("drawn", 3, tmp_path / "a.npz")
-    prior = spectral_prior.load_prior.__wrapped__("drawn")
+    prior = spectral_prior.load_spectral_prior.__wrapped__("drawn")
     assert json.loads(prior.source) == json.loads(source)
     assert json.loads(source)["command"] == "rodcone train --spectral drawn --seed 3"
     # Patches were divided by their mean luminous reflectance: the mixture's is 1.
