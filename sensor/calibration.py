@@ -148,7 +148,7 @@ class ChannelNoise:
 
     @property
     def law(self) -> NoiseLaw:
-        """Variance by the mean; what columns' gains make of dark current and light left out."""
+        """Law of a sample's variance by its mean, without the noise of the columns' gains."""
         return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
     @property

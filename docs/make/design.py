@@ -27,8 +27,7 @@ from page_parts import RESULTS, csv_text, run, unstamped, write_page
 from skimage.color import rgb2lab
 
 from isp.design.expected_error import expected_error, sampled
-from isp.design.spectral_prior import PRIORS
-from isp.design.spectral_prior import load_prior as load_spectral
+from isp.design.spectral_prior import PRIORS, load_spectral_prior
 from isp.ple.prior import Prior, load_prior, save_prior
 from isp.processors.catalogue import NAMED, Processor
 from isp.processors.own import processor_of
@@ -230,7 +229,7 @@ def write(lines: Sequence[Mapping[str, Any]]) -> None:
 
 def linear_db(prior: str, sensor: SensorConfig, time_s: float) -> float:
     """Expected PSNR of linear sRGB at 25 cd/m2, white 1, component known."""
-    spectral, view, lens = load_spectral(prior), view_of(prior, "D65"), lens_of(sensor, blur=False)
+    spectral, view, lens = load_spectral_prior(prior), view_of(prior, "D65"), lens_of(sensor, blur=False)
     patches = sampled(spectral.patches, sampling_of(sensor, responses_e(sensor, view), lens), MIDDLE, lens)
     rows, unit = xyz_to_srgb(view.xyz.T).T / sqrt(3), LEVELS["classroom"] / spectral.reflectances.mean() * time_s
     forms, noise = np.broadcast_to(rows.T @ rows, (1, *patches.within.shape)), noise_of(chip_readings(sensor, time_s))

@@ -30,16 +30,17 @@ def hadamard(sites: Image) -> NDArray[np.float64]:
 
 
 def principal_components(sites: Image) -> NDArray[np.float64]:
-    """Orthonormal rows along which pictures (h, w, site) vary most, in falling order.
+    """Return the orthonormal rows along which the pictures (h, w, site) vary most, in falling order.
 
-    Noise of the same variance in each adds a multiple of the unit matrix to their covariance, and so turns none.
+    Noise of one variance in all pictures adds a multiple of the unit matrix to their covariance, which leaves the rows
+    as they are.
     """
     _, rows = np.linalg.eigh(np.cov(sites.reshape(-1, sites.shape[-1]), rowvar=False))
     return rows[:, ::-1].T
 
 
 def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
-    """Mosaic of a 2x2 tile denoised by BM3D, shape (h, w) [e-].
+    """Denoise the mosaic of a 2x2 tile by BM3D, shape (h, w) [e-].
 
     Parameters
     ----------
@@ -53,7 +54,7 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
     InputError
         Without the library `bm3d`.
     """
-    plain = without_prnu(raw)  # of a pixel read several times, with the noise of each range of light
+    plain = without_prnu(raw)  # for several readings per pixel it states the noise of each range of light
     odd = [(0, size % 2) for size in raw.shape]
     stable = np.pad(stabilise_raw(raw.electrons, plain), odd, mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)

@@ -157,7 +157,10 @@ def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> F
 
 
 def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
-    """Return the weighted mean, found in a few rounds, by the weights (level, reading) at its own level."""
+    """Return the estimates' weighted mean, in which each pixel's weights are those of its own mean's level.
+
+    Weights (level, reading) depend on the mean and the mean on the weights, so both are refined in a few rounds.
+    """
     light = np.asarray(weights[0] @ estimates_e)
     if np.ptp(weights, axis=0).max() < 1e-9:
         return light

@@ -61,7 +61,7 @@ class Estimated(Protocol):
 
 
 def told(cost: Estimated, *, dry_run: bool, json: bool) -> bool:
-    """Tell what a command will cost before it begins: as its result, or on stderr; whether it is to begin."""
+    """Print what a command will cost: as its result for a dry run, else on stderr. Return whether it shall begin."""
     if dry_run:
         print_result(cost.words(), cost.facts(), json=json)
     else:

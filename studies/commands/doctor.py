@@ -151,7 +151,7 @@ def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Find
 
 
 def engine_findings() -> list[Finding]:
-    """LLVM library, backend, variant and threads, as the render and the kernels use them."""
+    """Find which LLVM library, backend, Mitsuba variant and number of threads renders and kernels use here."""
     try:
         from render.loader import variant
         from rodcone import jit, llvm

@@ -171,13 +171,13 @@ def make_all(
     Parameters
     ----------
     planned : callable
-        Makes the plan; its progress goes to what it is given.
+        Makes the plan and reports its progress to the function that it is given.
     runner : context manager of callable
-        Open while cells are made: its workers leave before the report is drawn.
+        Is open while cells are made, and closed before the report is drawn.
     clock : Clock
-        Whose start is the run's.
+        Started when the run was.
     ahead : bool
-        As of `studies.sweep.run_sweep.sweep`.
+        As `studies.sweep.run_sweep.sweep` takes it.
 
     Returns
     -------
@@ -186,7 +186,7 @@ def make_all(
     """
     with ExitStack() as at_work:
         run_cells = at_work.enter_context(runner)
-        # the folder before the plan: one that can't be written fails before anything is rendered
+        # The folder comes before the plan, so that one that can't be written fails before anything is rendered.
         with locked_folder(out), saying_what_is_kept(out), progress(sys.stderr) as step:
             with clock.stage("plan"):
                 plan = planned(step)

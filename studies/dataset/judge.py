@@ -145,7 +145,11 @@ def expected(samples: Lines, study: str) -> list[Score]:
 
 
 def judge_shard(files: Mapping[str, Path], shard: Shard) -> Shard:
-    """Shard with a row of figures in the place of each sample's line; `files` are pictures by their samples' keys."""
+    """Measure a shard's pictures: return it with a row of figures in place of each sample's line.
+
+    `files` are the pictures by their samples' keys; samples without one have no row. A row's ``mistakes`` are the PSNRs
+    that the picture would have with each of the usual mistakes undone.
+    """
     rows = []
     for arrays, facts in read_shard(shard.path):
         if facts["key"] in files:
@@ -167,7 +171,7 @@ def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
     InputError
         For a file that can't be read, that has another size, or whose values lie outside 0 to 1.
     """
-    # damaged files fail in many ways
+    # A damaged file may raise any exception.
     with read_errors(f"{path}: it is no picture of this set", "write it again", Exception):
         ending = path.suffix.lower()
         if ending == ".npy":

@@ -31,7 +31,7 @@ _READ = {
     "shard": ("name", "split", "samples", "bytes", "digest", "made_from"),
     "sample": _LISTED,
 }
-SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # up to which share of the hashes
+SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # ends of the splits' ranges of a scene's hash, from 0 to 1
 Lines = list[dict[str, Any]]
 Runner = Callable[..., Generator[Any, None, None]]  # of tasks, by `make`; such as `studies.sweep.workers.run`
 

@@ -211,10 +211,10 @@ class Session:
         self._send(whose | {"kind": "error", "message": words}, ())
 
     def _render_on(self) -> None:
-        """Render the next, finer state, and answer the page's last request again from it."""
+        """Render the next, finer state, and answer the page's last request once more, from that state."""
         try:
             rendered = next(self._states)
-        except Exception as error:  # the generator has ended: only another scene's states can follow
+        except Exception as error:  # it ends the generator: only another scene gives new states
             self._rendering = isinstance(error, Overtaken)
             words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
             self._failure = "" if self._rendering else words
@@ -227,7 +227,7 @@ class Session:
                 self._pending.setdefault("show", self._shown)
 
     def _between_runs(self) -> None:
-        """Answer what is asked between two runs of a render, which goes on once the sliders rest."""
+        """Between two runs of a render, answer the page's messages until it sends none; then the render goes on."""
         source = self._source
         while self._source is source and (message := self._next(lambda: never_cancel)[0]):
             self._turn(message, never_cancel)

@@ -180,7 +180,10 @@ def difference(reading: str, patch: int) -> float:
 
 
 def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim, ...]:
-    """The two limits of eq. (1); largest differences [ppm] by patch and reading."""
+    """Judge both claims on the limits of eq. (1), by its largest differences from the filter [ppm].
+
+    The differences are given by patch and by reading of Table 1.
+    """
     return tuple(
         judge_claim(number, {f"{x}, {patch} × {patch}": values[x] for x in values}, side=FRAME_SIDE)
         for number, (patch, values) in enumerate(differences.items(), 34)
@@ -188,5 +191,5 @@ def filter_claims(differences: Mapping[int, Mapping[str, float]]) -> tuple[Claim
 
 
 def section_3_1() -> tuple[Claim, ...]:
-    """Both claims, computed."""
+    """Compute the differences from the filter, and judge both claims by them."""
     return filter_claims({patch: {name: difference(name, patch) for name in READINGS} for patch in (1, 5)})

@@ -31,11 +31,11 @@ class EvenField:
     Attributes
     ----------
     sensor : SensorConfig
-        Its lens without falloff and shake: an even field has none in the middle of the picture.
+        The camera, whose lens has neither falloff nor shake here: the middle of an even field shows none.
     light : Light
     exposure_s : float
     channel : str
-        Whose samples are measured.
+        Channel whose samples are measured.
     frame_e : (h, w) float64
         Photo-electrons behind each filter at 1 cd/m^2.
     means_e : (channel,) float64

@@ -32,7 +32,7 @@ LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # of the light that the closed form give
 SNR1S = ("3200 K", 1 / 60, 1.4)  # of SNR1s: colour temperature, exposure time, f-number
 
 
-Named = tuple[Merit, Callable[[float], float]]  # a figure before it is computed, and what it makes of a luminance
+Named = tuple[Merit, Callable[[float], float]]  # a figure without value, and its value by luminance
 
 
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:

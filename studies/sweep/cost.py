@@ -111,7 +111,7 @@ class _Part:
 def estimated(
     study: Study, out: Path, workers: int, *, reference: bool = False, planned: bool = False, frames: bool = False
 ) -> Estimate:
-    """Estimate a sweep into a folder; the study as stated is the most that a plan chooses.
+    """Estimate a sweep into a folder by the study as stated, which is the most that a plan chooses.
 
     Parameters
     ----------
@@ -121,9 +121,9 @@ def estimated(
     reference : bool
         Whether everything is modelled.
     planned : bool
-        Whether the pilots of a plan go before.
+        Whether a plan renders its pilots before the sweep.
     frames : bool
-        Whether raw frames are all that is made, a cell for each mosaic, as of a data set.
+        Whether only raw frames are made, one cell per mosaic, as a data set has them.
     """
     everything = reference or study.budget.model == REFERENCE
     plan = reference_plan(study) if everything else plan_from_settings(study)
@@ -153,19 +153,19 @@ def estimate_cost(
     planned: bool = False,
     frames: bool = False,
 ) -> Estimate:
-    """Estimate a sweep of opened scenes, `kept` cells of which are there; others as of `estimated`."""
+    """Estimate a sweep of opened scenes; `kept` of its cells are made already. Other parameters are `estimated`'s."""
     cells = len(conditions(study)) * len(study.seeds) * len(study_mosaics(study) if frames else study.processors)
     parts = [_part(study, plan, opened) for opened in scenes.values()]
     need = _memory(parts, workers, ahead=workers > 1 and not frames)
-    at = partial(_seconds, study, parts, workers, planned, frames)
+    seconds = partial(_seconds, study, parts, workers, planned, frames)
     return Estimate(
         cells=cells,
         kept=kept,
         renders=sum(part.renders for part in parts),
         workers=workers,
-        seconds=at(cells, 1.0),
-        half_size_seconds=at(cells, _HALF_SIZE),
-        half_cells_seconds=at(cells / 2, 1.0),
+        seconds=seconds(cells, 1.0),
+        half_size_seconds=seconds(cells, _HALF_SIZE),
+        half_cells_seconds=seconds(cells / 2, 1.0),
         bytes=need.total,
         largest_bytes=need.largest,
     )

@@ -85,10 +85,21 @@ def frame_key(
     sensor: SensorConfig,
     exposure: str = "",
 ) -> str:
-    """Key of a frame: the render's content, the scene's own lights, the spectrum, and what computes it.
+    """Return the key of a frame: a digest of all that decides it, and of the versions that compute it.
 
-    The preset sets the exposure; the sensor is as it is modelled. Of the levels it counts whether one is in lux. The
-    exposure is that of a scene that moves, which each blurs otherwise.
+    Parameters
+    ----------
+    render : str
+        Digest of the render's content.
+    opened : OpenedScene
+        Whose own lights count.
+    spectrum : str
+    study : Study
+        Of its levels it only counts whether one is in lux, because a frame states lux per cd/m^2 then.
+    preset, sensor : SensorConfig
+        The preset, by which the exposure is set, and the sensor as it is modelled.
+    exposure : str
+        For a scene that moves, because it is blurred by how long the exposure takes; empty for others.
     """
     light = illuminant(spectrum) if is_curve_file(spectrum) else spectrum
     area = [] if study.equal_area is None else [study.equal_area]
@@ -98,7 +109,7 @@ def frame_key(
 
 
 def load_frame(folder: Path, key: str, sensor: SensorConfig) -> UnitFrame | None:
-    """Frame made earlier; None where it or a file that it names is missing or damaged, so that it is made again."""
+    """Load a frame made earlier; return None if it, or a file that it names, is missing or damaged."""
     facts = read_facts(folder, key)
     if facts is None:
         return None
