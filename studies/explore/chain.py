@@ -4,7 +4,7 @@ Light adds up: every light group goes through lens and filters by itself, at pow
 level and exposure are factors on these, as in a sweep, whose frames are those of 1 cd/m^2 and 1 s.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -295,12 +295,12 @@ def _white(lit: Transport, spectra: tuple[tuple[str, Any, Any], ...], memo: Memo
     return white_of_pixels(_weighted([lit.groups[lamp[0]].power for lamp in shining], planes), lit.coverage.mean)
 
 
-def _weighted(weights: Any, planes: list[Image]) -> Image:
+def _weighted(weights: Sequence[float], planes: list[Image]) -> Image:
     total = weights[0] * planes[0]
     for weight, plane in zip(weights[1:], planes[1:], strict=True):
         total += weight * plane
     return np.asarray(total)
 
 
-def _items(terms: Any) -> tuple[tuple[str, float], ...]:
+def _items(terms: Mapping[str, float]) -> tuple[tuple[str, float], ...]:
     return tuple(sorted(terms.items()))

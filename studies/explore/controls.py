@@ -202,7 +202,7 @@ def options_of(controls: Controls) -> dict[str, Any]:
 # From and to JSON
 
 
-def controls_from(content: Any, dropped: Iterable[str] = ()) -> Controls:
+def controls_from(content: object, dropped: Iterable[str] = ()) -> Controls:
     """Check and read the controls of a message.
 
     Parameters
@@ -253,7 +253,7 @@ def to_json(controls: Controls) -> dict[str, Any]:
     return result
 
 
-def _number(value: Any, _: Any) -> float:
+def _number(value: object, _: object) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not -1e300 <= value <= 1e300:
         raise InputError(f"{value!r} is not a number")
     return float(value)

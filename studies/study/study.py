@@ -4,7 +4,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import product
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 from isp.processors.catalogue import DEFAULT_PAIR
 from isp.processors.own import processor_of, require_consent, user_file
@@ -319,7 +319,7 @@ def study_mosaics(study: Study) -> tuple[str, ...]:
     return tuple(dict.fromkeys(processor_of(name).mosaic for name in study.processors))
 
 
-def label(value: Any) -> str:
+def label(value: object) -> str:
     """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
     text = str(value)
     user_code = user_file(text)

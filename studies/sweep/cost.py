@@ -135,10 +135,10 @@ def estimated(
     return estimate_cost(study, plan, open_all(study), workers, kept, planned=planned, frames=frames)
 
 
-def _code_of(versions_text: Any) -> Any:
+def _code_of(versions_text: str) -> str | None:
     """Version of rodcone among a row's versions; None where the row is damaged, which a sweep makes again."""
     try:
-        return json.loads(versions_text)["rodcone"]
+        return str(json.loads(versions_text)["rodcone"])
     except (ValueError, TypeError, LookupError):
         return None
 

@@ -19,9 +19,7 @@ The reconstruction's limits, all of them (log weights and exponents are logarith
 | ROOT_SCALE             | 2^-32  | so small that the product of two scaled squared distances is finite                |
 """
 
-from typing import Any
-
-from rodcone.jit import dr
+from rodcone.jit import Float, dr
 
 HEADROOM = 55.0
 LOWEST_EXPONENT = -62.0
@@ -37,7 +35,7 @@ ROOT_SCALE = 2.0**-32
 # difference. A fourth power would take a tenth more time.
 EXP2 = (0.99992522, 0.69583354, 0.22606716, 0.07802452)
 
-Sums = tuple[Any, ...]  # of the weights, of weight times sample, of the squared weights[, largest log weight so far]
+Sums = tuple[Float, ...]  # of the weights, of weight times sample, of the squared weights[, largest log weight so far]
 
 
 def start_sums(running: bool) -> tuple[float, ...]:
@@ -46,7 +44,7 @@ def start_sums(running: bool) -> tuple[float, ...]:
 
 
 def add_samples(
-    sums: list[Sums], log_weights: list[Any], samples: list[Any], brightest: list[Any], *, running: bool
+    sums: list[Sums], log_weights: list[Float], samples: list[Float], brightest: list[Float], *, running: bool
 ) -> list[Sums]:
     """Add one sample to each pixel's sums; at a fixed scale the log weights have HEADROOM added.
 
@@ -57,8 +55,8 @@ def add_samples(
 
 
 def squared_distances(
-    at_x: dict[int, list[Any]], at_y: dict[int, list[Any]], pixels: list[tuple[int, int]], patch: int
-) -> list[Any]:
+    at_x: dict[int, list[Float]], at_y: dict[int, list[Float]], pixels: list[tuple[int, int]], patch: int
+) -> list[Float]:
     """Squared distance of each pixel's patches.
 
     Parameters
@@ -73,7 +71,7 @@ def squared_distances(
     return [_sum(lines[c], r, patch) for r, c in pixels]
 
 
-def mixed_squares(colour: list[Any], white: list[Any], alpha: list[Any]) -> list[Any]:
+def mixed_squares(colour: list[Float], white: list[Float], alpha: list[Float]) -> list[Float]:
     """Square of eq. (5) from both squared distances, expanded: exactly one of them where alpha is 0 or 1.
 
     (a sqrt(colour) + (1 - a) sqrt(white))^2 = a^2 colour + (1 - a)^2 white + 2 a (1 - a) sqrt(colour white): one root.
@@ -86,7 +84,7 @@ def mixed_squares(colour: list[Any], white: list[Any], alpha: list[Any]) -> list
     return results
 
 
-def _sum(values: Any, first: int, count: int) -> Any:
+def _sum(values: list[Float] | dict[int, Float], first: int, count: int) -> Float:
     """Sum of some values that follow each other: pairs, fours, eights, which Dr.Jit shares where sums overlap."""
     if count == 1:
         return values[first]
@@ -94,18 +92,18 @@ def _sum(values: Any, first: int, count: int) -> Any:
     return _sum(values, first, power) + _sum(values, first + power, count - power)
 
 
-def larger(a: Any, b: Any) -> Any:
+def larger(a: Float, b: Float) -> Float:
     """The larger one; `dr.maximum` takes three instructions, for the sake of NaN."""
     return dr.select(a > b, a, b)
 
 
-def _add_at_fixed_scale(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
+def _add_at_fixed_scale(sums: Sums, log_weight: Float, sample: Float, brightest: Float) -> Sums:
     weight, value, square = sums
     new = dr.select(sample <= brightest, _exp2(larger(log_weight, LOWEST_EXPONENT)), 0.0)
     return weight + new, dr.fma(new, sample, value), dr.fma(new, new, square)
 
 
-def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest: Any) -> Sums:
+def _add_to_running_maximum(sums: Sums, log_weight: Float, sample: Float, brightest: Float) -> Sums:
     weight, value, square, largest = sums
     bounded = dr.select((log_weight > LOWEST_LOG_WEIGHT) & (sample <= brightest), log_weight, LOWEST_LOG_WEIGHT)
     ahead = bounded - largest
@@ -121,7 +119,7 @@ def _add_to_running_maximum(sums: Sums, log_weight: Any, sample: Any, brightest:
     )
 
 
-def _exp2(exponent: Any) -> Any:
+def _exp2(exponent: Float) -> Float:
     """2^exponent for -125 <= exponent < 127, right to 8e-5.
 
     The bits of a float are its logarithm, but for the fraction: 2^n (1 + m) holds (n + 127 + m) 2^23. So n + 2^f - 1 is

@@ -3,7 +3,7 @@
 from functools import reduce
 from itertools import combinations_with_replacement, product
 from operator import or_
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,9 +11,11 @@ from numpy.typing import NDArray
 from isp.interleaved.kernel.accumulate import larger
 from isp.settings import WhiteReading
 from rodcone.device_arrays import divide, divisor, upload
-from rodcone.jit import arrays, dr
+from rodcone.jit import Float, UInt, arrays, dr
 from rodcone.types import Floats
 from sensor.raw import RawImage
+
+Packet: TypeAlias = Any  # four values of a pixel, one per channel
 
 REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
 SIDE = 2 * REACH + 1
@@ -62,13 +64,13 @@ def sharpen_frame(
     tables = (*channel_noise(raw), *scales)
     shot, dark, full_e, balance, nu = (jit.Array4f([dr.opaque(jit.Float, float(x)) for x in row]) for row in tables)
 
-    def lines(table: Any, first: Any, steps: range) -> list[Any]:
+    def lines(table: UInt, first: UInt, steps: range) -> list[UInt]:
         return [dr.gather(jit.UInt, table, first + step) for step in steps]
 
     pixel = dr.arange(jit.UInt, height * width)
     row, column = divide(pixel, divisor(width))
 
-    def places(steps: range) -> list[list[Any]]:
+    def places(steps: range) -> list[list[UInt]]:
         return [[r + c for c in lines(column_starts, column, steps)] for r in lines(row_starts, row, steps)]
 
     starts = places(range(FAR - REACH, FAR + REACH + 1))
@@ -146,7 +148,7 @@ def sharpen_frame(
     return np.asarray(result.numpy().reshape(planes.shape))
 
 
-def _moments(window: list[Any]) -> tuple[Any, list[Any]]:
+def _moments(window: list[Packet]) -> tuple[Packet, list[Packet]]:
     """M and the rows of C of a window, about its middle pixel, since squares of light have too many digits."""
     middle = window[len(window) // 2]
     away = [value - middle for value in window]
@@ -158,10 +160,10 @@ def _moments(window: list[Any]) -> tuple[Any, list[Any]]:
     return middle + offset, [arrays().Array4f([products[min(c, d), max(c, d)] for d in range(4)]) for c in range(4)]
 
 
-def _tint_of_like_places(mean: Any, far: list[Any], shot: Any, dark: Any, faint: Any) -> Any:
+def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Packet, faint: Float) -> Packet:
     """r, the colour of those of the places `far` whose light is like a window's; `faint` is the noise of W."""
 
-    def in_noise(values: Any) -> Any:
+    def in_noise(values: Packet) -> Packet:
         return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
 
     own = in_noise(mean)
@@ -172,7 +174,7 @@ def _tint_of_like_places(mean: Any, far: list[Any], shot: Any, dark: Any, faint:
     return arrays().Array4f(tint[0], tint[1], tint[2], 1.0)
 
 
-def _lamp(white: list[Any], light: Any, contrast: Any, chi_squared: Any) -> Any:
+def _lamp(white: list[Float], light: Float, contrast: Float, chi_squared: Float) -> Float:
     """How far a lamp's colour isn't known, from the planes of W in its window and their mean."""
     lines = [[larger(value, 0.0) for value in white[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
     lattices = [[w for line in lines[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
@@ -184,7 +186,7 @@ def _lamp(white: list[Any], light: Any, contrast: Any, chi_squared: Any) -> Any:
     return (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
 
 
-def _own_light(sample: Any, share: Any, of_white: Any, noise: tuple[Any, Any]) -> Any:
+def _own_light(sample: Float, share: Float, of_white: Float, noise: tuple[Float, Float]) -> Float:
     """What W would read by the pixel's own sample, as far as that stands out of W's plane."""
     shot, dark = noise
     as_white_noise = larger((shot * larger(of_white, 0.0) + dark / share) / share, TINY)
@@ -193,7 +195,7 @@ def _own_light(sample: Any, share: Any, of_white: Any, noise: tuple[Any, Any]) -
     return of_white + seen * difference
 
 
-def at_site(values: list[Any], site: Any) -> Any:
+def at_site(values: list[Float], site: UInt) -> Float:
     """That of four values whose number is `site`."""
     *rest, result = values
     for number, value in enumerate(rest):

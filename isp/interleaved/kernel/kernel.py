@@ -7,6 +7,7 @@ all mosaics with a tile of this size. Loading is what costs: at y whole rows are
 """
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 from isp.interleaved.kernel.accumulate import (
@@ -72,7 +73,7 @@ class KernelSums:
     columns: Any
 
 
-def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
+def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
     """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
     patch = shape.patch
     across = shape.tile[1]
@@ -166,7 +167,7 @@ def launch(jit: Any, inputs: Inputs, threads: Threads, shape: Shape, sums: Kerne
     return failed
 
 
-def _failed(jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
+def _failed(jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
     """Threads that hold a pixel of the frame with too small a sum; those of other strips too: all decide alike."""
     failed = dr.full(jit.Bool, False, dr.width(threads.row))
     for (r, c), (weight, *_) in zip(pixels, totals, strict=True):
@@ -177,7 +178,7 @@ def _failed(jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads:
 
 
 def _store(
-    jit: Any, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
+    jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
 ) -> list[Any]:
     """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
     targets = [sums.weight, sums.mean, sums.noise_gain] + [sums.unit] * shape.running

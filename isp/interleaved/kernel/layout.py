@@ -28,6 +28,7 @@ for half a patch and are OUTSIDE further on. Nothing in a strip depends on where
 """
 
 from dataclasses import dataclass
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -194,7 +195,7 @@ def halo(region: tuple[Span, Span], pattern: Pattern, settings: Settings) -> tup
 
 
 def lay_out(
-    jit: Any, strip: Strip, region: tuple[Span, Span], pattern: Pattern, settings: Settings, guide: Guide
+    jit: ModuleType, strip: Strip, region: tuple[Span, Span], pattern: Pattern, settings: Settings, guide: Guide
 ) -> Inputs:
     """Fill planes, make packets and upload what the threads of a region of the strip's rows and columns read."""
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)

@@ -5,6 +5,7 @@ the kernels of that other strip still run.
 """
 
 from dataclasses import dataclass, replace
+from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -61,7 +62,7 @@ def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | 
 
 
 def _start(
-    jit: Any, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, shared: NDArray[Any] | None
+    jit: ModuleType, raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, shared: NDArray[Any] | None
 ) -> StartedStrip:
     """Start the kernels of some rows of the frame; the first row is a whole number of blocks."""
     columns = (0, raw.dn.shape[1])
@@ -90,7 +91,7 @@ def _start(
     return StartedStrip(rows=rows, sums=sums, launches=launches)
 
 
-def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern) -> KernelSums:
+def _empty_sums(jit: ModuleType, rows: Span, width: int, pattern: Pattern) -> KernelSums:
     """Room for what the blocks of all phases give; at the fixed scale they leave the unit as it is."""
     # Whole blocks that cover the strip and the tile - 1 rows and columns by which phases begin early.
     size = [
@@ -109,7 +110,7 @@ def _empty_sums(jit: Any, rows: Span, width: int, pattern: Pattern) -> KernelSum
     )
 
 
-def _finish(jit: Any, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
+def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
     """Put estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
         again: Any = dr.compress(one.failed)  # waits for the launch
