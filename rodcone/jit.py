@@ -61,14 +61,14 @@ def compiling() -> Iterator[Callable[[], float]]:
     """Give a function that tells the seconds of compiling so far: 0 where all kernels were there already."""
     seconds: float = 0.0
 
-    def told() -> float:
+    def seconds_so_far() -> float:
         nonlocal seconds
         seconds += float(sum(kernel.get("backend_time", 0.0) for kernel in dr.kernel_history())) / 1e3
         return seconds
 
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        yield told
+        yield seconds_so_far
 
 
 def arrays() -> ModuleType:

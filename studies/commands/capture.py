@@ -6,7 +6,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.progress import progress
-from studies.commands.console import print_result, say, told
+from studies.commands.console import announce_cost, print_result, say
 from studies.photograph.shot import Order, carry_out, check
 
 
@@ -21,7 +21,7 @@ def capture(order: Annotated[Order, Parameter(name="*")], *, dry_run: bool = Fal
         Print one JSON object with the paths and facts of the exposure instead of the paths.
     """
     checked = check(order)
-    if not told(checked.cost, dry_run=dry_run, json=json):
+    if not announce_cost(checked.cost, dry_run=dry_run, json=json):
         return
     with progress(sys.stderr) as step:
         result = carry_out(checked, step)

@@ -60,7 +60,7 @@ class Estimated(Protocol):
         """The same as values."""
 
 
-def told(cost: Estimated, *, dry_run: bool, json: bool) -> bool:
+def announce_cost(cost: Estimated, *, dry_run: bool, json: bool) -> bool:
     """Print what a command will cost: as its result for a dry run, else on stderr. Return whether it shall begin."""
     if dry_run:
         print_result(cost.words(), cost.facts(), json=json)

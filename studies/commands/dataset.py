@@ -9,7 +9,7 @@ from typing import Annotated
 from cyclopts import Parameter
 
 from rodcone.progress import progress
-from studies.commands.console import print_result, told
+from studies.commands.console import announce_cost, print_result
 from studies.commands.sweep import WORKERS, Workers, require_enough, saying_what_is_kept
 from studies.dataset.make_set import make_set
 from studies.dataset.order import SetOrder
@@ -51,7 +51,7 @@ def dataset(
     task = read_study(study, set)
     task = replace(task, scenes=(*task.scenes, *order.drawn_scenes))
     sizes = estimated(task, out, workforce.processes or cores(), frames=True)
-    if not told(sizes, dry_run=dry_run, json=json):
+    if not announce_cost(sizes, dry_run=dry_run, json=json):
         return 0
     require_enough(task, sizes, force=workforce.force)
     options = [*(("set", change) for change in set), *vars(order).items()]

@@ -7,7 +7,7 @@ from typing import Annotated, Any
 from cyclopts import Parameter
 
 from studies.budget.starting_points import plan_from_settings
-from studies.commands.console import Seconds, Time, told
+from studies.commands.console import Seconds, Time, announce_cost
 from studies.commands.sweep import make_all, require_enough
 from studies.photograph.clock import Clock
 from studies.study.cost import cores
@@ -120,7 +120,7 @@ def demo(
     clock = Clock()
     study = order.of(read_study(DEMO_STUDY))
     sizes = estimated(study, out, cores())
-    if not told(sizes, dry_run=dry_run, json=False):
+    if not announce_cost(sizes, dry_run=dry_run, json=False):
         return
     require_enough(study, sizes, force=force)
     _, report = make_all(study, out, lambda step: plan_from_settings(study), worker_processes(cores()), clock)

@@ -16,7 +16,7 @@ from scenes.levels import AVERAGE_REFLECTANCE, DEMO_LEVELS
 from sensor.cfa import OWN
 from sensor.exposure import AUTO_INFORMATION
 from sensor.presets import preset, vary
-from studies.commands.console import print_json, print_table, require_place, told
+from studies.commands.console import announce_cost, print_json, print_table, require_place
 from studies.design.expect import ExpectedError
 from studies.design.expect import expect as expect_errors
 from studies.pages.gain_plot import gain_svg
@@ -106,7 +106,7 @@ def expect(
     levels = {text: _luminance(text) for text in level} if level else levels_between(over)
     time_s = parse_exposure(exposure, "exposure")
     cameras = [(name, tile) for name in sensors for tile in mosaic or [""]]
-    if not told(_Cost(len(cameras), len(levels)), dry_run=dry_run, json=json):
+    if not announce_cost(_Cost(len(cameras), len(levels)), dry_run=dry_run, json=json):
         return
     choices = (list(levels.values()), light, exposure if time_s is None else time_s, prior, blur)
     by_camera = {

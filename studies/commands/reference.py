@@ -21,7 +21,7 @@ from rodcone.errors import require_range
 from rodcone.progress import duration, progress, render_words
 from sensor.presets import preset
 from studies.budget.starting_points import plan_from_settings
-from studies.commands.console import INTERRUPTED, Seconds, say, told
+from studies.commands.console import INTERRUPTED, Seconds, announce_cost, say
 from studies.study.cost import PictureCost
 from studies.study.lit_scene import film_of, level_luminance, lux_per_cd_m2, open_choice
 from studies.study.render_noise import MARGIN, render_share
@@ -90,7 +90,7 @@ def reference(
             after_s=0.0,
             max_seconds=max_seconds,
         )
-        if not told(cost, dry_run=dry_run, json=False):
+        if not announce_cost(cost, dry_run=dry_run, json=False):
             print(f"After these it tells how long a share of {until:g} of the sensor's variance takes.")
             return 0
     elif dry_run:

@@ -22,7 +22,7 @@ from rodcone.files import check_place, require_ending
 from rodcone.memory import require_memory
 from rodcone.progress import compile_note, progress, render_words
 from rodcone.types import Floats
-from studies.commands.console import INTERRUPTED, Seconds, print_result, say, told
+from studies.commands.console import INTERRUPTED, Seconds, announce_cost, print_result, say
 from studies.photograph.ready_light import BANDS, find_ready
 from studies.study.cost import PictureCost
 from studies.study.lit_scene import asked_spectra
@@ -166,7 +166,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
         denoised=order.denoise,
         max_seconds=order.max_seconds,
     )
-    if not told(cost, dry_run=dry_run, json=json):
+    if not announce_cost(cost, dry_run=dry_run, json=json):
         return 0
     require_memory(cost.memory, order.force)
     check_place(order.out)

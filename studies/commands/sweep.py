@@ -17,7 +17,7 @@ from rodcone.memory import Memory, require_memory
 from rodcone.progress import Step, progress
 from studies.budget.ledger import Plan
 from studies.budget.starting_points import plan_from_settings, reference_plan
-from studies.commands.console import INTERRUPTED, print_result, say, told
+from studies.commands.console import INTERRUPTED, announce_cost, print_result, say
 from studies.commands.report_mark import REPORT, is_current
 from studies.photograph.clock import Clock
 from studies.study.cost import cores
@@ -137,7 +137,7 @@ def sweep(
     task = read_study(study, order.set, trust_code=order.trust_code)
     planned = task.budget.model == AUTOMATIC and not (order.as_stated or order.reference)
     sizes = estimated(task, order.out, workforce.processes or cores(), reference=order.reference, planned=planned)
-    if not told(sizes, dry_run=order.dry_run, json=json):
+    if not announce_cost(sizes, dry_run=order.dry_run, json=json):
         return 0
     require_enough(task, sizes, force=workforce.force)
     runner = workforce.runner()

@@ -53,9 +53,7 @@ def run_cell(cell: Cell) -> Row:
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
     require_same(cell.made_by, cell.processor, processor.on_backend, own_version(cell.processor))
-    frame = cell.frame
-    sensor = frame.sensor
-    engine = cell.made_by.readout_engine
+    frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
     names = labels(cell.condition) | {"processor": label(cell.processor)}
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
