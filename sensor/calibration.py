@@ -111,7 +111,7 @@ class NoiseStep:
 
     @property
     def law(self) -> NoiseLaw:
-        """Variance by the mean, from `from_e` on; what columns' gains make of dark current and light left out."""
+        """Law of a sample's variance by its mean from `from_e` on, without the noise of the columns' gains."""
         return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
 

@@ -78,7 +78,7 @@ class Score:
 
 
 def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Row, list[Score]]:
-    """What a set is, and the scores of its conditions: of the pictures, and of processors that a sweep developed it by.
+    """Score a set's developed pictures beside the processors that a sweep developed it by; return the set's head too.
 
     Parameters
     ----------
@@ -222,7 +222,7 @@ def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
 
 
 def _pictures_of(folder: Path, samples: Lines) -> dict[str, Path]:
-    """Files by the set's keys: of each condition all or none."""
+    """Find the picture files by the set's keys; a condition has all of its pictures or none."""
     files: dict[str, Path] = {}
     for path in sorted(path for path in folder.glob("*") if path.suffix.lower() in ENDINGS):
         also = files.setdefault(path.stem, path).name

@@ -107,7 +107,7 @@ def _show_render(show: Step, index: int, count: int, share: float, error: float)
 
 
 def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:
-    """Hash of all that parts a set from another one: its scenes, its frames' names, and the order.
+    """Return the hash of all that tells a set from another: its scenes, its frames' names, and the order.
 
     Raises
     ------

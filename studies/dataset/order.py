@@ -70,7 +70,7 @@ class SetOrder:
 
 
 def check_cameras(study: Study, order: SetOrder) -> None:
-    """Raise `InputError` for what a sample can't hold: raw frames of other than one reading, a tile that parts cut."""
+    """Raise `InputError` for what a sample can't hold: frames of several readings, or parts that would cut a tile."""
     require_absent(
         "in a data set, whose frames are single ones at a scene's own pixels",
         frames=None if study.frames == (1,) else list(study.frames),

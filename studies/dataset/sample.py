@@ -180,7 +180,7 @@ def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -
 
 @lru_cache(maxsize=64)
 def _opened(path: Path) -> NDArray[Any]:
-    """Array that is read where it is looked at."""
+    """Open an array of which only what is used is read."""
     return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 

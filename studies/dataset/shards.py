@@ -87,7 +87,7 @@ def shard_key(samples: Sequence[Sample]) -> str:
 
 
 def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lines, runner: Runner, step: Step) -> int:
-    """Make those shards that don't stand, and list in the manifest what stands; returns the number made.
+    """Make the shards that are missing or damaged, and list all in the manifest; return how many were made.
 
     Parameters
     ----------
@@ -146,7 +146,7 @@ def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
 
 
 def _write_manifest(folder: Path, head: Lines, shards: Iterable[Shard]) -> None:
-    """Write the manifest of the shards that stand, in order of their names, as JSON lines."""
+    """Write the manifest of the shards that are whole, in order of their names, as JSON lines."""
     lines = head + [line for shard in sorted(shards, key=lambda shard: shard.path) for line in shard.lines]
     write_files({folder / MANIFEST: "".join(f"{json.dumps(line)}\n" for line in lines)})
 

@@ -1,4 +1,4 @@
-"""The machine that works, and its seconds: of a run by stages that add up, and of calls without what is done once."""
+"""Seconds of a run by stages that add up, seconds of calls without what only the first does, and the machine."""
 
 import os
 import platform
@@ -14,7 +14,7 @@ FIRST, OTHER = "first calls", "other"
 
 @contextmanager
 def noting_times(note: Callable[[float, float], None]) -> Iterator[None]:
-    """Call `note` with the times (`time.perf_counter`) between which what is within went on, also for an error."""
+    """Call `note` with the start and end (`time.perf_counter`) of the ``with`` block, also if it ends in an error."""
     start = time.perf_counter()
     try:
         yield
@@ -34,11 +34,11 @@ class Clock:
         self._seconds[stage] = self._seconds.get(stage, 0.0) + seconds
 
     def stage(self, name: str) -> AbstractContextManager[None]:
-        """Add what is done within to a stage, also where it ends in an error."""
+        """Add the seconds of the ``with`` block to a stage, also if it ends in an error."""
         return noting_times(lambda start, end: self.add(name, end - start))
 
     def stages(self, more: Mapping[str, float] | None = None) -> dict[str, float]:
-        """Seconds by stage, some more added; with `OTHER` they are those since the clock was made."""
+        """Return the seconds by stage, `more` among them; `OTHER` is the rest of the time since the clock was made."""
         seconds = dict(self._seconds)
         for name, value in (more or {}).items():
             seconds[name] = seconds.get(name, 0.0) + value

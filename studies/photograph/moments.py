@@ -47,14 +47,14 @@ def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: i
 
 
 def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: float, count: int) -> Floats:
-    """Give what each row's exposure takes of the times of a longer one, in whose middle it lies.
+    """Return each row's shares of the times of a longer exposure, in whose middle the row's own exposure lies.
 
     Parameters
     ----------
     sensor, rows, exposure_s
         As of `rolling_moments`.
     whole_s : float
-        Of the longer one, from the first row's start to the last row's end; `count` times are spread over it.
+        Length of the longer exposure, from the first row's start to the last row's end; it has `count` times.
     count : int
 
     Returns
@@ -167,7 +167,7 @@ def _parts(shares: Floats | None, count: int) -> float | Floats:
 
 
 def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -> Transport:
-    """Mean over `count` times, of the mean over all but the last and the last.
+    """Return the mean over `count` times, from the mean over all but the last one, and the last one.
 
     m + (x - m) / k; of independent errors the variance is ((k - 1)^2 v_m + v_x) / k^2. What has rows has `parts` of
     `_parts` for k.
@@ -242,7 +242,7 @@ def _correlated(groups: tuple[int, int], covariance: Planes, variance: Planes) -
 
 
 def _meter(meters: Sequence[Callable[[], Irradiance]]) -> Callable[[], Irradiance]:
-    """Meter of the mean, which asks each time's once."""
+    """Return the meter of the mean, which asks the meter of each time once."""
 
     @cache
     def measured() -> Irradiance:

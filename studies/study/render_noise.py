@@ -68,9 +68,9 @@ def monte_carlo_share(
 def _noise_and_room(
     expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Variance of the light that a frame's samples tell, and which of them are under the well.
+    """Return the variance of the light as estimated from each sample, and which samples are under the well.
 
-    Of a mosaic, or of one channel's.
+    The frame is a mosaic, or what one channel reads at every pixel.
     """
     return light_variance(expected_e, readings), unsaturated(expected_e, readings)
 
@@ -82,7 +82,7 @@ def _mean_share(error_e: NDArray[np.floating], variance_e2: NDArray[np.float64],
 def monte_carlo_bound(
     errors_e: NDArray[np.floating], expected_e: NDArray[np.float64], readings: Sequence[PlainReading]
 ) -> float:
-    """Monte Carlo variance that a frame is charged, over the sensor's own noise variance; 0 where the well is full.
+    """Return the Monte Carlo variance to count for a frame, over the sensor's own noise; 0 where the well is full.
 
     Parameters
     ----------
@@ -145,7 +145,7 @@ def render_share(
 def speckle_sizes(
     error_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
 ) -> NDArray[np.float64]:
-    """Errors beyond `SPECKLE`, over the sensor's own standard deviation there; shape (pixel,), below saturation.
+    """Return the errors beyond `SPECKLE`, over the sensor's own standard deviation, below saturation, (pixel,).
 
     Where the render's noise is under the sensor's only single bright samples reach so far. Parameters as of
     `monte_carlo_share`, of one frame.
@@ -156,7 +156,7 @@ def speckle_sizes(
 
 
 def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = None) -> str:
-    """What to say of a render whose noise shows, with the samples that would do; nothing where it doesn't.
+    """Say that a render's noise shows, and how many samples would do; return an empty text if it doesn't show.
 
     Parameters
     ----------

@@ -152,7 +152,7 @@ def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum
 
 
 def default_white(path: str | Path) -> AdoptedWhite:
-    """Light of a picture file that nothing tells, D65; reference light tells its lamps when it is opened."""
+    """Return D65, the light of a picture file that states none; reference light states its own lamps."""
     use = "it is lit by" if is_reflectance(path) else f"{_SMOOTH}; its colours are judged under"
     note = f"{Path(path).name}: {use} {LIGHT}; give another light where that isn't so"
     return AdoptedWhite(illuminant(LIGHT), () if is_reference(path) else (note,))

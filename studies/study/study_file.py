@@ -93,7 +93,7 @@ def _set(content: dict[str, Any], change: str) -> None:
 
 
 def _beside(value: Any, folder: Path) -> Any:
-    """Value of an axis in which files are found from anywhere: their names are those of files in the study's folder."""
+    """Return an axis's value with the paths of its files, whose names are relative to the study's folder."""
     if isinstance(value, list):
         return [_beside(item, folder) for item in value]
     if isinstance(value, dict):

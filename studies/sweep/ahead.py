@@ -25,7 +25,7 @@ class Spans:
         self._spans: list[tuple[str, float, float]] = []
 
     def stage(self, name: str) -> AbstractContextManager[None]:
-        """Note what is done within as a stage, also where it ends in an error."""
+        """Note the ``with`` block as a stage, also if it ends in an error."""
         return noting_times(lambda start, end: self._spans.append((name, start, end)))
 
     def within(self, start: float, end: float) -> dict[str, float]:
@@ -86,6 +86,6 @@ class Ahead(Generic[Result]):
         return self._future.result(), self._spans.within(start, time.perf_counter())
 
     def stop(self) -> None:
-        """End the call at its next progress, and wait for that; whatever it gives or raises is let go of."""
+        """End the call at its next progress, and wait for that; its result or error is dropped."""
         self._stopped.set()
         wait([self._future])

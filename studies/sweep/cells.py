@@ -40,7 +40,7 @@ class RenderRecord:
 
 
 def render_text(record: RenderRecord) -> str:
-    """What a row holds of a render beside columns of its own, as JSON."""
+    """Return as JSON what a row states of its render, but for what has a column of its own."""
     facts = asdict(record.facts)
     for column in ("variant", "seconds", "spp", "bands"):
         del facts[column]
@@ -111,7 +111,7 @@ class Cell:
 
 
 def labels(condition: Condition) -> dict[str, Any]:
-    """Condition as a row names it: a file by its name, without its folder."""
+    """Return a condition as a row names it: a file by its name, without its folder."""
     files = {name: label(getattr(condition, name)) for name in ("spectrum", "sensor")}
     return vars(condition) | {"scene": condition.scene.label, **files}
 

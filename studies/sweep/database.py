@@ -174,7 +174,7 @@ def add(base: sqlite3.Connection, row: Row) -> None:
 
 
 def done(base: sqlite3.Connection, pictures: Path, keys: Iterable[str]) -> set[str]:
-    """Which of these cells have an undamaged row and undamaged pictures, which a power cut may have taken."""
+    """Find which of these cells have an undamaged row and undamaged pictures; a power cut may have damaged either."""
     one = f"SELECT {_COLUMNS} FROM cells WHERE key = ?"
     sound = (Row(*values[:-1]) for key in keys for values in base.execute(one, (key,)) if _is_sound(values))
     return {row.key for row in sound if is_whole(pictures / row.picture) and is_whole(pictures / row.truth)}
@@ -311,7 +311,7 @@ def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
 
 
 def _is_sound(values: tuple[Any, ...]) -> bool:
-    """Whether the digest at the end is that of the values before it."""
+    """Whether a row ends in the digest of the values before it."""
     return bool(digest(values[:-1]) == values[-1])
 
 

@@ -1,5 +1,6 @@
-"""What is read out of a sweep: rows, as CSV and JSON, and figures as a Markdown table: means over the seeds, a line for
-each combination of axes.
+"""Write what a sweep has measured: its rows as CSV or JSON, and its figures as a Markdown table.
+
+A table holds means over the seeds, one line per combination of the axes.
 """
 
 import json
@@ -53,7 +54,7 @@ def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
 
 
 def axis_values(texts: Sequence[str]) -> dict[str, str]:
-    """Values to keep by axis, of texts such as ``level=10lux``."""
+    """Parse texts such as ``level=10lux`` into the values to keep, by axis."""
     values = {}
     for text in texts:
         axis, equals, value = text.partition("=")

@@ -1,4 +1,4 @@
-"""A study's plan, kept beside its pilots: a sweep that goes on doesn't weigh them again."""
+"""A study's plan, kept beside its pilots, so that a sweep that goes on doesn't compute it again."""
 
 from collections.abc import Mapping
 from dataclasses import asdict
@@ -19,7 +19,7 @@ from studies.sweep.stored import keep_facts, read_facts
 
 
 def kept_plan(study: Study, folder: Path, step: Step | None = None) -> Plan:
-    """Plan of `studies.budget.plan.plan`: out of the folder of pilots where the same was made before, else made there.
+    """Return a study's plan: from the folder of pilots if it was made there before, else made and kept there.
 
     Raises
     ------
@@ -32,7 +32,7 @@ def kept_plan(study: Study, folder: Path, step: Step | None = None) -> Plan:
     facts = read_facts(folder, key)
     if facts is not None:
         return _plan(study, facts)
-    from studies.budget.plan import plan  # imported here: a sweep that finds its plan weighs nothing
+    from studies.budget.plan import plan  # imported here, because a sweep that finds its plan doesn't need it
 
     made = plan(study, cache=folder, step=step)
     folder.mkdir(parents=True, exist_ok=True)

@@ -83,7 +83,7 @@ class MovingLight:
 
 
 def part_of(progress: Progress, number: int, count: int) -> Progress:
-    """Tell of one of `count` equal parts as of a part of the whole."""
+    """Return a progress for one of `count` equal parts, which is told to `progress` as a part of the whole."""
     return lambda share, error: progress((number + share) / count, error)
 
 
