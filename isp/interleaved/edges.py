@@ -184,7 +184,7 @@ def _sharpen(
     seen = np.maximum(light[..., 3], np.sqrt(nu[3] * noise[..., 3]))
     estimate = estimate + (beyond / seen)[..., None] * light
 
-    # F: where contrast is a lamp's and the samples lie on their planes, the estimate counts less.
+    # F: the estimate counts less where contrast is a lamp's and the samples lie on their planes.
     sharp = plane + np.maximum(1.0 - contrast**4 / (1.0 + squares @ NEAR[:, None]), 0.0) * (estimate - plane)
 
     # F_c less A_c - r_c A_W: a colour that noise hides is the surroundings'.

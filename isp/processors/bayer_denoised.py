@@ -23,7 +23,7 @@ from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
 Denoise = Callable[[Image, Sequence[float]], Image]  # planes and the standard deviation of each one's noise
-# Noise that BM3D is told after demosaicking, in units of the mosaic's (docs/decisions/0039-the-strongest-opponents.md).
+# Noise to state to BM3D after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.75
 # Mean and two differences of R, G and B: orthonormal rows, the mean first.
 OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])

@@ -15,7 +15,7 @@ from sensor.pixel import PixelConfig
 _STEP_NM = 4.0  # of lent curves
 _LEAST_SHARE = 0.05  # of the greatest response, at an anchor's wavelength
 NEEDED = ("pitch_um", "fill_factor", "full_well_e", "read_noise_e", "dsnu_e", "prnu")  # keys without a default
-_OFF = {  # what a term that a source says nothing of is, by key
+_OFF = {  # by key, what is assumed of a term that no source states
     "dark_current_e_per_s": "no dark current",
     "column_gain_spread": "columns alike",
     "column_offset_e": "columns alike",

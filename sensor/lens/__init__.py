@@ -1,1 +1,1 @@
-"""What a lens does to light beyond an ideal one: light that it scatters."""
+"""What a real lens does beyond an ideal one: falloff, scattered light, defocus, and lenses described by data."""

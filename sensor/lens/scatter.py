@@ -76,15 +76,15 @@ def scattered_share(lens: LensConfig) -> float:
 
 
 def scatterer(lens: LensConfig, shape: tuple[int, int], horizontal_view_deg: float | None) -> Callable[[Plane], Plane]:
-    """Function that gives the light behind a lens that scatters, of light that an ideal one would give.
+    """Return a function from the light behind an ideal lens to the light behind one that scatters.
 
     Parameters
     ----------
     lens : LensConfig
     shape : (int, int)
-        Of the picture.
+        Height and width of the picture.
     horizontal_view_deg : float or None
-        Of the scene's camera across the picture's width, where the lens states none.
+        Angle of view of the scene's camera across the picture's width, for a lens that states none.
 
     Raises
     ------

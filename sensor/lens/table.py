@@ -37,7 +37,7 @@ from sensor.config import LensConfig, SensorConfig
 SHIPPED = Path(__file__).parent / "data"
 MOST_BYTES = 1 << 24  # 9 rings of 7 wavelengths with kernels of 64 x 64 points take 8 MB
 MOST_NOLL = 66  # up to the tenth order
-BEYOND = 1.25  # image height up to which a lens that draws the picture together is followed
+BEYOND = 1.25  # largest image height from which distortion may bring light into the picture
 PLACE = ("field", "wavelength_nm")
 PUPIL = ("pupil_radial", "pupil_across")
 POINTS = ("radial_um", "across_um", "energy")

@@ -80,7 +80,7 @@ def reference(
     assert opened.scene is not None
     path = reference_path(folder, opened.scene, film)
     found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)
-    transport = found.transport if found else None  # what is there already is gone on from
+    transport = found.transport if found else None  # light that is there already is continued
     if not transport:
         cost = PictureCost(
             size=film.size,

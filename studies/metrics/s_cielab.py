@@ -48,7 +48,7 @@ def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGR
 
 
 def _gaussians(plane: int, cycles_per_degree: Floats) -> Floats:
-    """Return the factors of an opponent plane's Gaussians on contrast at each frequency, along a last axis."""
+    """Return by how much each Gaussian of an opponent plane reduces contrast, (frequency, Gaussian)."""
     spreads_deg = np.array(SPREADS[plane])[:, 1]
     return np.exp(-((np.pi * spreads_deg * np.asarray(cycles_per_degree)[..., None]) ** 2))
 

@@ -52,7 +52,8 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
     rng = np.random.default_rng(0)
     shape = (FLAT_SIDE, FLAT_SIDE)
     device = draw_device(sensor, shape, rng)
-    # In the dark the SNR goes with the light, so what one is off by is what the other is.
+    # In the dark the SNR is proportional to the light. So the luminance of an SNR of 1 follows from the SNR measured at
+    # the luminance where the closed form has 1.
     dark_e = read_out(np.full(shape, dark_cd_m2 * white), sensor, device, EXPOSURE_S, rng).electrons
     measured_cd_m2 = dark_cd_m2 * float(dark_e.std() / dark_e.mean())
     steps = full_cd_m2 * np.linspace(0.9, 1.1, 21)

@@ -298,12 +298,12 @@ class Study:
 
 
 def default_balance(processor: str) -> str:
-    """White balance of a processor where none is stated: as shot, Gray World with the paper's method."""
+    """Return a processor's white balance if none is stated: Gray World for the paper's method, as shot for others."""
     return GRAY_WORLD if processor == PAPER_METHOD else AS_SHOT
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
-    """All combinations of scenes (or of one alone) and of the axes that decide a picture; the last varies fastest."""
+    """Return all combinations of the scenes (or one) and of the axes that decide a picture; the last varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
     camera = study.exposures, study.sensors, study.white_balances, study.frames, study.gain_texts
     return [Condition(*place) for place in product(scenes, study.spectra, study.levels, *camera)]
