@@ -22,7 +22,7 @@ from sensor.readout import convert, pixel_read_noise_e, row_noise_e, spread_char
 
 BANDS_AT_ONCE = 8  # a CPU reads ahead in some dozen places; 40 at once take a third longer, and fight for its cache
 LARGEST = np.finfo(np.float32).max
-# Bytes under which unaligned arrays are copied. Larger arrays of NumPy all lie alike, so that they cost one kernel more.
+# Bytes under which unaligned arrays are copied. Larger arrays of NumPy all lie alike, which costs one kernel more.
 COPY_UNDER = 1 << 20
 _FINITE_E = 1e30  # over any well; times any response in single precision's range
 

@@ -303,7 +303,7 @@ def default_balance(processor: str) -> str:
 
 
 def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition]:
-    """Return all combinations of the scenes (or one) and of the axes that decide a picture; the last varies fastest."""
+    """Return all combinations of the scenes (or one) and of the axes of a picture; the last varies fastest."""
     scenes = study.scenes if scene is None else (scene,)
     camera = study.exposures, study.sensors, study.white_balances, study.frames, study.gain_texts
     return [Condition(*place) for place in product(scenes, study.spectra, study.levels, *camera)]
