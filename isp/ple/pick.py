@@ -38,7 +38,7 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
     # These arrays are reused for all blocks, because allocating them anew would take as long as the sums.
     block, reads = (np.empty((BLOCK, columns), np.float32) for columns in (evidence.shape[1], width))
     # Without a pilot there are few patches, so that every component is a candidate.
-    candidates = np.ones((len(components.quick), count), bool) if noise is None else _candidates(components, evidence)
+    candidates = np.ones((len(components.values), count), bool) if noise is None else _candidates(components, evidence)
     components.make_whitenings(np.flatnonzero(candidates.any(axis=1)).tolist())
     for k, group in ((k, group) for k, row in enumerate(candidates) for group in blocks(np.flatnonzero(row))):
         whitening = components.whitening(k)
@@ -63,9 +63,13 @@ def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.
 
 
 def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
-    """Return which components may be the likeliest, (component, patch), by their likelihood in a few directions."""
+    """Return which components may be the likeliest, (component, patch).
+
+    Trained ones by their likelihood in a few directions, fine lines by whether the pilot has a colour that lines have.
+    """
     size = len(components.rows)
-    candidates = np.empty((len(components.quick), len(evidence)), np.bool_)
+    trained = components.trained
+    candidates = np.empty((len(components.values), len(evidence)), np.bool_)
     count = components.directions.shape[1]
     starts = np.cumsum([0, *range(count, 0, -1)]).tolist()
     products = np.empty((components.quick.shape[1], BLOCK), np.float32)
@@ -84,5 +88,9 @@ def _candidates(components: Table, evidence: Singles) -> NDArray[np.bool_]:
         crowded = np.flatnonzero(likely.sum(axis=0, dtype=np.int8) > MOST)
         least = np.full(len(rows), -np.inf, np.float32)
         least[crowded] = np.partition(quick[:, crowded], len(quick) - MOST, axis=0)[-MOST]
-        candidates[:, first : first + BLOCK] = likely & (quick >= least)
+        candidates[:trained, first : first + BLOCK] = likely & (quick >= least)
+        if components.mix.lines:
+            light = (rows[:, size + 1 :] - components.sampling.black).T
+            seen = np.abs(components.aliased @ light) > components.least_aliased @ light
+            candidates[trained:, first : first + BLOCK] = seen
     return candidates

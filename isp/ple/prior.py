@@ -81,12 +81,15 @@ class Mixture:
     log_weights : (component,) float64
     means : (component, size * size * 4) float64
     covariances : (component, size * size * 4, size * size * 4) float32
+    lines : int
+        How many of the components, the last ones, are fine lines (`isp.ple.fine_lines`) and were not trained.
     """
 
     size: int
     log_weights: NDArray[np.float64]
     means: NDArray[np.float64]
     covariances: NDArray[np.float32]
+    lines: int = 0
 
 
 @cache

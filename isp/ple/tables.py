@@ -13,7 +13,8 @@ from functools import cached_property, lru_cache
 import numpy as np
 import scipy
 
-from isp.ple.prior import Mixture, Prior, mixture
+from isp.ple.fine_lines import LEAST_ALIASED, aliased, with_fine_lines
+from isp.ple.prior import PATCH, Mixture, Prior, mixture
 from isp.ple.units import readings
 from rodcone.types import Floats, Singles
 
@@ -146,6 +147,7 @@ class Table:
     def __init__(self, mix: Mixture, sampling: Sampling, light: float) -> None:
         self.mix, self.sampling, self.rows = mix, sampling, np.array(sampling.rows)
         pixels = mix.size**2
+        self.trained = len(mix.means) - mix.lines
         at = self.rows
         among = _among(mix, sampling.rows)
         gains, dark = (np.tile(values, pixels) for values in (sampling.gains, sampling.dark_e))
@@ -166,7 +168,7 @@ class Table:
         self.drift = signal * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(information.sum())))
         # The pilot: the patch's means by channel.
         self.average = np.tile(np.eye(4), pixels) / pixels
-        brightness = (self.average @ signal.T).mean(axis=1)
+        brightness = (self.average @ signal[: self.trained].T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
         along = brightness / np.linalg.norm(brightness)
         error = PILOT_VARIANCE * (4 * BRIGHTNESS * np.outer(along, along) + (1 - BRIGHTNESS) * np.eye(4))
@@ -178,9 +180,15 @@ class Table:
         drift = (self.average @ self.drift.T).T
         self.pilot_samples = lean[:, :, at] + drift[:, :, None] * self.drift[:, None, at]
         self.pilot_pilot = lean @ self.average.T + drift[:, :, None] * drift[:, None]
+        # Coarser scales take fine lines for a colour: an error as large as the light makes them count for nothing.
+        self.pilot_pilot[self.trained :] += np.diag(brightness**2)
+        # What fine lines of contrast 1 would add to the pilot's means, and how much of it makes a patch one of them.
+        sampled = np.isin(np.arange(4), at % 4) / (self.average @ self.over_black[: self.trained].T).mean(axis=1)
+        self.aliased = (aliased(at, mix.size) * sampled).astype(np.float32)
+        self.least_aliased = (LEAST_ALIASED * sampled).astype(np.float32)
         self.centre, self.directions, self.quick, outside = self._quick_likelihood()
         # The quick likelihood may be wrong by the more, the more signal the directions hold that it leaves out.
-        share = 1.0 - np.mean(self.noise) / (np.exp(mix.log_weights) @ outside)
+        share = 1.0 - np.mean(self.noise[: self.trained]) / (np.exp(mix.log_weights[: self.trained]) @ outside)
         self.margin = float(np.interp(share, (0.0, 1.0), MARGINS))
         self._whitenings: dict[int, Whitening] = {}
         self._estimators: dict[int, Estimator] = {}
@@ -193,25 +201,27 @@ class Table:
 
             2 log w - (z - m)^T C^-1 (z - m) - log |C| - q / o - n log o.
 
-        That of all components is one matrix times the products of pairs of z, z, q and 1: C^-1, C^-1 m, 1 / o and the
-        rest.
+        That of all trained components is one matrix times the products of pairs of z, z, q and 1: C^-1, C^-1 m, 1 / o
+        and the rest.
         """
         at = self.rows
         own = len(self.rows)
         white = self.white
-        means = np.concatenate([self.values[:, at], self.values @ self.average.T @ white.T], axis=1)
+        trained = slice(self.trained)
+        values = self.values[trained]
+        means = np.concatenate([values[:, at], values @ self.average.T @ white.T], axis=1)
         covariances = np.empty((*means.shape, means.shape[1]))
         samples = covariances[:, :own, :own]
-        slopes, drift = self.slopes[:, at], self.drift[:, at]
-        np.multiply(_among(self.mix, self.sampling.rows).samples, slopes[:, :, None], out=samples)
+        slopes, drift = self.slopes[trained, at], self.drift[trained, at]
+        np.multiply(_among(self.mix, self.sampling.rows).samples[trained], slopes[:, :, None], out=samples)
         samples *= slopes[:, None]
         samples += drift[:, :, None] * drift[:, None]
-        samples[:, np.arange(own), np.arange(own)] += self.noise
-        covariances[:, own:, :own] = white @ self.pilot_samples
+        samples[:, np.arange(own), np.arange(own)] += self.noise[trained]
+        covariances[:, own:, :own] = white @ self.pilot_samples[trained]
         covariances[:, :own, own:] = covariances[:, own:, :own].swapaxes(1, 2)
-        covariances[:, own:, own:] = white @ self.pilot_pilot @ white.T + np.eye(4)
+        covariances[:, own:, own:] = white @ self.pilot_pilot[trained] @ white.T + np.eye(4)
 
-        weights = np.exp(self.mix.log_weights)
+        weights = np.exp(self.mix.log_weights[trained])
         centre = weights @ means
         off = means - centre
         pooled = np.tensordot(weights, covariances, 1) + (off.T * weights) @ off
@@ -226,7 +236,7 @@ class Table:
         pairs = np.triu_indices(count)
         square = -0.5 * inverse[:, pairs[0], pairs[1]] * np.where(pairs[0] == pairs[1], 1.0, 2.0)
         straight = np.einsum("kij,kj->ki", inverse, mean)
-        constant = self.mix.log_weights - 0.5 * (
+        constant = self.mix.log_weights[trained] - 0.5 * (
             np.linalg.slogdet(within)[1] + (straight * mean).sum(axis=1) + others * np.log(outside)
         )
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
@@ -330,4 +340,5 @@ def _among(mix: Mixture, rows: tuple[int, ...]) -> Among:
 @lru_cache(maxsize=_TABLES)
 def table(prior: Prior, sampling: Sampling, step: int) -> Table:
     """Table at light ``STEP ** step``."""
-    return Table(mixture(prior, sampling.size), sampling, STEP**step)
+    mix = mixture(prior, sampling.size)
+    return Table(with_fine_lines(mix) if sampling.size == PATCH else mix, sampling, STEP**step)
