@@ -89,7 +89,8 @@ def require_range(name: str, value: Any, low: float, high: float, fix: str) -> N
         number = float(value) if not isinstance(value, bool) and isinstance(value, Real) else nan
     except OverflowError:  # whole numbers of Python go on beyond float's
         number = nan
-    if not (isfinite(number) and low <= number <= high):
+    exact = int(value) if isinstance(value, Integral) else number  # 2^53 + 1 is no float
+    if not (isfinite(number) and low <= exact <= high):
         raise InputError(f"{name}: {value!r} is outside {low:g} to {high:g}; {fix}")
 
 

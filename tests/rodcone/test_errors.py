@@ -5,7 +5,7 @@ import pickle
 
 import pytest
 
-from rodcone.errors import MOST_TOLD, InputError, one_line, require_range
+from rodcone.errors import MOST_TOLD, InputError, one_line, require_range, require_whole
 
 
 def test_a_message_is_one_line_that_a_terminal_only_shows() -> None:
@@ -35,6 +35,15 @@ def test_what_is_no_number_of_the_range_is_refused_and_numbers_within_it_pass() 
             require_range("side", value, 0.0, 5.0, "give less")
     for number in (0, 5, 2.5):
         require_range("side", number, 0.0, 5.0, "give less")
+
+
+def test_whole_numbers_are_held_against_their_limits_digit_by_digit() -> None:
+    """Beyond 2^53 a float is the nearest of several: a study's last seed passes, and its next doesn't."""
+    for last in (2**53, 2**63 - 1, 2**160 - 1):
+        require_whole("seed", last, 0, last, "give less")
+        for beyond in (last + 1, -1):
+            with pytest.raises(InputError, match="is outside"):
+                require_whole("seed", beyond, 0, last, "give less")
 
 
 def test_of_a_traceback_within_an_error_the_last_line_is_told() -> None:

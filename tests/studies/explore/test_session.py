@@ -596,7 +596,7 @@ def test_a_messages_limits_are_kept_to_the_unit() -> None:
     refusal(read_message, json.dumps({"kind": "hello", "number": 1, "page": "p" * 41}), match="allowed: 40 characters")
     for number in (0, 2**53):
         assert read_message(json.dumps({"kind": "hello", "number": number}))["number"] == number
-    for number in (-1, 2**53 + 2):  # floats tell no odd number there
+    for number in (-1, 2**53 + 1):
         refusal(read_message, json.dumps({"kind": "hello", "number": number}), match="number: ")
     for count in (1, 2):
         asked = {"kind": "histogram", "number": 1, "cameras": [{}] * count}
