@@ -178,6 +178,18 @@ def test_noise_steps_begin_where_a_reading_is_left_out_in_the_electrons_that_are
     assert 0.5 * 10_000 <= handover_e < 10_000
 
 
+def test_where_dark_current_fills_every_reading_the_last_to_fill_is_what_is_left():
+    """Its own law is stated from the dark on: a Poisson of a million electrons beside its read noise of 6 e-."""
+    readings = chip_readings(dual(dark_current_e_per_s=1e6), 1.0)
+    assert (seams(readings).handover_e < 0).all()
+    of_chip, step = merged_noise_steps(readings)
+    assert of_chip == step
+    assert step.from_e == 0.0
+    steps_e2 = readings[1].sources["quantisation"].dark_e ** 2 + readings[1].sources["converter noise"].dark_e ** 2
+    assert step.read_noise_e == pytest.approx(np.sqrt(1e6 + 6.0**2 + steps_e2), rel=1e-9)
+    assert (step.shot, step.prnu) == (pytest.approx(1.0), 0.0)
+
+
 @loop("name", HDR)
 def test_a_sensor_for_a_burst_holds_the_variance_of_its_merged_frames(name):
     one, fixed = preset(name), ("PRNU", "DSNU", "column offsets", "column gains")

@@ -136,6 +136,12 @@ def test_each_starting_point_holds_what_its_name_says_and_its_ledger_states_what
     reference = made["reference"].ledgers[-1]
     noise = sum(term.share for term in reference.terms[:2])
     assert reference.share == pytest.approx(noise, rel=1e-6)
+    # the variance of the light's level falls with the samples alone, of which the reference has four times as many
+    of_level = {name: np.array([row.terms[1].share for row in plan.ledgers]) for name, plan in made.items()}
+    assert (of_level["reference"] > 0).all()
+    for name in ("fast", "default"):
+        np.testing.assert_allclose(of_level[name], 4 * of_level["reference"], rtol=1e-9)
+    assert all(row.terms[0].share > 0 for plan in made.values() for row in plan.ledgers)
 
 
 def test_a_fast_plan_keeps_what_the_study_itself_states_of_the_lens() -> None:

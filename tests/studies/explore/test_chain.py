@@ -14,6 +14,7 @@ from refusal import refusal
 import rodcone as public
 import studies.explore.chain as CHAIN
 import studies.explore.controls as CONTROLS
+import studies.photograph.shot as SHOT
 from isp.processors.catalogue import PROCESSORS, default_processor, libraries
 from isp.processors.piecewise import takes
 from render.spectrum import luminance
@@ -227,6 +228,18 @@ def test_without_shot_noise_read_noise_is_all_that_moves():
 
 
 @pytest.mark.thorough
+def test_a_lamps_start_is_drawn_from_a_captures_stream_which_is_no_frames(monkeypatch):
+    """A stream [7, 1] is also [7, 1, 0], the first frame's: its noise would tell where in its period a lamp was."""
+    drawn, starts = [], CHAIN.frame_starts_s
+    monkeypatch.setattr(CHAIN, "frame_starts_s", lambda *x: drawn.append(x[-1].bit_generator.state) or starts(*x))
+    expose_scene(small_transport(), Controls(flicker_depth=1.0, seed=7, frames=2), Memo())
+    of_start, *of_frames = (np.random.default_rng([7, *x]).bit_generator.state for x in ([2], [1], [1, 0], [1, 1]))
+    assert drawn
+    assert all(state == of_start for state in drawn)
+    assert of_start not in of_frames
+    assert (CHAIN._CHIP, CHAIN._FRAME, CHAIN._START) == (SHOT._DEVICE, SHOT._FRAME, SHOT._START)
+
+
 def test_the_memory_is_bounded():
     transport, memo = small_transport(), Memo()
     for seed in range(30):

@@ -65,6 +65,32 @@ def test_each_number_has_its_default_and_its_two_limits(kind: Any, numbers: dict
         assert getattr(kind(), name) == default, name
 
 
+def test_ports_go_to_the_last_that_there_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Any other is refused in a line, and never comes to the system's own words, which name no remedy."""
+    bound: list[int] = []
+
+    class Socket:
+        def bind(self, address: tuple[str, int]) -> None:
+            bound.append(address[1])
+
+        def __getattr__(self, name: str) -> Any:
+            return lambda *_: None
+
+    monkeypatch.setattr(server.socket, "socket", lambda *_: Socket())
+    for port in (0, 65_535):
+        server.listen(port)
+    for port in (-1, 65_536):
+        refusal(server.listen, port, match="port: .* is outside 0 to 65535")
+    assert bound == [0, 65_535]
+
+
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_what_no_browser_reads_is_never_sent(value: float) -> None:
+    """JavaScript's JSON has no NaN: a message that held one would end the page's connection without a word."""
+    with pytest.raises(ValueError, match="JSON"):
+        server.packed({"facts": [{"snr_db": value}]}, ())
+
+
 def test_a_lamp_has_its_default_and_its_limits() -> None:
     assert Lamp() == Lamp("own", 1.0, ())
     for power in (0.0, 1e9):

@@ -17,7 +17,7 @@ from sensor.readings.resolve import chip_readings
 from sensor.readout import noise_variance
 from sensor.response import channel_electrons, expected_electrons
 from studies.metrics.appearance import picture_quality, psnr_db
-from studies.metrics.truth import light_in_bands, neutral_electrons, shown_white_cd_m2, true_srgb
+from studies.metrics.truth import light_in_bands, named_light, neutral_electrons, shown_white_cd_m2, true_srgb
 from studies.study.render_noise import monte_carlo_bound, monte_carlo_share
 
 NM = DEFAULT_WAVELENGTH_NM
@@ -40,6 +40,21 @@ def test_known_scale_is_green_electrons_per_luminance() -> None:
     sensor, light = low_noise(), light_in_bands(illuminant("A"), NM, WIDTH)
     electrons = channel_electrons(form_image(neutral_scene(20.0, "A"), sensor), sensor, 0.01)
     assert 20.0 * neutral_electrons(sensor, light, 0.01) == pytest.approx(electrons[0, 0], rel=1e-9)
+
+
+@pytest.mark.parametrize(("window_nm", "ends_nm"), [((380.0, 780.0), (380, 780)), ((350.2, 1000.7), (350, 1001))])
+def test_a_named_light_is_in_whole_nanometres_side_by_side(
+    window_nm: tuple[float, float], ends_nm: tuple[int, int]
+) -> None:
+    """Illuminant A by CIE 15's formula in each of them, and nothing of it lies half a nanometre off."""
+    light = named_light("A", window_nm)
+    edges_nm = np.arange(ends_nm[0], ends_nm[1] + 1.0)
+    np.testing.assert_array_equal(light.wavelength_nm, (edges_nm[1:] + edges_nm[:-1]) / 2)
+    np.testing.assert_array_equal(light.width_nm, np.diff(edges_nm))
+    nm = light.wavelength_nm[(light.wavelength_nm > 380.0) & (light.wavelength_nm < 780.0)]
+    by_formula = (560.0 / nm) ** 5 / np.expm1(1.435e7 / (2848.0 * nm))
+    ratio = light.spectrum[np.searchsorted(light.wavelength_nm, nm)] / by_formula
+    np.testing.assert_allclose(ratio, ratio.mean(), rtol=1e-3)
 
 
 def test_psnr_closed_form() -> None:

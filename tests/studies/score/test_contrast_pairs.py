@@ -1,5 +1,6 @@
 """Contrast accuracy written from CDP's published definition another way: exact counts, and Fourier's distributions."""
 
+from dataclasses import replace
 from fractions import Fraction
 from math import pi
 
@@ -48,10 +49,11 @@ def distribution(mean_e: float, rest_e: float, gain: float, reach: int) -> np.nd
     return np.array([np.trapezoid(seen * np.exp(-1j * turn * step), turn).real for step in steps]) / (2 * pi)
 
 
-@pytest.mark.parametrize("lux", [0.1, 1.0, 4.0])
-def test_the_closed_form_is_the_definition_on_distributions_by_fourier(lux: float) -> None:
+@pytest.mark.parametrize(("lux", "bits"), [(0.1, None), (1.0, None), (4.0, None), (0.05, 16)])
+def test_the_closed_form_is_the_definition_on_distributions_by_fourier(lux: float, bits: int | None) -> None:
     """PRNU of so few electrons adds to the normal noise; pairs are counted on whole DN, with limits as fractions."""
-    sensor, reach = public.low_noise(), 150
+    fine = bits is not None  # steps of a quarter of an electron: pairs may read less than one
+    sensor, reach = (replace(public.low_noise(), bits=bits), 300) if fine else (public.low_noise(), 150)
     field = even_field(sensor, named_light("D65"), EXPOSURE_S, "G")
     mean_cd_m2, pixel = lux * 0.18 / pi, sensor.pixel
     sides = []

@@ -124,6 +124,22 @@ def test_print_figures_are_their_formulas_by_hand() -> None:
     assert computed(sensor, "print.sports") == pytest.approx(speed, rel=0.01)
 
 
+def test_the_low_light_speed_of_much_read_noise_is_where_nine_stops_are_left() -> None:
+    """A ratio of 1 at n electrons, n^2 = n + 40^2: nine stops are 512 n of range; 30 dB at 18 % need less."""
+    sensor = replace(shot_noise_camera(full_well_e=60_000.0), bits=16)
+    sensor = replace(sensor, pixel=replace(sensor.pixel, read_noise_e=40.0))
+    range_e = 512 * (0.5 + sqrt(0.25 + 40.0**2))
+    assert 0.18 * range_e > (1000 + sqrt(1000**2 + 4000 * 40.0**2)) / 2
+    gain = sensor.pixel.full_well_e / range_e
+    speed = computed(sensor, "iso_12232.saturation_speed") * gain
+    assert computed(sensor, "print.sports") == pytest.approx(speed, rel=2e-3)
+    # beyond it is no speed at all: four times as noisy, not even the well holds as much
+    noisy = replace(sensor, pixel=replace(sensor.pixel, read_noise_e=160.0))
+    merits = [x for one in definitions(noisy, "D65", EXPOSURE_S, ["print.sports"]) for x in one.merits]
+    (missing,) = (x.missing for x in merits if x.name == "print.sports")
+    assert missing == "at gain 1 its range is less already"
+
+
 @pytest.mark.parametrize("name", ["dual_gain", "split_pixel", "staggered"])
 def test_colours_of_several_readings_have_the_noise_of_the_merge(name: str) -> None:
     """The integral of 1 / noise up to 90 % of the range by a fine sum; noise is the signal over its ratio.
