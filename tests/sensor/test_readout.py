@@ -295,16 +295,6 @@ def test_each_term_alone_in_closed_form(pixel, expected):
     assert variance(100.0, **pixel) == pytest.approx(expected, rel=1e-12)
 
 
-def test_noise_is_told_in_double_precision_whatever_holds_the_light():
-    """A law's small terms beside large squares: in float32 they would be rounded to seven digits."""
-    light = np.array([[3.0, 700.0], [41.0, 5003.0]])
-    wanted = noise_variance(light, deep_camera(prnu=0.013), 0.1)
-    for held in (light.astype(np.float32), light.astype(np.uint16), light.tolist()):
-        found = noise_variance(held, deep_camera(prnu=0.013), 0.1)
-        assert found.dtype == np.float64
-        np.testing.assert_array_equal(found, wanted)
-
-
 def test_crosstalk_spreads_the_shot_noise_as_it_spreads_the_charge():
     light = np.zeros((5, 5))
     light[2, 2] = 100.0

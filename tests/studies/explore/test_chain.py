@@ -227,7 +227,6 @@ def test_without_shot_noise_read_noise_is_all_that_moves():
     assert np.array_equal(steady.raw.dn, expected.raw.dn)
 
 
-@pytest.mark.thorough
 def test_a_lamps_start_is_drawn_from_a_captures_stream_which_is_no_frames(monkeypatch):
     """A stream [7, 1] is also [7, 1, 0], the first frame's: its noise would tell where in its period a lamp was."""
     drawn, starts = [], CHAIN.frame_starts_s
@@ -240,6 +239,7 @@ def test_a_lamps_start_is_drawn_from_a_captures_stream_which_is_no_frames(monkey
     assert (CHAIN._CHIP, CHAIN._FRAME, CHAIN._START) == (SHOT._DEVICE, SHOT._FRAME, SHOT._START)
 
 
+@pytest.mark.thorough
 def test_the_memory_is_bounded():
     transport, memo = small_transport(), Memo()
     for seed in range(30):

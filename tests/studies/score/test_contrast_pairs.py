@@ -52,8 +52,9 @@ def distribution(mean_e: float, rest_e: float, gain: float, reach: int) -> np.nd
 @pytest.mark.parametrize(("lux", "bits"), [(0.1, None), (1.0, None), (4.0, None), (0.05, 16)])
 def test_the_closed_form_is_the_definition_on_distributions_by_fourier(lux: float, bits: int | None) -> None:
     """PRNU of so few electrons adds to the normal noise; pairs are counted on whole DN, with limits as fractions."""
-    fine = bits is not None  # steps of a quarter of an electron: pairs may read less than one
-    sensor, reach = (replace(public.low_noise(), bits=bits), 300) if fine else (public.low_noise(), 150)
+    sensor, reach = public.low_noise(), 150
+    if bits is not None:  # steps of a thirteenth of an electron: pairs that read less than one count too
+        sensor, reach = replace(sensor, bits=bits, pixel=replace(sensor.pixel, full_well_e=5000.0)), 300
     field = even_field(sensor, named_light("D65"), EXPOSURE_S, "G")
     mean_cd_m2, pixel = lux * 0.18 / pi, sensor.pixel
     sides = []
