@@ -22,7 +22,7 @@ from render.level import Irradiance
 from render.limits import LEAST_POINTS, PILOT_FROM, Limits
 from render.loader import INTEGRATOR, Film, load_groups, own_mitsuba_variant, variant
 from render.meter import Meter
-from render.runs import add_run, clear_traceback, fields_of, means_of, no_means, pilot_rates, scene_means_of
+from render.runs import add_run, clear_traceback, error_of, fields_of, means_of, no_means, pilot_rates, scene_means_of
 from render.scene import Scene, film_size
 from render.scene_range import check_range, warn_of_coloured_lights
 from render.spectrum import RENDER_BAND_NM, VISIBLE_NM, band_widths, even_bands
@@ -220,16 +220,15 @@ def _render(
         earlier = None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
     # Draw runs until a limit is reached
-    fields: dict[str, Any] = {"relative_mc_error": np.inf}
+    error = np.inf
     look = limits.next_look(means.count)
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
             add_run(loaded, means, film, look, limits.seed)
             if means.count >= LEAST_POINTS:
-                fields = fields_of(lights, means)
+                error = error_of(lights, means)
             now = time.perf_counter()
-            error = fields["relative_mc_error"]
             try:
                 progress(own_share * limits.share(means.count, error, now - start), error)
             except KeyboardInterrupt:
@@ -245,10 +244,9 @@ def _render(
         if denoise:
             denoised = denoise_means(scene, loaded, film, means, limits.seed, earlier.denoised if earlier else None)
     # Tell what was drawn
-    if "variance" not in fields:  # fewer points than an error is told of
-        fields = fields_of(lights, means)
+    release_memory()  # what Dr.Jit keeps for its next launch
     return Transport(
-        **fields,
+        **fields_of(lights, means),
         scene_means=scene_means_of(means),
         groups=dict(scene.groups),
         wavelength_nm=film.wavelength_nm,

@@ -43,14 +43,25 @@ class Halves:
         """View of one along the first axis."""
         return Halves(self.mean[index], self.difference[index])
 
-    def add(self, even: Planes, odd: Planes, weight: np.float32) -> None:
-        """Add a chunk's two means, in place: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w."""
+    def add(self, even: Planes, odd: Planes, weight: np.float32, at: slice | NDArray[np.intp]) -> None:
+        """Add a chunk's two means (..., pixel) at some pixels: m += ((a + b) / 2 - m) w, d += ((a - b) / 2 - d) w.
+
+        Parameters
+        ----------
+        even, odd : (..., pixel) float32
+        weight : float32
+        at : slice or (pixel,) int
+            The pixels, counted row by row. One that stands there twice has the same light twice.
+        """
         for planes, combined in ((self.mean, np.add), (self.difference, np.subtract)):
             step = combined(even, odd)
             np.multiply(step, np.float32(0.5), out=step)
-            np.subtract(step, planes, out=step)
-            np.multiply(step, weight, out=step)
-            np.add(planes, step, out=planes)
+            rows = planes.reshape(-1, planes.shape[-2] * planes.shape[-1])
+            for row, values in zip(rows, step.reshape(-1, step.shape[-1]), strict=True):
+                before = row[at]
+                np.subtract(values, before, out=values)
+                np.multiply(values, weight, out=values)
+                row[at] = np.add(before, values, out=values)
 
 
 @dataclass(frozen=True)
@@ -169,10 +180,16 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
         Groups whose errors are correlated.
     """
     chosen = spread_pixels(radiance.shape[2:])
-    total = (emitted[:, :, None, None] ** 2 * variance[chosen]).sum(axis=0)
+    of_chosen = replace(shared, correlation=shared.correlation[chosen]) if shared else None
+    return median_error(emitted, radiance[chosen], variance[chosen], of_chosen)
+
+
+def median_error(emitted: Floats, radiance: Planes, variance: Planes, shared: SharedPaths | None) -> float:
+    """`relative_error` of pixels that were chosen already (`spread_pixels`)."""
+    total = (emitted[:, :, None, None] ** 2 * variance).sum(axis=0)
     if shared:
-        total += replace(shared, correlation=shared.correlation[chosen]).term(emitted, variance[chosen])
-    values = (emitted[:, :, None, None] * radiance[chosen]).sum(axis=0)
+        total += shared.term(emitted, variance)
+    values = (emitted[:, :, None, None] * radiance).sum(axis=0)
     lit = values > 0
     return float(np.median(np.sqrt(np.maximum(total[lit], 0.0)) / values[lit])) if lit.any() else 0.0
 

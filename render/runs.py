@@ -6,7 +6,8 @@ position in the sequence: a resumed render has the same bits as one that was nev
 """
 
 import traceback
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
@@ -14,9 +15,18 @@ import numpy as np
 from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
-from render.error_estimates import Halves, SharedPaths, group_errors, relative_error, shared_paths
+from render.error_estimates import (
+    Halves,
+    SharedPaths,
+    group_errors,
+    median_error,
+    relative_error,
+    shared_paths,
+    spread_pixels,
+)
 from render.integrator.allocation import rates_of
-from render.integrator.wavefront import Span, seed_of, traced, tracers
+from render.integrator.dense import Tracer
+from render.integrator.wavefront import Span, launches, seed_of, traced_at, tracers, where
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
 from render.loader import PART_BANDS, Film, LoadedScene
@@ -61,16 +71,36 @@ class Means:
 
 
 @dataclass(frozen=True)
-class Drawn:
-    """Sums that one half of the paths of a loaded scene gives in some chunks.
+class Half:
+    """One half of the paths of a loaded scene.
 
     Attributes
     ----------
-    radiance : (chunk, group, band, h, w) float32
-    seen : list of (chunk, 1 or band, h, w) float32
+    loaded : LoadedScene
+    tracers : tuple of Tracer
+        One for each part of the bands; all parts see the same paths.
+    seed : int
+    split : bool
+        Whether indirect light is also given by itself.
+    """
+
+    loaded: LoadedScene
+    tracers: tuple[Tracer, ...]
+    seed: int
+    split: bool
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """Means that one half of the paths of a loaded scene gives in some chunks, at the pixels of a launch.
+
+    Attributes
+    ----------
+    radiance : (chunk, group, band, pixel) float32
+    seen : list of (chunk, 1 or band, pixel) float32
         For each group, as `Means.seen`.
-    coverage : (chunk, h, w) float32
-    indirect : (chunk, group, band, h, w) float32
+    coverage : (chunk, pixel) float32
+    indirect : (chunk, group, band, pixel) float32
         No groups where it isn't asked for.
     """
 
@@ -110,21 +140,46 @@ def means_of(transport: Transport, *, split: bool = False) -> Means:
 
 def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
     """Return the fields of a `Transport` that hold the means and their Monte Carlo error under lights (group, band)."""
-    light, rates = means.light, means.rates
+    light = means.light
+    bands, height, width = light.mean.shape[1:]
     variance = np.empty(light.mean.shape, np.float32)
     correlation = np.empty(light.mean.shape[1:], np.float32)
-    for band in range(light.mean.shape[1]):  # one by one: all at once would take twice the memory of the render
-        at = slice(band, band + 1)
-        seen = [lamp if len(lamp.mean) == 1 else Halves(lamp.mean[at], lamp.difference[at]) for lamp in means.seen]
-        of_band = Halves(light.mean[:, at], light.difference[:, at])
-        errors = group_errors(of_band, seen, means.coverage.mean, rates)
-        variance[:, at] = [group.covariance(group, rates) for group in errors]
-        if means.shared:
-            correlation[at] = shared_paths(means.shared, errors, variance[:, at], rates).correlation
+    together = max(1, BLOCK // (bands * width))  # rows; all at once would take several times the memory of the render
+    for first in range(0, height, together):
+        rows = slice(first, min(first + together, height))
+        variance[:, :, rows], of_rows = _errors_in_rows(means, rows)
+        if of_rows:
+            correlation[:, rows] = of_rows.correlation
     shared = SharedPaths(means.shared, correlation) if means.shared else None
     error = relative_error(lights, means.light.mean, variance, shared)
     halves = {"light": light, "coverage": means.coverage, "seen": tuple(means.seen)}
     return halves | {"variance": variance, "shared": shared, "relative_mc_error": error}
+
+
+def error_of(lights: Floats, means: Means) -> float:
+    """Return the relative error of `fields_of` alone: only the rows of pixels that it looks at are worked out."""
+    light = means.light.mean
+    chosen = spread_pixels(light.shape[2:])
+    _, rows, columns = chosen
+    errors = [_errors_in_rows(means, slice(row, row + 1)) for row in rows.ravel().tolist()]
+    variance = np.concatenate([variance[..., columns] for variance, _ in errors], axis=2)
+    correlations = [shared.correlation[..., columns] for _, shared in errors if shared]
+    shared = SharedPaths(means.shared, np.concatenate(correlations, axis=1)) if means.shared else None
+    return median_error(lights, light[chosen], variance, shared)
+
+
+def _errors_in_rows(means: Means, rows: slice) -> tuple[Planes, SharedPaths | None]:
+    """Variance (group, band, row, w) in some rows of the picture, and what groups with shared paths have in common."""
+    height = len(means.rates)
+    near = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))  # errors are pooled over 3x3 pixels
+    own = slice(rows.start - near.start, rows.stop - near.start)
+    light, *seen = (Halves(x.mean[..., near, :], x.difference[..., near, :]) for x in (means.light, *means.seen))
+    rates = means.rates[near]
+    errors = group_errors(light, seen, means.coverage.mean[near], rates)
+    variance = np.stack([group.covariance(group, rates) for group in errors])
+    shared = shared_paths(means.shared, errors, variance, rates) if means.shared else None
+    of_rows = replace(shared, correlation=shared.correlation[:, own]) if shared else None
+    return variance[:, :, own], of_rows
 
 
 def scene_means_of(means: Means) -> SceneMeans:
@@ -154,10 +209,24 @@ def scene_means_of(means: Means) -> SceneMeans:
     return SceneMeans(scattered, uncovered, covariance / pixels**2)
 
 
-def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed: int) -> None:
+def add_run(
+    scenes: list[LoadedScene],
+    means: Means,
+    film: Film,
+    stop: int,
+    seed: int,
+    after: Callable[[float], None] | None = None,
+) -> None:
     """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
 
+    A launch adds both halves of its pixels, so that beside the means no more than its own light is held.
     An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
+
+    Parameters
+    ----------
+    scenes, means, film, stop, seed
+    after : callable, optional
+        Called after each launch but the last, with the points of a half in the mean over the picture so far.
     """
     start = means.count
     chunk = chunk_from(means.count)
@@ -168,21 +237,35 @@ def add_run(scenes: list[LoadedScene], means: Means, film: Film, stop: int, seed
     equal_chunks = next(n for n in range(1, MOST_POINTS) if n == fitting or chunk_from(start + n * chunk) != chunk)
     chunks = min(equal_chunks, -(-(stop - start) // chunk))
     span = Span(start, chunk, chunks)
-    draws = [_drawn(loaded, film, means.rates, span, threads, seed, split=split) for loaded in scenes]
     if len(scenes[0].groups) == 2:
         means.shared = scenes[0].groups[0], scenes[0].groups[1]
-    for index in range(chunks):
-        weight = np.float32(chunk / (means.count + chunk))
+    halves = [_halves(loaded, film, seed, split=split) for loaded in scenes]
+    parts = launches(means.rates, span, threads)
+    for number, pixels in enumerate(parts, 1):
+        draws = [[_drawn(half, means.rates, pixels, span) for half in both] for both in halves]
+        _add(scenes, means, draws, pixels, span)
+        if after and number < len(parts):
+            after(start + chunk * chunks * number / len(parts))
+    means.count += chunks * chunk
+
+
+def _add(
+    scenes: list[LoadedScene], means: Means, draws: list[list[Drawn]], pixels: NDArray[np.intp], span: Span
+) -> None:
+    """Add the chunks of a launch, of which each loaded scene has both halves, at its pixels."""
+    at = where(pixels)
+    for index in range(span.chunks):
+        count = span.start + index * span.chunk
+        weight = np.float32(span.chunk / (count + span.chunk))
         # Each camera path first meets one lamp at most, which belongs to one group, so coverage adds up over groups.
         covered = [np.asarray(sum(half.coverage[index] for half in halves)) for halves in zip(*draws, strict=True)]
-        means.coverage.add(covered[0], covered[1], weight)
+        means.coverage.add(covered[0], covered[1], weight, at)
         for loaded, (even, odd) in zip(scenes, draws, strict=True):
             for slot, group in enumerate(loaded.groups):
-                means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight)
-                means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight)
+                means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight, at)
+                means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight, at)
                 if means.indirect is not None:
-                    means.indirect[group].add(even.indirect[index, slot], odd.indirect[index, slot], weight)
-        means.count += chunk
+                    means.indirect[group].add(even.indirect[index, slot], odd.indirect[index, slot], weight, at)
 
 
 def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
@@ -194,19 +277,25 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
         The scene's own emission.
     """
     energy = (lights * film.width_nm).astype(np.float32)
+    uniform = np.ones(film.size, np.uint32)
     scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
     seen = np.zeros((len(lights), *film.size), np.float32)
-    uniform = np.ones(film.size, np.uint32)
     threads = launch_threads(scenes, film)
+    # Of a picture that takes several launches one chunk is held at a time.
+    at_once = PILOT.chunks if uniform.size * PILOT.chunk * PILOT.chunks <= threads else 1
+    spans = [Span(first * PILOT.chunk, PILOT.chunk, at_once) for first in range(0, PILOT.chunks, at_once)]
     for loaded in scenes:
-        halves = _drawn(loaded, film, uniform, PILOT, threads, seed_of(seed, _PILOT_STREAM))
-        for slot, group in enumerate(loaded.groups):
-            for index, (half, chunk) in enumerate(product(halves, range(PILOT.chunks))):
-                direct = half.seen[slot][chunk]
-                light = half.radiance[chunk, slot] - direct
-                scattered[group, index] = np.tensordot(energy[group], light, axes=1)
+        draws = product(_halves(loaded, film, seed_of(seed, _PILOT_STREAM)), spans)
+        for number, (half, span) in enumerate(draws):
+            radiance, seen_in_half = _drawn_everywhere(half, uniform, span, threads)
+            for (slot, group), chunk in product(enumerate(loaded.groups), range(at_once)):
+                direct = seen_in_half[slot][chunk]
+                # Bands are summed over the whole picture at once, because BLAS rounds by the size.
+                light = (radiance[chunk, slot] - direct).reshape(-1, *film.size)
+                scattered[group, number * at_once + chunk] = np.tensordot(energy[group], light, axes=1)
                 emission = energy[group] if len(direct) > 1 else energy[group].sum(keepdims=True)
-                seen[group] += np.tensordot(emission, direct, axes=1) / (2 * PILOT.chunks)
+                planes = direct.reshape(-1, *film.size)
+                seen[group] += np.tensordot(emission, planes, axes=1) / (2 * PILOT.chunks)
     return rates_of(scattered, seen)
 
 
@@ -215,41 +304,45 @@ def launch_threads(scenes: list[LoadedScene], film: Film, *, split: bool = False
     return MOST_FLOATS // max(loaded.channels(film.wavelength_nm.size, split=split) for loaded in scenes)
 
 
-def _drawn(
-    loaded: LoadedScene,
-    film: Film,
-    rates: NDArray[np.uint32],
-    span: Span,
-    threads: int,
-    seed: int,
-    *,
-    split: bool = False,
-) -> tuple[Drawn, Drawn]:
-    """Draw a span of both halves of the paths of one loaded scene: the even half and the odd."""
-    halves = []
-    groups = len(loaded.groups)
-    for half in range(2):
-        group_seed = seed_of(seed, loaded.groups[0], half)
-        traces = (tracer.camera for tracer in tracers(loaded, film, PART_BANDS, group_seed, split=split))
-        parts = [traced(trace, rates, span, threads, group_seed) for trace in traces]
-        total, indirect = (
-            np.concatenate([_grouped(part[name], count, film) for part in parts], axis=2)
-            for name, count in (("scattered", groups), ("indirect", groups * split))
-        )
-        coverage = parts[0]["shares"]  # the parts of the bands see the same paths
-        seen = [coverage[:, slot, None] for slot in range(groups)]
-        if loaded.coloured:
-            seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
-        for slot, planes in enumerate(seen):
-            total[:, slot] += planes
-        halves.append(Drawn(radiance=total, seen=seen, coverage=coverage.sum(axis=1), indirect=indirect))
-    return halves[0], halves[1]
+def _halves(loaded: LoadedScene, film: Film, seed: int, *, split: bool = False) -> list[Half]:
+    """Return the even and the odd half of the paths of a loaded scene."""
+    seeds = [seed_of(seed, loaded.groups[0], half) for half in range(2)]
+    return [Half(loaded, tuple(tracers(loaded, film, PART_BANDS, each, split=split)), each, split) for each in seeds]
 
 
-def _grouped(channels: Planes, groups: int, film: Film) -> Planes:
-    """Reshape bands of several groups, which lie one after the other, to (chunk, group, band, h, w)."""
-    chunks, count = channels.shape[:2]
-    return channels.reshape(chunks, groups, count // max(groups, 1), *film.size)
+def _drawn(half: Half, rates: NDArray[np.uint32], pixels: NDArray[np.intp], span: Span) -> Drawn:
+    """Draw a span of a half's paths at the pixels of a launch."""
+    groups = len(half.loaded.groups)
+    parts = [traced_at(tracer.camera, rates, pixels, span, half.seed) for tracer in half.tracers]
+    total, indirect = (
+        np.concatenate([_grouped(part[name], count) for part in parts], axis=2)
+        for name, count in (("scattered", groups), ("indirect", groups * half.split))
+    )
+    coverage = parts[0]["shares"]  # the parts of the bands see the same paths
+    seen = [coverage[:, slot, None] for slot in range(groups)]
+    if half.loaded.coloured:
+        seen[0] = np.concatenate([part["lamps"] for part in parts], axis=1)
+    for slot, planes in enumerate(seen):
+        total[:, slot] += planes
+    return Drawn(radiance=total, seen=seen, coverage=coverage.sum(axis=1), indirect=indirect)
+
+
+def _drawn_everywhere(half: Half, rates: NDArray[np.uint32], span: Span, threads: int) -> tuple[Planes, list[Planes]]:
+    """Radiance and seen light as `_drawn`, of all pixels."""
+    whole: list[Planes] = []
+    for pixels in launches(rates, span, threads):
+        drawn = _drawn(half, rates, pixels, span)
+        parts = [drawn.radiance, *drawn.seen]
+        whole = whole or [np.empty((*part.shape[:-1], rates.size), np.float32) for part in parts]
+        for planes, part in zip(whole, parts, strict=True):
+            planes[..., where(pixels)] = part
+    return whole[0], whole[1:]
+
+
+def _grouped(channels: Planes, groups: int) -> Planes:
+    """Reshape bands of several groups, which lie one after the other, to (chunk, group, band, pixel)."""
+    chunks, count, pixels = channels.shape
+    return channels.reshape(chunks, groups, count // max(groups, 1), pixels)
 
 
 def clear_traceback(error: BaseException) -> None:

@@ -403,14 +403,21 @@ def relight_by_band(
     light, level_error = transport._at_level(in_bands, luminance_cd_m2, illuminance_lux)
     warn_of_wide_bands(transport._curve_error(lights, in_bands), transport.width_nm)
 
+    planes = transport.light.mean  # alone: whoever holds the result doesn't hold the variance
+
     def plane(band: int) -> Planes:
-        values = _combined(light, band, transport.light.mean)
+        values = _combined(light, band, planes)
         return np.maximum(values, np.float32(0), out=values) if light.mixed else values
 
     mc_error = relative_error(light.emitted, transport.light.mean, transport.variance, transport.shared)
     return replace(
         _by_band(transport, light, plane), relative_mc_error=mc_error, relative_level_error=level_error, signed=False
     )
+
+
+def without_variance(transport: Transport) -> Transport:
+    """Return a transport that has let go of its variance, a third of its memory: it is for what asks for no error."""
+    return replace(transport, variance=np.zeros((0, 0, 0, 0), np.float32), shared=None)
 
 
 def halves_by_band(
@@ -423,8 +430,10 @@ def halves_by_band(
     """Return `Transport.relight_halves` one band at a time, of the same bits; parameters and errors as of it."""
     light, _ = transport._at_level(transport._emission(spectra), luminance_cd_m2, illuminance_lux)
 
+    planes = transport.light
+
     def half(band: int, add: Callable[[Planes, Planes], Planes]) -> Planes:
-        return add(_combined(light, band, transport.light.mean), _combined(light, band, transport.light.difference))
+        return add(_combined(light, band, planes.mean), _combined(light, band, planes.difference))
 
     even, odd = (partial(half, add=add) for add in (np.add, np.subtract))
     return _by_band(transport, light, even), _by_band(transport, light, odd)

@@ -46,14 +46,25 @@ def traced(
 ) -> dict[str, Planes]:
     """Trace paths and average what they give over each chunk of points: by name, each (chunk, channel, h, w).
 
-    A pixel of rate r has r times as many points as one of rate 1: its chunks are r times as long.
-
     Raises
     ------
     InputError
-        Where a material sampled another direction at another wavelength.
+        As `traced_at`.
     """
-    mi = mitsuba_module()
+    means: dict[str, Planes] = {}
+    for pixels in launches(rates, span, threads):
+        for name, part in traced_at(trace, rates, pixels, span, seed).items():
+            if name not in means:
+                means[name] = np.empty((*part.shape[:2], rates.size), np.float32)
+            means[name][..., where(pixels)] = part
+    return {name: planes.reshape(*planes.shape[:2], *rates.shape) for name, planes in means.items()}
+
+
+def launches(rates: NDArray[np.uint32], span: Span, threads: int) -> list[NDArray[np.intp]]:
+    """Cut the picture into launches of so many threads: the pixels of each, by their rates.
+
+    A pixel of rate r has r times as many points as one of rate 1: its chunks are r times as long.
+    """
     flat = rates.ravel()
     order = np.argsort(flat, kind="stable")
     # Paths of one packet change each other's last bits, because Embree traverses its tree in another way once few paths
@@ -64,39 +75,60 @@ def traced(
     order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in by_rate])
     ends = np.cumsum(flat[order].astype(np.int64) * span.chunk * span.chunks)
     cuts = (np.flatnonzero(np.diff(ends // threads)) + 1) // together * together
-    means: dict[str, Planes] = {}
-    for batch in np.split(order, np.unique(cuts[cuts > 0])):
-        # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
-        # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
-        values, firsts = np.unique(flat[batch], return_index=True)
-        parts = list(zip(values.tolist(), np.split(batch, firsts[1:]), strict=True))
-        blocks = np.concatenate([_blocks(rate, pixels, span) for rate, pixels in parts], axis=1)
-        pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
-        dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code
-        channels = _launched(trace, pixel_of, first_of, span.chunk, seed)
-        if not means:
-            shape = span.chunks, rates.size
-            means = {name: np.empty((len(values), *shape), np.float32) for name, values in channels.items()}
-        start = 0
-        for rate, pixels in parts:
-            length = rate * span.chunk
-            count = pixels.size * length * span.chunks
-            index = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
-            totals = []
-            for channel in (x for values in channels.values() for x in values):
-                part = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
-                totals.append(dr.block_sum(part, length) if length > 1 else part)
-            sums = iter(dr.concat(totals).numpy().reshape(len(totals), span.chunks, -1))  # one copy for all
-            for planes in means.values():
-                for plane in planes:
-                    plane[:, pixels] = next(sums) * np.float32(1 / length)
-            start += count
+    return np.split(order, np.unique(cuts[cuts > 0]))
+
+
+def where(pixels: NDArray[np.intp]) -> slice | NDArray[np.intp]:
+    """Return the slice that picks consecutive pixels, which NumPy copies faster, or the pixels themselves."""
+    first, stop = int(pixels[0]), int(pixels[-1]) + 1
+    consecutive = stop - first == pixels.size and bool((np.diff(pixels) == 1).all())
+    return slice(first, stop) if consecutive else pixels
+
+
+def traced_at(
+    trace: Callable[[UInt, Points], Channels],
+    rates: NDArray[np.uint32],
+    pixels: NDArray[np.intp],
+    span: Span,
+    seed: int,
+) -> dict[str, Planes]:
+    """Trace the paths of one of the `launches` and average them as `traced`: by name, each (chunk, channel, pixel).
+
+    Raises
+    ------
+    InputError
+        Where a material sampled another direction at another wavelength.
+    """
+    mi = mitsuba_module()
+    # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
+    # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
+    values, firsts = np.unique(rates.ravel()[pixels], return_index=True)
+    parts = list(zip(values.tolist(), np.split(pixels, firsts[1:]), firsts.tolist(), strict=True))
+    blocks = np.concatenate([_blocks(rate, of_rate, span) for rate, of_rate, _ in parts], axis=1)
+    pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
+    dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code
+    channels = _launched(trace, pixel_of, first_of, span.chunk, seed)
+    means = {name: np.empty((len(x), span.chunks, pixels.size), np.float32) for name, x in channels.items()}
+    start = 0
+    for rate, of_rate, first in parts:
+        length = rate * span.chunk
+        count = of_rate.size * length * span.chunks
+        index = dr.arange(mi.UInt32, count) + dr.opaque(mi.UInt32, start)
+        totals = []
+        for channel in (x for values in channels.values() for x in values):
+            part = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
+            totals.append(dr.block_sum(part, length) if length > 1 else part)
+        sums = iter(dr.concat(totals).numpy().reshape(len(totals), span.chunks, -1))  # one copy for all
+        for planes in means.values():
+            for plane in planes:
+                np.multiply(next(sums), np.float32(1 / length), out=plane[:, first : first + of_rate.size])
+        start += count
     if means.pop(CHOSEN).any():
         raise InputError(
             "scene: a material chooses where light goes by wavelength (dispersion, wavelength-dependent lobes); "
             "allowed: materials whose sampling doesn't depend on wavelength; replace it"
         )
-    return {name: np.moveaxis(x.reshape(*x.shape[:2], *rates.shape), 0, 1) for name, x in means.items()}
+    return {name: np.moveaxis(planes, 0, 1) for name, planes in means.items()}
 
 
 def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint32]:

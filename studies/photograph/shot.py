@@ -23,7 +23,7 @@ from render.radiance_files.radiance_source import (
 )
 from render.scene import Scene, film_size
 from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
-from render.transport import Transport, halves_by_band, relight_by_band
+from render.transport import Transport, halves_by_band, relight_by_band, without_variance
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
@@ -336,6 +336,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     if step:
         step("exposure", 0.9)
     radiance = relight_by_band(transport, spectra, **level)
+    transport = without_variance(transport)  # the relit light knows its error
     luminance_cd_m2 = radiance.mean_luminance
     if luminance_cd_m2 > _LAMPS_IN_VIEW * level.get("luminance_cd_m2", luminance_cd_m2):
         notes += [

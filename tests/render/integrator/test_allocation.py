@@ -10,7 +10,8 @@ from render import engine, runs
 from render.combine import combine, emission
 from render.engine import render
 from render.integrator.allocation import LEAST_SHARE, POOL, rates_of
-from render.runs import PILOT
+from render.integrator.wavefront import Span
+from render.runs import MOST_FLOATS, PILOT
 from scenes.catalogue import load
 
 NM = np.arange(450.0, 700.0, 60.0)
@@ -101,8 +102,11 @@ def test_pixels_with_more_samples_are_not_biased(name, monkeypatch):
     assert np.abs(z).max() < t.isf(1e-3 / 2 / z.size, 2 * repeats - 2)
 
 
-def test_a_pilot_weighs_each_bands_light_by_its_lamp_and_width(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two lights, bands of 10 and 30 nm; of the second what is seen directly is the same in both bands."""
+@pytest.mark.parametrize("most_floats", [MOST_FLOATS, 64])
+def test_a_pilot_weighs_each_bands_light_by_its_lamp_and_width(
+    most_floats: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Both chunks in one launch, or one by one; of the second light what is seen directly is the same in both bands."""
     widths, lights, size = np.array([10.0, 30.0]), np.array([[1.0, 2.0], [3.0, 0.5]]), (2, 3)
     rng, chunks = np.random.default_rng(1), PILOT.chunks
     halves = [
@@ -113,7 +117,15 @@ def test_a_pilot_weighs_each_bands_light_by_its_lamp_and_width(monkeypatch: pyte
         for _ in range(2)
     ]
     asked: list[np.ndarray] = []
-    monkeypatch.setattr(runs, "_drawn", lambda *_: halves)
+
+    def drawn(half: SimpleNamespace, _: np.ndarray, span: Span, __: int) -> tuple[np.ndarray, list[np.ndarray]]:
+        chunks = slice(span.start // span.chunk, span.start // span.chunk + span.chunks)
+        planes = [x[chunks].reshape(*x[chunks].shape[:-2], -1) for x in (half.radiance, *half.seen)]
+        return planes[0], planes[1:]
+
+    monkeypatch.setattr(runs, "_halves", lambda *_: halves)
+    monkeypatch.setattr(runs, "_drawn_everywhere", drawn)
+    monkeypatch.setattr(runs, "MOST_FLOATS", most_floats)
     monkeypatch.setattr(runs, "rates_of", lambda *planes: asked.extend(planes))
     film = SimpleNamespace(size=size, width_nm=widths, wavelength_nm=np.array([450.0, 470.0]))
     loaded = SimpleNamespace(groups=(1, 0), channels=lambda *_, **__: 8)
