@@ -85,8 +85,9 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
         samples or fewer is made anew where more are asked for, since it had no pilot.
     progress : callable, optional
-        Called after each run with the share done and the error so far (infinite before the first look); where it raises
-        `KeyboardInterrupt`, that ends the render as Ctrl-C does. Left out, a notebook shows a bar.
+        Called after each launch, of which a run of a large picture has many, with the share done and the error so far
+        (infinite before the first look); where it raises `KeyboardInterrupt`, that ends the render as Ctrl-C does. Left
+        out, a notebook shows a bar.
     denoise : bool
         Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
         measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
@@ -136,7 +137,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
 
         def show(share: float, error: float) -> None:
             compiled_s()  # read after each run, what Dr.Jit notes stays short
-            (progress or (lambda share, error: step(render_words(error), share)))(share, error)
+            (progress or (lambda share, error: step(render_words(error, share), share)))(share, error)
 
         try:
             transport = _render(scene, film, limits, earlier, show, denoise)
@@ -222,18 +223,25 @@ def _render(
     # Draw runs until a limit is reached
     error = np.inf
     look = limits.next_look(means.count)
+    asked_to_end = threading.Event()
+
+    def show(points: float) -> None:
+        try:
+            progress(own_share * limits.share(points, error, time.perf_counter() - start), error)
+        except KeyboardInterrupt:
+            if interrupted():  # the second Ctrl-C came just then
+                raise
+            asked_to_end.set()
+
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
-            add_run(loaded, means, film, look, limits.seed)
+            add_run(loaded, means, film, look, limits.seed, show)
             if means.count >= LEAST_POINTS:
                 error = error_of(lights, means)
             now = time.perf_counter()
-            try:
-                progress(own_share * limits.share(means.count, error, now - start), error)
-            except KeyboardInterrupt:
-                if interrupted():  # the second Ctrl-C came just then
-                    raise
+            show(means.count)
+            if asked_to_end.is_set():
                 stopped_by = "interrupt"
             # The error is told after every run, and stops the render at a look alone.
             looked_at = error if means.count >= look else np.inf

@@ -104,7 +104,7 @@ class Limits:
             return "seconds"
         return None
 
-    def share(self, count: int, error: float, seconds: float) -> float:
+    def share(self, count: float, error: float, seconds: float) -> float:
         """Share of the work done, 0 to 1: by the limit that is nearest."""
         by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
         return min(max(count / self.most_points, seconds / (self.max_seconds or np.inf), by_noise), 1.0)

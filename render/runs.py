@@ -242,30 +242,34 @@ def add_run(
     halves = [_halves(loaded, film, seed, split=split) for loaded in scenes]
     parts = launches(means.rates, span, threads)
     for number, pixels in enumerate(parts, 1):
-        draws = [[_drawn(half, means.rates, pixels, span) for half in both] for both in halves]
-        _add(scenes, means, draws, pixels, span)
+        # Each camera path first meets one lamp at most, which belongs to one group, so coverage adds up over groups.
+        covered = np.zeros((2, chunks, pixels.size), np.float32)
+        for loaded, both in zip(scenes, halves, strict=True):
+            even, odd = (_drawn(half, means.rates, pixels, span) for half in both)
+            covered += even.coverage, odd.coverage
+            _add(loaded, means, (even, odd), pixels, span)
+        for index, weight in enumerate(_weights(span)):
+            means.coverage.add(covered[0, index], covered[1, index], weight, where(pixels))
         if after and number < len(parts):
             after(start + chunk * chunks * number / len(parts))
     means.count += chunks * chunk
 
 
-def _add(
-    scenes: list[LoadedScene], means: Means, draws: list[list[Drawn]], pixels: NDArray[np.intp], span: Span
-) -> None:
-    """Add the chunks of a launch, of which each loaded scene has both halves, at its pixels."""
+def _weights(span: Span) -> list[np.float32]:
+    """Weight of each chunk in the mean of all points up to its end."""
+    counts = [span.start + index * span.chunk for index in range(span.chunks)]
+    return [np.float32(span.chunk / (count + span.chunk)) for count in counts]
+
+
+def _add(loaded: LoadedScene, means: Means, halves: tuple[Drawn, Drawn], pixels: NDArray[np.intp], span: Span) -> None:
+    """Add the light of a loaded scene in the chunks of a launch, at its pixels."""
+    even, odd = halves
     at = where(pixels)
-    for index in range(span.chunks):
-        count = span.start + index * span.chunk
-        weight = np.float32(span.chunk / (count + span.chunk))
-        # Each camera path first meets one lamp at most, which belongs to one group, so coverage adds up over groups.
-        covered = [np.asarray(sum(half.coverage[index] for half in halves)) for halves in zip(*draws, strict=True)]
-        means.coverage.add(covered[0], covered[1], weight, at)
-        for loaded, (even, odd) in zip(scenes, draws, strict=True):
-            for slot, group in enumerate(loaded.groups):
-                means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight, at)
-                means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight, at)
-                if means.indirect is not None:
-                    means.indirect[group].add(even.indirect[index, slot], odd.indirect[index, slot], weight, at)
+    for (index, weight), (slot, group) in product(enumerate(_weights(span)), enumerate(loaded.groups)):
+        means.light[group].add(even.radiance[index, slot], odd.radiance[index, slot], weight, at)
+        means.seen[group].add(even.seen[slot][index], odd.seen[slot][index], weight, at)
+        if means.indirect is not None:
+            means.indirect[group].add(even.indirect[index, slot], odd.indirect[index, slot], weight, at)
 
 
 def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int) -> NDArray[np.uint32]:
@@ -315,7 +319,7 @@ def _drawn(half: Half, rates: NDArray[np.uint32], pixels: NDArray[np.intp], span
     groups = len(half.loaded.groups)
     parts = [traced_at(tracer.camera, rates, pixels, span, half.seed) for tracer in half.tracers]
     total, indirect = (
-        np.concatenate([_grouped(part[name], count) for part in parts], axis=2)
+        _joined([_grouped(part.pop(name), count) for part in parts])
         for name, count in (("scattered", groups), ("indirect", groups * half.split))
     )
     coverage = parts[0]["shares"]  # the parts of the bands see the same paths
@@ -337,6 +341,11 @@ def _drawn_everywhere(half: Half, rates: NDArray[np.uint32], span: Span, threads
         for planes, part in zip(whole, parts, strict=True):
             planes[..., where(pixels)] = part
     return whole[0], whole[1:]
+
+
+def _joined(parts: list[Planes]) -> Planes:
+    """Join the parts of the bands, (chunk, group, band, pixel)."""
+    return parts[0] if len(parts) == 1 else np.concatenate(parts, axis=2)
 
 
 def _grouped(channels: Planes, groups: int) -> Planes:

@@ -108,9 +108,11 @@ def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
         print(f"rodcone: {state}{left}", file=file, flush=True)
 
 
-def render_words(error: float) -> str:
-    """What a render is at: its first passes compile, and only after them is its relative error known."""
-    return f"render, relative error {error:.3f}" if math.isfinite(error) else "render, compiling"
+def render_words(error: float, share: float = 0.0) -> str:
+    """What a render is at: until its first share it may compile, and some samples later its error is known."""
+    if math.isfinite(error):
+        return f"render, relative error {error:.3f}"
+    return "render" if share else "render, compiling"
 
 
 def compile_note(seconds: float) -> str | None:

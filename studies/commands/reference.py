@@ -122,7 +122,7 @@ def reference(
                 max_seconds=max_seconds,
                 seed=SEED,
                 resume=transport,
-                progress=lambda share, error: step(render_words(error), share),
+                progress=lambda share, error: step(render_words(error, share), share),
             )
             if transport.spp == samples:  # the time is up
                 break

@@ -210,7 +210,7 @@ def _rendered(
             max_depth=order.max_depth,
             seed=order.seed,
             cache=order.cache or kept,
-            progress=lambda share, error: step(render_words(error), share),
+            progress=lambda share, error: step(render_words(error, share), share),
             denoise=order.denoise,
         )
 

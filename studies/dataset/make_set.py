@@ -103,7 +103,7 @@ def make_set(
 
 
 def _show_render(show: Step, index: int, count: int, share: float, error: float) -> None:
-    show(f"scene {index + 1} of {count}: {render_words(error)}", RENDERS * (index + share) / count)
+    show(f"scene {index + 1} of {count}: {render_words(error, share)}", RENDERS * (index + share) / count)
 
 
 def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> str:

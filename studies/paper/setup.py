@@ -167,7 +167,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
         study,
         model,
         setup.out / RENDERS,
-        lambda share, error: setup.step(f"{scene}: {render_words(error)}", share),
+        lambda share, error: setup.step(f"{scene}: {render_words(error, share)}", share),
     )
     group = transport.groups[white or next(iter(transport.groups))]
     return View(

@@ -506,7 +506,7 @@ def _rendered(
             cache=kept,
             progress=None
             if step is None
-            else lambda share, error: step(render_words(error), 0.9 * (first + share / len(scenes))),
+            else lambda share, error: step(render_words(error, share), 0.9 * (first + share / len(scenes))),
         )
 
     transports = (at(number, scene) for number, scene in enumerate(scenes))

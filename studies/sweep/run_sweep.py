@@ -250,7 +250,7 @@ class Shares:
 
     def rendered(self, index: int, share: float, error: float) -> None:
         """Show how far the render of a scene is that is waited for."""
-        self._show(index, render_words(error), RENDER_SHARE * share)
+        self._show(index, render_words(error, share), RENDER_SHARE * share)
 
     def made(self, index: int, what: str, share: float) -> None:
         """Show how far the cells of a scene are, whose render is done."""

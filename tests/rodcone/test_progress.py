@@ -91,6 +91,7 @@ def test_what_is_refused_before_its_first_step_gets_no_line(often: None) -> None
 
 def test_a_render_compiles_until_its_error_is_known() -> None:
     assert render_words(math.inf) == "render, compiling"
+    assert render_words(math.inf, 0.05) == "render"
     assert render_words(0.0314) == "render, relative error 0.031"
 
 
