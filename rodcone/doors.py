@@ -117,13 +117,13 @@ def _exposure(name: str, value: Any) -> Any:
     return value if isinstance(value, str) and value in at("sensor.exposure:RULES") else _seconds(name, value)
 
 
-def _array(*shape: int, or_kind: str = "", least: float = -inf) -> Check:
-    """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for an `or_kind`."""
+def _array(*shape: int, or_kinds: tuple[str, ...] = (), least: float = -inf) -> Check:
+    """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for `or_kinds`."""
 
     def check(name: str, value: Any) -> Any:
         import numpy as np
 
-        if or_kind and isinstance(value, at(or_kind)):
+        if any(isinstance(value, at(kind)) for kind in or_kinds):
             return value
         array = at("rodcone.types:real_array")(name, value)
         if shape and array.shape != shape:
@@ -195,6 +195,7 @@ def _shown(value: Any) -> str:
 
 
 _ILLUMINANT = "render.illuminants:illuminant"
+_PICTURE = "isp.picture:Picture"
 _WHOLE, _NUMBER = _plain(Integral, "a whole number"), _range(-1e12, 1e12, "give a number")
 _TEXT, _FLAG = _plain(str, "text in quotes"), _plain(bool, "True or False")
 _PATH, _CALL = _plain((str, PathLike), "a path in quotes"), _plain(Callable, "a function")
@@ -241,9 +242,10 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         "exposure_s": _seconds,
         **dict.fromkeys(("light_for_snr.exposure_s", "score.exposure_s", "flicker_figures.exposure_s"), _some_seconds),
         "exposure": _exposure,
-        "picture": _array(or_kind="isp.picture:Picture"),
-        "matrix": _array(or_kind="isp.colour.colour_fit:ColourFit"),
-        "balance": _array(or_kind="isp.colour.white_balance:WhiteBalance"),
+        "picture": _array(or_kinds=(_PICTURE,)),
+        "write_picture.picture": _array(or_kinds=(_PICTURE, "studies.metrics.compare:ReferencePicture")),
+        "matrix": _array(or_kinds=("isp.colour.colour_fit:ColourFit",)),
+        "balance": _array(or_kinds=("isp.colour.white_balance:WhiteBalance",)),
         **dict.fromkeys(("neutral", "wavelength_nm", "width_nm", "lines_nm"), _array()),
         "line_bands.width_nm": _range(0.01, 1e4, "give nanometres"),
         **dict.fromkeys(("origin", "target", "up"), _array(3)),
@@ -256,6 +258,10 @@ CHECKS: Mapping[str, Check] = MappingProxyType(
         **dict.fromkeys(("render.size", "load_transport.size"), _size_or_side),
         **dict.fromkeys(("cfa", "tile"), lambda _, value: at("sensor.cfa:tile_of")(value)),
         "develop_file.path": _paths,
+        "develop.calibration": _value(
+            "sensor.calibration:ColourCalibration",
+            "give calibrate(sensor, light), and a processor by its keyword: develop(raw, processor='ple')",
+        ),
         "bsdf": _plain(dict, "a Mitsuba node such as rodcone.matte(...)"),
         "define": _plain(Mapping, "a dict of texts by name"),
         "where": _plain(Mapping, "a dict of values by axis"),

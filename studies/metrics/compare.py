@@ -7,12 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.optimize import brentq
 
+from isp.colour.encoding import encode
 from isp.picture import Picture
 from render.illuminants import illuminant
 from render.radiance import SpectralRadiance
 from render.spectrum import Spectrum
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from rodcone.display import brief, preview_png
+from rodcone.doors import method
 from rodcone.errors import InputError
 from rodcone.types import Image, real_array
 from studies.metrics.appearance import TruePicture, appearance, true_picture
@@ -44,6 +46,11 @@ class ReferencePicture:
     def truth(self) -> TruePicture:
         """What comparisons need of the picture, computed once."""
         return true_picture(self.linear)
+
+    @method
+    def encode(self, encoding: str = "srgb") -> Image:
+        """Encode the picture for a display, of `isp.colour.encoding.ENCODINGS`: shape (h, w, 3), 0 to 1."""
+        return encode(self.linear, encoding)
 
     def _repr_png_(self) -> bytes:
         return preview_png(self.linear)

@@ -18,6 +18,7 @@ from isp.colour.encoding import ENCODINGS, quantise
 from isp.picture import Picture
 from rodcone.errors import InputError, require_name
 from rodcone.files import require_ending, write_files
+from studies.metrics.compare import ReferencePicture
 
 DATA = Path(__file__).parents[1] / "data"
 _SIGNATURE = b"\x89PNG\r\n\x1a\n"
@@ -83,14 +84,14 @@ def default_path(raw: Path) -> Path:
 
 
 def write_picture(
-    picture: Picture | NDArray[np.floating], path: str | Path, bits: int = 8, encoding: str = "srgb"
+    picture: Picture | ReferencePicture | NDArray[np.floating], path: str | Path, bits: int = 8, encoding: str = "srgb"
 ) -> None:
     """Write a picture, whole or not at all.
 
     Parameters
     ----------
-    picture : Picture or (h, w, 3) or (h, w) array
-        A `Picture` is linear and encodes itself. An array is one that is encoded, 0 black and 1 white.
+    picture : Picture, ReferencePicture, or (h, w, 3) or (h, w) array
+        The first two are linear and encode themselves. An array is one that is encoded, 0 black and 1 white.
     path : path
         Ends in ``.png``, ``.tif`` or ``.tiff``.
     bits : int
@@ -112,7 +113,7 @@ def write_picture(
     """
     path = Path(path)
     check_picture_file(path, bits, encoding)
-    encoded = picture.encode(encoding=encoding) if isinstance(picture, Picture) else picture
+    encoded = picture.encode(encoding=encoding) if isinstance(picture, Picture | ReferencePicture) else picture
     write = to_png if path.suffix.lower() == ".png" else to_tiff
     content = write(quantise(encoded, bits), encoding)
     write_files({path: content})

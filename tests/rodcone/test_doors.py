@@ -347,5 +347,6 @@ def test_arguments_in_each_others_place_are_told_so() -> None:
         (lambda: public.write_exr("a.exr", RADIANCE)): "write write_exr(radiance, path, scene)",
         (lambda: public.write_picture("a.png", np.ones((2, 2)))): "write write_picture(picture, path",
         (lambda: public.capture("low_noise", RADIANCE)): "radiance and sensor stand in each other's place",
+        (lambda: public.develop(RAW, "ple")): "a processor by its keyword: develop(raw, processor='ple')",
     }.items():
         assert words in said(call)

@@ -1,9 +1,11 @@
 """A picture beside the scene without noise: the metrics of a study, and what their one factor does."""
 
 from dataclasses import asdict, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
+import tifffile
 from refusal import refusal
 
 from render.illuminants import illuminant
@@ -15,6 +17,7 @@ from studies.metrics.appearance import picture_quality as quality_of
 from studies.metrics.compare import ReferencePicture, _brightness, measure, reference_picture
 from studies.photograph.camera import capture
 from studies.photograph.develop import develop
+from studies.photograph.picture_file import write_picture
 
 NM = np.arange(385.0, 780.0, 10.0)
 
@@ -60,6 +63,14 @@ def test_a_lamp_that_the_camera_clips_says_nothing_of_the_brightness() -> None:
     assert told["psnr_db"] > 200  # by the mean luminance 5 dB: all is white
     noisy = np.minimum(scene + np.random.default_rng(6).normal(0, 0.3, scene.shape), 1.0)
     assert measure(noisy * 7.0, reference)["psnr_db"] == pytest.approx(measure(noisy, reference)["psnr_db"], abs=1e-6)
+
+
+def test_a_reference_is_written_as_it_is_shown(tmp_path: Path) -> None:
+    """Encoded, and white is 1: a grey of 0.2 is sRGB's 124 of 255."""
+    reference = ReferencePicture(np.full((8, 8, 3), 0.2), 100.0)
+    write_picture(reference, tmp_path / "truth.tif")
+    assert np.unique(tifffile.imread(tmp_path / "truth.tif")).tolist() == [124]
+    np.testing.assert_array_equal(reference.encode(), encode_srgb(reference.linear))
 
 
 @pytest.mark.thorough
