@@ -4,8 +4,8 @@ from dataclasses import asdict, dataclass
 from functools import cached_property
 
 import numpy as np
+import scipy
 from numpy.typing import ArrayLike
-from scipy.optimize import brentq
 
 from isp.colour.encoding import encode
 from isp.picture import Picture
@@ -140,7 +140,7 @@ def _brightness(luminance: Image, reference: Image) -> float:
     high = next((k for k in low * 2.0 ** np.arange(1, _MOST_DOUBLED) if shown(picture, k) >= wanted), None)
     if high is None or shown(picture, low) >= wanted:  # nothing clips, to within rounding
         return low
-    return float(brentq(lambda k: shown(picture, k) - wanted, low, high))
+    return float(scipy.optimize.brentq(lambda k: shown(picture, k) - wanted, low, high))
 
 
 def _cell_sums(plane: Image) -> Image:
