@@ -161,6 +161,15 @@ def test_each_mosaic_has_an_image_of_its_own(tmp_path: Path) -> None:
     assert two - one == pytest.approx(7e-7 * pixels * bands, rel=1e-6)
 
 
+def test_a_sweeps_line_tells_each_size_in_its_place_and_unit() -> None:
+    sizes = {"seconds": 90.0, "half_size_seconds": 30.0, "half_cells_seconds": 45.0, "bytes": 2.34e9}
+    told = Estimate(cells=12, kept=3, renders=2, workers=4, largest_bytes=1e9, **sizes).words()
+    assert told == (
+        "12 cells, at most 3 kept from the last run; 2 to render; about 90 s with 4 workers, at most 2.3 GB of memory, "
+        "what exists already counted too; at half the size 30 s, with half the cells 45 s"
+    )
+
+
 def test_a_sweep_of_renders_is_the_sum_of_its_parts() -> None:
     """By hand: two scenes, three cells each, two images that cells share; nothing is read of a picture file."""
     choices = [SceneChoice("still_life"), SceneChoice("night_street")]

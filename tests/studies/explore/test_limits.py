@@ -18,7 +18,7 @@ from render.spectrum import VISIBLE_NM
 from sensor.cfa import MOSAICS
 from sensor.exposure import RULES
 from sensor.presets import preset_names
-from studies.explore import server, views
+from studies.explore import messages, server, views
 from studies.explore import source as source_module
 from studies.explore.controls import MOST_POINTS, WIDEST, Controls, Lamp, controls_from, mosaics_of, to_json
 from studies.explore.memo import Memo
@@ -63,6 +63,14 @@ def test_each_number_has_its_default_and_its_two_limits(kind: Any, numbers: dict
     assert {field.name for field in fields(kind)} == {*numbers, *others}, "a field without a line here"
     for name, default in others.items():
         assert getattr(kind(), name) == default, name
+
+
+@pytest.mark.parametrize("absent", ["", "bm3d"])
+def test_processors_are_offered_whose_libraries_are_all_there(absent: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(messages, "find_spec", lambda name: None if name == absent else name)
+    offered = first_message(of_transport(small_transport()), ())["processors"]
+    assert set(offered) == {name for name in PROCESSORS if absent not in libraries(name)}
+    assert (len(offered) < len(PROCESSORS)) == bool(absent)
 
 
 def test_ports_go_to_the_last_that_there_is(monkeypatch: pytest.MonkeyPatch) -> None:

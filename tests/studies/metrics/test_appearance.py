@@ -175,6 +175,9 @@ def test_pairs_are_neighbours_and_greys_differ_by_their_lightness() -> None:
     picture, masks = chart_of(np.outer([luminance(50.0), luminance(51.0), 0.3, 0.3], np.ones(3)))
     expected = 1 / (1 + 0.015 * 0.25 / np.sqrt(20.25))
     assert pair_delta_e(picture, masks) == pytest.approx([expected, 0.0], abs=1e-4)
+    # steps of 1, 2 and 3 in lightness, each beside its own neighbour
+    around = [luminance(50.0 + sign * step / 2) for step in (1, 2, 3) for sign in (-1, 1)]
+    assert pair_delta_e(*chart_of(np.outer(around, np.ones(3)))) == pytest.approx([1.0, 2.0, 3.0], abs=1e-4)
 
 
 def test_the_chart_in_daylight_has_no_error_and_one_colour_alone_has_a_large_one() -> None:

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.paper.best_exposure import Best, claims_held
-from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, within_margin
+from studies.paper.claims import Claim, ClaimCheck, about, at_least, at_most, within, within_margin
 from studies.paper.early import GINDELE, claims_early
 from studies.paper.figure2 import Gain, signal_claims, signal_ratios, snr_claims
 from studies.paper.light_levels import LevelCurves, claims_levels
@@ -49,8 +49,8 @@ def test_kinds_of_checks_hold_at_their_ends_and_not_beyond() -> None:
         (at_least({"1": 1.0, "0.99": 0.99}, 1.0), {"1"}),
         (at_most({"1": 1.0, "1.01": 1.01}, 1.0), {"1"}),
     )
-    for checks, within in by_kind:
-        assert {check.condition for check in checks if check.holds} == within
+    for checks, wanted in by_kind:
+        assert {check.condition for check in checks if check.holds} == wanted
 
 
 def both(value: object, other: object | None = None) -> dict[str, object]:
@@ -127,6 +127,24 @@ def hand(times: tuple[float, float] = (2.0, 2.0), gains_db: tuple[float, float] 
         for level, factor, gain in zip(bayer, times, gains_db, strict=True)
     }
     return claims_held(bayer, ours, 2.3)
+
+
+def test_best_times_are_told_in_milliseconds_and_blur_in_pixels() -> None:
+    """Bayer's tenth of a second at each level, and a half and a quarter of it."""
+    claim, *_ = hand(times=(2.0, 4.0))
+    assert "1 cd/m² 100 and 50 ms, blur 1.00 and 0.50 pixels; 4 cd/m² 100 and 25 ms, blur 1.00 and 0.50" in claim.note
+
+
+def test_each_kind_of_check_tells_the_unit_of_its_claim() -> None:
+    value = {"gain": 3.0}
+    for checks in (
+        within(value, 1.0, 5.0, "dB"),
+        about(value, 3.0, "dB"),
+        within_margin(value, 3.0, 1.0, "dB"),
+        at_least(value, 1.0, "dB"),
+        at_most(value, 5.0, "dB"),
+    ):
+        assert [(check.value, check.unit, check.holds) for check in checks] == [(3.0, "dB", True)]
 
 
 # A row for each claim of the page: claims as a function of what was measured, which of them, and numbers by verdict.

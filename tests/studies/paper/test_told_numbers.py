@@ -25,7 +25,7 @@ from sensor.optics import form_image
 from sensor.response import behind_filters, channel_electrons, expected_electrons
 from sensor.shake import held_lens, shaken
 from studies.metrics.flip import flip
-from studies.metrics.truth import light_in_bands, named_light
+from studies.metrics.truth import light_in_bands, named_light, neutral_electrons
 from studies.paper import (
     best_exposure,
     early,
@@ -415,6 +415,22 @@ def test_figure_1b_gains_what_the_pictures_of_large_pixels_do(monkeypatch: pytes
     shown = drawn(called["picture_rows"][0][0])
     assert list(shown) == ["6 µm, PSNR 26.1 dB", "2 µm, PSNR 22.1 dB"]
     np.testing.assert_allclose(next(iter(shown.values())), encode_srgb(np.full((2, 2, 3), 0.6)))
+
+
+def test_figure_3s_images_show_a_grey_field_as_it_is() -> None:
+    """Half of white: the mean of 64 x 64 pixels is 0.5 in colour and in W, less noise of a few thousandths."""
+    camera, light = Camera("table1_output"), named_light("D65")
+    neutral_e = neutral_electrons(camera.sensor, light, 0.02)
+    sensor = camera.sensor
+    white_cd_m2 = 0.8 * sensor.pixel.full_well_e / neutral_e.max()
+    per_cd_m2 = dict(zip(sensor.channels, neutral_e.tolist(), strict=True))
+    field_e = np.tile([[per_cd_m2[channel] for channel in row] for row in sensor.cfa], (32, 32)) * white_cd_m2 / 2
+    rng = np.random.default_rng(1)
+    raw = expose(field_e, sensor, 0.02, draw_device(sensor, field_e.shape, rng), rng)
+    subject: Any = SimpleNamespace(light=light, white_cd_m2=white_cd_m2)
+    colour, white = white_in_low_light.colour_and_white(raw, subject, camera)
+    for picture in (colour, white):
+        np.testing.assert_allclose(picture.mean(axis=(0, 1)), 0.5, rtol=0.01)
 
 
 def test_figure_3_measures_colour_white_and_both_results(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -88,6 +88,16 @@ def test_beyond_fixed_patterns_or_the_well_no_light_is_enough() -> None:
     assert electrons_at_snr(1.01 * sensor.pixel.full_well_e**0.5, shot_noise_alone(sensor), EXPOSURE_S) == inf
 
 
+def test_a_short_exposure_takes_as_much_more_light() -> None:
+    """A ten-thousandth of the time, in which 1 cd/m^2 gives less than an electron, needs 10 000 times the light."""
+    sensor = table1_output()
+    sensor = replace(sensor, pixel=replace(sensor.pixel, dark_current_e_per_s=0.0, hot_pixel_share=0.0))
+    assert channel_e(sensor, named_light("A"), 1.0, 1e-6).max() < 1.0
+    for long, short in zip(*(light_for_snr(10.0, sensor, "A", time_s) for time_s in (1e-2, 1e-6)), strict=True):
+        assert short.electrons == pytest.approx(long.electrons, rel=1e-9)
+        assert short.luminance_cd_m2 == pytest.approx(1e4 * long.luminance_cd_m2, rel=1e-9)
+
+
 def test_light_and_electrons_belong_together() -> None:
     sensor = table1_output()
     found = {each.channel: each for each in light_for_snr(10.0, sensor, "A", EXPOSURE_S)}

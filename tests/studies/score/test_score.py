@@ -158,6 +158,17 @@ def test_colours_of_several_readings_have_the_noise_of_the_merge(name: str) -> N
     assert computed(sensor, "print.portrait") == pytest.approx(bits, abs=0.01)
 
 
+@pytest.mark.parametrize("name", ["low_noise", "dual_gain", "split_pixel", "staggered"])
+def test_a_dark_pixels_noise_over_frames_is_that_of_two_dark_frames(name: str) -> None:
+    """Their difference over sqrt(2), which no fixed pattern is in; three standard errors of so many samples."""
+    field = even_field(public.preset(name), named_light("D65"), EXPOSURE_S, "G")
+    rng = np.random.default_rng(3)
+    chip = field.draw_chip(rng)
+    first, second = (field.samples_e(field.shoot(0.0, chip, rng)) for _ in range(2))
+    found = float(np.std(first - second)) / sqrt(2)
+    assert found == pytest.approx(field.temporal_dark_e, rel=3 / sqrt(2 * first.size))
+
+
 def test_flare_is_the_share_that_scatters_by_hand() -> None:
     """2 % of a picture whose mean is 15 / 16 of white: 0.01875 over 0.99875."""
     sensor = public.low_noise()
