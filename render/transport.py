@@ -415,9 +415,10 @@ def relight_by_band(
     )
 
 
-def without_variance(transport: Transport) -> Transport:
-    """Return a transport that has let go of its variance, a third of its memory: it is for what asks for no error."""
-    return replace(transport, variance=np.zeros((0, 0, 0, 0), np.float32), shared=None)
+def light_alone(transport: Transport) -> Transport:
+    """Return a transport that has let go of all planes but its light's: for what relights it and asks for no error."""
+    none = np.zeros((0, 0), np.float32)
+    return replace(transport, variance=none, shared=None, coverage=Halves(none, none), seen=(), denoised=None)
 
 
 def halves_by_band(

@@ -14,21 +14,23 @@ TRANSPORT_ARRAYS = 3  # radiance, half difference, variance, float32, each by gr
 _DENOISED_ARRAYS = 7  # beside those: denoised light, indirect light, folds, and their copies
 _DENOISER_BYTES = 1300  # per pixel, by Open Image Denoise
 _DENOISER_LIBRARY_BYTES = 200e6  # by its library, and by what Dr.Jit keeps of the folds' launches
-# While a render draws: its means, the sums of a launch for each half and group, and two copies of one group's sums.
-_MEANS_ARRAYS, _SUMS_ARRAYS, _COPIES = 2, 2, 2
+_MEANS_ARRAYS = 2  # of them that a render holds while it draws: variance comes last, when Dr.Jit's memory is free
 _LAUNCH_BYTES = 4 * (1 << 24)  # all channels of a launch at most (`render.runs.MOST_FLOATS`)
 _CHANNELS_BESIDE = 4  # channels of a launch beside its bands
-_LAUNCHES = 2.5  # how many launches' channels Dr.Jit keeps: one launch's, their sums, and one copy
+# How many launches' channels are held: what Dr.Jit keeps of one launch, its sums and their copy, in blocks of powers of
+# two; both halves' light, and the step by which the means move.
+_LAUNCHES = 4.5
+_LAST_LAUNCH = 2.0  # as many more where the last launch of a run is smaller, whose blocks Dr.Jit keeps too
 _OTHER_LAUNCHES = 1.0  # as many more for each further group, whose launches differ in size in a render of many samples
 _MANY_SPP = 32  # samples per pixel from which on a render has many
 _RENDERER_BYTES = 224e6  # libraries and compiled kernels
-_RENDER_BYTES = 140  # per pixel, whatever the number of bands: its order, its rate
+_RENDER_BYTES = 45  # per pixel, whatever the number of bands: order, rate, coverage, light that is seen directly
 # What follows a render beside its transport, by band: relit light, its image, both halves' light and what they are made
 # from, an image forming of one of them with its copy for the lens.
 _VIEW_ARRAYS = 10
-# Per pixel of a capture, which makes its light's bands one at a time: electrons behind every filter, their sums while
-# an image forms, a photograph's colours, and what the raw files are made of.
-_CAPTURE_BYTES = 155
+# Per pixel of a capture, which makes its light's bands one at a time: electrons behind every filter, of both halves or
+# beside a photograph's colours, their sums while an image forms, and what the raw files are made of.
+_CAPTURE_BYTES = 185
 _VIEWER_BYTES = 212e6  # libraries, and what Dr.Jit doesn't give back
 _CELL_BYTES = 800  # mosaic, planes, patches' packed planes, picture, and two truths with their CIELABs
 _WORKER_BYTES = 350e6  # libraries and compiled kernels of a worker
@@ -101,10 +103,10 @@ def memory(
     samples = _MANY_SPP if spp is None else spp
     channels = 4.0 * (bands + _CHANNELS_BESIDE)  # bytes of a path of a half
     launch = _LAUNCH_BYTES if spp is None else min(_LAUNCH_BYTES, channels * pixels * max(spp, 2.0) / 2)
-    sums = max(plane, launch * 4.0 * bands / channels)  # of several chunks, where the pixels are few
-    other_sizes = _OTHER_LAUNCHES * max(groups - 1, 0) * min(1.0, samples / _MANY_SPP)
-    drawing = _RENDERER_BYTES + _RENDER_BYTES * pixels + (_LAUNCHES + other_sizes) * launch
-    drawing += (_MEANS_ARRAYS * groups + 1) * plane + (_SUMS_ARRAYS * groups + _COPIES - 1) * sums
+    launches = _LAUNCHES + _LAST_LAUNCH * (channels * pixels > _LAUNCH_BYTES)
+    launches += _OTHER_LAUNCHES * max(groups - 1, 0) * min(1.0, samples / _MANY_SPP)
+    drawing = max(_MEANS_ARRAYS * groups * plane + launches * launch, TRANSPORT_ARRAYS * groups * plane)
+    drawing += _RENDERER_BYTES + _RENDER_BYTES * pixels
     # Looking at what was drawn, and developing it: the render is let go of before the first cell
     arrays = TRANSPORT_ARRAYS if light_arrays is None else light_arrays
     viewing = _VIEWER_BYTES + arrays * groups * plane

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -21,13 +22,14 @@ from render.radiance_files.radiance_source import (
     is_reference,
     is_reflectance,
 )
+from render.radiance_files.stored_planes import with_stored_light
 from render.scene import Scene, film_size
 from render.spectrum import RENDER_BAND_NM, Spectrum, fine_bands
-from render.transport import Transport, halves_by_band, relight_by_band, without_variance
+from render.transport import Transport, halves_by_band, light_alone, relight_by_band
 from render.user_scene.scene_parts import SceneFile
 from rodcone.errors import InputError, require_absent, require_fields
 from rodcone.files import check_place
-from rodcone.memory import TRANSPORT_ARRAYS, require_memory
+from rodcone.memory import require_memory
 from rodcone.progress import Step, compile_note, render_words
 from rodcone.time_text import parse_time
 from rodcone.types import Floats
@@ -73,6 +75,8 @@ MOST_SATURATED = 0.5  # share of the pixels above which an exposure is hardly me
 _LAMPS_IN_VIEW = 1.1  # the picture's mean luminance over the level asked for, above which a reader would wonder
 _SPP = 64
 _FILE_ARRAYS = 2  # of all bands: a file's light, and its variance or what it is read from
+_HALVES = 2  # arrays of a render's light: its mean, and half the difference of its halves
+_MOST_HELD_BYTES = 1 << 28  # of each of them; larger ones are read from files, a band at a time
 _AFTER_S = 3.5e-7  # processor seconds a pixel and band: relit light, image, exposure and what is said of its noise
 # Second part of the seed: the chip's patterns, this exposure's noise, when it starts by the lamps' clock, and the paths
 # of the light at its later times.
@@ -336,7 +340,7 @@ def _taken(checked: Checked, step: Step | None, kept: Path) -> Taken:
     if step:
         step("exposure", 0.9)
     radiance = relight_by_band(transport, spectra, **level)
-    transport = without_variance(transport)  # the relit light knows its error
+    transport = light_alone(transport)  # the relit light knows its error
     luminance_cd_m2 = radiance.mean_luminance
     if luminance_cd_m2 > _LAMPS_IN_VIEW * level.get("luminance_cd_m2", luminance_cd_m2):
         notes += [
@@ -419,6 +423,8 @@ def _of_scene(checked: Checked, balance: Spectrum | None, step: Step | None, kep
         if ready:
             return ready.transport, [ready.line]
         rendered = _rendered(checked, opened, spectra, step, kept)
+        if _lies_in_files(rendered.light.mean.nbytes):
+            rendered = with_stored_light(rendered, kept)
         return rendered, [*filter(None, [compile_note(rendered.compile_s)])]
 
     return _Subject(transport, spectra, asked_level(opened.scene, order.level), light, tuple(notes))
@@ -627,9 +633,19 @@ def check(order: Order) -> Checked:
         _after_s(sensor),
         through=through,
         times=times,
-        light_arrays=_light_arrays(order, sensor, TRANSPORT_ARRAYS),
+        light_arrays=_light_arrays(order, sensor, _held(prod(rendered), centres.size, len(opened.scene.groups))),
     )
     return Checked(order, sensor, opened, exposure_s, ready, samples, cost, flicker, moving, shares)
+
+
+def _lies_in_files(light_bytes: float) -> bool:
+    """Whether a render's light is read from files while it is imaged."""
+    return light_bytes > _MOST_HELD_BYTES
+
+
+def _held(pixels: int, bands: int, groups: int) -> int:
+    """Arrays of all bands that are held of a render's light while it is imaged."""
+    return 0 if _lies_in_files(4.0 * pixels * bands * groups) else _HALVES
 
 
 def _light_arrays(order: Order, sensor: SensorConfig, held: int) -> int | None:

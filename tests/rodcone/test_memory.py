@@ -17,7 +17,7 @@ from rodcone.memory import Limit, file_extent, memory, memory_limits
 
 COMMANDS = {
     "render": ["render", "still_life", "--height", "4000", "--width", "4000", "-o", "out/picture.exr"],
-    "capture": ["capture", "still_life", "--size", "4000", "-o", "out/shot.dng"],
+    "capture": ["capture", "still_life", "--size", "4400", "-o", "out/shot.dng"],
     "demo": ["demo", "--size", "4000", "-o", "out"],
     "sweep": ["sweep", "study.toml", "--workers", "1", "-o", "out"],
 }
@@ -45,7 +45,7 @@ def in_five_gb(arguments: list[str], folder: Path) -> tuple[int, str, str]:
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("command", COMMANDS)
-def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(command: str, tmp_path: Path) -> None:
+def test_a_run_of_16_mpx_or_more_in_5_gb_is_refused_in_one_line_before_it_renders(command: str, tmp_path: Path) -> None:
     code, out, err = in_five_gb(COMMANDS[command], tmp_path)
     assert (code, out, err.count("\n")) == (2, "False\n", 1)
     told = re.match(
@@ -55,7 +55,7 @@ def test_a_run_of_4000_by_4000_in_5_gb_is_refused_in_one_line_before_it_renders(
         err,
     )
     assert told is not None, err
-    assert float(told[1]) > 8  # a render of this size holds some 10 GB while it draws, whatever comes after it
+    assert float(told[1]) > 5  # a render of this size holds 5 GB or more at its end, whatever comes after it
     assert 3.5 < float(told[2]) < 5.0  # the interpreter and its libraries have mapped some
     assert [path.name for path in tmp_path.iterdir()] == ["study.toml"]
 
@@ -119,15 +119,25 @@ def test_workers_add_up_and_the_largest_process_counts_for_limits_that_each_has(
 
 
 def test_a_render_and_what_follows_it_count_by_their_arrays() -> None:
-    """The larger of both: a launch's channels, means and sums while it draws; three arrays a group and ten after it."""
+    """The larger of both: a launch and means while it draws, or means and variance; three arrays a group and ten."""
     plane = 4 * 20 * 10**7
     viewed = [memory(10**7, 20, groups, spp=1).total for groups in (1, 2)]
     assert viewed[0] - memory(10**7, 20, 0).total == viewed[1] - viewed[0] == 3 * plane
     assert memory(10**7, 20, 1, spp=0).total == viewed[0]
     few, many, most = (memory(256**2, 20, 1, spp=spp).total for spp in (8, 64, None))
     channels = [4 * 24 * 256**2 * 4, 4 << 24]  # of four points a pixel, and of a full launch
-    assert many - few == pytest.approx((2.5 + 3 * 20 / 24) * (channels[1] - channels[0]))
+    assert many - few == pytest.approx(4.5 * (channels[1] - channels[0]))
     assert many == most
+
+
+def test_a_scene_of_12_mpx_is_captured_in_under_4_gb_whose_peak_is_the_end_of_its_render() -> None:
+    """Three arrays of 20 bands of one light group, some 45 bytes per pixel, and libraries."""
+    pixels = 4000 * 3000
+    needed = memory(pixels, 20, 1, spp=64, light_arrays=0).total
+    assert needed == pytest.approx(3 * 4 * 20 * pixels + 45 * pixels + 0.22e9, rel=0.01)
+    assert needed < 4e9
+    drawing = memory(2_000_000, 20, 1, spp=64, light_arrays=0).total
+    assert drawing == pytest.approx(2 * 4 * 20 * 2e6 + 45 * 2e6 + 6.5 * (4 << 24) + 0.22e9, rel=0.01)
 
 
 def test_a_capture_counts_its_light_and_what_each_pixel_takes_once() -> None:
@@ -137,7 +147,6 @@ def test_a_capture_counts_its_light_and_what_each_pixel_takes_once() -> None:
     )
     assert scene - photograph == 2 * 4 * 20 * pixels
     assert photograph < 3e9, "a photograph's bands are never held together"
-    assert scene < 4e9
     assert photograph == memory(pixels, 20, 1, spp=0, light_arrays=0).total
 
 
@@ -191,7 +200,7 @@ def peak_of(arguments: list[str], folder: Path) -> int:
 @pytest.mark.parametrize("name", MEASURED)
 def test_a_run_needs_no_more_than_its_estimate_which_is_at_most_1_4_times_it(name: str, tmp_path: Path) -> None:
     arguments, pixels, bands, groups, spp = MEASURED[name]
-    light_arrays = 3 if arguments[0] == "capture" else None
+    light_arrays = 2 if arguments[0] == "capture" else None
     denoised = "--denoise" in arguments
     estimated = memory(pixels, bands, groups, spp=spp, denoised=denoised, light_arrays=light_arrays).total
     # The first run may compile its kernels, which takes up to 3 MB a band more and isn't estimated.

@@ -1,0 +1,53 @@
+"""Planes of a large picture's light that lie in a file, of which each reader holds what it asks for."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from numpy.typing import DTypeLike, NDArray
+
+from render.error_estimates import Halves
+from render.transport import Transport
+from rodcone.types import Planes
+
+
+class StoredPlanes:
+    """Planes (..., h, w) of a file in NumPy's format, which is opened at each look and closed after it.
+
+    Parameters
+    ----------
+    path : path
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        planes = self._mapped()
+        self.shape, self.dtype = planes.shape, planes.dtype
+
+    def __getitem__(self, index: Any) -> Planes:
+        """Return a copy of what an index chooses."""
+        return np.array(self._mapped()[index])
+
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self._mapped(), dtype=dtype)
+
+    def _mapped(self) -> Planes:
+        return cast(Planes, np.load(self.path, mmap_mode="r"))
+
+
+def with_stored_light(transport: Transport, folder: Path) -> Transport:
+    """Return a transport whose light lies in a folder's files and is read plane by plane, of the same bits.
+
+    Raises
+    ------
+    OSError
+        Where the folder can't be written.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    stored = []
+    for name, planes in vars(transport.light).items():
+        path = folder / f"light_{name}.npy"
+        np.save(path, planes)
+        stored.append(cast(Planes, StoredPlanes(path)))
+    return replace(transport, light=Halves(*stored))
