@@ -6,6 +6,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from numpy.typing import ArrayLike
 from render.cache import read_transport, save_transport
 from render.combinations import check_combinations
 from render.combine import emission
-from render.denoised.denoise import denoiser
+from render.denoised.denoise import Denoised, denoiser
 from render.denoised.folds import FOLD_SHARE, denoise_means
 from render.geometry import horizontal_view_deg
 from render.level import Irradiance
@@ -31,6 +32,9 @@ from rodcone.errors import InputError, is_out_of_memory, one_line, require_whole
 from rodcone.jit import compiling, release_memory
 from rodcone.progress import Step, progress_bar, render_words
 from rodcone.types import Progress
+
+KEEP_EVERY_S = 60.0  # at least, from one look at a long render to the next whose result goes to the cache
+KEEP_SHARE = 0.1  # of the time, which keeping takes at most
 
 
 @own_mitsuba_variant()
@@ -81,6 +85,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
         Folder of renders. A stored one that is fine enough is returned, a coarser one continued, a damaged one ignored.
+        A render of minutes is stored also on its way, unless it is denoised: killed, it is continued from there.
     resume : Transport, optional
         An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
         samples or fewer is made anew where more are asked for, since it had no pilot.
@@ -124,13 +129,17 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         meter = Meter(scene, film, seed, None if cache is None else Path(cache))
     # What there is already
     earlier = _checked_earlier(resume, scene, film, denoise)
+    keep: Callable[[Transport], None] | None = None
     if cache is not None:
+        keep = partial(save_transport, Path(cache), scene, film, seed)
         stored = read_transport(Path(cache), scene, film, seed, denoised=denoise)
         earlier = max((x for x in (earlier, stored) if x), key=lambda x: x.spp, default=None)
+        del stored
     if earlier is not None:
         meter = earlier.meter or meter  # it may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
+        earlier = _to_go_on_with(earlier, copied=earlier is resume)
     silent: Step | None = (lambda what, share: None) if progress else None
     with progress_bar(silent) as step, compiling() as compiled_s:
         step(render_words(np.inf), 0.0)
@@ -140,7 +149,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
             (progress or (lambda share, error: step(render_words(error, share), share)))(share, error)
 
         try:
-            transport = _render(scene, film, limits, earlier, show, denoise)
+            transport = _render(scene, film, limits, earlier, show, denoise, keep)
         except InputError as error:
             clear_traceback(error)
             raise
@@ -151,8 +160,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
             raise MemoryError(one_line(error)) from None
         transport = replace(transport, compile_s=compiled_s())
     release_memory()  # before it is kept and looked at: what Dr.Jit keeps for its next launch is as much as the light
-    if cache is not None:
-        save_transport(Path(cache), scene, film, seed, transport)
+    if keep is not None:
+        keep(transport)
     return replace(transport, meter=meter)
 
 
@@ -202,20 +211,42 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denois
     return earlier
 
 
+def _to_go_on_with(earlier: Transport, *, copied: bool) -> Transport:
+    """Return an earlier result whose means a render goes on in, in arrays of its own, and without their variance."""
+    if copied:
+        denoised = earlier.denoised
+        earlier = replace(
+            earlier,
+            light=earlier.light.copy(),
+            coverage=earlier.coverage.copy(),
+            seen=tuple(halves.copy() for halves in earlier.seen),
+            denoised=replace(denoised, indirect=denoised.indirect.copy()) if denoised else None,
+        )
+    return replace(earlier, variance=np.zeros((0, 0, 0, 0), np.float32))
+
+
 def _render(
-    scene: Scene, film: Film, limits: Limits, earlier: Transport | None, progress: Progress, denoise: bool
+    scene: Scene,
+    film: Film,
+    limits: Limits,
+    earlier: Transport | None,
+    progress: Progress,
+    denoise: bool,
+    keep: Callable[[Transport], None] | None = None,
 ) -> Transport:
+    """Draw from an earlier result's means on until a limit is reached; what there is by then is kept now and then."""
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
     own_share = 1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0
-    denoised = None
+    denoised: Denoised | None = None
     piloted = limits.most_samples > PILOT_FROM
     loaded = load_groups(scene, film)
     lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
     stopped_by: Stop | None = None
     # Go on from the earlier means, or begin
-    if earlier and (earlier.spp > PILOT_FROM or not piloted):
+    had_pilot = earlier and (earlier.spp > PILOT_FROM or earlier.counts.min() < earlier.counts.max())
+    if earlier and (had_pilot or not piloted):
         means = means_of(earlier, split=denoise)
-    else:  # a short one that had no pilot is drawn anew
+    else:  # one that had no pilot is drawn anew
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
         means = no_means(scene, film, rates, split=denoise)
         earlier = None
@@ -233,6 +264,24 @@ def _render(
                 raise
             asked_to_end.set()
 
+    def so_far(stopped_by: Stop) -> Transport:
+        release_memory()  # what Dr.Jit keeps for its next launch
+        return Transport(
+            **fields_of(lights, means),
+            scene_means=scene_means_of(means),
+            groups=dict(scene.groups),
+            wavelength_nm=film.wavelength_nm,
+            width_nm=film.width_nm,
+            counts=2 * means.count * means.rates,
+            stopped_by=stopped_by,
+            seconds=time.perf_counter() - start,
+            integrator=INTEGRATOR,
+            variant=variant(),
+            denoised=denoised,
+            horizontal_view_deg=horizontal_view_deg(scene.geometry["sensor"], film.size) or None,
+        )
+
+    keep_from = time.perf_counter() + KEEP_EVERY_S
     with _interrupt_noted() as interrupted:
         while stopped_by is None:
             run_start = time.perf_counter()
@@ -249,24 +298,13 @@ def _render(
             look = limits.next_look(means.count) if means.count >= look else look
             if stopped_by is None and interrupted():
                 stopped_by = "interrupt"
+            if keep and not denoise and stopped_by is None and now > keep_from:
+                keep(so_far("interrupt"))
+                took_s = time.perf_counter() - now
+                keep_from = now + took_s + max(KEEP_EVERY_S, took_s / KEEP_SHARE)
         if denoise:
             denoised = denoise_means(scene, loaded, film, means, limits.seed, earlier.denoised if earlier else None)
-    # Tell what was drawn
-    release_memory()  # what Dr.Jit keeps for its next launch
-    return Transport(
-        **fields_of(lights, means),
-        scene_means=scene_means_of(means),
-        groups=dict(scene.groups),
-        wavelength_nm=film.wavelength_nm,
-        width_nm=film.width_nm,
-        counts=2 * means.count * means.rates,
-        stopped_by=stopped_by,
-        seconds=time.perf_counter() - start,
-        integrator=INTEGRATOR,
-        variant=variant(),
-        denoised=denoised,
-        horizontal_view_deg=horizontal_view_deg(scene.geometry["sensor"], film.size) or None,
-    )
+    return so_far(stopped_by)
 
 
 @contextmanager

@@ -125,16 +125,16 @@ def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool
 
 
 def means_of(transport: Transport, *, split: bool = False) -> Means:
-    """Return the means at which an earlier render stopped, so that this one continues with the same bits."""
+    """Return the means at which an earlier render stopped, so that this one continues with the same bits, in place."""
     denoised = transport.denoised if split else None
     return Means(
         count=int(transport.counts.min()) // 2,
         rates=transport.counts // transport.counts.min(),
-        light=transport.light.copy(),
-        seen=[halves.copy() for halves in transport.seen],
-        coverage=transport.coverage.copy(),
+        light=transport.light,
+        seen=list(transport.seen),
+        coverage=transport.coverage,
         shared=transport.shared.groups if transport.shared else None,
-        indirect=denoised.indirect.copy() if denoised else None,
+        indirect=denoised.indirect if denoised else None,
     )
 
 

@@ -8,7 +8,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from render import engine
+from render import engine, runs
 from render.cache import read_transport, save_transport
 from render.denoised.denoise import Denoised
 from render.engine import render
@@ -256,3 +256,43 @@ def test_a_file_that_can_not_be_written_leaves_nothing(tmp_path, renders, monkey
     with pytest.raises(OSError, match="disk full"):
         small(tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+class Killed(Exception):
+    """Stands for a signal that ends the process."""
+
+
+@pytest.mark.parametrize("spp", [40, pytest.param(100, marks=pytest.mark.thorough)])
+def test_a_render_killed_on_its_way_goes_on_from_what_was_kept(spp, tmp_path, monkeypatch):
+    """To the bits of one go, with a pilot and without; what was drawn before isn't drawn again."""
+    monkeypatch.setattr(runs, "MOST_FLOATS", 1 << 13)
+    scene = replace(load("cornell_box"), reference_plane=None)
+    given = {"scene": scene, "size": (7, 9), "spp": spp}
+    whole = small(None, **given)
+    monkeypatch.setattr(engine, "KEEP_EVERY_S", 0.0)
+    monkeypatch.setattr(engine, "KEEP_SHARE", np.inf)
+    shares = []
+
+    def killed(share, _):
+        shares.append(share)
+        if share > 0.6:
+            raise Killed
+
+    with pytest.raises(Killed):
+        small(tmp_path, **given, progress=killed)
+    kept = small(tmp_path, **given | {"spp": 2})
+    assert 2 <= kept.spp <= 0.6 * whole.spp
+    assert kept.stopped_by == "interrupt"
+    on = []
+    made = small(tmp_path, **given, progress=lambda share, _: on.append(share))
+    assert on[0] > kept.spp / whole.spp
+    for name in ("radiance", "light.difference", "variance", "coverage.mean", "coverage.difference", "counts"):
+        assert np.array_equal(attrgetter(name)(made), attrgetter(name)(whole)), name
+    assert (made.spp, made.stopped_by) == (whole.spp, "samples")
+
+
+def test_a_short_render_is_kept_once(tmp_path, monkeypatch):
+    kept = []
+    monkeypatch.setattr(engine, "save_transport", lambda *given: kept.append(given))
+    small(tmp_path, spp=40)
+    assert len(kept) == 1
