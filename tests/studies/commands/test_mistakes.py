@@ -281,7 +281,7 @@ def test_what_explore_says_to_do_is_done_and_works(tmp_path: Path, monkeypatch: 
         server, address = make(session, listener)
 
         def ask() -> None:
-            with urllib.request.urlopen(address, timeout=60) as page:
+            with urllib.request.urlopen(address, timeout=300) as page:
                 answers.append(page.status)
             server.should_exit = True
 

@@ -35,7 +35,7 @@ def served() -> Iterator[tuple[int, str]]:
 
 
 def asked(port: int, path: str, method: str = "GET", **headers: str) -> tuple[int, Any]:
-    connection = HTTPConnection("127.0.0.1", port, timeout=20)
+    connection = HTTPConnection("127.0.0.1", port, timeout=300)
     connection.request(method, path, headers={name.replace("_", "-"): value for name, value in headers.items()})
     answer = connection.getresponse()
     answer.read()
@@ -110,7 +110,7 @@ def test_a_socket_of_another_page_is_refused(served):
 
 
 def received(connection: Any) -> dict[str, Any]:
-    data = connection.recv(timeout=60)
+    data = connection.recv(timeout=300)
     length = int.from_bytes(data[:4], "little")
     header: dict[str, Any] = json.loads(data[4 : 4 + length])
     assert sum(header["lengths"]) == len(data) - 4 - length
