@@ -20,7 +20,7 @@ _CHANNELS_BESIDE = 4  # channels of a launch beside its bands
 # How many launches' channels are held: what Dr.Jit keeps of one launch, its sums and their copy, in blocks of powers of
 # two; both halves' light, and the step by which the means move.
 _LAUNCHES = 4.5
-_LAST_LAUNCH = 2.0  # as many more where the last launch of a run is smaller, whose blocks Dr.Jit keeps too
+_LAST_LAUNCH = 3.0  # as many more where the last launch of a run is smaller, whose blocks Dr.Jit keeps too
 _OTHER_LAUNCHES = 1.0  # as many more for each further group, whose launches differ in size in a render of many samples
 _MANY_SPP = 32  # samples per pixel from which on a render has many
 _RENDERER_BYTES = 224e6  # libraries and compiled kernels

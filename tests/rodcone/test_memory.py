@@ -137,7 +137,7 @@ def test_a_scene_of_12_mpx_is_captured_in_under_4_gb_whose_peak_is_the_end_of_it
     assert needed == pytest.approx(3 * 4 * 20 * pixels + 45 * pixels + 0.22e9, rel=0.01)
     assert needed < 4e9
     drawing = memory(2_000_000, 20, 1, spp=64, light_arrays=0).total
-    assert drawing == pytest.approx(2 * 4 * 20 * 2e6 + 45 * 2e6 + 6.5 * (4 << 24) + 0.22e9, rel=0.01)
+    assert drawing == pytest.approx(2 * 4 * 20 * 2e6 + 45 * 2e6 + 7.5 * (4 << 24) + 0.22e9, rel=0.01)
 
 
 def test_a_capture_counts_its_light_and_what_each_pixel_takes_once() -> None:
