@@ -120,12 +120,12 @@ def test_a_level_in_lux_is_told_with_the_scatter_of_its_meter():
     mean, spread = rng.uniform(0.5, 1.0, (2, NM.size)), rng.normal(size=(2 * NM.size, 4)) * 0.004
     made = transport(meter=lambda: Irradiance(mean, spread @ spread.T))
     drawn = []
-    for cause in rng.normal(size=(4000, 4)):
+    for cause in rng.normal(size=(1000, 4)):
         measured = Irradiance(mean + (spread @ cause).reshape(mean.shape), spread @ spread.T)
         drawn.append(replace(made, meter=lambda measured=measured: measured).illuminance_lux(1.0))
     told = made.relight(illuminance_lux=300.0).relative_level_error
-    # The deviation of 4000 draws is known to 1.1 %.
-    assert told == pytest.approx(np.std(drawn) / made.illuminance_lux(1.0), rel=0.06)
+    # The deviation of 1000 draws is known to 2.2 %; each takes 50 ms, for the lamps' bands are worked out anew.
+    assert told == pytest.approx(np.std(drawn) / made.illuminance_lux(1.0), rel=4 * 0.022)
     assert made.relight(luminance_cd_m2=3.0).relative_level_error == 0.0  # of its means, which have no errors
 
 
