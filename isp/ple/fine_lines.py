@@ -40,7 +40,7 @@ def signs(size: int) -> Floats:
 
 @cache
 def with_fine_lines(mix: Mixture) -> Mixture:
-    """Return a mixture of the patches' whole pixels, and of fine lines, which come last."""
+    """Return a mixture with two Gaussians more, of fine lines, which come last."""
     y, x = np.indices((mix.size, mix.size)).reshape(2, -1)
     square_px2 = (x[:, None] - x) ** 2.0 + (y[:, None] - y) ** 2.0
 
