@@ -88,7 +88,8 @@ def named(averages: Floats, nm: Floats, width: Floats, lamp: Spectrum) -> Floats
     """Weights of a file's band means in each channel's electrons where its lamp is named, shape (channel, band)."""
     file = SpectralRadiance(averages[None], nm, width_nm=width)
     finer = over_lamp(file, lamp)
-    assert finer is not None
+    if finer is None:  # an even lamp tells nothing
+        return electrons_per_irradiance(low_noise(), nm, width, 1.0, None)
     of_finer = electrons_per_irradiance(low_noise(), finer.wavelength_nm, finer.widths_nm, 1.0, lamp)
     emission = lamp.band_average(finer.wavelength_nm, finer.widths_nm)
     return (of_finer * emission) @ transport_of_light(nm, width, lamp, finer.wavelength_nm, finer.widths_nm)
