@@ -6,8 +6,8 @@ from typing import Any, TypeAlias
 
 import numpy as np
 
+from rodcone import jit
 from rodcone.errors import InputError, unknown
-from rodcone.jit import Matrix4
 from rodcone.types import Floats
 
 Point: TypeAlias = tuple[float, float, float]  # [m]
@@ -65,7 +65,7 @@ def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float
 
 def to_world(*transforms: Floats) -> Any:
     """Product of transforms, the last applied first, as `mitsuba.load_dict` takes it in every variant."""
-    return Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())
+    return jit.Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())
 
 
 def camera(fov_deg: float, origin: Point, target: Point, size: tuple[int, int] | None = None) -> dict[str, Any]:

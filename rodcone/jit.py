@@ -1,17 +1,19 @@
-"""Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit."""
+"""Dr.Jit, with the LLVM library of `rodcone.llvm`. The only module that imports Dr.Jit.
+
+It does so when something of it is first asked for: Dr.Jit takes a quarter of a second and 60 MB, and neither `ple` nor
+commands that read a light from a file need it.
+"""
 
 import ctypes
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
+from importlib import import_module
 from types import ModuleType
-from typing import Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal, TypeAlias
 
-import drjit as dr  # the package's own import has run `rodcone.llvm` by now, which tells Dr.Jit where its LLVM is
-import drjit.scalar
-
-from rodcone.llvm import LIBLLVM
+from rodcone.llvm import LIBLLVM  # it tells Dr.Jit where its LLVM is
 
 Backend = Literal["cuda", "llvm", "numpy"]
 # Arrays of a kernel, one value a thread. Which classes they are depends on the backend, so that a type checker takes
@@ -37,9 +39,43 @@ __all__ = [
     "compiling",
     "dr",
     "release_memory",
+    "syntax",
 ]
 
-Matrix4 = dr.scalar.Matrix4f64  # a 4x4 transform as `mitsuba.load_dict` takes it in every variant
+
+class _Deferred(ModuleType):
+    """A module that is imported when something of it is first asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        """Return what the module itself has under this name."""
+        return getattr(import_module(self.__name__), name)
+
+
+if TYPE_CHECKING:
+    import drjit as dr
+    from drjit.scalar import Matrix4f64 as Matrix4
+else:
+    dr = _Deferred("drjit")
+
+    def __getattr__(name: str) -> Any:
+        """Return `Matrix4`, a 4x4 transform as `mitsuba.load_dict` takes it in every variant."""
+        if name == "Matrix4":
+            return import_module("drjit.scalar").Matrix4f64
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def syntax(function: Callable[..., Any]) -> Callable[..., Any]:
+    """Decorate a function as `drjit.syntax` does, once it is first called."""
+
+    @cache
+    def transformed() -> Callable[..., Any]:
+        return dr.syntax(function)
+
+    @wraps(function)
+    def traced(*args: Any, **kwargs: Any) -> Any:
+        return transformed()(*args, **kwargs)
+
+    return traced
 
 
 @cache

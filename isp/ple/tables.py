@@ -11,7 +11,6 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import scipy
 
 from isp.ple.fine_lines import LEAST_ALIASED, aliased, with_fine_lines
 from isp.ple.prior import PATCH, Mixture, Prior, mixture
@@ -263,7 +262,7 @@ class Table:
         scatter += drift[:, :, None] * drift[:, None]
         scatter[:, np.arange(own), np.arange(own)] += self.noise[ks]
         # F of F C_yy F^T = 1, so that F (y - t_y) are independent numbers of variance 1.
-        factors = np.stack([scipy.linalg.lapack.dtrtri(lower, lower=1)[0] for lower in np.linalg.cholesky(scatter)])
+        factors = _triangular_inverses(np.linalg.cholesky(scatter))
         # H = C_py F^T. The pilot's innovation p - t_p - H F (y - t_y), in units of its errors, is turned so that its
         # four directions are independent given the samples: by the eigenvectors of its covariance C_pp - H H^T.
         half = self.pilot_samples[ks] @ factors.swapaxes(1, 2)
@@ -324,6 +323,18 @@ class Table:
             pilot_variance=pilot**2 @ self.average.T,
             pilot_inner=(pilot @ self.inner.T) ** 2,
         )
+
+
+def _triangular_inverses(lower: Floats) -> Floats:
+    """Invert lower triangular matrices (matrix, row, column), by halves: [[A, 0], [B, C]] has -C^-1 B A^-1 below."""
+    if lower.shape[-1] == 1:
+        return 1.0 / lower
+    half = lower.shape[-1] // 2
+    inverses = np.zeros_like(lower)
+    inverses[:, :half, :half] = _triangular_inverses(lower[:, :half, :half])
+    inverses[:, half:, half:] = _triangular_inverses(lower[:, half:, half:])
+    inverses[:, half:, :half] = -inverses[:, half:, half:] @ lower[:, half:, :half] @ inverses[:, :half, :half]
+    return inverses
 
 
 @lru_cache(maxsize=16)

@@ -17,7 +17,6 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import scipy
 from numpy.typing import NDArray
 
 from isp.anscombe import stabilise
@@ -28,6 +27,7 @@ LIFT = 2.0
 FLOOR = 0.7  # dark noises under 0
 _KNOTS, _STEPS = 200, 8192  # at which the curves are made, and between which they are looked up
 _LARGEST_ROOT = 8.0  # of expected electrons, over the dark noise: from there on the curves keep their last value
+_FEWEST = np.finfo(np.float64).tiny
 _NORMAL = np.linspace(-6.0, 6.0, 193)
 
 
@@ -98,7 +98,9 @@ def readings(dark_e: float) -> Readings:
     density /= density.sum()
     if dark_e < 1.0:
         counts = np.arange(2 * electrons[-1, 0])
-        shares = np.exp(scipy.special.xlogy(counts, electrons) - electrons - scipy.special.gammaln(counts + 1))
+        factorials = np.concatenate([[0.0], np.cumsum(np.log(counts[1:]))])  # their logarithms
+        # Of no electrons: a logarithm so low that every count but 0 has a share of 0.
+        shares = np.exp(counts * np.log(np.maximum(electrons, _FEWEST)) - electrons - factorials)
         values = transform(counts[:, None] + dark_e * _NORMAL, dark_e)
     else:
         spread = np.sqrt(electrons + dark_e**2)

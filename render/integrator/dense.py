@@ -33,7 +33,7 @@ from render.integrator.variant_types import (
     Vector,
 )
 from render.loader import Film, LoadedScene
-from rodcone.jit import dr
+from rodcone.jit import dr, syntax
 
 # Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
 # lobes by wavelength and one path can't serve all bands. Densities count by their size: below the horizon `measured`
@@ -112,7 +112,7 @@ class Tracer:
         scattered, _, _, chosen = self._trace(self.scene, points, start, wavelengths, step, 1)
         return {"scattered": self._flat(*scattered), CHOSEN: [self.mi.Float(chosen)]}
 
-    @dr.syntax
+    @syntax
     def first_surface(self, pixel: UInt, points: Points) -> Channels:
         """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
 
@@ -211,7 +211,7 @@ class Tracer:
         density = mi.warp.square_to_cosine_hemisphere_pdf(out)
         return onward, surface, density, mi.Bool(not self.sample_lights), received
 
-    @dr.syntax
+    @syntax
     def _trace(
         self, scene: MitsubaScene, points: Points, start: Start, wavelengths: Spectra, step: UInt, bounced: int
     ) -> tuple[list[Spectra], list[Spectra], tuple[Mask, Mask, Spectra], Mask]:

@@ -105,6 +105,17 @@ def test_lists_import_no_renderer(kind: str) -> None:
     assert in_new_python(program).splitlines()[-1] == "[]"
 
 
+@pytest.mark.sample(1)
+@pytest.mark.parametrize("command", ["develop", "capture"])
+def test_commands_that_may_need_no_renderer_import_none(command: str) -> None:
+    """Dr.Jit takes a quarter of a second and 60 MB, which `ple` and a light from a file don't need."""
+    program = (
+        f"import sys, studies.commands.{command}; "
+        f"print([name for name in 'mitsuba drjit matplotlib colour scipy.linalg'.split() if name in sys.modules])"
+    )
+    assert in_new_python(program).splitlines()[-1] == "[]"
+
+
 # No Python file of the working directory runs: it may be the folder of a downloaded scene.
 
 
