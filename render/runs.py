@@ -1,8 +1,8 @@
-"""Runs of two sequences of points over a scene, and their means: the picture, and half the difference as its error.
+"""Runs of samples over a scene, and their means: the picture, and half the difference of two halves as its error.
 
-Each pixel has two sequences of its own, independent of each other: the even and the odd half. A point is one Sobol
-point: one path. A run draws the next points of both halves. They are added in chunks, whose limits depend only on the
-position in the sequence: a resumed render has the same bits as one that was never stopped.
+Each pixel has two independent sequences of Sobol points, the even and the odd half. A point gives one path. A run draws
+the next points of both halves. They are added in chunks, whose limits depend only on the position in the sequence.
+Therefore a resumed render has the same bits as one that was never interrupted.
 """
 
 import traceback
@@ -26,7 +26,7 @@ from render.error_estimates import (
 )
 from render.integrator.allocation import rates_of
 from render.integrator.dense import Tracer
-from render.integrator.wavefront import Span, launches, seed_of, traced_at, tracers, where
+from render.integrator.wavefront import Span, launches, on_whole_film, seed_of, traced_at, tracers, where
 from render.level import SceneMeans
 from render.limits import MOST_POINTS, chunk_from
 from render.loader import PART_BANDS, Film, LoadedScene
@@ -49,16 +49,16 @@ class Means:
     count : int
         Points of each half in a pixel of rate 1.
     rates : (h, w) uint32
-        How many times as many points each pixel gets as a pixel of rate 1; powers of two.
+        Points of each pixel over those of a pixel of rate 1; powers of two.
     light : Halves of (group, band, h, w)
     seen : list of Halves of (1 or band, h, w)
-        Light that is seen directly, of each group: one plane where emission doesn't depend on wavelength.
+        Directly visible light of each group: one plane if its emission doesn't depend on wavelength.
     coverage : Halves of (h, w)
         Share of the paths that meet a light first.
     shared : (int, int) or None
-        A light group and the constant environment, which share paths: their indices.
+        Indices of a light group and the constant environment, which share paths.
     indirect : Halves of (group, band, h, w) or None
-        Indirect light in `light`, where it is kept by itself.
+        The indirect part of `light`, if it is kept separately.
     """
 
     count: int
@@ -81,7 +81,7 @@ class Half:
         One for each part of the bands; all parts see the same paths.
     seed : int
     split : bool
-        Whether indirect light is also given by itself.
+        Whether indirect light is also given separately.
     """
 
     loaded: LoadedScene
@@ -101,7 +101,7 @@ class Drawn:
         For each group, as `Means.seen`.
     coverage : (chunk, pixel) float32
     indirect : (chunk, group, band, pixel) float32
-        No groups where it isn't asked for.
+        It has no groups unless it was asked for.
     """
 
     radiance: Planes
@@ -111,7 +111,7 @@ class Drawn:
 
 
 def no_means(scene: Scene, film: Film, rates: NDArray[np.uint32], *, split: bool = False) -> Means:
-    """Return means of no samples, for a render to begin with. With `split`, indirect light has means of its own too."""
+    """Return means of no samples, with which a render begins. With `split`, indirect light has its own means too."""
     bands = film.wavelength_nm.size
     groups = scene.groups.values()
     return Means(
@@ -144,7 +144,7 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
     bands, height, width = light.mean.shape[1:]
     variance = np.empty(light.mean.shape, np.float32)
     correlation = np.empty(light.mean.shape[1:], np.float32)
-    together = max(1, BLOCK // (bands * width))  # rows; all at once would take several times the memory of the render
+    together = max(1, BLOCK // (bands * width))  # rows at once; all rows would take several times the render's memory
     for first in range(0, height, together):
         rows = slice(first, min(first + together, height))
         variance[:, :, rows], of_rows = _errors_in_rows(means, rows)
@@ -157,7 +157,7 @@ def fields_of(lights: Floats, means: Means) -> dict[str, Any]:
 
 
 def error_of(lights: Floats, means: Means) -> float:
-    """Return the relative error of `fields_of` alone: only the rows of pixels that it looks at are worked out."""
+    """Return only the relative error of `fields_of`; it computes only those rows whose pixels the error takes."""
     light = means.light.mean
     chosen = spread_pixels(light.shape[2:])
     _, rows, columns = chosen
@@ -169,7 +169,7 @@ def error_of(lights: Floats, means: Means) -> float:
 
 
 def _errors_in_rows(means: Means, rows: slice) -> tuple[Planes, SharedPaths | None]:
-    """Variance (group, band, row, w) in some rows of the picture, and what groups with shared paths have in common."""
+    """Estimate the variance (group, band, row, w) in some rows, and the correlation of groups that share paths."""
     height = len(means.rates)
     near = slice(max(rows.start - 1, 0), min(rows.stop + 1, height))  # errors are pooled over 3x3 pixels
     own = slice(rows.start - near.start, rows.stop - near.start)
@@ -217,16 +217,16 @@ def add_run(
     seed: int,
     after: Callable[[float], None] | None = None,
 ) -> None:
-    """Draw the points from `means.count` on, before `stop` and as many as a launch holds, and add them.
+    """Draw points from `means.count` on, at most to `stop` and as many as a launch holds, and add them to the means.
 
-    A launch adds both halves of its pixels, so that beside the means no more than its own light is held.
-    An error or a second Ctrl-C leaves the means useless: they are dropped with the render.
+    Each launch adds both halves of its pixels, so that memory holds only the means and one launch's light. After an
+    error or a second Ctrl-C the means are incomplete and must not be used.
 
     Parameters
     ----------
     scenes, means, film, stop, seed
     after : callable, optional
-        Called after each launch but the last, with the points of a half in the mean over the picture so far.
+        Called after each launch but the last with the number of points of a half so far, averaged over the picture.
     """
     start = means.count
     chunk = chunk_from(means.count)
@@ -256,7 +256,7 @@ def add_run(
 
 
 def _weights(span: Span) -> list[np.float32]:
-    """Weight of each chunk in the mean of all points up to its end."""
+    """Return each chunk's weight in the mean of all points up to its end."""
     counts = [span.start + index * span.chunk for index in range(span.chunks)]
     return [np.float32(span.chunk / (count + span.chunk)) for count in counts]
 
@@ -285,7 +285,7 @@ def pilot_rates(scenes: list[LoadedScene], film: Film, lights: Floats, seed: int
     scattered = np.zeros((len(lights), 2 * PILOT.chunks, *film.size), np.float32)
     seen = np.zeros((len(lights), *film.size), np.float32)
     threads = launch_threads(scenes, film)
-    # Of a picture that takes several launches one chunk is held at a time.
+    # If a picture takes several launches, memory holds one chunk of it at a time.
     at_once = PILOT.chunks if uniform.size * PILOT.chunk * PILOT.chunks <= threads else 1
     spans = [Span(first * PILOT.chunk, PILOT.chunk, at_once) for first in range(0, PILOT.chunks, at_once)]
     for loaded in scenes:
@@ -332,15 +332,14 @@ def _drawn(half: Half, rates: NDArray[np.uint32], pixels: NDArray[np.intp], span
 
 
 def _drawn_everywhere(half: Half, rates: NDArray[np.uint32], span: Span, threads: int) -> tuple[Planes, list[Planes]]:
-    """Radiance and seen light as `_drawn`, of all pixels."""
-    whole: list[Planes] = []
-    for pixels in launches(rates, span, threads):
+    """Draw a span of a half's paths at all pixels; return its radiance and directly visible light as in `Drawn`."""
+
+    def planes(pixels: NDArray[np.intp]) -> dict[int, Planes]:
         drawn = _drawn(half, rates, pixels, span)
-        parts = [drawn.radiance, *drawn.seen]
-        whole = whole or [np.empty((*part.shape[:-1], rates.size), np.float32) for part in parts]
-        for planes, part in zip(whole, parts, strict=True):
-            planes[..., where(pixels)] = part
-    return whole[0], whole[1:]
+        return dict(enumerate([drawn.radiance, *drawn.seen]))
+
+    radiance, *seen = on_whole_film(planes, rates, span, threads).values()
+    return radiance, seen
 
 
 def _joined(parts: list[Planes]) -> Planes:
@@ -355,7 +354,7 @@ def _grouped(channels: Planes, groups: int) -> Planes:
 
 
 def clear_traceback(error: BaseException) -> None:
-    """Free the refused scene, which the traceback holds: else Dr.Jit compiles its materials into the next render."""
+    """Free the refused scene that a traceback holds; Dr.Jit would compile its materials into the next render."""
     cause: BaseException | None = error
     while cause:
         if cause.__traceback__ and cause.__traceback__.tb_next:

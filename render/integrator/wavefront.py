@@ -1,9 +1,10 @@
-"""Mean light of paths per pixel, over consecutive points of their low-discrepancy sequences."""
+"""Launches of paths: mean light of each pixel over consecutive points of its low-discrepancy sequence."""
 
 import math
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Hashable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,13 +17,14 @@ from rodcone.errors import InputError
 from rodcone.jit import dr
 from rodcone.types import Planes
 
-LANES = 16  # paths of the widest packet that Embree traces together
+LANES = 16  # largest number of paths that Embree traces together as a packet
+K = TypeVar("K", bound=Hashable)  # name or number of a plane
 _COLOUR_FOR_NUMBER = re.compile(r'BitmapTexture "([^"]*)" was queried for a monochromatic value')
 
 
 @dataclass(frozen=True)
 class Span:
-    """Consecutive points of each pixel's sequence: from `start` on, `chunks` chunks of `chunk` points each."""
+    """Consecutive points of each pixel's sequence: `chunks` chunks of `chunk` points each, from `start` on."""
 
     start: int
     chunk: int
@@ -30,12 +32,12 @@ class Span:
 
 
 def seed_of(*coordinates: int) -> int:
-    """Derive a seed of 32 bits from numbers: the render's own seed, and numbers that say what the seed is for."""
+    """Derive a seed of 32 bits from the render's own seed and numbers that say what the seed is for."""
     return int(np.random.SeedSequence(coordinates).generate_state(1)[0])
 
 
 def tracers(loaded: LoadedScene, film: Film, most_bands: int, seed: int, *, split: bool = False) -> Iterator[Tracer]:
-    """Give a tracer for each part of the bands, at most so many together; all parts see the same paths."""
+    """Yield a tracer for each part of the bands, of at most `most_bands`; all parts follow the same paths."""
     parts = -(-film.wavelength_nm.size // most_bands)
     for nm, width_nm in zip(*(np.array_split(x, parts) for x in (film.wavelength_nm, film.width_nm)), strict=True):
         yield Tracer(mitsuba_module(), loaded, replace(film, wavelength_nm=nm, width_nm=width_nm), seed, split=split)
@@ -51,25 +53,41 @@ def traced(
     InputError
         As `traced_at`.
     """
-    means: dict[str, Planes] = {}
-    for pixels in launches(rates, span, threads):
-        for name, part in traced_at(trace, rates, pixels, span, seed).items():
-            if name not in means:
-                means[name] = np.empty((*part.shape[:2], rates.size), np.float32)
-            means[name][..., where(pixels)] = part
+    means = on_whole_film(lambda pixels: traced_at(trace, rates, pixels, span, seed), rates, span, threads)
     return {name: planes.reshape(*planes.shape[:2], *rates.shape) for name, planes in means.items()}
 
 
-def launches(rates: NDArray[np.uint32], span: Span, threads: int) -> list[NDArray[np.intp]]:
-    """Cut the picture into launches of so many threads: the pixels of each, by their rates.
+def on_whole_film(
+    draw: Callable[[NDArray[np.intp]], Mapping[K, Planes]], rates: NDArray[np.uint32], span: Span, threads: int
+) -> dict[K, Planes]:
+    """Draw all launches and join what they give into planes of the whole film, each (..., pixel) float32.
 
-    A pixel of rate r has r times as many points as one of rate 1: its chunks are r times as long.
+    Parameters
+    ----------
+    draw : callable
+        Takes the pixels of a launch, and gives planes (..., pixel of the launch) by their names or numbers.
+    rates, span, threads
+        As in `launches`.
+    """
+    whole: dict[K, Planes] = {}
+    for pixels in launches(rates, span, threads):
+        for key, part in draw(pixels).items():
+            if key not in whole:
+                whole[key] = np.empty((*part.shape[:-1], rates.size), np.float32)
+            whole[key][..., where(pixels)] = part
+    return whole
+
+
+def launches(rates: NDArray[np.uint32], span: Span, threads: int) -> list[NDArray[np.intp]]:
+    """Divide the picture into launches of about `threads` threads; return the pixels of each launch, by their rates.
+
+    A pixel of rate r has r times as many points as one of rate 1, because its chunks are r times as long.
     """
     flat = rates.ravel()
     order = np.argsort(flat, kind="stable")
-    # Paths of one packet change each other's last bits, because Embree traverses its tree in another way once few paths
-    # are left. So a packet holds the same paths in every launch, and copies of a rate's last pixel fill its last
-    # packet.
+    # Paths of one packet change each other's last bits, because Embree traverses its tree differently once few paths of
+    # the packet are left. Therefore a packet holds the same paths however the picture is divided, and copies of a
+    # rate's last pixel fill that rate's last packet.
     together = LANES // math.gcd(LANES, span.chunk)
     by_rate = np.split(order, np.flatnonzero(np.diff(flat[order])) + 1)
     order = np.concatenate([np.pad(pixels, (0, -pixels.size % together), mode="edge") for pixels in by_rate])
@@ -79,7 +97,7 @@ def launches(rates: NDArray[np.uint32], span: Span, threads: int) -> list[NDArra
 
 
 def where(pixels: NDArray[np.intp]) -> slice | NDArray[np.intp]:
-    """Return the slice that picks consecutive pixels, which NumPy copies faster, or the pixels themselves."""
+    """Return a slice for consecutive pixels, which NumPy copies faster, or else the pixels unchanged."""
     first, stop = int(pixels[0]), int(pixels[-1]) + 1
     consecutive = stop - first == pixels.size and bool((np.diff(pixels) == 1).all())
     return slice(first, stop) if consecutive else pixels
@@ -92,21 +110,21 @@ def traced_at(
     span: Span,
     seed: int,
 ) -> dict[str, Planes]:
-    """Trace the paths of one of the `launches` and average them as `traced`: by name, each (chunk, channel, pixel).
+    """Trace the paths of one launch and average them as `traced` does: by name, each (chunk, channel, pixel).
 
     Raises
     ------
     InputError
-        Where a material sampled another direction at another wavelength.
+        If a material sampled another direction at another wavelength.
     """
     mi = mitsuba_module()
-    # A launch has a part for each rate, where chunks of one length follow each other: chunk by chunk, and within it
-    # pixel by pixel. `blocks` gives the pixel and the number of the first point of each `span.chunk` threads.
+    # A launch has a part for each rate, in which all chunks are equally long. They are ordered by chunk, then by pixel.
+    # A block is `span.chunk` threads; `blocks` holds the pixel and the first point of each.
     values, firsts = np.unique(rates.ravel()[pixels], return_index=True)
     parts = list(zip(values.tolist(), np.split(pixels, firsts[1:]), firsts.tolist(), strict=True))
     blocks = np.concatenate([_blocks(rate, of_rate, span) for rate, of_rate, _ in parts], axis=1)
     pixel_of, first_of = (mi.UInt32(numbers) + dr.opaque(mi.UInt32, 0) for numbers in blocks)
-    dr.eval(pixel_of, first_of)  # memory of Dr.Jit's own: a kernel reads NumPy's, aligned or not, by other code
+    dr.eval(pixel_of, first_of)  # copied to Dr.Jit's memory, because code that reads NumPy's depends on its alignment
     channels = _launched(trace, pixel_of, first_of, span.chunk, seed)
     means = {name: np.empty((len(x), span.chunks, pixels.size), np.float32) for name, x in channels.items()}
     start = 0
@@ -118,7 +136,7 @@ def traced_at(
         for channel in (x for values in channels.values() for x in values):
             part = channel if count == dr.width(channel) else dr.gather(mi.Float, channel, index)
             totals.append(dr.block_sum(part, length) if length > 1 else part)
-        sums = iter(dr.concat(totals).numpy().reshape(len(totals), span.chunks, -1))  # one copy for all
+        sums = iter(dr.concat(totals).numpy().reshape(len(totals), span.chunks, -1))  # one copy for all channels
         for planes in means.values():
             for plane in planes:
                 np.multiply(next(sums), np.float32(1 / length), out=plane[:, first : first + of_rate.size])
@@ -132,7 +150,7 @@ def traced_at(
 
 
 def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint32]:
-    """Pixel and first point of blocks of `span.chunk` points of pixels of one rate, shape (2, block)."""
+    """List the blocks of `span.chunk` points of pixels of one rate: pixel and first point, shape (2, block)."""
     chunk, pixel, block = np.meshgrid(np.arange(span.chunks), pixels, np.arange(rate), indexing="ij")
     first = span.start * rate + (chunk * rate + block) * span.chunk
     return np.stack([pixel.ravel(), first.ravel()]).astype(np.uint32)
@@ -141,7 +159,7 @@ def _blocks(rate: int, pixels: NDArray[np.intp], span: Span) -> NDArray[np.uint3
 def _launched(
     trace: Callable[[UInt, Points], Channels], pixel_of: UInt, first_of: UInt, chunk: int, seed: int
 ) -> Channels:
-    """Channels of all points of blocks, each `chunk` points long, evaluated."""
+    """Trace the paths of all points of blocks of `chunk` points, and evaluate their channels."""
     mi = mitsuba_module()
     thread = dr.arange(mi.UInt32, dr.width(pixel_of) * chunk)
     length = dr.opaque(mi.UInt32, chunk)
@@ -153,14 +171,14 @@ def _launched(
         dr.eval(channels)
     except RuntimeError as error:
         cause = _root_cause(error)
-        if not isinstance(cause, RuntimeError):  # a fault of this program, not of the scene
+        if not isinstance(cause, RuntimeError):  # an error of this program, not of the scene
             raise
         raise _refusal(cause) from None
     return channels
 
 
 def _refusal(error: RuntimeError) -> InputError:
-    """Say what Mitsuba can't render: for a fault of otherwise good scenes in plain words, else in Mitsuba's own."""
+    """Say what Mitsuba can't render: in plain words for a mistake that is easily made, otherwise in Mitsuba's."""
     words = mitsuba_words(error)
     if colour := _COLOUR_FOR_NUMBER.search(words):
         return InputError(
@@ -171,7 +189,7 @@ def _refusal(error: RuntimeError) -> InputError:
 
 
 def _root_cause(error: BaseException) -> BaseException:
-    """First cause of an error that Dr.Jit has wrapped."""
+    """Return the first cause of an error that Dr.Jit has wrapped."""
     while error.__cause__ or error.__context__:
         error = error.__cause__ or error.__context__ or error
     return error
