@@ -24,8 +24,18 @@ AXES = ("height", "width", "wavelength")
 
 @dataclass(frozen=True)
 class StoredArray:
-    """Numbers of a file as they stand in it: their axes, and where the file states them wavelengths, the gain and
-    offset of each band, and which bands are of use.
+    """Numbers of a file as it stores them, and what it states about them.
+
+    Attributes
+    ----------
+    values : array
+    axes : tuple of str
+        Names of the array's axes.
+    wavelength_nm : (band,) float64 or None
+    law : (gains, offsets) or None
+        Linear law of each band from stored numbers to values.
+    good : (band,) bool or None
+        Whether a band is usable.
     """
 
     values: NDArray[Any]
@@ -55,12 +65,12 @@ _CONVERTER = strict_converter()
 
 
 def description(path: str | Path) -> Path:
-    """Name of the TOML beside a cube: ``desk.toml`` of ``desk.npy``."""
+    """Return the path of the TOML beside a cube: ``desk.toml`` for ``desk.npy``."""
     return Path(path).with_suffix(".toml")
 
 
 def cube_holds(path: str | Path) -> str:
-    """What a cube holds, one of `KINDS`.
+    """Return what a cube holds, one of `KINDS`.
 
     Raises
     ------
@@ -71,13 +81,20 @@ def cube_holds(path: str | Path) -> str:
 
 
 def read_cube(path: str | Path) -> SpectralRadiance:
-    """Read a cube; a reflectance stands in the place of the radiance.
+    """Read a cube of radiance or reflectance; reflectances are returned as the values of a `SpectralRadiance`.
 
-    Beside it lies a TOML of the same name with ``holds`` ("radiance" [W m^-2 sr^-1 nm^-1] or "reflectance" [0 to 1]);
-    ``wavelength_nm``, one number a band or the first and the last of evenly spaced ones, or in a ``.mat`` the name of a
-    variable (ENVI's header states them); ``axes``, in the order of the array, ``height``, ``width`` and ``wavelength``
-    by default, which a ``.mat`` has to name; ``variable`` of a ``.mat``; ``scale``, what a stored 1 is worth (in place
-    of ENVI's reflectance scale factor), or a 1 that ENVI's gain and offset values give. Bands are sorted by wavelength.
+    A TOML file of the same name lies beside it. Its keys are:
+
+    - ``holds``: "radiance" [W m^-2 sr^-1 nm^-1] or "reflectance" [0 to 1];
+    - ``wavelength_nm``: one number per band, or the first and the last of evenly spaced ones, or for a ``.mat`` the
+      name of a variable. ENVI's header states wavelengths itself;
+    - ``axes``: names of the array's axes in its order, by default ``height``, ``width``, ``wavelength``. A ``.mat``
+      needs the key;
+    - ``variable``: name of the cube in a ``.mat``;
+    - ``scale``: value of a stored 1. It replaces ENVI's reflectance scale factor; after ENVI's gains and offsets it is
+      the value of a 1 that these give.
+
+    Bands are sorted by wavelength.
 
     Raises
     ------
@@ -105,7 +122,7 @@ def read_cube(path: str | Path) -> SpectralRadiance:
         gains, offsets = (np.ones(nm.size), np.zeros(nm.size)) if stored.law is None else stored.law
         scale = 1.0 if described.scale is None else described.scale
         scaled = np.empty((*values.shape[:2], used.size), dtype=np.float32)
-        with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
+        with np.errstate(all="ignore"):  # SpectralRadiance reports a value that isn't finite
             for place, band in enumerate(used):
                 scaled[..., place] = (values[..., band] * gains[band] + offsets[band]) * scale
         cube = SpectralRadiance(scaled, centres, width_nm=widths)
@@ -115,7 +132,7 @@ def read_cube(path: str | Path) -> SpectralRadiance:
 
 
 def _described(path: Path) -> Description:
-    """Content of the TOML beside a cube, checked but for what depends on the array."""
+    """Read the TOML beside a cube and check all that doesn't depend on the array."""
     require_file(path)
     beside = description(path)
     if not beside.is_file():
@@ -156,7 +173,7 @@ def _read_npy(path: Path, described: Description) -> StoredArray:
 
 
 def _open_envi(header: Path, described: Description) -> StoredArray:
-    """ENVI's picture, with the law from its numbers to what the description says that they hold."""
+    """Open ENVI's picture, with the linear law from stored numbers to the radiance or reflectance they stand for."""
     picture = open_envi(header)
     law = picture.radiance
     if described.holds == REFLECTANCE:

@@ -1,7 +1,7 @@
-"""ENVI's pictures: a text header, ``.hdr``, and the numbers as they are in a file beside it.
+"""ENVI's pictures: a text header, ``.hdr``, and a file of plain numbers beside it.
 
-Fields are named as in "ENVI Header Files" (NV5 Geospatial's documentation). Every one that changes values, geometry or
-their meaning is applied, or refused by name.
+Fields are named as in "ENVI Header Files" (NV5 Geospatial's documentation). A field that changes values, geometry or
+their meaning is either applied or refused by name.
 """
 
 import re
@@ -20,7 +20,7 @@ from rodcone.errors import InputError
 from rodcone.file_keys import require_known
 from rodcone.types import Floats
 
-_MOST_HEADER_BYTES = 1 << 20  # of ENVI; one of 500 bands with their names takes 20 kB
+_MOST_HEADER_BYTES = 1 << 20  # a header of 500 bands with their names takes 20 kB
 _TYPES = {1: "u1", 2: "i2", 3: "i4", 4: "f4", 5: "f8", 12: "u2", 13: "u4", 14: "i8", 15: "u8"}
 _SIDES = {"height": "lines", "width": "samples", "wavelength": "bands"}
 _ORDER = {
@@ -30,26 +30,26 @@ _ORDER = {
 }
 _ENDINGS = ("", ".raw", ".img", ".dat", ".bin", ".bsq", ".bil", ".bip")
 _FIELD = re.compile(r"^\s*([^=;\n]+?)\s*=\s*(\{[^}]*\}|[^\n]*)", re.MULTILINE)
-_NO_UNIT = ("", "unknown")  # of wavelengths: nm are taken, which values under 50 contradict
+_NO_UNIT = ("", "unknown")  # units of wavelength for which nm are assumed; values too small for nm are refused later
 
 
 @dataclass(frozen=True)
 class EnviPicture:
-    """ENVI's picture, its numbers still in their file.
+    """ENVI's picture, whose numbers are still in their file.
 
     Attributes
     ----------
     values : array
-        As they stand in the file, (axes in the file's order).
+        Numbers as the file stores them, with its order of axes.
     axes : tuple of str
-        ``height``, ``width`` and ``wavelength`` in that order.
+        ``height``, ``width`` and ``wavelength`` in the order of the array's axes.
     wavelength_nm : (band,) float64 or None
     radiance, reflectance : tuple of (band,) float64, or None
-        Gain and offset of each band to radiance and to reflectance, where the header states them.
+        Gain and offset of each band that give radiance or reflectance; None if the header states none.
     factor : float or None
-        What a stored 1 is in reflectance, where the header states one divisor for all; agrees with `reflectance`.
+        Reflectance of a stored 1, if the header states one divisor for all bands; it agrees with `reflectance`.
     good : (band,) bool
-        Bands that are not marked as bad.
+        Whether a band isn't marked as bad.
     ignored : float or None
         Value that stands for no data.
     """
@@ -65,12 +65,12 @@ class EnviPicture:
 
 
 def data_file(header: str | Path) -> Path:
-    """File of the numbers: of the header's name without ``.hdr``, or with another ending.
+    """Find the file of numbers: the header's name without ``.hdr``, or with another ending.
 
     Raises
     ------
     InputError
-        Where there is none.
+        If there is none.
     """
     stem = Path(header).with_suffix("")
     for ending in _ENDINGS:
@@ -126,7 +126,7 @@ def open_envi(header: Path) -> EnviPicture:
 
 
 def _fields(header: Path) -> dict[str, str]:
-    """Read a header's fields by name; a field that would change values, and that this program ignores, is refused."""
+    """Read a header's fields by name; refuse a field that would change values and that this program doesn't apply."""
     if require_file(header) > _MOST_HEADER_BYTES:
         raise InputError(f"its header is over {_MOST_HEADER_BYTES} bytes; give the .hdr of an ENVI picture")
     text = header.read_text("utf-8", errors="replace")
@@ -140,14 +140,14 @@ def _fields(header: Path) -> dict[str, str]:
 
 
 def _law(fields: Mapping[str, str], gains: str, offsets: str, bands: int) -> tuple[Floats, Floats] | None:
-    """Gain and offset of each band; None where the header states neither."""
+    """Return the gain and offset of each band; None if the header states neither."""
     if gains not in fields and offsets not in fields:
         return None
     return _list(fields, gains, bands, 1.0), _list(fields, offsets, bands, 0.0)
 
 
 def _reflectance(fields: Mapping[str, str], bands: int) -> tuple[tuple[Floats, Floats] | None, float | None]:
-    """Gain and offset of each band to reflectance, and the one factor; both only where they are alike."""
+    """Return each band's gain and offset to reflectance, and the common factor; refuse a header where they differ."""
     law = _law(fields, "data reflectance gain values", "data reflectance offset values", bands)
     if "reflectance scale factor" not in fields:
         return law, None
@@ -176,13 +176,13 @@ def _wavelengths(fields: Mapping[str, str]) -> Floats | None:
 
 
 def _parts(text: str) -> list[str]:
-    """Entries of a list, without the empty one behind a last comma."""
+    """Split a list into its entries, without the empty one after a final comma."""
     parts = [part.strip() for part in text.strip("{} \t\r\n").split(",")]
     return parts[:-1] if parts[-1] == "" else parts
 
 
 def _list(fields: Mapping[str, str], name: str, bands: int, default: float) -> Floats:
-    """Number for each band."""
+    """Return a field's numbers, one per band, or the default for each."""
     if name not in fields:
         return np.full(bands, default)
     values = np.array([_number(name, part) for part in _parts(fields[name])])

@@ -1,8 +1,8 @@
 """Spectral OpenEXR files: absolute radiance in float32, with a preview that any viewer shows.
 
 The layout is that of Fichet, Pacanowski and Wilkie, "An OpenEXR Layout for Spectral Images", Journal of Computer
-Graphics Techniques 10(3), 2021: one channel a wavelength, ``S0.<number>nm`` with a decimal comma for radiance, ``S1``
-to ``S3`` for the rest of the Stokes vector, ``T`` for reflectance. What the layout has no place for stands in
+Graphics Techniques 10(3), 2021: one channel per wavelength, ``S0.<number>nm`` with a decimal comma for radiance, ``S1``
+to ``S3`` for the rest of the Stokes vector, ``T`` for reflectance. Facts for which the layout has no place are
 attributes whose names begin with ``rodcone``.
 """
 
@@ -41,26 +41,26 @@ LAYOUT_UNITS = "W.m^-2.sr^-1"  # what the layout prescribes, though its values a
 TRUE_UNITS = "W.m^-2.sr^-1.nm^-1"
 UNITS, OWN_UNITS, BANDS = "emissiveUnits", "rodconeUnits", "rodconeBands_nm"
 LAMP = "rodconeLamp"  # nm:value, up to a factor; linear between, 0 outside
-_MEASUREMENT = ("lensTransmission", "cameraResponse")  # of the camera that took the picture, which rodcone doesn't undo
+_MEASUREMENT = ("lensTransmission", "cameraResponse")  # curves of the camera that took the picture; they aren't undone
 _SPECTRAL = re.compile(r"(S[0-3]|T)\.([0-9]*,?[0-9]*(?:[Ee][+-]?[0-9]+)?)(\w{,2}(?:m|Hz)(?:\..*)?)")
 
 
 def channel_name(wavelength_nm: float) -> str:
-    """Name of a radiance channel; of fixed width, so that the alphabet orders channels by wavelength."""
+    """Name a radiance channel; all names are equally long, so that alphabetical order is the order of wavelength."""
     require_range("wavelength_nm", wavelength_nm, 1.0, 9999.0, "OpenEXR channel names hold 1 to 9999 nm")
     number = f"{wavelength_nm:011.6f}".replace(".", ",")
     return f"S0.{number}nm"
 
 
 def spectral_channels(names: Iterable[str]) -> tuple[bool, dict[str, float]]:
-    """Whether a picture holds reflectance, and the wavelength [nm] of each of its channels, in the order of wavelength.
+    """Return whether a picture holds reflectance, and its spectral channels' wavelengths [nm] in increasing order.
 
-    Channels of radiance are ``S0``, of reflectance ``T``; S1 to S3 and other channels are left out.
+    Channels of radiance are ``S0``, channels of reflectance ``T``. S1 to S3 and other channels are left out.
 
     Raises
     ------
     InputError
-        Where there are none or both, or where two have the same wavelength.
+        If there are none or both, or two have the same wavelength.
     """
     names = list(names)
     matches = {name: match for name in names if (match := _SPECTRAL.fullmatch(name))}
@@ -78,7 +78,7 @@ def spectral_channels(names: Iterable[str]) -> tuple[bool, dict[str, float]]:
 
 
 def _to_nm(name: str, match: re.Match[str]) -> float:
-    """Wavelength of a channel from its number; the layout's other units are refused."""
+    """Read the wavelength in a channel's name; the layout's other units are refused."""
     _, number, unit = match.groups()
     try:
         nm = float(number.replace(",", "."))
@@ -90,15 +90,15 @@ def _to_nm(name: str, match: re.Match[str]) -> float:
 
 
 def write_pairs(first: Floats, second: Floats) -> str:
-    """Pairs of numbers, such as centres and widths of bands, as text that reads back to the same float64."""
+    """Write pairs of numbers, such as centres and widths of bands, as text that reads back to the same float64."""
     return ";".join(f"{a!r}:{b!r}" for a, b in zip(first.tolist(), second.tolist(), strict=True))
 
 
 def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tuple[Floats, Floats]:
-    """Band centres and widths [nm] of a file's spectral channels.
+    """Return the band centres and widths [nm] of a file's spectral channels.
 
-    As rodcone's own attribute states them, if it still fits the channels; else the names' wavelengths, as
-    `bands_between` takes them. A `UserWarning` names what has to be assumed.
+    They are those of rodcone's own attribute, if it fits the channels. Otherwise `bands_between` derives them from the
+    wavelengths in the names. A `UserWarning` names what has to be assumed.
 
     Raises
     ------
@@ -121,7 +121,7 @@ def read_bands(channels: Mapping[str, float], header: Mapping[str, Any]) -> tupl
 
 
 def _parsed(text: str) -> tuple[Floats, Floats] | None:
-    """Centres and widths from text, None where it isn't that."""
+    """Parse centres and widths; return None for text of another form."""
     try:
         centres, widths = _pairs(text)
         return centres, band_widths(centres, widths)
@@ -135,7 +135,7 @@ def _pairs(text: str) -> tuple[Floats, Floats]:
 
 
 def _lamp(header: Mapping[str, Any]) -> Spectrum | None:
-    """Lamp that the header states, None where it states none; a `UserWarning` tells of text that is no spectrum."""
+    """Return the lamp that the header states, or None; warn (`UserWarning`) of text that is no spectrum."""
     if LAMP not in header:
         return None
     try:
@@ -169,15 +169,15 @@ PREVIEW_TEXT = (
 _MAGIC = b"\x76\x2f\x31\x01"
 _HALF_MAX = 65504.0
 _FLOAT = np.finfo(np.float32)
-MOST_ASPECT = 1e-3  # of a pixel's width over its height, from 1: a pixel in a thousand
-MOST_TILE_BYTES = 64 << 20  # of one tile, however small the file: 1024 x 1024 pixels in 16 channels
+MOST_ASPECT = 1e-3  # largest difference from 1 of a pixel's width over its height
+MOST_TILE_BYTES = 64 << 20  # largest size of one tile in any file: 1024 x 1024 pixels in 16 channels
 
 
 def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") -> None:
     """Write radiance as a spectral OpenEXR file; it appears whole or not at all.
 
-    Channels are float32 with lossless PIZ compression; there are no half floats, since absolute radiance at night is
-    under their least number. float32 radiance, band centres, widths and the lamp read back bit by bit.
+    Channels are float32 with lossless PIZ compression. Half floats aren't used, because absolute radiance at night is
+    below their smallest number. Radiance in float32, band centres, widths and the lamp read back bit by bit.
 
     Parameters
     ----------
@@ -201,7 +201,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
     if len(set(names)) < len(names):
         raise InputError(f"{path}: band centres less than 1e-6 nm apart have no names of their own; merge those bands")
     preview, white_cd_m2 = _preview(radiance)
-    lamp = radiance.light  # an even one says nothing: light of colours of its own has it too
+    lamp = radiance.light  # a constant spectrum isn't written: coloured light has it too, and it tells nothing
     channels = {name: np.ascontiguousarray(radiance.values[:, :, k], np.float32) for k, name in enumerate(names)}
     channels |= {name: np.ascontiguousarray(preview[:, :, k]) for k, name in enumerate("RGB")}
     header = {
@@ -228,7 +228,7 @@ def write_exr(radiance: SpectralRadiance, path: str | Path, *, scene: str = "") 
 
 
 def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
-    """Linear sRGB (h, w, 3), and the luminance [cd m^-2] that reads 1 in it."""
+    """Return linear sRGB (h, w, 3), and the luminance [cd m^-2] at which it is 1."""
     xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm, radiance.light)
     white = float(np.percentile(xyz[:, :, 1], PREVIEW_PERCENTILE)) / PREVIEW_AT or 1.0
     white = float(np.clip(white, _FLOAT.tiny, _FLOAT.max))
@@ -236,7 +236,7 @@ def _preview(radiance: SpectralRadiance) -> tuple[NDArray[np.float32], float]:
 
 
 def exr_holds_reflectance(path: str | Path) -> bool:
-    """Whether a spectral OpenEXR file holds reflectances, by its header.
+    """Return whether a spectral OpenEXR file holds reflectances, by its header.
 
     Raises
     ------
@@ -250,7 +250,7 @@ def exr_holds_reflectance(path: str | Path) -> bool:
 
 
 def read_exr_lamp(path: str | Path) -> Spectrum | None:
-    """Return the lamp behind a file of radiance, scaled to 1 cd/m^2; None where it states none.
+    """Return the lamp behind a file of radiance, scaled to 1 cd/m^2; None if it states none.
 
     Raises
     ------
@@ -266,11 +266,11 @@ def read_exr_lamp(path: str | Path) -> Spectrum | None:
 
 
 def read_exr(path: str | Path) -> SpectralRadiance:
-    """Read a spectral OpenEXR file, rodcone's own or another program's; reflectance stands in the place of radiance.
+    """Read a spectral OpenEXR file of any program; reflectances are returned as the values of a `SpectralRadiance`.
 
-    Any S0 or T channels in any order, in half or float, with or without a preview. What has
-    to be assumed is named by a `UserWarning`. Polarisation (S1 to S3) is left out: S0 is the radiance. Of a picture
-    that is smaller than its frame the part that is there is read.
+    S0 or T channels may stand in any order, in half or float, with or without a preview. A `UserWarning` names what has
+    to be assumed. Polarisation (S1 to S3) is left out, because S0 is the radiance. If the picture is smaller than its
+    frame, only the part that it fills is read.
 
     Parameters
     ----------
@@ -285,9 +285,9 @@ def read_exr(path: str | Path) -> SpectralRadiance:
     Raises
     ------
     InputError
-        Where there is no file, no spectral OpenEXR in it, it holds radiance and reflectance, deep data, several parts,
-        subsampled channels, pixels that aren't square or an environment map; where over 1 % of its reflectances exceed
-        1, its size is over the limits, it is damaged, or a value is negative or not finite.
+        If there is no file, or no spectral OpenEXR in it; if it holds both radiance and reflectance, deep data, several
+        parts, subsampled channels, pixels that aren't square, or an environment map; if over 1 % of its reflectances
+        exceed 1, its size exceeds the limits, it is damaged, or a value is negative or not finite.
     """
     path = Path(path)
     size = require_file(path)
@@ -314,7 +314,7 @@ def _damage() -> AbstractContextManager[None]:
 
 
 def _check_geometry(header: Mapping[str, Any]) -> None:
-    """Raise `InputError` for pixels that aren't those of a flat picture with square pixels."""
+    """Raise `InputError` for a picture that isn't flat or has no square pixels."""
     aspect = float(header.get("pixelAspectRatio", 1.0))
     if abs(aspect - 1.0) > MOST_ASPECT:
         raise InputError(f"pixelAspectRatio: {aspect:g} is not allowed; give square pixels, 1; scale it")
@@ -332,7 +332,7 @@ def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
     (left, top), (right, bottom) = ([int(n) for n in corner] for corner in header["dataWindow"])
     height, width = bottom - top + 1, right - left + 1
     require_extent(height, width, len(channels), file_bytes)
-    if kind == OpenEXR.tiledimage:  # the library takes a whole tile's memory, however small the picture
+    if kind == OpenEXR.tiledimage:  # the library allocates a whole tile, however small the picture
         across, down = int(header["tiles"].xSize), int(header["tiles"].ySize)
         if across * down * len(channels) * _FLOAT.dtype.itemsize > max(MOST_TILE_BYTES, MOST_EXPANSION * file_bytes):
             raise InputError(f"its tiles have {across} x {down} pixels, far more than it holds; save it again")
@@ -340,11 +340,11 @@ def _extent(header: dict[str, Any], file_bytes: int) -> tuple[int, int]:
 
 
 def _planes(path: Path, names: list[str], shape: tuple[int, int]) -> NDArray[np.float32]:
-    """Pixels of the named channels, shape (band, h, w)."""
+    """Read the pixels of the named channels, shape (band, h, w)."""
     channels = _part(path, header_only=False).channels
     planes = np.empty((len(names), *shape), dtype=np.float32)
     for plane, name in zip(planes, names, strict=True):
-        pixels = channels.pop(name).pixels  # let go of one by one
+        pixels = channels.pop(name).pixels  # removed, so that its memory is freed
         if pixels.dtype not in (np.float16, np.float32) or pixels.shape != shape:
             raise InputError(
                 f"channel {name!r} is {pixels.dtype} of {pixels.shape}; allowed: half or float; convert it"
@@ -354,7 +354,7 @@ def _planes(path: Path, names: list[str], shape: tuple[int, int]) -> NDArray[np.
 
 
 def _part(path: Path, *, header_only: bool) -> Any:
-    """Read the file's one part through the library, which raises many kinds, or prints why and gives no part."""
+    """Read the file's single part. The library raises errors of many types, or prints one and returns no part."""
     with path.open("rb") as file:
         if file.read(4) != _MAGIC:
             raise InputError("it is no OpenEXR file; allowed: spectral OpenEXR; convert it")

@@ -1,4 +1,4 @@
-"""Limits on the size that a picture file declares, checked before memory is allocated; bands from its wavelengths."""
+"""Checks of a picture file: the size that it declares, before memory is allocated, and bands from its wavelengths."""
 
 import warnings
 from math import inf
@@ -11,22 +11,22 @@ from render.spectrum import band_widths
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
-MOST_SIDE = 1 << 15  # pixels; the engine's own limit
-MOST_BYTES = 1 << 33  # of float32 pixels: 8 GiB, such as 4 Mpx with 500 bands; a render that size needs three times it
-MOST_CHANNELS = 4096  # ten times the bands of 1 nm over the visible; OpenEXR's time grows with their square
-# A black picture shrinks by 957 in ZIP, 405 in PIZ, 1264 in PXR24; more is a file that claims what it doesn't hold.
+MOST_SIDE = 1 << 15  # pixels of a side, as in a render
+MOST_BYTES = 1 << 33  # 8 GiB of float32 pixels, such as 4 Mpx with 500 bands; a render of them takes three times it
+MOST_CHANNELS = 4096  # ten times the bands of 1 nm over the visible; OpenEXR's time grows with the number's square
+# A black picture shrinks to 1/957 in ZIP, 1/405 in PIZ and 1/1264 in PXR24. A file that claims more doesn't hold it.
 MOST_EXPANSION = 2000
-MOST_OVER_ONE = 0.01  # of a reflectance's values: highlights and noise; more is another unit
-SMALL_BYTES = 1 << 26  # of a .mat file's numbers, which is no harm: 64 MiB
+MOST_OVER_ONE = 0.01  # share of reflectances over 1 that may be highlights and noise; more means another unit
+SMALL_BYTES = 1 << 26  # 64 MiB, which a .mat file's numbers may take however small the file is
 
 
 def require_file(path: Path) -> int:
-    """Size of a file in bytes.
+    """Return the size of a file in bytes.
 
     Raises
     ------
     InputError
-        Where there is no file at `path`.
+        If there is no file at `path`.
     """
     if not path.is_file():
         raise InputError(f"{path}: there is no such file; allowed: the path of a file; correct it")
@@ -34,10 +34,10 @@ def require_file(path: Path) -> int:
 
 
 def require_extent(height: int, width: int, channels: int, file_bytes: float = inf, small_bytes: int = 0) -> None:
-    """Raise `InputError` for float32 pixels that a file shouldn't or can't hold.
+    """Raise `InputError` for a declared size that isn't allowed, or that the file can't hold.
 
-    A side is 1 to 32768 pixels, there are at most 4096 channels, and all pixels take at most 8 GiB, and at most
-    `MOST_EXPANSION` times the file or `small_bytes`.
+    A side has 1 to 32768 pixels, there are at most 4096 channels, and all pixels take, in float32, at most 8 GiB. They
+    also take at most `MOST_EXPANSION` times the file's size, or `small_bytes` if that is more.
     """
     if not (0 < height <= MOST_SIDE and 0 < width <= MOST_SIDE):
         raise InputError(f"{height} x {width} pixels are not allowed; each side is 1 to {MOST_SIDE}; crop or scale it")
@@ -54,7 +54,7 @@ def require_extent(height: int, width: int, channels: int, file_bytes: float = i
 
 
 def require_reflectances(values: NDArray[np.float32]) -> None:
-    """Raise `InputError` where more than the share of highlights and noise exceeds a reflectance of 1."""
+    """Raise `InputError` if more reflectances exceed 1 than highlights and noise explain."""
     over = float((values > 1).mean())
     if over > MOST_OVER_ONE:
         raise InputError(
@@ -64,15 +64,15 @@ def require_reflectances(values: NDArray[np.float32]) -> None:
 
 
 def bands_between(wavelength_nm: Floats) -> tuple[Floats, Floats]:
-    """Band centres and widths [nm] of a file that states its samples' wavelengths alone: they are as wide as spaced.
+    """Derive band centres and widths [nm] from a file's wavelengths: each band is as wide as their spacing.
 
-    Where the spacing is uneven, bands meet half-way between neighbours (widths as in the trapezoidal rule), with a
-    `UserWarning`: a sample then lies beside its band's centre.
+    If the spacing is uneven, bands meet half-way between neighbours, so that widths are those of the trapezoidal rule.
+    A `UserWarning` says so, because a sample then isn't at its band's centre.
 
     Raises
     ------
     InputError
-        For fewer than two wavelengths, or where they don't increase.
+        For fewer than two wavelengths, or if they don't increase.
     """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     if nm.size < 2 or not np.all(np.isfinite(nm)) or not np.all(nm[1:] > nm[:-1]) or nm[0] <= 0:

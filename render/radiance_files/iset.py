@@ -22,7 +22,7 @@ from rodcone.errors import InputError, in_place, require_range
 from rodcone.file_keys import require_known
 from rodcone.types import Floats
 
-MOST_NEGATIVE = 0.01  # of the samples of stored photons; more is no noise
+MOST_NEGATIVE = 0.01  # largest share of stored photons that may be negative by noise
 _KEYS = (
     *("scene/spectrum/wave", "scene/data/photons", "scene/data/dmin", "scene/data/dmax", "scene/data/min"),
     *("scene/data/max", "mcCOEF", "basis/basis", "basis/wave", "imgMean", "photons", "data", "wave", "wavelength"),
@@ -30,17 +30,18 @@ _KEYS = (
 _PHOTONS = ("illuminant/data/photons", "illuminant/spectrum/wave")
 _ENERGY = ("illuminant/data", "illuminant/wavelength")  # of files before illuminants were structs
 _OF_LAMP = tuple(place + key for place in ("scene/", "") for key in (*_PHOTONS, *_ENERGY))
-_VIEWS_DEG = ("scene/wAngular", "scene/fov", "fov")  # across the picture; the last by ieSaveMultiSpectralImage
-Numbers = Mapping[str, NDArray[Any]]  # by the keys above
+_VIEWS_DEG = ("scene/wAngular", "scene/fov", "fov")  # field of view across the picture; the last is that of
+# ieSaveMultiSpectralImage
+Numbers = Mapping[str, NDArray[Any]]  # a file's arrays by the keys above
 
 
 def read_iset_scene(path: str | Path) -> SpectralRadiance:
     """Read an ISETCam multispectral scene as radiance.
 
-    Three forms are known, and looked for in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with
-    ``imgMean`` where the mean was taken out; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative
-    photons become 0, as in ISETCam, with a `UserWarning`: any that a basis gives, and up to 1 % of those that
-    stand in the file. Wavelength samples stand for bands as wide as their spacing.
+    Three forms are tried in this order: a saved ``scene`` struct; ``mcCOEF`` and ``basis``, with ``imgMean`` if the
+    mean was subtracted; ``photons`` (or ``data``) with ``wave`` (or ``wavelength``). Negative photons become 0, as in
+    ISETCam, with a `UserWarning`; of photons that the file stores at most 1 % may be negative. A sample of wavelength
+    stands for a band as wide as the spacing.
 
     Parameters
     ----------
@@ -55,8 +56,8 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
     Raises
     ------
     InputError
-        Where there is no such file or form in it, it is ``-v7.3`` or damaged, shapes don't fit, its
-        size is over 32768 pixels a side or 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
+        If there is no such file, it has none of these forms, is ``-v7.3`` or damaged, its shapes don't fit, a side has
+        over 32768 pixels, it takes over 8 GiB, over 1 % of stored photons are negative, or a value is not finite.
     """
     path = Path(path)
     numbers = read_numbers(path, (*_KEYS, *_OF_LAMP, *_VIEWS_DEG, NAMES))
@@ -69,7 +70,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
         centres, widths = bands_between(nm)
         require_extent(*shape, nm.size, require_file(path), SMALL_BYTES)
         planes = np.empty((nm.size, *shape), dtype=np.float32)
-        with np.errstate(all="ignore"):  # SpectralRadiance tells where a value isn't finite
+        with np.errstate(all="ignore"):  # SpectralRadiance reports a value that isn't finite
             for plane, band, per_joule in zip(planes, photons, photons_per_joule(nm), strict=True):
                 plane[:] = band / per_joule
         _clip_negative(planes, 1.0 if from_basis else MOST_NEGATIVE)
@@ -78,7 +79,7 @@ def read_iset_scene(path: str | Path) -> SpectralRadiance:
 
 
 def read_iset_illuminant(path: str | Path) -> Spectrum | None:
-    """Illuminant of an ISETCam scene, scaled to 1 cd/m^2; None where the file holds none, or one for each pixel.
+    """Read an ISETCam scene's illuminant, scaled to 1 cd/m^2; return None if it has none, or one per pixel.
 
     Raises
     ------
@@ -89,7 +90,7 @@ def read_iset_illuminant(path: str | Path) -> Spectrum | None:
 
 
 def _lamp(numbers: Numbers, path: str | Path) -> Spectrum | None:
-    """Illuminant among a file's numbers, scaled to 1 cd/m^2."""
+    """Find the illuminant among a file's numbers and scale it to 1 cd/m^2."""
     for values_key, nm_key in zip(_OF_LAMP[::2], _OF_LAMP[1::2], strict=True):
         values, nm = (numbers.get(key, np.empty(0)).ravel().astype(np.float64) for key in (values_key, nm_key))
         if nm.size and values.size == nm.size and values.any():
@@ -100,7 +101,7 @@ def _lamp(numbers: Numbers, path: str | Path) -> Spectrum | None:
 
 
 def _to_edges(lamp: Spectrum) -> Spectrum:
-    """Illuminant whose end samples hold to the edges of the bands that they stand for."""
+    """Extend an illuminant's first and last values to the outer edges of their bands."""
     nm = lamp.wavelength_nm
     if nm.size == 1:
         return lamp
@@ -109,7 +110,7 @@ def _to_edges(lamp: Spectrum) -> Spectrum:
 
 
 def _view_deg(numbers: Numbers, path: str | Path) -> float | None:
-    """Field of view across the picture [degrees]; None where the file states none, as NaN or nothing."""
+    """Return the field of view across the picture [degrees]; None if the file states none, or NaN."""
     for key in _VIEWS_DEG:
         value = numbers.get(key, np.empty(0)).ravel()
         if value.size == 1 and np.isfinite(value[0]):
@@ -120,7 +121,7 @@ def _view_deg(numbers: Numbers, path: str | Path) -> float | None:
 
 
 def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
-    """Wavelengths, height and width, and the photons of one band after another, as they stand in the file."""
+    """Read stored photons: return wavelengths, (height, width), and an iterator over the bands' photons."""
     if any(key.startswith("scene/") for key in numbers):
         wave, data, photons = "scene/spectrum/wave", "scene/data/", "scene/data/photons"
     else:
@@ -134,7 +135,7 @@ def _stored(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray
 
 
 def _quantised(dtype: np.dtype[Any], numbers: Numbers, data: str) -> tuple[float, float]:
-    """Scale and offset of photons: old files hold 16 or 32 bit integers that span least to most (ieCompressData)."""
+    """Return the scale and offset of stored photons. Old files hold integers from least to most (ieCompressData)."""
     if dtype.kind == "f":
         return 1.0, 0.0
     for least, most in (("dmin", "dmax"), ("min", "max")):
@@ -145,7 +146,7 @@ def _quantised(dtype: np.dtype[Any], numbers: Numbers, data: str) -> tuple[float
 
 
 def _from_basis(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDArray[np.float64]]]:
-    """Photons from coefficients: coefficients times basis, and the mean where it was taken out."""
+    """Compute photons from coefficients, basis and mean; return as `_stored` does."""
     nm = _numbers(numbers, "basis/wave").ravel().astype(np.float64)
     functions = np.atleast_2d(_numbers(numbers, "basis/basis").astype(np.float64))
     if functions.shape[0] != nm.size:
@@ -159,7 +160,7 @@ def _from_basis(numbers: Numbers) -> tuple[Floats, tuple[int, int], Iterator[NDA
 
 
 def _clip_negative(planes: NDArray[np.float32], most: float) -> None:
-    """Set negative values to 0 and warn of their share; where it is over `most` they stay, to be refused."""
+    """Set negative values to 0 and warn of their share; if it exceeds `most`, leave them to be refused."""
     share = sum(int(np.count_nonzero(plane < 0)) for plane in planes) / planes.size
     if 0 < share <= most and np.isfinite(planes.min()):
         np.maximum(planes, 0.0, out=planes)
@@ -177,7 +178,7 @@ def _numbers(numbers: Numbers, name: str) -> NDArray[Any]:
 
 
 def _cube(numbers: Numbers, name: str, depth: int) -> NDArray[Any]:
-    """Array of (h, w, depth); MATLAB drops a last axis of 1."""
+    """Return an array as (h, w, depth), because MATLAB drops a last axis of length 1."""
     value = _numbers(numbers, name)
     cube = value[:, :, None] if value.ndim == 2 and depth == 1 else value
     if cube.ndim != 3 or cube.shape[2] != depth:

@@ -1,8 +1,8 @@
-"""Numbers from MATLAB level 5 files (``save -v6`` and ``-v7``), by SciPy in a process of its own.
+"""Numbers from MATLAB level 5 files (``save -v6`` and ``-v7``), read by SciPy in a child process.
 
-A few changed bytes make SciPy's reader leave its memory (version 1.17 ends the process within some thousand random
-changes), and a scene may come from anywhere. So `mat_reader` runs it in a child, whose memory, output and time are
-bounded by the file's size; the child's end is an error of one line here.
+A few changed bytes make SciPy's reader access memory outside its buffers: version 1.17 crashes within some thousand
+random changes. A scene may come from anywhere, so `mat_reader` runs the reader in a child process, whose memory, output
+and time are bounded by the file's size. If the child crashes, the caller gets an error of one line.
 """
 
 import subprocess
@@ -21,24 +21,24 @@ from rodcone.child_process import safe_environment
 from rodcone.errors import InputError
 
 _HEADER_BYTES = 128
-_SECONDS, _BYTES_PER_SECOND = 120, 1e6  # that the child may take, its start included: a hundred times what it takes
+_SECONDS, _BYTES_PER_SECOND = 120, 1e6  # time limit of the child with its start: a hundred times what it needs
 
 
 def read_numbers(path: Path, keys: Collection[str]) -> Mapping[str, NDArray[Any]]:
-    """Arrays of a file, as (row, column, ...) in the type that MATLAB would give them.
+    """Read arrays of a file, as (row, column, ...) in the types that MATLAB would give them.
 
     Parameters
     ----------
     path : Path
     keys : collection of str
-        What to read: a variable, or a field of a struct such as ``scene/data/photons``. What isn't there, or is no
-        array of real numbers, is missing from the result.
+        Variables, or fields of structs such as ``scene/data/photons``. A key that isn't there, or is no array of real
+        numbers, is missing from the result.
 
     Raises
     ------
     InputError
-        Where there is no file, none of level 5 (MATLAB's ``-v7.3`` and ``-v4`` are named), it is damaged, or what is
-        wanted takes over 8 GiB, or over 64 MiB and 2000 times the file.
+        If there is no file, it isn't of level 5 (the message names MATLAB's ``-v7.3`` and ``-v4``) or is damaged; if
+        the arrays take over 8 GiB, or over both 64 MiB and 2000 times the file.
     """
     size = require_file(path)
     with path.open("rb") as file:

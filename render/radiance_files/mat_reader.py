@@ -1,4 +1,4 @@
-"""The process in which SciPy reads a MATLAB file: run as a script by `mat_file`, it imports nothing of rodcone's."""
+"""Script of the child process in which SciPy reads a MATLAB file for `mat_file`; it imports nothing of rodcone."""
 
 import resource
 import sys
@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-NAMES = "names of all"  # as a key what to read; no variable's, which hold no blank
-READER_BYTES = 1 << 28  # beside the file's values: SciPy's buffers
-COPIES = 4  # of the values on their way: inflated, stored type, MATLAB's type, written
+NAMES = "names of all"  # key that asks for all names; it holds blanks, so that no variable has this name
+READER_BYTES = 1 << 28  # memory for SciPy's buffers, beside the file's values
+COPIES = 4  # copies of the values that exist at once: inflated, stored type, MATLAB's type, written
 
 
 def main(path: str, output: str, most_bytes: str, *keys: str) -> None:
-    """Write the numbers that stand under some keys as one .npz file."""
+    """Write the numbers under some keys into one .npz file."""
     from scipy.io import loadmat
 
     _limit(int(most_bytes))
@@ -29,7 +29,7 @@ def main(path: str, output: str, most_bytes: str, *keys: str) -> None:
 
 
 def _names(path: str, content: dict[str, Any]) -> Iterator[str]:
-    """Names of a file's variables, and of the fields of those structs that are read, by their places."""
+    """Yield the names of a file's variables, and the paths of all fields of those structs that are read."""
     from scipy.io import whosmat
 
     yield from (name for name, _, _ in whosmat(path))
@@ -43,7 +43,7 @@ def _names(path: str, content: dict[str, Any]) -> Iterator[str]:
 
 
 def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:
-    """Array of real numbers under a key, None where there is none."""
+    """Return the array of real numbers under a key, or None."""
     name, *fields = key.split("/")
     value = content.get(name)
     for field in fields:
@@ -53,7 +53,7 @@ def _numbers(content: dict[str, Any], key: str) -> np.ndarray[Any, Any] | None:
 
 
 def _limit(most_bytes: int) -> None:
-    """Bound this process's memory and the file that it writes; without /proc its output alone."""
+    """Limit this process's memory and the file that it writes; without /proc only the file."""
     _lower(resource.RLIMIT_FSIZE, most_bytes)
     statm = Path("/proc/self/statm")
     if statm.is_file():

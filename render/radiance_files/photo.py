@@ -1,7 +1,7 @@
-"""Photographs as scenes: the colour of each pixel upsampled to a reflectance.
+"""Photographs as scenes: each pixel's colour is converted to a spectral reflectance.
 
-A photograph doesn't tell the spectra that were there: each colour gets one of the many that look like it under D65, of
-surfaces as they were measured, or a mixture of sRGB's three basis curves (`render.radiance_files.surface_spectra`).
+A photograph doesn't tell the true spectra. Each colour gets one of the many spectra that look like it under D65: one
+like those of measured surfaces, or a mixture of sRGB's three basis curves (`render.radiance_files.surface_spectra`).
 """
 
 import warnings
@@ -21,38 +21,38 @@ from rodcone.errors import InputError, read_errors, require_name
 from rodcone.types import Floats, Planes, Singles
 
 EXTENSIONS = (".jpg", ".jpeg", ".png")
-MOST_SIDE = 4096  # pixels, before memory is taken for them
+MOST_SIDE = 4096  # pixels of a side, checked before memory is allocated
 SURFACES, SRGB_BASIS = SPECTRA = ("surfaces", "srgb_basis")
-NEARLY_WHITE = 0.9  # of all light: only one spectrum reflects all, whatever surfaces were measured
-TOGETHER = 64  # rows of a photograph whose colours are decoded together
-LEAST_TOLD = 0.01  # share of the pixels beyond the measured surfaces' reach, under which nothing is said
+NEARLY_WHITE = 0.9  # above this linear value a colour isn't reported, because white has only one spectrum anyway
+TOGETHER = 64  # rows of a photograph that are decoded at once
+LEAST_TOLD = 0.01  # share of pixels beyond the measured surfaces' reach from which on a warning is given
 
 
 def photo_size(path: str | Path) -> tuple[int, int]:
-    """Height and width of a photograph, from its header alone."""
+    """Read the height and width of a photograph from its header."""
     with _opened(Path(path)) as image:
         return image.height, image.width
 
 
 def read_photo(path: str | Path, spectra: str = SURFACES) -> SpectralRadiance:
-    """Read a photograph as reflectances, which stand in the place of the radiance; its colours are taken as sRGB.
+    """Read a photograph, whose colours are taken as sRGB, as reflectances: the values of a `SpectralRadiance`.
 
     Parameters
     ----------
     path : str or Path
     spectra : str
-        ``surfaces``, spectra as measured surfaces have them (Otsu et al. 2018), or ``srgb_basis``, mixtures of three
-        curves (Mallett and Yuksel 2019), as Mitsuba has them.
+        ``surfaces``, spectra like those of measured surfaces (Otsu et al. 2018), or ``srgb_basis``, mixtures of three
+        curves (Mallett and Yuksel 2019), as in Mitsuba.
 
     Raises
     ------
     InputError
-        For a file that isn't a JPEG or PNG of at most 4096 pixels a side, or is damaged, and for other spectra.
+        For a file that isn't a JPEG or PNG of at most 4096 pixels per side, or is damaged; for another `spectra`.
 
     Warns
     -----
     UserWarning
-        Where one pixel in a hundred or more has a colour that the measured surfaces don't reach.
+        If one pixel in a hundred or more has a colour that the measured surfaces don't reach.
     """
     require_name("spectra", spectra, SPECTRA)
     if spectra == SRGB_BASIS:
@@ -65,9 +65,9 @@ def read_photo(path: str | Path, spectra: str = SURFACES) -> SpectralRadiance:
 
 
 def read_upsampled(path: str | Path) -> tuple[Upsampled, tuple[int, int]]:
-    """Read a photograph whose reflectances are made band by band, and its height and width.
+    """Read a photograph whose reflectances are computed band by band; also return its height and width.
 
-    They are those of `read_photo` by ``surfaces``, which warns and refuses likewise.
+    The reflectances, warnings and errors are those of `read_photo` with ``surfaces``.
     """
     linear = read_colours(path)
     upsampled = Upsampled.of(linear.reshape(-1, 3))
@@ -76,12 +76,12 @@ def read_upsampled(path: str | Path) -> tuple[Upsampled, tuple[int, int]]:
 
 
 class PhotoPlanes:
-    """Reflectances of a photograph as (1, band, h, w) float32, of which an array is made of what is asked for.
+    """Reflectances of a photograph, (1, band, h, w) float32, computed only for the planes or pixels that are read.
 
     Parameters
     ----------
     upsampled : Upsampled
-        Of the photograph's pixels, row by row.
+        The photograph's pixels, row by row.
     shape : (int, int)
         Its height and width.
     """
@@ -94,7 +94,7 @@ class PhotoPlanes:
         self._whole: Planes | None = None
 
     def __getitem__(self, index: Any) -> Planes:
-        """Return one plane, of ``[0, band]``, or some pixels in all bands, of ``[..., rows, columns]``."""
+        """Compute one plane, for ``[0, band]``, or some pixels in all bands, for ``[..., rows, columns]``."""
         if len(index) == 2:
             return self.upsampled.plane(index[1]).reshape(self.shape[2:])
         places = index[1] * self.shape[3] + index[2]
@@ -103,13 +103,13 @@ class PhotoPlanes:
         )
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
-        if self._whole is None:  # once: whoever asks for all of it asks again
+        if self._whole is None:  # kept, because whoever needs all of it needs it several times
             self._whole = np.stack([self[0, band] for band in range(self.shape[1])])[None]
         return np.array(self._whole, dtype=dtype, copy=copy)
 
 
 def warn_of_reach(of_basis: NDArray[np.floating], linear: Singles) -> None:
-    """Warn where one pixel in a hundred or more takes of sRGB's basis, (h, w), but for those that are nearly white."""
+    """Warn if one pixel in a hundred or more takes a share (h, w) of sRGB's basis and isn't nearly white."""
     beyond = (of_basis > 0) & (linear.min(axis=-1) < NEARLY_WHITE)
     if beyond.mean() >= LEAST_TOLD:
         warnings.warn(
@@ -121,7 +121,7 @@ def warn_of_reach(of_basis: NDArray[np.floating], linear: Singles) -> None:
 
 
 def read_colours(path: str | Path) -> Singles:
-    """Read the colours of a photograph in linear sRGB, (h, w, 3); it fails as `read_pixels`."""
+    """Read the colours of a photograph in linear sRGB, (h, w, 3); errors are those of `read_pixels`."""
     samples, most = _samples(path)
     linear = np.empty((*samples.shape[:2], 3), np.float32)
     for first in range(0, len(samples), TOGETHER):
@@ -131,25 +131,25 @@ def read_colours(path: str | Path) -> Singles:
 
 
 def read_pixels(path: str | Path) -> Floats:
-    """Read the pixels of a photograph, (h, w, 3) from 0 to 1 as the file encodes them, upright by its Exif.
+    """Read the pixels of a photograph, (h, w, 3) from 0 to 1 as the file encodes them, turned upright by its Exif.
 
     Raises
     ------
     InputError
-        For a file that isn't a JPEG or PNG of at most 4096 pixels a side, or is damaged.
+        For a file that isn't a JPEG or PNG of at most 4096 pixels per side, or is damaged.
     """
     return _encoded(*_samples(path))
 
 
 def _encoded(samples: NDArray[Any], most: float) -> Floats:
-    """Samples (h, w) or (h, w, 3) of which the largest is `most`, as fractions (h, w, 3)."""
+    """Divide samples (h, w) or (h, w, 3) by `most`, the largest possible one; return (h, w, 3)."""
     encoded = np.clip(np.asarray(samples, dtype=np.float64) / most, 0.0, 1.0)
     return encoded if encoded.ndim == 3 else np.repeat(encoded[..., None], 3, axis=-1)
 
 
 def _samples(path: str | Path) -> tuple[NDArray[Any], float]:
-    """Samples of a photograph as its file holds them, and the largest that there can be."""
-    # damaged streams and Exif fail in many ways within Pillow
+    """Read a photograph's samples as the file stores them; also return the largest possible sample."""
+    # Damaged streams and Exif make Pillow raise errors of many types.
     damage = read_errors(f"{path}: its pixels can't be read", "save it again", Exception)
     with _opened(Path(path)) as image, damage:
         upright = ImageOps.exif_transpose(image)
@@ -160,7 +160,7 @@ def _samples(path: str | Path) -> tuple[NDArray[Any], float]:
 
 def _opened(path: Path) -> Image.Image:
     require_file(path)
-    with read_errors(f"{path}: it is no JPEG or PNG", "save it as one", Exception):  # of Pillow's many
+    with read_errors(f"{path}: it is no JPEG or PNG", "save it as one", Exception):  # Pillow raises many types
         image = Image.open(path, formats=("JPEG", "PNG"))
     if max(image.size) > MOST_SIDE:
         image.close()

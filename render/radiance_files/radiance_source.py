@@ -1,4 +1,4 @@
-"""Radiance from a file in place of a rendered scene."""
+"""Radiance that is read from a file instead of rendered."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -24,35 +24,35 @@ from rodcone.errors import unknown
 from rodcone.memory import file_extent
 from rodcone.types import Floats, Planes
 
-MOST_WHOLE_BYTES = 1 << 28  # of a photograph's bands together, beyond which they are made one at a time
-WHITE_CD_M2 = 100.0  # luminance of a reflectance of 1, where no level is asked for
+MOST_WHOLE_BYTES = 1 << 28  # size of a photograph's bands together, above which they are computed one at a time
+WHITE_CD_M2 = 100.0  # luminance of a reflectance of 1, if no level is asked for
 _READERS = {
     ".exr": read_exr,
     ".mat": lambda path: read_iset_scene(path) if is_iset(path) else read_cube(path),
     **dict.fromkeys((".npy", ".hdr"), read_cube),
     **dict.fromkeys(photo.EXTENSIONS, photo.read_photo),
 }
-REFERENCE = ".npz"  # of `rodcone reference`
+REFERENCE = ".npz"  # ending of the files that `rodcone reference` writes
 ENDINGS = (*_READERS, REFERENCE)
 
 
 def is_radiance_file(name: str | Path) -> bool:
-    """Whether a name ends as a file that `load_radiance` reads."""
+    """Return whether a name has the ending of a file that `load_radiance` reads."""
     return Path(name).suffix.lower() in ENDINGS
 
 
 def is_reference(path: str | Path) -> bool:
-    """Whether a file is named as reference light, whose lamps any light can replace."""
+    """Return whether a file's ending is that of reference light, whose lamps can be replaced by any light."""
     return Path(path).suffix.lower() == REFERENCE
 
 
 def is_iset(path: str | Path) -> bool:
-    """Whether a file is named as an ISETCam scene: a ``.mat`` that no description lies beside."""
+    """Return whether a file is taken as an ISETCam scene: a ``.mat`` without a description beside it."""
     return Path(path).suffix.lower() == ".mat" and not description(path).is_file()
 
 
 def is_reflectance(path: str | Path) -> bool:
-    """Whether a file holds reflectances, which any light can light: a photograph, or a cube or OpenEXR that says so.
+    """Return whether a file holds reflectances: a photograph, or a cube or OpenEXR file that says so.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def is_reflectance(path: str | Path) -> bool:
 
 
 def files_of(path: str | Path) -> list[Path]:
-    """All files that a picture is read from: itself, the description beside a cube, and ENVI's numbers."""
+    """List the files from which a picture is read: itself, the description beside a cube, and ENVI's numbers."""
     suffix = Path(path).suffix.lower()
     described = description(path)
     beside = [described] if suffix in cube.EXTENSIONS and described.is_file() else []
@@ -76,7 +76,7 @@ def files_of(path: str | Path) -> list[Path]:
 
 
 def extent_of(path: str | Path) -> tuple[int, int, int]:
-    """Pixels, bands and light groups that a picture file counts as: a photograph by its header, else by its bytes."""
+    """Estimate a picture file's pixels, bands and light groups: a photograph by its header, others by their bytes."""
     if Path(path).suffix.lower() in photo.EXTENSIONS:
         height, width = photo.photo_size(path)
         return height * width, DEFAULT_WAVELENGTH_NM.size, 1
@@ -88,7 +88,7 @@ def extent_of(path: str | Path) -> tuple[int, int, int]:
 
 
 def comes_by_band(path: str | Path) -> bool:
-    """Whether a file is a photograph so large that its bands are made one at a time."""
+    """Return whether a file is a photograph so large that its bands are computed one at a time."""
     if Path(path).suffix.lower() not in photo.EXTENSIONS:
         return False
     pixels, bands, _ = extent_of(path)
@@ -101,15 +101,15 @@ def load_radiance(path: str | Path, light: str | None = None, spectra: str = pho
     Parameters
     ----------
     path : str or Path
-        Beside a cube (``.npy``, ENVI's ``.hdr``, a plain ``.mat``) lies its description
-        (`render.radiance_files.cube.read_cube`); a photograph's (``.jpg``, ``.png``) spectra are upsampled from its
+        A cube (``.npy``, ENVI's ``.hdr``, a plain ``.mat``) has its description beside it
+        (`render.radiance_files.cube.read_cube`). The spectra of a photograph (``.jpg``, ``.png``) are derived from its
         colours (`render.radiance_files.photo.read_photo`).
     light : str, optional
-        Illuminant of reflectances, of which 1 has 100 cd/m^2; left out, D65. Of a file of radiance that states no lamp,
-        the lamp that it was taken under: the light is followed to this lamp's lines, in bands of at most 10 nm. It
-        takes the place of the illuminant that an ISETCam scene holds.
+        For reflectances, the illuminant, by default D65; a reflectance of 1 then has 100 cd/m^2. For radiance that
+        states no lamp, the lamp under which it was taken: the light then follows this lamp's lines, in bands of at most
+        10 nm. For an ISETCam scene, the illuminant that replaces the stored one.
     spectra : str
-        Of a photograph's colours, ``surfaces`` or ``srgb_basis``, as `read_photo` takes it.
+        How a photograph's spectra are derived: ``surfaces`` or ``srgb_basis``, as in `read_photo`.
 
     Raises
     ------
@@ -122,22 +122,22 @@ def load_radiance(path: str | Path, light: str | None = None, spectra: str = pho
 
 
 def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACES, *, named: bool = False) -> Transport:
-    """Read a file as `load_radiance` does, as light transport: reflectances can be lit by another light afterwards.
+    """Read a file as `load_radiance` does, but as light transport, so that reflectances can be relit later.
 
     Parameters
     ----------
     light : Spectrum
-        Of 1 cd/m^2; for reflectances, and for radiance where it is `named`. Reference light has lights of its own.
+        Light of 1 cd/m^2. It applies to reflectances, and to radiance if it is `named`. Reference light has its own.
     spectra : str
-        As of `load_radiance`.
+        As in `load_radiance`.
     named : bool
-        Whether a person named the light: it is then the lamp behind radiance that states none, and takes the place of
-        the illuminant of an ISETCam scene.
+        Whether the user named the light. If so, it is the lamp behind radiance that states none, and replaces the
+        illuminant of an ISETCam scene.
 
     Warns
     -----
     OtherLampWarning
-        Where the lamp leaves bands dark in which there is light. The light is then taken as smooth.
+        If the file holds light in bands that the lamp leaves dark. The light is then taken as smooth.
     """
     if is_reference(path):
         return open_reference(path).transport
@@ -159,12 +159,12 @@ def load_picture(path: str | Path, light: Spectrum, spectra: str = photo.SURFACE
 
 
 def _lit(transport: SpectralRadiance, lamp: Spectrum, power: float) -> Transport:
-    """Light transport of one lamp from reflectances, or from radiance over the lamp, in the place of radiance."""
+    """Make the transport of one lamp from reflectances, or from radiance divided by the lamp."""
     return replace(as_transport(transport), groups={"light": LightGroup((), lamp, power)})
 
 
 def stored_illuminant(path: str | Path) -> Spectrum | None:
-    """Lamp that a picture file holds, at 1 cd/m^2: rodcone's own and an ISETCam scene may; None where there is none."""
+    """Read the lamp that a picture file of rodcone or ISETCam states, scaled to 1 cd/m^2, or return None."""
     if Path(path).suffix.lower() == ".exr":
         return read_exr_lamp(path)
     return read_iset_illuminant(path) if is_iset(path) else None
@@ -178,17 +178,17 @@ def _read(path: str | Path) -> SpectralRadiance:
 
 
 def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
-    """Transport whose one light group gives the radiance as it is at a spectrum of 1.
+    """Make a transport with one light group, which at a spectrum of 1 gives the radiance unchanged.
 
-    It has no reference plane, and no light counts as seen directly. The variance is what the radiance's
-    relative Monte Carlo error says, the same share in every pixel; the halves' difference is 0, for one picture holds
-    no halves.
+    It has no reference plane, and no light counts as directly visible. The variance follows from the radiance's
+    relative Monte Carlo error, which is taken as the same in every pixel. The halves' difference is 0, because one
+    picture holds no halves.
 
     Parameters
     ----------
     radiance : SpectralRadiance
     name : str
-        Of the light group. Its spectrum stands for the factor on the file's own light: 1 in every band.
+        Name of the light group. Its spectrum is a factor on the file's own light, 1 in every band.
     """
     planes = np.ascontiguousarray(np.moveaxis(radiance.values, -1, 0), dtype=np.float32)[None]
     means = planes.mean(axis=(2, 3), dtype=np.float64)
@@ -204,7 +204,7 @@ def as_transport(radiance: SpectralRadiance, name: str = "scene") -> Transport:
 
 
 def _transport(planes: Planes, means: Floats, nm: Floats, width: Floats, name: str) -> Transport:
-    """Transport without noise of planes (1, band, h, w), whose means are known, as `as_transport` gives it."""
+    """Make a transport without noise from planes (1, band, h, w) whose means are known; see `as_transport`."""
     ends = np.clip([(nm - width).min(), (nm + width).max()], SHORTEST_NM, LONGEST_NM)
     whole = Spectrum(ends, np.ones(2))
     none = np.broadcast_to(np.float32(0), planes.shape)

@@ -1,4 +1,4 @@
-"""Planes of a large picture's light that lie in a file, of which each reader holds what it asks for."""
+"""Planes of a large picture's light that stay in a file, so that a reader loads only those it asks for."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -13,7 +13,7 @@ from rodcone.types import Planes
 
 
 class StoredPlanes:
-    """Planes (..., h, w) of a file in NumPy's format, which is opened at each look and closed after it.
+    """Planes (..., h, w) in a file of NumPy's format, which is opened and closed at each access.
 
     Parameters
     ----------
@@ -26,7 +26,7 @@ class StoredPlanes:
         self.shape, self.dtype = planes.shape, planes.dtype
 
     def __getitem__(self, index: Any) -> Planes:
-        """Return a copy of what an index chooses."""
+        """Return a copy of what an index selects."""
         return np.array(self._mapped()[index])
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
@@ -37,12 +37,12 @@ class StoredPlanes:
 
 
 def with_stored_light(transport: Transport, folder: Path) -> Transport:
-    """Return a transport whose light lies in a folder's files and is read plane by plane, of the same bits.
+    """Store a transport's light in files of a folder; return a transport of the same bits that reads it by plane.
 
     Raises
     ------
     OSError
-        Where the folder can't be written.
+        If the folder can't be written.
     """
     folder.mkdir(parents=True, exist_ok=True)
     stored = []

@@ -1,15 +1,15 @@
-"""Reflectances that surfaces have, from colours: the eight clusters of measured spectra of Otsu et al. (2018).
+"""Realistic reflectances from colours, by the eight clusters of measured spectra of Otsu et al. (2018).
 
 H. Otsu, M. Yamamoto, T. Hachisuka, "Reproducing spectral reflectances from tristimulus colours", Computer Graphics
 Forum 37(6), 2018; the data are colour-science's. A colour's chromaticity under D65 picks a cluster, whose mean m and
-three principal curves B give the reflectance with exactly that colour. Ours: it is that of the cluster's own mean
-luminance Y_m, scaled, so that shade changes no spectrum,
+three principal curves B give the reflectance with exactly that colour. Unlike the paper, the reflectance is computed at
+the cluster's mean luminance Y_m and then scaled, so that shade changes no spectrum,
 
     r(XYZ) = (Y / Y_m) r_0 + B M^-1 XYZ,   r_0 = m - B M^-1 XYZ_m,
 
-with M the colours of B: one matrix for each cluster. Where r leaves 0 to 1 the reflectance of sRGB's basis, which never
-does, takes the least share that brings it back: the colour stays what it is. From 730 nm on, where the data end, curves
-keep their last value.
+with M the colours of B: one matrix for each cluster. Where r leaves 0 to 1, it is mixed with the reflectance of sRGB's
+basis, which never does. The mixture has the same colour, and takes the least share of the basis that keeps it within 0
+to 1. From 730 nm on, where the data end, curves keep their last value.
 """
 
 from collections.abc import Iterator
@@ -26,11 +26,11 @@ from rodcone.optional import quietly_imported
 from rodcone.types import Floats, Singles
 
 Spectra = NDArray[np.float32]
-STRIP = 1 << 15  # pixels that are worked on together, to stay in a core's cache
+STRIP = 1 << 15  # pixels that are computed together; they fit into a core's cache
 
 
 def srgb_basis(wavelength_nm: Floats) -> Floats:
-    """Reflectances of red, green and blue of sRGB at wavelengths within 380-780 nm, shape (3, band).
+    """Return the reflectances of sRGB's red, green and blue at wavelengths within 380-780 nm, shape (3, band).
 
     The basis is that of I. Mallett and C. Yuksel, "Spectral primary decomposition for rendering with sRGB reflectance",
     EGSR 2019: three reflectances that add up to white.
@@ -40,19 +40,19 @@ def srgb_basis(wavelength_nm: Floats) -> Floats:
 
 
 def surface_reflectances(linear_srgb: Floats | Singles) -> tuple[NDArray[np.float32], Floats]:
-    """Reflectances of colours in the bands of `DEFAULT_WAVELENGTH_NM`, and how much of each is of sRGB's basis.
+    """Convert colours to reflectances in the bands of `DEFAULT_WAVELENGTH_NM`.
 
     Parameters
     ----------
     linear_srgb : (..., 3) float32 or float64
-        0 to 1, under D65.
+        Colours under D65, 0 to 1.
 
     Returns
     -------
     (..., band) float32
-        0 to 1.
+        Reflectances, 0 to 1.
     (...) float64
-        0 where the clusters hold the colour, up to 1.
+        Share of sRGB's basis in each reflectance: 0 if its cluster reaches the colour, at most 1.
     """
     colours = np.asarray(linear_srgb, dtype=np.float32).reshape(-1, 3)
     result = np.empty((DEFAULT_WAVELENGTH_NM.size, len(colours)), np.float32)  # band by band, as light transport is
@@ -68,15 +68,16 @@ def surface_reflectances(linear_srgb: Floats | Singles) -> tuple[NDArray[np.floa
 
 @dataclass(frozen=True)
 class Upsampled:
-    """Reflectances of colours that are made one band at a time, of the same bits as `surface_reflectances`.
+    """Reflectances of colours, computed one band at a time, with the same bits as by `surface_reflectances`.
 
     Attributes
     ----------
     colours : (colour, 3) float32
         Linear sRGB.
     cluster : (colour,) uint8
+        Number of each colour's cluster.
     share : (colour,) float32
-        What each reflectance holds of sRGB's basis.
+        Share of sRGB's basis in each reflectance.
     """
 
     colours: Spectra
@@ -85,7 +86,7 @@ class Upsampled:
 
     @classmethod
     def of(cls, colours: Spectra) -> "Upsampled":
-        """Find the clusters and shares of linear sRGB (colour, 3)."""
+        """Find the clusters and shares of colours in linear sRGB, (colour, 3)."""
         cluster, share = np.empty(len(colours), np.uint8), np.zeros(len(colours), np.float32)
         for first in range(0, len(colours), STRIP):
             strip = slice(first, first + STRIP)
@@ -95,11 +96,11 @@ class Upsampled:
         return cls(colours, cluster, share)
 
     def at(self, band: int, places: NDArray[np.intp]) -> Spectra:
-        """Reflectances of one band at some colours, (place,)."""
+        """Compute the reflectances of some colours in one band, (place,)."""
         return _of_band(band, self.colours[places], self.cluster[places], self.share[places])
 
     def plane(self, band: int) -> Spectra:
-        """Reflectances of one band, (colour,)."""
+        """Compute the reflectances of all colours in one band, (colour,)."""
         result = np.empty(len(self.colours), np.float32)
         for first in range(0, len(result), STRIP):
             strip = slice(first, first + STRIP)
@@ -108,7 +109,7 @@ class Upsampled:
 
 
 def _of_band(band: int, colours: Spectra, cluster: NDArray[np.uint8], share: Spectra) -> Spectra:
-    """Reflectances of one band, (colour,): in the order of `_mixed` and `_brought_back`, so of the same bits."""
+    """Compute reflectances in one band, (colour,), in the same order of operations as `_mixed` and `_brought_back`."""
     amounts = colours.T
     values = _mixed_at(_maps()[:, band][cluster].T, amounts)
     beyond = np.flatnonzero(share)
@@ -122,7 +123,7 @@ def _mixed_at(curves: Spectra, amounts: Spectra) -> Spectra:
 
 
 def _by_cluster(colours: Spectra) -> Iterator[tuple[int, NDArray[np.intp], Spectra, Spectra]]:
-    """Each cluster's number, the places of its colours, their spectra (band, place) and shares of sRGB's basis."""
+    """Yield for each cluster its number, its colours' indices, and their spectra (band, index) and basis shares."""
     number = cluster_of(colours @ SRGB_TO_XYZ.T.astype(np.float32))
     for cluster in np.flatnonzero(np.bincount(number)).tolist():
         within = np.flatnonzero(number == cluster)
@@ -138,12 +139,12 @@ def _by_cluster(colours: Spectra) -> Iterator[tuple[int, NDArray[np.intp], Spect
 
 
 def _mixed(curves: Spectra, amounts: Spectra) -> Spectra:
-    """Add curves (band, 3) by amounts (3, colour), shape (band, colour); BLAS takes three times as long for three."""
+    """Mix curves (band, 3) in amounts (3, colour), shape (band, colour); BLAS takes three times as long for three."""
     return np.asarray(curves[:, :1] * amounts[0] + curves[:, 1:2] * amounts[1] + curves[:, 2:] * amounts[2])
 
 
 def _brought_back(outside: Spectra, inside: Spectra) -> tuple[Spectra, Spectra]:
-    """Mix spectra that leave 0 to 1 with the least share of ones that don't, shapes (band, colour); also the share."""
+    """Mix spectra (band, colour) that leave 0 to 1 with the least share of spectra that don't; also return that."""
     limit = np.clip(outside, 0, 1)
     needed = np.divide(limit - outside, inside - outside, out=np.zeros_like(outside), where=limit != outside)
     taken = np.clip(needed.max(axis=0), 0, 1)
@@ -151,7 +152,7 @@ def _brought_back(outside: Spectra, inside: Spectra) -> tuple[Spectra, Spectra]:
 
 
 def cluster_of(xyz: NDArray[np.floating]) -> NDArray[np.intp]:
-    """Number of the cluster that holds each colour's chromaticity, shape (colour,); black goes with white."""
+    """Find the cluster of each colour's chromaticity, shape (colour,); black belongs to white's cluster."""
     x, y, z = xyz.T
     total = x + y + z
     lit = total > 0
@@ -167,10 +168,11 @@ def cluster_of(xyz: NDArray[np.floating]) -> NDArray[np.intp]:
 
 @cache
 def _selector() -> tuple[list[tuple[float, int]], NDArray[np.intp]]:
-    """Lines that part the clusters, (value, axis: x 0, y 1), and the cluster by which of them a colour is above.
+    """Return the lines that separate the clusters, (value, axis), and a table of clusters by the lines below a colour.
 
-    The data's tree has a row for each line: its value, its axis, and what lies at or below it and above it: a cluster,
-    or less than 0 the row of the next line.
+    Axis 0 is x and axis 1 is y. Bit i of a table's index says whether a colour lies above line i. The data are a tree
+    with a row per line: value, axis, and what follows for colours at or below it and above it. What follows is a
+    cluster, or, if negative, the next line's row.
     """
     tree = quietly_imported("colour.recovery").SELECTOR_ARRAY_OTSU2018
     cluster = np.empty(1 << len(tree), dtype=np.intp)
@@ -184,13 +186,13 @@ def _selector() -> tuple[list[tuple[float, int]], NDArray[np.intp]]:
 
 @cache
 def _basis() -> Spectra:
-    """`srgb_basis` in the bands of `DEFAULT_WAVELENGTH_NM`, shape (band, 3)."""
+    """Return `srgb_basis` in the bands of `DEFAULT_WAVELENGTH_NM`, shape (band, 3)."""
     return srgb_basis(DEFAULT_WAVELENGTH_NM).T.astype(np.float32)
 
 
 @cache
 def _maps() -> NDArray[np.float32]:
-    """From linear sRGB to reflectance by cluster, shape (cluster, band, 3)."""
+    """Compute each cluster's matrix from linear sRGB to reflectance, shape (cluster, band, 3)."""
     recovery = quietly_imported("colour.recovery")
     nm = DEFAULT_WAVELENGTH_NM
     width = band_widths(nm)
