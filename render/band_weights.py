@@ -88,7 +88,7 @@ class BandPoints:
 
 
 def of_few_lines(energy: Floats) -> bool:
-    """Whether bands beside dark ones hold more than a hundredth of a lamp's light, as those of a lamp of few lines do.
+    """Return whether a lamp consists of few lines: over a hundredth of its light lies in bands beside dark ones.
 
     The transport in such dark bands says how surfaces reflect at the line.
 
@@ -142,7 +142,7 @@ def band_weights(
     light: LampSpectrum | None = None,
     most_noise: float = MOST_NOISE,
 ) -> Floats:
-    """Weights by which band means of light give the integral of each curve over it, shape (curve, band).
+    """Return the weights that turn band means of light into the integral of each curve over it, shape (curve, band).
 
     Parameters
     ----------
@@ -153,12 +153,13 @@ def band_weights(
     light : Spectrum, optional
         The lamp, up to a factor; None where it isn't known: the light itself is then taken as smooth.
     most_noise : float
-        Of the weights, times that of products of averages, where bands have independent relative errors of one size.
+        Largest noise of the weights, over the noise of plain products of averages. Each band is taken to have an
+        independent relative error of the same size.
 
     Returns
     -------
     (curve, band) float64
-        0 or more where the curves are. Bands without any of the lamp's light count as if they were evenly lit.
+        At least 0 for a curve that is at least 0. Bands that the lamp leaves dark count as if they were evenly lit.
     """
     points = points_of(knots_nm, wavelength_nm, width_nm, light)
     values = curves(points.nm)
@@ -182,10 +183,10 @@ def transport_weights(
     light: LampSpectrum,
     most_noise: float = MOST_NOISE,
 ) -> tuple[Floats, Floats]:
-    """Weights by which band means of transport give the integral of each curve over a lamp's light on it.
+    """Return the weights that turn band means of transport into the integral of each curve over a lamp's light on it.
 
-    Parameters are as of `band_weights`. Of a lamp of few lines dark bands count too, for what surfaces do beside a line
-    tells what they do at it; some weights may be negative then.
+    Parameters are those of `band_weights`. For a lamp of few lines dark bands count too, because what surfaces do
+    beside a line tells what they do at it. Some weights may then be negative.
 
     Returns
     -------
@@ -247,7 +248,7 @@ def transport_of_light(
 
 @dataclass(frozen=True)
 class Interpolation:
-    """T at points by its means in bands.
+    """Interpolation of T at points from its means in bands.
 
     Attributes
     ----------
@@ -266,9 +267,9 @@ class Interpolation:
     among: Floats
 
     def weights(self, values: Floats, most_noise: float) -> Floats:
-        """Weights of T's band means in the integral of curves over the light, shape (curve, known).
+        """Return the weights of T's band means in the integral of curves over the light, shape (curve, known).
 
-        They have the least expected error among those that aren't negative and within the noise allowed.
+        Of all weights that are at least 0 and whose noise is allowed, these have the least expected error.
 
         Parameters
         ----------
@@ -290,7 +291,7 @@ class Interpolation:
         return result
 
     def signed_weights(self, values: Floats, most_noise: float) -> Floats:
-        """Weights as `weights`, some of which may be negative."""
+        """Return weights as `weights` does, except that some may be negative."""
         result = self._of_ridge(values, 0.0)
         for row, one, average in zip(result, values, self._averages(values), strict=True):
             row[:] = _within_noise(row, partial(self._of_ridge, one[None]), most_noise * _noise(average))
@@ -313,11 +314,11 @@ class Interpolation:
         return np.asarray(result + (missing / np.einsum("br,br->r", each, even)) @ even.T)
 
     def _averages(self, values: Floats) -> Floats:
-        """Weights that are products of averages, shape (curve, band)."""
+        """Return the plain weights, each the product of a curve's and the light's average, shape (curve, band)."""
         return _sums(values * self.points.step_nm, self.points, self.points.mean.size) * self.points.mean
 
     def expected_error(self, values: Floats, weights: Floats) -> Floats:
-        """Standard deviation of the integral's error by such weights, for T of variance 1, shape (curve,)."""
+        """Return the standard deviation of the integral's error by given weights, for T of variance 1: (curve,)."""
         of_light = self._of_light(values)
         nm = self.points.nm
         own = np.einsum("cx,xy,cy->c", of_light, _matern(nm[:, None] - nm), of_light, optimize=True)
@@ -332,7 +333,7 @@ class Interpolation:
 def interpolating(
     points: BandPoints, wavelength_nm: Floats, width_nm: Floats, known: NDArray[np.intp]
 ) -> Interpolation:
-    """Interpolation of T from its means in the bands of indices `known`."""
+    """Prepare the interpolation of T from its means in the bands of indices `known`."""
     within = _nodes(wavelength_nm[known], width_nm[known])
     run = points.run[known]
     towards = _means(_matern(points.nm[:, None] - within)) * (points.run[points.band][:, None] == run)
@@ -341,7 +342,7 @@ def interpolating(
 
 
 def band_covariance(wavelength_nm: Floats, width_nm: Floats) -> Floats:
-    """Covariance of the band means of T, of variance 1, shape (band, band)."""
+    """Compute the covariance of the band means of a T of variance 1, shape (band, band)."""
     within = _nodes(wavelength_nm, width_nm)
     return _means(_means(_matern(within[:, None] - within)).T)
 
@@ -357,7 +358,10 @@ def _means(covariance: Floats) -> Floats:
 
 
 def _least(root: Floats, target: Floats, ridge: float) -> Floats:
-    """Weights of 0 or more nearest to `target` in expected error, plus `ridge` times their squares, of its sum."""
+    """Find the weights, at least 0 and of the sum of `target`, that are nearest to it in expected error.
+
+    `ridge` times the sum of their squares is added to that error.
+    """
     most = np.abs(target).max()
     rows = np.vstack([root, ridge**0.5 * np.eye(target.size)]) if ridge else root
     sought = np.concatenate([root @ target, np.zeros(len(rows) - len(root))]) / most
@@ -377,12 +381,12 @@ def _within_noise(best: Floats, of_ridge: Callable[[float], Floats], most: float
 
 
 def _noise(weights: Floats) -> float:
-    """Relative error of a sum of bands whose errors are independent and 1 each."""
+    """Compute the relative error of a weighted sum of bands, each with an independent relative error of 1."""
     return float(np.linalg.norm(weights) / abs(weights.sum())) if weights.any() else 0.0
 
 
 def _runs(wavelength_nm: Floats, width_nm: Floats) -> NDArray[np.intp]:
-    """Number of the run that each band lies in: neighbours that touch and are about as wide."""
+    """Number the runs of bands: neighbours that touch and are about equally wide belong to one run."""
     gaps = np.abs(np.diff(wavelength_nm) - (width_nm[1:] + width_nm[:-1]) / 2)
     wider = np.maximum(width_nm[1:], width_nm[:-1]) / np.minimum(width_nm[1:], width_nm[:-1])
     return np.concatenate([[0], np.cumsum((gaps > _TOUCH * width_nm[1:]) | (wider > _AS_WIDE))]).astype(np.intp)

@@ -28,7 +28,7 @@ from rodcone.digests import digest_file, digest_inputs
 from rodcone.files import replacing
 from rodcone.jit import compiler_version
 
-ENGINE_VERSION = 11  # raise it where a value or an array's name changes: older entries are then not used
+ENGINE_VERSION = 11  # raise it when a value or an array's name changes, so that older entries are no longer used
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _ARRAYS = ("variance", "counts")
 _MEANS = tuple(field.name for field in fields(SceneMeans))
@@ -37,10 +37,10 @@ _NOT_IN_NAMES = re.compile(r"[^\w.-]+")  # above all path separators: entries st
 
 
 def read_transport(folder: Path, scene: Scene, film: Film, seed: int, *, denoised: bool = False) -> Transport | None:
-    """Stored transport, or None where there is no intact file: it begins with its SHA-256 digest.
+    """Read a stored transport; return None where there is no intact file.
 
-    Renders with `denoised` light are files of their own.
-    The digest tells damage by accident. Whoever writes to the folder on purpose is believed.
+    Renders with `denoised` light have files of their own. A file begins with its SHA-256 digest, which reveals
+    accidental damage. It is no protection against someone who writes to the folder on purpose.
     """
     arrays = read_arrays(_path(folder, scene, film, seed, _kind(denoised)))
     if arrays is None:
@@ -85,10 +85,10 @@ def save_transport(folder: Path, scene: Scene, film: Film, seed: int, transport:
 
 @contextmanager
 def kept_beside(out: Path) -> Iterator[Path]:
-    """Give a folder for the render of a file that is written later: where that fails, the render isn't lost.
+    """Give a folder that keeps a render until the file made from it is written, so that a failure doesn't lose it.
 
-    The folder lies beside the file, and goes once the file is there. What fails says that the same command goes on from
-    it; a refusal of the render itself leaves no folder.
+    The folder lies beside the file and is removed once the file is there. An error says that the same command goes on
+    from the kept render. If the render itself is refused, there is no folder.
     """
     folder = _folder_beside(out)
     try:
@@ -100,7 +100,7 @@ def kept_beside(out: Path) -> Iterator[Path]:
 
 
 def note_kept(error: BaseException, out: Path) -> None:
-    """Note on an error where the render of a file is kept, if it is (`kept_beside`)."""
+    """Add a note to an error that says where a file's render is kept, if it is (`kept_beside`)."""
     if out.name and (folder := _folder_beside(out)).is_dir():
         error.add_note(f"the render is kept in {folder}, from which the same command goes on")
 
@@ -123,7 +123,7 @@ def _halves(arrays: Mapping[str, Any], name: str) -> Halves:
 
 
 def load_irradiance(folder: Path, scene: Scene, film: Film, seed: int) -> Irradiance | None:
-    """Stored irradiance of the reference plane, or None where there is no intact file."""
+    """Read the stored irradiance of the reference plane; return None where there is no intact file."""
     arrays = read_arrays(_path(folder, scene, film, seed, "meter"))
     return None if arrays is None else Irradiance(**arrays)
 
@@ -134,7 +134,7 @@ def save_irradiance(folder: Path, scene: Scene, film: Film, seed: int, irradianc
 
 
 def read_arrays(path: Path) -> dict[str, Any] | None:
-    """Arrays of a file, None where it is missing or isn't what was written."""
+    """Read the arrays of a file; return None if it is missing or damaged."""
     try:
         with path.open("rb") as file:
             stated = file.read(_DIGEST_BYTES)
@@ -167,12 +167,12 @@ def _path(folder: Path, scene: Scene, film: Film, seed: int, kind: str = "render
 
 
 def scene_terms(scene: Scene, film: Film) -> list[Any]:
-    """What decides a scene's light transport on a film: neither lamps' spectra and powers nor the engine."""
+    """List all that decides a scene's light transport on a film; lamps' spectra and powers and the engine don't."""
     groups = [[name, group.emitters, group.coloured] for name, group in scene.groups.items()]
     return [scene.name, scene.geometry, scene.reference_plane, file_digests(scene.geometry), groups, film]
 
 
 def file_digests(geometry: Node) -> list[str]:
-    """Content of the files (meshes, bitmaps) that a scene's dict names, in its order."""
+    """Digest the content of the files (meshes, bitmaps) that a scene's dict names, in its order."""
     files = [str(part["filename"]) for _, part in walk(geometry) if "filename" in part]
     return [digest_file(file) for file in files if Path(file).is_file()]

@@ -1,4 +1,4 @@
-"""Pairs of features that Mitsuba 3.9 renders rightly each by itself, and wrongly together: refused before a render.
+"""Pairs of features that Mitsuba 3.9 renders correctly one by one but wrongly together; they are refused.
 
 Each row of the table in docs/render.md was tried against stock Mitsuba and against a copy of the shape without the
 second feature (`tests/render/test_combinations.py`): an instance's picture has to be that of a copy in its place.
@@ -42,7 +42,7 @@ def check_combinations(scene: Scene) -> None:
 
 
 def _wrong_pairs(geometry: Node) -> Iterator[tuple[str, str, str]]:
-    """Give for each wrong pair the shape and its features, what Mitsuba does wrong, and what may stand in its place."""
+    """Yield for each wrong pair: the shape and its features, what Mitsuba does wrong, and what to use instead."""
     parts = _parts_by_name(geometry)
     yield from _lamps_in_groups(parts)
     for instance in _instances(geometry, parts):
@@ -133,7 +133,7 @@ def _instances(geometry: Node, parts: Mapping[str, Node]) -> Iterator[_Instance]
 
 
 def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
-    """Give a node and all parts under it, and those that they refer to, each once."""
+    """Yield a node, all parts under it, and the parts that they refer to, each once."""
     pending = [node]
     met = set()
     while pending:
@@ -147,7 +147,7 @@ def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
 
 
 def _matrix(transform: Any) -> Floats:
-    """Return the upper 3x4 of a `to_world` in any of its forms, and that of the identity where there is none."""
+    """Return the upper 3x4 of a `to_world` in any of its forms; of the identity if there is none."""
     if transform is None:
         return np.eye(4)[:3]
     return np.array(getattr(transform, "matrix", transform), np.float64).reshape(4, 4)[:3]
@@ -158,7 +158,7 @@ def _mirrors(transform: Floats) -> bool:
 
 
 def _has_normals(shape: Node, kinds: tuple[str, ...]) -> bool:
-    """Whether a shape is one of `kinds`, or a mesh whose file states normals of its vertices and keeps them."""
+    """Return whether a shape is one of `kinds`, or a mesh whose file states vertex normals that the scene uses."""
     if shape["type"] not in _MESHES or "filename" not in shape:
         return shape["type"] in kinds
     if shape.get("face_normals"):
@@ -170,6 +170,6 @@ def _has_normals(shape: Node, kinds: tuple[str, ...]) -> bool:
 
 
 def _is_uneven(axes: Floats) -> bool:
-    """Whether a transform stretches its axes differently, or shears them: no multiple of a rotation."""
+    """Return whether a transform stretches its axes differently or shears them (is no multiple of a rotation)."""
     gram = axes.T @ axes
     return not np.allclose(gram, gram[0, 0] * np.eye(len(gram)), rtol=0, atol=_SLACK * max(1e-30, gram[0, 0]))

@@ -1,4 +1,4 @@
-"""Light groups together: their emission in bands, and the sum of what each gives."""
+"""The sum over light groups: their emission in bands, and the light that they give together."""
 
 from collections.abc import Mapping
 
@@ -10,7 +10,7 @@ from rodcone.types import Floats, Planes
 
 
 def emission(lights: Mapping[str, LightGroup], wavelength_nm: Floats, width_nm: Floats) -> Floats:
-    """Spectral emission of each group, band averages, shape (group, band)."""
+    """Average the spectral emission of each group over the bands, shape (group, band)."""
     return np.array([x.spectrum.band_average(wavelength_nm, width_nm) * x.power for x in lights.values()])
 
 
@@ -20,8 +20,8 @@ def combine(maps: Floats, planes: Planes) -> Planes:
     Parameters
     ----------
     maps : (group, band, band) float64
-        Factors from each group's bands (last axis) to those of the sum, which may be a few of them; where they are 0
-        nothing is read.
+        Factors from each group's bands (last axis) to the bands of the sum, of which there may be fewer. Planes whose
+        factors are 0 aren't read.
     planes : (group, band, h, w) float32
     """
     groups, read_bands, height, width = planes.shape

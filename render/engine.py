@@ -1,4 +1,4 @@
-"""Rendering a scene's transport: two halves, their difference as the error, and the rule that stops it."""
+"""The render of a scene's transport: two halves of the samples, their difference as the error, and when to stop."""
 
 import signal
 import threading
@@ -33,8 +33,8 @@ from rodcone.jit import compiling, release_memory
 from rodcone.progress import Step, progress_bar, render_words
 from rodcone.types import Progress
 
-KEEP_EVERY_S = 60.0  # at least, from one look at a long render to the next whose result goes to the cache
-KEEP_SHARE = 0.1  # of the time, which keeping takes at most
+KEEP_EVERY_S = 60.0  # least time between two copies of a long render to the cache
+KEEP_SHARE = 0.1  # largest share of the time that these copies take
 
 
 @own_mitsuba_variant()
@@ -57,8 +57,8 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
 ) -> Transport:
     """Render each light group of a scene at unit spectral emission.
 
-    Stops at whichever comes first of `spp` (or `max_spp`), `noise` and `max_seconds`; with none of them after 64
-    samples a pixel. Ctrl-C ends it after the run under way and keeps it; a second one gives up.
+    The render stops at whichever limit is reached first: `spp` (or `max_spp`), `noise` or `max_seconds`; without any of
+    them, after 64 samples per pixel. Ctrl-C ends it after the current run and keeps the result; a second one aborts it.
 
     Parameters
     ----------
@@ -69,33 +69,34 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         Band centres and widths; 20 bands of 20 nm over 380-780 nm by default. `render.spectrum.line_bands` gives
         emission lines bands of their own.
     spp : int, optional
-        Samples a pixel in the mean over the picture, in two independent halves; rounded up by an eighth at most.
-        `Transport.counts` holds the samples of each pixel. Where more than 64 are asked for, a pilot of 32, which isn't
-        counted, finds the pixels that need more; all get at least a quarter of the mean.
+        Samples per pixel in the mean over the picture, in two independent halves; rounded up by an eighth at most.
+        `Transport.counts` holds the samples of each pixel. If `spp` exceeds 64, a pilot of 32 samples, which aren't
+        counted, first finds the pixels that need more. Every pixel gets at least a quarter of the mean.
     max_spp : int, optional
-        The same as a ceiling beside `noise` or `max_seconds`.
+        The same, as a ceiling that may stand beside `noise` or `max_seconds`.
     noise : float, optional
-        Relative Monte Carlo error (median over pixels and bands, variance pooled over 3x3 pixels, scene's own lights)
-        to reach, looked at from 16 samples on at powers of two and half-way between.
+        Relative Monte Carlo error to reach: median over pixels and bands, with variance pooled over 3x3 pixels, under
+        the scene's own lights. It is checked from 16 samples on, at powers of two and half-way between them.
     max_seconds : float, optional
-        Time to keep, earlier calls' included; at least one run is made.
+        Time limit, which includes earlier calls' time; at least one run is made.
     max_depth : int, optional
         Longest path in segments; 1 is emission alone, 2 direct light. By default the scene's own.
     seed : int
         The same seed gives the same bits on one machine, variant and LLVM, whatever the number of threads.
     cache : path, optional
         Folder of renders. A stored one that is fine enough is returned, a coarser one continued, a damaged one ignored.
-        A render of minutes is stored also on its way, unless it is denoised: killed, it is continued from there.
+        Unless it is denoised, a long render is also stored every minute or so: after a kill it continues from there.
     resume : Transport, optional
-        An earlier result of the same scene, size, bands, depth and seed to go on from: to the bits of one go. One of 64
-        samples or fewer is made anew where more are asked for, since it had no pilot.
+        An earlier result of the same scene, size, bands, depth and seed, to be continued. The result has the same bits
+        as one uninterrupted render. A result of 64 samples or fewer had no pilot, so that it starts over if more are
+        asked for.
     progress : callable, optional
-        Called after each launch, of which a run of a large picture has many, with the share done and the error so far
-        (infinite before the first look); where it raises `KeyboardInterrupt`, that ends the render as Ctrl-C does. Left
-        out, a notebook shows a bar.
+        Called after each launch with the share done and the error so far, which is infinite before it is first known;
+        a run of a large picture has many launches. If it raises `KeyboardInterrupt`, the render ends as by Ctrl-C. If
+        it is left out, a notebook shows a progress bar.
     denoise : bool
-        Give denoised light beside the unbiased, and two folds of a quarter of the samples each that its error is
-        measured by (`render.denoised.relight`). Their time counts; Ctrl-C ends the render, and they are still drawn.
+        Also give denoised light, and two folds, each of a quarter of the samples, by which its error is measured
+        (`render.denoised.relight`). `max_seconds` includes their time. After Ctrl-C they are still drawn.
 
     Returns
     -------
@@ -113,9 +114,9 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     Warns
     -----
     UserWarning
-        Where data of a coloured light end within the bands: outside it is dark.
+        If the data of a coloured light end within the bands: beyond them the light is dark.
     """
-    # What is asked for
+    # Check the arguments.
     sides = film_size(scene.size, size) if isinstance(size, int) and size > 0 else size
     film = _checked_film(scene, sides, wavelength_nm, width_nm, scene.max_depth if max_depth is None else max_depth)
     warn_of_coloured_lights(scene, film.wavelength_nm, film.width_nm)
@@ -127,7 +128,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
     meter: Callable[[], Irradiance] | None = None
     if scene.reference_plane:
         meter = Meter(scene, film, seed, None if cache is None else Path(cache))
-    # What there is already
+    # Look for an earlier result.
     earlier = _checked_earlier(resume, scene, film, denoise)
     keep: Callable[[Transport], None] | None = None
     if cache is not None:
@@ -136,7 +137,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         earlier = max((x for x in (earlier, stored) if x), key=lambda x: x.spp, default=None)
         del stored
     if earlier is not None:
-        meter = earlier.meter or meter  # it may have measured already
+        meter = earlier.meter or meter  # the earlier result's meter may have measured already
         if limits.met_by(earlier):
             return replace(earlier, meter=meter)
         earlier = _to_go_on_with(earlier, copied=earlier is resume)
@@ -145,7 +146,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
         step(render_words(np.inf), 0.0)
 
         def show(share: float, error: float) -> None:
-            compiled_s()  # read after each run, what Dr.Jit notes stays short
+            compiled_s()  # read after each launch, so that the list of compilations that Dr.Jit keeps stays short
             (progress or (lambda share, error: step(render_words(error, share), share)))(share, error)
 
         try:
@@ -159,7 +160,7 @@ def render(  # noqa: PLR0913  its calls in README and tutorials go on
             clear_traceback(error)
             raise MemoryError(one_line(error)) from None
         transport = replace(transport, compile_s=compiled_s())
-    release_memory()  # before it is kept and looked at: what Dr.Jit keeps for its next launch is as much as the light
+    release_memory()  # Dr.Jit's reserve for its next launch is as large as the light, of which copies are made next
     if keep is not None:
         keep(transport)
     return replace(transport, meter=meter)
@@ -194,7 +195,7 @@ def _checked_film(
 
 
 def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denoise: bool) -> Transport | None:
-    """Return the result to continue; refuse another scene's."""
+    """Return the result to continue, or raise `InputError` if it is of another scene, size or bands."""
     if earlier is None:
         return None
     shape = (len(scene.groups), film.wavelength_nm.size, *film.size)
@@ -212,7 +213,10 @@ def _checked_earlier(earlier: Transport | None, scene: Scene, film: Film, denois
 
 
 def _to_go_on_with(earlier: Transport, *, copied: bool) -> Transport:
-    """Return an earlier result whose means a render goes on in, in arrays of its own, and without their variance."""
+    """Return an earlier result, without its variance, whose arrays the render may overwrite.
+
+    With `copied` they are copies, because the caller keeps the result.
+    """
     if copied:
         denoised = earlier.denoised
         earlier = replace(
@@ -234,7 +238,7 @@ def _render(
     denoise: bool,
     keep: Callable[[Transport], None] | None = None,
 ) -> Transport:
-    """Draw from an earlier result's means on until a limit is reached; what there is by then is kept now and then."""
+    """Draw runs, continuing an earlier result's means, until a limit is reached; call `keep` from time to time."""
     start = time.perf_counter() - (earlier.seconds if earlier else 0.0)
     own_share = 1 / (1 + 2 * FOLD_SHARE) if denoise else 1.0
     denoised: Denoised | None = None
@@ -242,16 +246,16 @@ def _render(
     loaded = load_groups(scene, film)
     lights = emission(scene.groups, film.wavelength_nm, film.width_nm)
     stopped_by: Stop | None = None
-    # Go on from the earlier means, or begin
+    # Continue the earlier means, or begin.
     had_pilot = earlier and (earlier.spp > PILOT_FROM or earlier.counts.min() < earlier.counts.max())
     if earlier and (had_pilot or not piloted):
         means = means_of(earlier, split=denoise)
-    else:  # one that had no pilot is drawn anew
+    else:  # there is no earlier result, or it had no pilot and this render needs one
         rates = pilot_rates(loaded, film, lights, limits.seed) if piloted else np.ones(film.size, np.uint32)
         means = no_means(scene, film, rates, split=denoise)
         earlier = None
     limits = replace(limits, mean_rate=float(means.rates.mean()))
-    # Draw runs until a limit is reached
+    # Draw runs until a limit is reached.
     error = np.inf
     look = limits.next_look(means.count)
     asked_to_end = threading.Event()
@@ -265,7 +269,7 @@ def _render(
             asked_to_end.set()
 
     def so_far(stopped_by: Stop) -> Transport:
-        release_memory()  # what Dr.Jit keeps for its next launch
+        release_memory()  # Dr.Jit's reserve for its next launch
         return Transport(
             **fields_of(lights, means),
             scene_means=scene_means_of(means),
@@ -292,7 +296,7 @@ def _render(
             show(means.count)
             if asked_to_end.is_set():
                 stopped_by = "interrupt"
-            # The error is told after every run, and stops the render at a look alone.
+            # The error is reported after every run, but only at a look may it stop the render.
             looked_at = error if means.count >= look else np.inf
             stopped_by = stopped_by or limits.stop(means.count, looked_at, now - start, now - run_start)
             look = limits.next_look(means.count) if means.count >= look else look
@@ -309,7 +313,7 @@ def _render(
 
 @contextmanager
 def _interrupt_noted() -> Iterator[Callable[[], bool]]:
-    """Note the first Ctrl-C; a second one raises KeyboardInterrupt. Only the main thread gets them."""
+    """Note the first Ctrl-C; a second one raises KeyboardInterrupt. Only the main thread receives signals."""
     noted = threading.Event()
     if threading.current_thread() is not threading.main_thread():
         yield noted.is_set

@@ -1,4 +1,4 @@
-"""How far a render's Monte Carlo noise may put it off, from pixels spread evenly over the picture."""
+"""Estimates of a render's Monte Carlo error, from the difference between its two halves."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -11,12 +11,12 @@ from rodcone.display import brief
 from rodcone.types import Floats, Planes
 
 SAMPLE_PIXELS = 1024  # with 40 bands the median of the error is then known to about 1 %
-LEAST_UNCOVERED = 1e-6  # of a pixel: less is rounding
+LEAST_UNCOVERED = 1e-6  # least share of a pixel that no light covers; less is rounding
 
 
 @dataclass(frozen=True)
 class Halves:
-    """What two halves of the samples give, whose paths are independent of each other.
+    """Mean and half difference of two halves of the samples, whose paths are independent of each other.
 
     Attributes
     ----------
@@ -32,15 +32,15 @@ class Halves:
 
     @classmethod
     def zeros(cls, *shape: int) -> "Halves":
-        """Halves before the first sample."""
+        """Return halves of zeros, as they are before the first sample."""
         return cls(np.zeros(shape, np.float32), np.zeros(shape, np.float32))
 
     def copy(self) -> "Halves":
-        """Halves that can be added to."""
+        """Copy both arrays, so that more samples can be added."""
         return Halves(self.mean.copy(), self.difference.copy())
 
     def __getitem__(self, index: int) -> "Halves":
-        """View of one along the first axis."""
+        """Return a view of one entry of the first axis."""
         return Halves(self.mean[index], self.difference[index])
 
     def add(self, even: Planes, odd: Planes, weight: np.float32, at: slice | NDArray[np.intp]) -> None:
@@ -51,7 +51,7 @@ class Halves:
         even, odd : (..., pixel) float32
         weight : float32
         at : slice or (pixel,) int
-            The pixels, counted row by row. One that stands there twice has the same light twice.
+            The pixels, counted row by row. A pixel that occurs twice must have the same light both times.
         """
         for planes, combined in ((self.mean, np.add), (self.difference, np.subtract)):
             step = combined(even, odd)
@@ -71,9 +71,9 @@ class SharedPaths:
     Attributes
     ----------
     groups : (int, int)
-        Which, by their order.
+        Indices of the two groups.
     correlation : (band, h, w) float32
-        Of their errors, -1 to 1.
+        Correlation of their errors, -1 to 1.
     """
 
     groups: tuple[int, int]
@@ -82,7 +82,7 @@ class SharedPaths:
     __repr__ = brief
 
     def term(self, emitted: Floats, variance: Planes) -> Planes:
-        """Twice the covariance of the two groups' light: what it adds to the variance of the sum, (band, h, w).
+        """Compute twice the covariance of the two groups' light, a term of their sum's variance: (band, h, w).
 
         Parameters
         ----------
@@ -95,8 +95,8 @@ class SharedPaths:
 
 
 def pooled(planes: Planes) -> Planes:
-    """Means over 3x3 pixels, of the last two axes; at the picture's edge the nearest pixels count again."""
-    # Sums of nine: a running sum would leave a rounding of its brightest pixel behind.
+    """Average over 3x3 pixels along the last two axes; at the picture's edge the outermost pixels are repeated."""
+    # Nine values are summed each time, because a running sum would carry on the rounding error of a bright pixel.
     wide = np.pad(planes, [(0, 0)] * (planes.ndim - 2) + [(1, 1), (1, 1)], mode="edge")
     rows = wide[..., :-2, :] + wide[..., 1:-1, :] + wide[..., 2:, :]
     return np.asarray((rows[..., :-2] + rows[..., 1:-1] + rows[..., 2:]) / planes.dtype.type(9))
@@ -104,16 +104,16 @@ def pooled(planes: Planes) -> Planes:
 
 @dataclass(frozen=True)
 class GroupError:
-    """One draw of a light group's error, in two parts that are independent of each other.
+    """A light group's error as half the difference of the halves shows it, in two independent parts.
 
     Attributes
     ----------
     scattered : (band, h, w) float32
-        Noise of scattered light, of one sample.
+        Error of scattered light, scaled to a pixel of rate 1.
     rim : (band, h, w) float32
-        What comes of a lamp that is seen in more or fewer samples of the pixel than it should be.
+        Error at the rim of a visible lamp, which too many or too few of a pixel's samples meet.
     scale : (band, h, w) float32
-        Root of scattered light over its mean in 3x3 pixels.
+        Square root of the ratio of scattered light to its mean over 3x3 pixels.
     """
 
     scattered: Planes
@@ -121,12 +121,12 @@ class GroupError:
     scale: Planes
 
     def covariance(self, other: "GroupError", rates: NDArray[np.uint32]) -> Planes:
-        """Covariance with another group's error, or the variance with itself: (band, h, w).
+        """Estimate the covariance with another group's error, or with itself the variance: (band, h, w).
 
-        Noise of scattered light is pooled over 3x3 pixels in ratio to the light: across an edge of light variance over
-        mean differs far less than variance. A lamp's rim counts in its own pixel alone, since a lamp is thousands of
-        times brighter than the dark beside it. One difference has one degree of freedom; bands share their paths, and
-        add none.
+        The variance of scattered light is pooled over 3x3 pixels relative to the light, because across an edge variance
+        over mean changes far less than variance. A lamp's rim is not pooled, since a lamp is thousands of times
+        brighter than the dark beside it. One pixel's difference has one degree of freedom; its bands share their paths
+        and add none.
         """
         scattered = pooled(self.scattered * other.scattered) * self.scale * other.scale
         return np.asarray(scattered / rates.astype(np.float32) + self.rim * other.rim)
@@ -135,14 +135,14 @@ class GroupError:
 def group_errors(
     light: Halves, seen: Sequence[Halves], coverage: Planes, rates: NDArray[np.uint32]
 ) -> list[GroupError]:
-    """Error of each group of light (group, band, h, w), from half the difference of the halves.
+    """Separate the error of each group's light (group, band, h, w) into scattered light and rims of lamps.
 
     Parameters
     ----------
     coverage : (h, w) float32
-        Share of the samples in which a lamp is seen: what more of the lamp is seen, less is seen of what lies behind.
+        Share of the samples that meet a lamp first. Where more of them do, fewer meet what lies behind the lamp.
     rates : (h, w) uint32
-        In the ratio of the pixels' samples.
+        Number of samples of each pixel, up to a common factor.
     """
     root_rates = np.sqrt(rates.astype(np.float32))
     uncovered = np.where(coverage < 1 - LEAST_UNCOVERED, 1 - coverage, 0)
@@ -161,7 +161,7 @@ def group_errors(
 def shared_paths(
     groups: tuple[int, int], errors: Sequence[GroupError], variance: Planes, rates: NDArray[np.uint32]
 ) -> SharedPaths:
-    """Correlation of the errors of two groups, whose variance is known."""
+    """Compute the correlation of two groups' errors from their covariance and known variances."""
     first, second = groups
     deviations = np.sqrt(variance[first]) * np.sqrt(variance[second])
     products = errors[first].covariance(errors[second], rates)
@@ -170,7 +170,7 @@ def shared_paths(
 
 
 def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: SharedPaths | None = None) -> float:
-    """Median over pixels and bands of standard error over mean; dark values out.
+    """Compute the median over pixels and bands of standard error over mean; dark values don't count.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def relative_error(emitted: Floats, radiance: Planes, variance: Planes, shared: 
 
 
 def median_error(emitted: Floats, radiance: Planes, variance: Planes, shared: SharedPaths | None) -> float:
-    """`relative_error` of pixels that were chosen already (`spread_pixels`)."""
+    """Compute `relative_error` from pixels that `spread_pixels` has already chosen."""
     total = (emitted[:, :, None, None] ** 2 * variance).sum(axis=0)
     if shared:
         total += shared.term(emitted, variance)
@@ -195,7 +195,7 @@ def median_error(emitted: Floats, radiance: Planes, variance: Planes, shared: Sh
 
 
 def spread_pixels(shape: tuple[int, ...]) -> tuple[Any, ...]:
-    """Index (..., row, column) of at most about `SAMPLE_PIXELS` pixels, evenly spread over a picture."""
+    """Return an index (..., row, column) of about `SAMPLE_PIXELS` pixels at most, spread evenly over a picture."""
     step = max(1, round(np.sqrt(shape[0] * shape[1] / SAMPLE_PIXELS)))
     rows, columns = (np.arange(min(step // 2, length - 1), length, step) for length in shape)
     return ..., rows[:, None], columns

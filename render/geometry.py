@@ -1,4 +1,4 @@
-"""Placing things and the camera: 4x4 transforms as NumPy arrays, and as the plain value that a scene's dict holds."""
+"""4x4 transforms that place things and the camera: NumPy arrays, and the plain values that a scene's dict holds."""
 
 from collections.abc import Mapping, Sequence
 from math import radians, tan
@@ -14,19 +14,19 @@ Point: TypeAlias = tuple[float, float, float]  # [m]
 
 
 def translate(x: float, y: float, z: float) -> Floats:
-    """Shift by (x, y, z) [m]."""
+    """Return the matrix that shifts by (x, y, z) [m]."""
     matrix = np.eye(4)
     matrix[:3, 3] = x, y, z
     return matrix
 
 
 def scale(x: float, y: float, z: float) -> Floats:
-    """Stretch along each axis."""
+    """Return the matrix that stretches along each axis."""
     return np.diag([x, y, z, 1.0])
 
 
 def rotate(axis: Sequence[float], degrees: float) -> Floats:
-    """Turn about an axis through the origin, right-handed (Rodrigues)."""
+    """Return the matrix that turns about an axis through the origin, right-handed (Rodrigues)."""
     x, y, z = np.asarray(axis, dtype=np.float64) / np.linalg.norm(axis)
     cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     angle = np.radians(degrees)
@@ -36,12 +36,12 @@ def rotate(axis: Sequence[float], degrees: float) -> Floats:
 
 
 def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float] = (0.0, 1.0, 0.0)) -> Floats:
-    """Place a camera (or anything that faces +z) at `origin`, turned towards `target`.
+    """Return the matrix that places a camera (or anything that faces +z) at `origin` and turns it towards `target`.
 
     Raises
     ------
     InputError
-        Where the two are one place, or `up` points from one to the other.
+        If the two are the same place, or `up` points from one to the other.
 
     Examples
     --------
@@ -64,31 +64,31 @@ def look_at(origin: Sequence[float], target: Sequence[float], up: Sequence[float
 
 
 def to_world(*transforms: Floats) -> Any:
-    """Product of transforms, the last applied first, as `mitsuba.load_dict` takes it in every variant."""
+    """Multiply transforms, the last applied first, into the form that `mitsuba.load_dict` takes in every variant."""
     return jit.Matrix4(np.linalg.multi_dot([*transforms, np.eye(4)]).tolist())
 
 
 def camera(fov_deg: float, origin: Point, target: Point, size: tuple[int, int] | None = None) -> dict[str, Any]:
-    """Perspective camera of `fov_deg` over the picture's shorter side; `size` is the picture's own height and width."""
+    """Describe a perspective camera with `fov_deg` across the shorter side; `size` is the film's height and width."""
     pose = to_world(look_at(origin, target))
     view = {"type": "perspective", "fov": fov_deg, "fov_axis": "smaller", "to_world": pose}
     return view | ({"film": {"type": "hdrfilm", "height": size[0], "width": size[1]}} if size else {})
 
 
 def thin_lens(camera: Mapping[str, Any], pupil_m: float, focus_m: float) -> dict[str, Any]:
-    """Return a camera with depth of field in place of a pinhole: the same view, sharp at one distance.
+    """Give a pinhole camera depth of field: return a camera of the same view that is sharp at one distance.
 
     Parameters
     ----------
     camera : mapping
-        Of Mitsuba's type ``perspective`` or ``thinlens``, whose lens is then left out.
+        Of Mitsuba's type ``perspective``, or ``thinlens``, whose own lens is replaced.
     pupil_m, focus_m : float
         Diameter of its pupil, and the distance of focus, in the scene's unit of length.
 
     Raises
     ------
     InputError
-        For an orthographic camera, and one whose axis isn't in the middle of its picture.
+        For an orthographic camera, and for one whose axis isn't in the middle of its picture.
     """
     if camera.get("type") not in ("perspective", "thinlens"):
         raise InputError(
@@ -101,7 +101,7 @@ def thin_lens(camera: Mapping[str, Any], pupil_m: float, focus_m: float) -> dict
 
 
 def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> float:
-    """Angle of view across a picture of a Mitsuba camera.
+    """Compute the horizontal angle of view of a Mitsuba camera's picture.
 
     It is 0 for an ``orthographic`` camera, whose rays are all parallel.
     """
@@ -127,7 +127,7 @@ def horizontal_view_deg(camera: Mapping[str, object], size: tuple[int, int]) -> 
 
 
 def _field_of_focal_length(focal_length: object) -> float:
-    """Angle of view in degrees across the diagonal of a film of 36 mm x 24 mm, as Mitsuba takes a focal length."""
+    """Convert a focal length to the diagonal angle of view [degrees] on film of 36 mm x 24 mm, as Mitsuba does."""
     try:
         focal_length_mm = float(str(focal_length).removesuffix("mm"))
     except ValueError:

@@ -1,4 +1,4 @@
-"""Light spectra by name, each scaled to a luminance of 1 cd/m^2 (1 lux for an irradiance)."""
+"""Spectra of light sources by name, each scaled to a luminance of 1 cd/m^2 (as an irradiance, to 1 lux)."""
 
 import re
 import warnings
@@ -20,25 +20,26 @@ from rodcone.curve_file import is_curve_file, read_columns
 from rodcone.errors import InputError, one_line, require_range, unknown
 from rodcone.optional import quietly_imported
 
-# Sodium D2 and D1 in air, NIST Atomic Spectra Database; D2 is twice as strong where the vapour is thin. In a
-# low-pressure lamp the two are nearer to equal: 0.6 nm apart, no band and no eye can tell.
+# Sodium's lines D2 and D1 in air, from the NIST Atomic Spectra Database. In thin vapour D2 is twice as strong. In a
+# low-pressure lamp the two are nearer to equal, but at a distance of 0.6 nm no band and no eye shows the difference.
 _LINES = {"sodium_low": ((588.995, 589.592), (2.0, 1.0))}
 # Rise of the full moon's reflectance per nm, over its value at 550 nm: straight line through the 16 bands of 405 to
 # 775 nm of the ROLO model at a phase of 7 degrees (Kieffer & Stone 2005, equation 10 and table 4; libration left out).
 MOON_SLOPE_PER_NM = 1.48e-3
-# Lamps of lines whose tables hold 5 nm steps: the table is all that is known, and it has none.
+# Lamps that emit lines, but of which only a table in steps of 5 nm is known, which shows none.
 TABULATED_LINES = ("F11", "LED-RGB1", "sodium_high")
-_NUMBER = re.compile(r"\d{4,5}")  # too large for a name's
+_NUMBER = re.compile(r"\d{4,5}")  # a temperature without its unit; no lamp's name is a number of so many digits
 # Units of a column that no factor turns into power per wavelength.
 _NOT_POWER = re.compile(r"\b(?:[µμu]?mol\w*|photons?|quanta|dBm?|log\w*|counts?)\b", re.IGNORECASE)
 _TEMPERATURE = re.compile(r"(D?)(\d+(?:\.\d+)?) ?K")
 
 
 def illuminant_names() -> tuple[str, ...]:
-    """Names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``.
+    """List the names that `illuminant` knows, besides a temperature such as ``3000K`` or ``D7000K``.
 
-    CIE 015:2018 has tables in 5 nm steps. F11 stands for narrow-band fluorescent lamps, its HP1 is standard
-    high-pressure sodium, LED-B3 a white LED of 4100 K, LED-RGB1 three LEDs, LED-V1 a violet-pumped one.
+    Most are tables of CIE 015:2018 in steps of 5 nm. F11 stands for narrow-band fluorescent lamps, HP1 for standard
+    high-pressure sodium lamps, LED-B3 for a white LED of 4100 K, LED-RGB1 for a lamp of three LEDs and LED-V1 for a
+    white LED with a violet pump.
 
     Examples
     --------
@@ -50,17 +51,17 @@ def illuminant_names() -> tuple[str, ...]:
 
 
 def lines_nm(name: str) -> tuple[float, ...]:
-    """Emission lines of a named light, to give `line_bands`; empty where its spectrum is smooth.
+    """Return a named light's emission lines [nm], which `line_bands` takes; no line if its spectrum is smooth.
 
     Raises
     ------
     InputError
-        Where `name` is unknown.
+        If `name` is unknown.
 
     Warns
     -----
     UserWarning
-        For a lamp of lines whose table has none: plain bands follow the table to its corners.
+        For a lamp that emits lines which its table doesn't show; plain bands follow such a table exactly.
 
     Examples
     --------
@@ -79,20 +80,20 @@ def lines_nm(name: str) -> tuple[float, ...]:
 
 
 def illuminant(name: str) -> Spectrum:
-    """Spectrum of a named light with a luminance of 1 cd/m^2.
+    """Return the spectrum of a named light, scaled to a luminance of 1 cd/m^2.
 
     Parameters
     ----------
     name : str
-        One of `names()`; or ``3000K`` or ``3000 K``, a black body; or ``D7000K``, daylight of that temperature; or what
-        colour-science calls another of its lights, such as ``FL3.12``, whose import takes 2 s; or a file,
-        ``led.csv``, ``.txt``, ``.spd`` or ``.spdx``, of wavelengths and one more column, in any unit of power
-        (`rodcone.curve_file.read_columns`). It is read at each call.
+        One of `illuminant_names`; ``3000K`` or ``3000 K``, a black body; ``D7000K``, daylight of that temperature; the
+        name of another light in colour-science, such as ``FL3.12``, for which that library is imported in 2 s; or a
+        file, ``led.csv``, ``.txt``, ``.spd`` or ``.spdx``, of wavelengths and one more column in any unit of power
+        (`rodcone.curve_file.read_columns`). A file is read at each call.
 
     Raises
     ------
     InputError
-        Where `name` is unknown or its temperature out of range, or the file is none such, or dark.
+        If `name` is unknown, its temperature is out of range, or the file has another form or holds no light.
 
     Examples
     --------
@@ -152,7 +153,7 @@ def _named(name: str) -> Spectrum:
 
 
 def _unit_lines(at_nm: tuple[float, ...], powers: tuple[float, ...]) -> Spectrum:
-    """Lines with a luminance of 1: V at the lines themselves, since bands of 1 nm would be 1 % off."""
+    """Scale lines to a luminance of 1 by V at the lines themselves, because bands of 1 nm would be 1 % off."""
     v = colour_matching_functions()[1]
     visible = np.interp(at_nm, v.wavelength_nm, v.values) @ np.array(powers)
     return line_spectrum(at_nm, np.array(powers) / (LUMINOUS_EFFICACY_LM_W * visible))
@@ -170,7 +171,7 @@ def _smooth(name: str) -> Spectrum:
 
 @cache
 def daylight(cct_k: float) -> Spectrum:
-    """CIE daylight of a correlated colour temperature (CIE 015:2018, formula of illuminants D), of 1 cd/m^2.
+    """Compute CIE daylight of a correlated colour temperature (CIE 015:2018, illuminants D), scaled to 1 cd/m^2.
 
     Parameters
     ----------
@@ -183,7 +184,7 @@ def daylight(cct_k: float) -> Spectrum:
         For a temperature outside that range, in which the formula holds.
     """
     require_range("illuminant: daylight [K]", cct_k, 4000.0, 25_000.0, "below it give a black body such as 3000K")
-    t = np.float64(cct_k)  # rounded as colour-science rounds, whose bits scenes have been known by
+    t = np.float64(cct_k)  # rounded as colour-science does: stored renders are found by these bits
     if t <= 7000.0:
         x = -4.607e9 / t**3 + 2.9678e6 / t**2 + 0.09911 * 10**3 / t + 0.244063
     else:
@@ -202,7 +203,7 @@ def unit_luminance(spectrum: Spectrum) -> Spectrum:
 
 
 def spectral_luminance(spectrum: Spectrum) -> float:
-    """Luminance of a spectrum at power 1, summed in 1 nm bands over 360-830 nm."""
+    """Compute the luminance of a spectrum at power 1, summed in bands of 1 nm over 360-830 nm."""
     nm = np.arange(360.5, 830.0)
     width = np.ones_like(nm)
     return float(LUMINOUS_EFFICACY_LM_W * (spectrum.band_average(nm, width) @ luminous_efficiency(nm, width)))

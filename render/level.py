@@ -1,8 +1,8 @@
-"""Level of a scene: mean luminance of what is no light, or illuminance on the reference plane, each with its error.
+"""Level of a scene: mean luminance of all but the lights, or illuminance on the reference plane, each with its error.
 
-A lamp in view is thousands of times brighter than what it lights, and a few of its pixels would set the level. So the
-light that the camera sees directly is left out of the sum of light, and the part of the picture that it covers is left
-out of the area: the ratio needs no threshold, and has the same expectation at any size of one aspect ratio.
+A visible lamp is thousands of times brighter than what it lights, so that a few of its pixels would set the level. The
+sum of light therefore leaves out light that the camera sees directly, and the area leaves out the part of the picture
+that this light covers. Their ratio needs no threshold, and its expectation doesn't depend on the picture's size.
 """
 
 from dataclasses import dataclass
@@ -32,16 +32,16 @@ class Level:
 
 @dataclass(frozen=True)
 class SceneMeans:
-    """Means over the picture of what is no light, from which levels are computed, at unit spectral emission.
+    """Means over the picture from which levels are computed, at unit spectral emission.
 
     Attributes
     ----------
     radiance : (group, band) float64
-        Light that isn't seen directly, over all of the picture.
+        Mean of the light that isn't seen directly, over the whole picture.
     uncovered : float
         Part of the picture in which no light is seen directly.
     covariance : (group x band + 1, group x band + 1) float64
-        Of the Monte Carlo errors of `radiance` and, last, of `uncovered`.
+        Covariance of the Monte Carlo errors of `radiance` and, last, of `uncovered`.
     """
 
     radiance: Floats
@@ -51,12 +51,12 @@ class SceneMeans:
     __repr__ = brief
 
     def mean_radiance(self) -> Floats:
-        """Mean radiance of what is no light, shape (group, band).
+        """Compute the mean radiance of the part of the picture that shows no light, shape (group, band).
 
         Raises
         ------
         InputError
-            Where lights fill the picture.
+            If lights fill the picture.
         """
         if self.uncovered <= 0:
             raise InputError(
@@ -65,12 +65,12 @@ class SceneMeans:
         return np.asarray(self.radiance / self.uncovered)
 
     def luminance_level(self, weights: Floats) -> Level:
-        """Mean luminance of what is no light.
+        """Compute the mean luminance of the part of the picture that shows no light.
 
         Parameters
         ----------
         weights : (group, band) float64
-            Luminance of a radiance of 1 times the emission.
+            Luminance of a transport of 1 in each group and band.
         """
         value = float((weights * self.mean_radiance()).sum())
         if value <= 0:
@@ -88,7 +88,7 @@ class Irradiance:
     ----------
     mean : (group, band) float64
     covariance : (group x band, group x band) float64
-        Of the means' Monte Carlo errors.
+        Covariance of the means' Monte Carlo errors.
     """
 
     mean: Floats
@@ -97,7 +97,7 @@ class Irradiance:
     __repr__ = brief
 
     def level(self, weights: Floats) -> Level:
-        """Illuminance; `weights` as of `SceneMeans.luminance_level`."""
+        """Compute the illuminance; `weights` are those of `SceneMeans.luminance_level`."""
         value = float((weights * self.mean).sum())
         flat = weights.ravel()
         if value <= 0:

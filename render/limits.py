@@ -1,4 +1,4 @@
-"""When a render stops: samples, error or time, whichever comes first."""
+"""Limits at which a render stops: samples, error or time, whichever is reached first."""
 
 import math
 from dataclasses import dataclass, replace
@@ -11,32 +11,32 @@ from render.transport import Stop, Transport
 from rodcone.errors import InputError, require_fields
 
 DEFAULT_SPP = 64
-PILOT_FROM = 64  # samples a pixel: where more are asked for, a pilot says where they are needed
-MOST_POINTS = 1 << LOG2_POINTS  # of each half, in the mean over the picture
-MOST_SPP = 2 * MOST_POINTS  # ceiling where only an error is asked for
-LEAST_POINTS = 8  # of each half, before an error is believed
-A_POWER = 8  # chunks from one power of two to the next: at most an eighth more is drawn than asked for
+PILOT_FROM = 64  # samples per pixel, above which a pilot render shows where they are needed
+MOST_POINTS = 1 << LOG2_POINTS  # largest number of points of each half, in the mean over the picture
+MOST_SPP = 2 * MOST_POINTS  # ceiling if only an error is asked for
+LEAST_POINTS = 8  # points of each half from which on an error is believed
+A_POWER = 8  # chunks from one power of two to the next, so that at most an eighth more is drawn than asked for
 
 
 def chunk_from(start: int) -> int:
-    """Points that are added together from a place in the sequence on: 1 up to 16, 2 up to 32, and so on."""
+    """Return the length of the chunk that begins at a point of the sequence: 1 before 16, 2 before 32, and so on."""
     return max(1, (1 << start.bit_length() >> 1) // A_POWER)
 
 
 @dataclass(frozen=True)
 class Limits:
-    """When a render stops: at whichever comes first; with none of the three after `DEFAULT_SPP` samples a pixel.
+    """Limits of a render, which stops at the first that is reached; without any, after `DEFAULT_SPP` samples per pixel.
 
     Attributes
     ----------
     spp, max_spp : int or None
-        Samples a pixel; `max_spp` beside another limit.
+        Samples per pixel; `max_spp` may stand beside another limit.
     noise : float or None
         Relative Monte Carlo error to reach.
     max_seconds : float or None
     seed : int
     mean_rate : float
-        Points of a pixel over those of a pixel of rate 1, in the mean over the picture: all counts below are of rate 1.
+        Mean over the picture of the pixels' rates. All counts below are points of a pixel of rate 1.
 
     Raises
     ------
@@ -60,7 +60,7 @@ class Limits:
 
     @property
     def most_samples(self) -> int:
-        """Samples a pixel after which the render stops in any case, halves together, before rounding up."""
+        """Samples per pixel, of both halves together, after which the render stops in any case; not rounded up."""
         return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
 
     @property
@@ -71,21 +71,21 @@ class Limits:
         return -(-half // chunk) * chunk
 
     def next_look(self, count: int) -> int:
-        """Points of each half after which the error is looked at next: powers of two, and half-way between."""
+        """Return after how many points of each half the error is checked next: powers of two, and half-way between."""
         if self.noise is None or count < LEAST_POINTS:
             return self.most_points if self.noise is None else min(LEAST_POINTS, self.most_points)
         power = 1 << count.bit_length() >> 1
         return min(power + power // 2 if count < power + power // 2 else 2 * power, self.most_points)
 
     def met_by(self, earlier: Transport) -> bool:
-        """Whether a render that was made earlier leaves nothing to do."""
+        """Return whether an earlier render has already reached a limit."""
         count = int(earlier.counts.min()) // 2
         last_s = earlier.seconds / max(count, 1)
         rated = replace(self, mean_rate=float(earlier.counts.mean() / earlier.counts.min()))
         return rated.stop(count, earlier.relative_mc_error, earlier.seconds, last_s) is not None
 
     def stop(self, count: int, error: float, seconds: float, last_s: float) -> Stop | None:
-        """Which limit is reached, None while none is.
+        """Return the limit that is reached, or None.
 
         Parameters
         ----------
@@ -94,7 +94,7 @@ class Limits:
         error : float
             Relative Monte Carlo error.
         seconds, last_s : float
-            So far, and of the last run: another one would end after the time given.
+            Time so far, and time of the last run; another run is assumed to take as long.
         """
         if count >= self.most_points:
             return "samples"
@@ -105,6 +105,6 @@ class Limits:
         return None
 
     def share(self, count: float, error: float, seconds: float) -> float:
-        """Share of the work done, 0 to 1: by the limit that is nearest."""
+        """Return the share of the work that is done, 0 to 1, by the limit that is nearest."""
         by_noise = (self.noise / error) ** 2 if self.noise and error else 0.0
         return min(max(count / self.most_points, seconds / (self.max_seconds or np.inf), by_noise), 1.0)

@@ -1,4 +1,4 @@
-"""From a `Scene` to Mitsuba objects: variant, film, and the scene at unit emission."""
+"""Conversion of a `Scene` to Mitsuba's objects: variant, film, and the scene at unit emission."""
 
 import re
 from collections.abc import Iterator
@@ -20,18 +20,18 @@ from rodcone.jit import at_least_two_threads, backend
 from rodcone.types import Floats
 
 INTEGRATOR = "dense path (all bands along each path)"
-METER_PIXELS = 64  # film of the irradiance meter, each side
+METER_PIXELS = 64  # side of the irradiance meter's film
 
 # Bands that are traced together. More bands share the work of tracing, but the time of a kernel's first compilation
 # grows faster than their number: 40 bands of `still_life_outdoor`, 96x96, 16 samples, take 0.89 s of processor time in
 # two parts and 0.69 s in one, and compile in 5 and 12 s.
 PART_BANDS = 40
-_search_path: list[Any] = []  # this program's file resolver, between two of its calls
+_search_path: list[Any] = []  # this program's file resolver, kept here while a user's own is in place
 _VARIANTS = {"cuda": "cuda_ad_spectral", "llvm": "llvm_ad_spectral", "numpy": "none"}
 
 
 def variant() -> str:
-    """Mitsuba variant in use: CUDA where a device answers, else LLVM, else none."""
+    """Return the Mitsuba variant in use: CUDA if there is a device, else LLVM, else ``none``."""
     return _VARIANTS[backend()]
 
 
@@ -61,9 +61,9 @@ def mitsuba_module() -> ModuleType:
 
 @contextmanager
 def own_mitsuba_variant() -> Iterator[None]:
-    """Work in this program's Mitsuba variant and search path, and leave a user's own as they were.
+    """Set this program's Mitsuba variant and search path while the context lasts, then restore the user's.
 
-    One who has chosen no variant gets this program's: Mitsuba can't go back to none.
+    A user who had chosen no variant keeps this program's, because Mitsuba can't go back to none.
     """
     import mitsuba
 
@@ -83,14 +83,14 @@ def own_mitsuba_variant() -> Iterator[None]:
 
 
 def mitsuba_words(error: BaseException) -> str:
-    """Mitsuba's message on one line, without its source locations, and of an object's long description its name."""
+    """Put Mitsuba's message on one line, without source locations, and with objects' names for their descriptions."""
     without_places = re.sub(r"\[\w+\.cpp:\d+\] ", "", one_line(error))
     return re.sub(r'\[ name = ("[^"]*"),.* \]', r" \1", without_places)
 
 
 @dataclass(frozen=True)
 class Film:
-    """What the film records: its size, bands and the deepest path.
+    """Size and bands that a render records, and how deep its paths go.
 
     Attributes
     ----------
@@ -112,21 +112,21 @@ class Film:
 
 @dataclass(frozen=True)
 class LoadedScene:
-    """Mitsuba's scene of one light group, or of one and a constant environment.
+    """Mitsuba's scene with one light group, and perhaps a constant environment beside it.
 
     Attributes
     ----------
     mi_scene : mitsuba.Scene
     groups : tuple of int
-        Which of the scene's groups it gives, by their order. A second one is the constant environment, which isn't in
+        Indices of the scene's groups that it gives. A second one is the constant environment, which isn't in
         `mi_scene`: paths that escape bring its light.
     coloured : bool
         Whether emission depends on wavelength; at unit emission it is evaluated once.
     sample_lights : bool
         Whether directions are sampled towards lights.
     curves : tuple of Spectrum
-        Reflectances that are read from a table, row by row. None for coloured lights: a line in them
-        would be met at few of the table's wavelengths.
+        Reflectances that are read from a table, row by row. There are none under coloured lights, because few of the
+        table's wavelengths would meet a line in such a light.
     """
 
     mi_scene: MitsubaScene
@@ -136,14 +136,15 @@ class LoadedScene:
     curves: tuple[Spectrum, ...] = ()
 
     def channels(self, bands: int, *, split: bool = False) -> int:
-        """Channels of a path in so many bands (`render.integrator.dense.Tracer.camera`), about."""
+        """Return the approximate number of channels that `render.integrator.dense.Tracer.camera` gives."""
         return (bands + 4) * (len(self.groups) * (1 + split) + self.coloured)
 
 
 def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[LoadedScene]:
-    """Load what is rendered one after the other: each light group, and a constant environment along with the first.
+    """Load the scenes that are rendered one after the other: one per light group.
 
-    With `metered` the reference plane carries an irradiance meter.
+    A constant environment is rendered along with the first group. With `metered` the reference plane carries an
+    irradiance meter.
     """
     hair = ["/".join(path) for path, node in walk(scene.geometry) if node.get("type") == "hair"]
     if hair and film.wavelength_nm.size > SPECTRUM_SIZE:
@@ -164,24 +165,24 @@ def load_groups(scene: Scene, film: Film, *, metered: bool = False) -> list[Load
 
 
 def load_unlit(scene: Scene, size: tuple[int, int]) -> MitsubaScene:
-    """Mitsuba's scene without its lights, each shape by itself, for what is seen whatever the light."""
+    """Load the scene without its lights and without merging meshes, to look up what is seen under any light."""
     description = scene.lit({})
     description["sensor"] = {**description["sensor"], "film": _recorder(size)}
     return _load(scene, description)
 
 
 def is_environment(scene: Scene, group: str) -> bool:
-    """Whether a group is one light of one spectrum and of the same radiance from all around."""
+    """Return whether a group is a single light of one spectrum, with the same radiance from all directions."""
     lights = scene.groups[group]
     kinds = [emitter_paths(scene.geometry)[path] for path in lights.emitters]
     return kinds == ["constant"] and not lights.coloured
 
 
 def _with_common_shapes(scene: Scene) -> Scene:
-    """Load the shapes that belong to no light once, for all groups' scenes to hold, and the surfaces of lamps.
+    """Load the shapes that belong to no light, and the surfaces of lamps, once for all groups' scenes.
 
-    Dr.Jit traces every live surface and shape at each call, whichever scene it is in: with copies for each group,
-    tracing took as many times longer as there are groups.
+    Dr.Jit's kernels include every surface and shape that exists, in whichever scene. With a copy per group, tracing
+    took as many times longer as there are groups.
     """
     mi = mitsuba_module()
     lit = {path.split("/")[0] for group in scene.groups.values() for path in group.emitters}
@@ -196,7 +197,7 @@ def _with_common_shapes(scene: Scene) -> Scene:
 
 
 def _is(part: Any, kind: Any) -> bool:
-    """Whether a part of a scene's dict is of a kind of Mitsuba's, and nothing refers from it or to it."""
+    """Return whether a part of a scene's dict has a Mitsuba type and holds no reference."""
     if not isinstance(part, dict) or part["type"] == "shapegroup":
         return False
     if any(node.get("type") == "ref" for _, node in walk({"": part})):
@@ -218,13 +219,13 @@ def _load_group(scene: Scene, group: str, film: Film, curves: tuple[Spectrum, ..
         description[scene.reference_plane] = {**description[scene.reference_plane], "illuminance_meter": meter}
     index = (list(scene.groups).index(group),)
     coloured = scene.groups[group].coloured
-    # Merging meshes orders a scene's shapes anew at each load, and its lights with them. A path chooses a light by its
-    # number, so several keep their order only without.
+    # When Mitsuba merges meshes, the order of shapes and lights changes from load to load. A path chooses a light by
+    # its number, so meshes are merged only if there is a single light.
     mi_scene = _load(scene, description, merge_meshes=len(scene.groups[group].emitters) == 1)
     if not mi_scene.shapes():
         raise InputError(f"scene {scene.name}: it has no shape, so nothing is lit; add one")
-    # A constant environment is met in every direction: directions sampled for the surface alone leave less noise than a
-    # mixture with ones sampled for the light, and half of the rays are saved.
+    # A constant environment is met in every direction. Directions that are sampled for the surface alone leave less
+    # noise than a mixture with directions sampled for the light, and save half of the rays.
     environment = [light.class_name() for light in mi_scene.emitters()] == ["ConstantBackgroundEmitter"]
     return LoadedScene(
         mi_scene=mi_scene,
@@ -259,5 +260,5 @@ def with_textures(node: Node) -> Node:
 
 
 def _recorder(size: tuple[int, int]) -> Node:
-    """Film node. Only its size counts: paths are summed by `render.integrator.wavefront`."""
+    """Describe a film, of which only the size counts, because `render.integrator.wavefront` sums the paths."""
     return {"type": "hdrfilm", "width": size[1], "height": size[0], "pixel_format": "luminance"}

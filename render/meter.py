@@ -1,4 +1,4 @@
-"""Irradiance on a scene's reference plane: traced once, and only when an illuminance is asked for."""
+"""Irradiance on a scene's reference plane, traced once, and only if an illuminance is asked for."""
 
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -15,23 +15,23 @@ from render.scene import Scene
 from rodcone.errors import InputError
 from rodcone.types import Planes
 
-METER_BANDS = 4  # traced together: as quick as all at once, and a kernel that compiles sooner
-HALF_SPP = 16  # samples a pixel of its film in each half: 2^17 paths for one number a band, right to 0.1 %
+METER_BANDS = 4  # bands that are traced together: as quick as all at once, and the kernel compiles sooner
+HALF_SPP = 16  # samples per pixel of its film in each half: 2^17 paths give each band's number within 0.1 %
 
 
 @dataclass(frozen=True)
 class Meter:
-    """Traces the irradiance of a scene at its first call, and keeps it.
+    """Meter of a scene's irradiance, which traces it at the first call and keeps it.
 
     Attributes
     ----------
     scene : Scene
-        With a reference plane.
+        A scene with a reference plane.
     film : Film
         Bands and longest path; its size isn't used.
     seed : int
     folder : Path, optional
-        Of renders: an irradiance traced before is taken from it.
+        Folder of renders, from which an irradiance that was traced before is taken.
     """
 
     scene: Scene
@@ -40,7 +40,7 @@ class Meter:
     folder: Path | None = None
 
     def __call__(self) -> Irradiance:
-        """Irradiance of the plane."""
+        """Return the irradiance of the plane."""
         return self._irradiance
 
     @cached_property
@@ -61,21 +61,21 @@ class Meter:
 
 @own_mitsuba_variant()
 def _measured(scene: Scene, film: Film, seed: int) -> Irradiance:
-    """Trace two halves with seeds of their own; summed in float64, so that threads don't change it."""
+    """Trace two halves with different seeds and sum them in float64, so that the threads' number changes no bit."""
     shape = (2, len(scene.groups), film.wavelength_nm.size, *film.size)
     halves = np.zeros(shape, np.float32)
     for loaded in load_groups(scene, film, metered=True):
         for half in range(2):
             of_half = seed_of(seed, loaded.groups[0], half, METER_PIXELS)
             halves[half, list(loaded.groups)] = _half(loaded, film, of_half)
-    # The meter's weight of a cosine-distributed ray, which Mitsuba leaves off extra channels.
+    # Irradiance is pi times what the meter's paths, distributed by cosine, bring on average.
     even, odd = (half.reshape(-1, METER_PIXELS**2).astype(np.float64) * np.pi for half in halves)
     error = (even - odd) / 2 / METER_PIXELS**2
     return Irradiance(((even + odd) / 2).mean(axis=1).reshape(shape[1:3]), error @ error.T)
 
 
 def _half(loaded: LoadedScene, film: Film, seed: int) -> Planes:
-    """Irradiance of each of the film's pixels, (group, band, h, w)."""
+    """Trace the irradiance over pi of each of the film's pixels, (group, band, h, w)."""
     alike = np.ones(film.size, np.uint32)
     span = Span(0, HALF_SPP, 1)
     threads = HALF_SPP * METER_PIXELS**2

@@ -1,4 +1,4 @@
-"""Spectral radiance of an image: what a camera looks at."""
+"""Spectral radiance of an image, which is the light that a camera takes."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -27,25 +27,25 @@ class SpectralRadiance:
     wavelength_nm : (band,) float64
         Band centres, increasing.
     relative_mc_error : float
-        Median over pixels and bands of the Monte Carlo standard error over the mean; 0 where nothing was rendered.
+        Median over pixels and bands of the Monte Carlo standard error over the mean; 0 if nothing was rendered.
     width_nm : (band,) float64
         Band widths; left out, the spacing of evenly spaced centres.
     relative_level_error : float, optional
-        Monte Carlo standard error over the value of the level that the light was brought to; None where none was asked
-        for, or there is no estimate.
+        Monte Carlo standard error of the level to which the light was scaled, over that level; None if no level was
+        asked for or there is no estimate.
     signed : bool
-        Whether values may be negative: half of a render, whose noise may cross 0.
+        Whether values may be negative, as in half of a render, whose noise may exceed its light.
     light : Spectrum, optional
-        The lamp behind the values, up to a factor: with it integrals over bands follow its lines and slopes. None where
-        it isn't known, or the values aren't a lamp's on smooth surfaces: they are then taken as smooth themselves.
+        The lamp behind the values, up to a factor; integrals over bands then follow its lines and slopes. If it is None
+        (unknown, or not one lamp on smooth surfaces), the values themselves are taken as smooth over wavelength.
     horizontal_view_deg : float, optional
         Field of view across the picture [degrees], as an ISETCam scene states it.
 
     Raises
     ------
     InputError
-        Where the shape is wrong, a value is negative, NaN or infinite (its position is named), or bands reach beyond
-        100 to 20 000 nm or overlap (`render.spectrum.band_widths`).
+        If the shape is wrong, a value is negative, NaN or infinite (the message names its position), or bands reach
+        beyond 100 to 20 000 nm or overlap (`render.spectrum.band_widths`).
 
     Examples
     --------
@@ -96,30 +96,32 @@ class SpectralRadiance:
         return self.values.shape[0], self.values.shape[1]
 
     def luminance(self) -> NDArray[np.float64]:
-        """Luminance of each pixel [cd m^-2], shape (h, w)."""
+        """Compute the luminance of each pixel [cd m^-2], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
 
     @method
     def relight(
         self, light: Spectrum | None = None, *, luminance_cd_m2: float | None = None, lux: float | None = None
     ) -> "SpectralRadiance":
-        """Radiance under another lamp of the same luminance in the place of the one that is behind the values.
+        """Replace the lamp behind the values by another one of the same luminance.
 
-        Each value is divided by the lamp's mean in its band and multiplied by the other's: what surfaces reflect stays.
+        Each value is divided by the old lamp's mean in its band and multiplied by the new lamp's. What surfaces reflect
+        stays the same.
 
         Parameters
         ----------
         light : Spectrum, optional
-            Or an illuminant's name; left out, the lamp stays.
+            The new lamp, or an illuminant's name. If it is left out, the lamp stays.
         luminance_cd_m2 : float, optional
-            Mean luminance of the picture to reach; left out, the lamp keeps its luminance.
+            Mean luminance to which the picture is scaled. If it is left out, the lamp keeps its luminance.
         lux : float, optional
-            Refused, with what to give in its place: a picture has no plane on which an illuminance could be measured.
+            Always refused, because a picture has no plane on which illuminance is measured; the message says what to
+            give instead.
 
         Raises
         ------
         InputError
-            Where the lamp isn't known, or gives nothing in a band in which there is light; for a level of a dark
+            If the old lamp isn't known, or gives nothing in a band in which there is light; for a level of a dark
             picture.
         """
         if lux is not None:
@@ -167,12 +169,12 @@ class SpectralRadiance:
 
 @dataclass(frozen=True)
 class BandRadiance:
-    """Radiance of which one band at a time is made, whenever it's asked for: no array holds all bands.
+    """Radiance whose bands are computed one at a time, on request, so that no array holds all of them.
 
     Attributes
     ----------
     make : callable
-        Gives a band's values, (h, w) float32, by its number.
+        Function that computes a band's values, (h, w) float32, from its number.
     shape : (int, int)
         Height and width in pixels.
     wavelength_nm, widths_nm : (band,) float64
@@ -193,14 +195,14 @@ class BandRadiance:
     __repr__ = brief
 
     def plane(self, band: int) -> Planes:
-        """Return a band's values, (h, w) float32; `InputError` for one that `SpectralRadiance` doesn't take."""
+        """Compute a band's values, (h, w) float32; raise `InputError` as `SpectralRadiance` does for wrong values."""
         plane = self.make(band)
         check_values("radiance", plane[..., None], self.signed, band)
         return plane
 
     @cached_property
     def extents(self) -> Floats:
-        """Largest absolute value, its mean, and the mean of each band, shape (3, band)."""
+        """Largest absolute value, mean absolute value and mean of each band, shape (3, band)."""
         planes = (self.plane(band) for band in range(self.wavelength_nm.size))
         return np.transpose([(*_extent(plane), plane.mean(dtype=np.float64)) for plane in planes])
 
@@ -211,7 +213,7 @@ class BandRadiance:
         return float(LUMINOUS_EFFICACY_LM_W * (self.extents[2] @ weights))
 
     def whole(self) -> SpectralRadiance:
-        """Return all bands together."""
+        """Compute all bands at once."""
         planes = np.stack([self.make(band) for band in range(self.wavelength_nm.size)])
         return SpectralRadiance(
             np.moveaxis(planes, 0, -1),
@@ -231,7 +233,7 @@ def band_plane(radiance: SpectralRadiance | BandRadiance, band: int) -> NDArray[
 
 
 def band_extents(radiance: SpectralRadiance | BandRadiance) -> Floats:
-    """Return the largest absolute value of each band and its mean, shape (2, band)."""
+    """Return the largest and the mean absolute value of each band, shape (2, band)."""
     if isinstance(radiance, BandRadiance):
         return radiance.extents[:2]
     return np.transpose([_extent(plane) for plane in np.moveaxis(radiance.values, -1, 0)])
@@ -245,9 +247,9 @@ def _extent(plane: NDArray[np.floating]) -> tuple[float, float]:
 def check_values(name: str, values: NDArray[np.floating], signed: bool = False, first_band: int = 0) -> None:
     """Raise `InputError` at the first value of (h, w, band) that is NaN, infinite or, unless `signed`, negative.
 
-    Where only a part of the bands is given, `first_band` is the number of its first one.
+    If `values` holds only some bands, `first_band` is the number of the first of them.
     """
-    # two passes without a temporary; NaN carries through
+    # Two passes without a temporary array; NaN propagates through both.
     least = float(values.min())
     most = float(values.max())
     if least >= (-np.finfo(values.dtype).max if signed else 0) and most < np.inf:

@@ -1,8 +1,8 @@
-"""Reference light: a long render of a scene in one small file, and whether a short render made here agrees with it.
+"""Reference light: a long render of a scene in one small file, and a test whether a short render agrees with it.
 
-Transport depends on no lamp's power, level, sensor or exposure, so it is computed once. The file holds light in half
-floats and one plane of its error, and a certificate of how it was made. It is found by the scene and the film; whether
-the engine still gives that light is tested, not read from a version.
+Transport doesn't depend on lamps' powers, level, sensor or exposure, so that it is computed once. The file holds light
+in half floats, one plane of its error, and a certificate of how it was made. It is found by scene and film. Whether
+the engine still gives that light is tested by a short render; no version is compared.
 """
 
 import json
@@ -35,18 +35,18 @@ from rodcone.jit import backend
 from rodcone.types import Planes
 
 SHIPPED = Path(__file__).parent / "data" / "references"
-FOLDER = "RODCONE_REFERENCES"  # environment variable: folder of a user's own
+FOLDER = "RODCONE_REFERENCES"  # environment variable that names the folder of a user's own references
 BLOCK = 16  # side of a block [pixels] over which errors are pooled: 256 differences give a variance within 9 %
-FALSE_ALARM = 1e-3  # largest chance that a render which agrees with the reference is said not to
-MOST_PACKED = 32  # largest ratio of a file's unpacked to its packed size that is read; light in half floats has 2 or 3
-_MULTIPLES = (1, 2, 3, 4, 8)  # a reference may be this many times as large as the film on each side, and is averaged
+FALSE_ALARM = 1e-3  # largest chance that a render which agrees with the reference fails the test
+MOST_PACKED = 32  # largest allowed ratio of a file's unpacked to its packed size; light in half floats has 2 or 3
+_MULTIPLES = (1, 2, 3, 4, 8)  # a reference's sides may be so many times the film's; it is then averaged
 _LARGEST_HALF = np.float32(6e4)  # a little below the largest half float, 65504
 _LEVELS = ("radiance", "uncovered", "covariance")
 
 
 @dataclass(frozen=True)
 class Reference:
-    """Light of a long render, and its certificate: samples, shares, test between its halves, command, versions."""
+    """Light of a long render, and its certificate: samples, test between its halves, command, versions and so on."""
 
     path: Path
     transport: Transport
@@ -64,7 +64,7 @@ class Agreement:
     blocks : int
         Degrees of freedom.
     chance : float
-        That agreeing renders differ by as much in a band or more, times the number of bands.
+        Chance that agreeing renders differ by as much or more in one band, times the number of bands.
     """
 
     wavelength_nm: float
@@ -74,33 +74,33 @@ class Agreement:
 
 
 def reference_folders() -> Iterator[Path]:
-    """Folders of references: the user's own, then what comes with the program."""
+    """Yield the folders of references: the user's own, then the one that comes with the program."""
     yield Path(os.environ.get(FOLDER) or Path.home() / ".local" / "share" / "rodcone" / "references")
     yield SHIPPED
 
 
 def reference_path(folder: Path, scene: Scene, film: Film) -> Path:
-    """File of a scene and film in a folder."""
+    """Return the path of a scene and film's reference in a folder."""
     key = digest_inputs(scene_terms(scene, film))[:12]
     return folder / f"{Path(scene.name).stem}-{film.size[0]}x{film.size[1]}x{film.wavelength_nm.size}-{key}.npz"
 
 
 def find_reference(scene: Scene, film: Film) -> Reference | None:
-    """Reference of a scene and film, the user's own first; None where there is no intact one."""
+    """Find the reference of a scene and film, the user's own first; return None if there is no intact one."""
     paths = (reference_path(folder, scene, film) for folder in reference_folders())
     return next(filter(None, (read_reference(path, scene) for path in paths)), None)
 
 
 def read_reference(path: Path, scene: Scene) -> Reference | None:
-    """Reference of a scene in a file; None where the file is missing or isn't what was written."""
+    """Read a scene's reference from a file; return None if it is missing or damaged."""
     arrays = read_arrays(path)
     return None if arrays is None else _unpacked(path, arrays, scene.groups, scene.geometry["sensor"])
 
 
 def ready_light(scene: Scene, film: Film) -> Reference | None:
-    """Reference of a scene and film, or one of whole multiples of the film's sides, averaged down to it.
+    """Find the reference of a scene and film, or a larger one (`_MULTIPLES`), which is averaged to the film's size.
 
-    None where there is neither. The scene's illuminance meter goes along, which measures where it is asked.
+    Return None if there is neither. The result also has the scene's illuminance meter, which traces at its first call.
     """
     height, width = film.size
     for times in _MULTIPLES:
@@ -116,7 +116,7 @@ def ready_light(scene: Scene, film: Film) -> Reference | None:
 
 
 def averaged(arrays: Mapping[str, Any], times: int) -> dict[str, Any]:
-    """Arrays of a reference's file over blocks of `times` pixels a side: their mean, and their samples together."""
+    """Average the arrays of a reference's file over blocks of `times` x `times` pixels, and add up their samples."""
 
     def blocks(planes: Any) -> Any:
         *rest, height, width = planes.shape
@@ -126,7 +126,7 @@ def averaged(arrays: Mapping[str, Any], times: int) -> dict[str, Any]:
         return dict(arrays)
     light = (arrays["light"] * arrays["scale"]).astype(np.float32)
     mean = blocks(light).mean(axis=(-3, -1), dtype=np.float32)
-    # The error's plane is relative to the light of all bands: weighed by it, it gives that of the block.
+    # The error plane is relative to the light of all bands, so that this light weighs it within a block.
     total = light.sum(axis=1)
     weights = np.maximum(mean.sum(axis=1) * times**2, np.float32(1e-30))
     return {
@@ -140,7 +140,7 @@ def averaged(arrays: Mapping[str, Any], times: int) -> dict[str, Any]:
 
 
 def open_reference(path: str | Path) -> Reference:
-    """Reference of a file, whatever scene it is of: its lights stand in it.
+    """Open the reference in a file without knowing its scene, because the file states its lights itself.
 
     Raises
     ------
@@ -159,13 +159,13 @@ def open_reference(path: str | Path) -> Reference:
 
 
 def _unpacks(file: Path) -> bool:
-    """Whether a file, by its own directory, unpacks to no more than `MOST_PACKED` times its size."""
+    """Return whether a file unpacks, by its own directory, to at most `MOST_PACKED` times its size."""
     with ZipFile(file) as packed:
         return sum(part.file_size for part in packed.infolist()) <= MOST_PACKED * file.stat().st_size
 
 
 def save_reference(path: Path, transport: Transport, certificate: Mapping[str, Any]) -> None:
-    """Write a reference. The error that the file states includes the rounding to half floats."""
+    """Write a reference; its error includes the rounding to half floats."""
     stored, scale = _half(transport.light.mean)
     rounding = stored * scale - transport.light.mean
     arrays = {
@@ -192,8 +192,8 @@ def save_reference(path: Path, transport: Transport, certificate: Mapping[str, A
 def _half(planes: Planes) -> tuple[Any, Planes]:
     """Return planes as half floats, and the factors (group, band, 1, 1) that turn them back into light.
 
-    A plane's largest value is stored as `_LARGEST_HALF`. Light of 1e-9 of it then keeps 11 bits, which is enough,
-    because a lamp in view is a million times brighter than what it lights.
+    A plane's largest value is stored as `_LARGEST_HALF`. Light of 1e-9 of it still has 11 bits. That is enough, because
+    a visible lamp is a million times brighter than what it lights.
     """
     largest = planes.max(axis=(2, 3), keepdims=True)
     scale = np.where(largest > 0, largest / _LARGEST_HALF, np.float32(1))
@@ -201,9 +201,10 @@ def _half(planes: Planes) -> tuple[Any, Planes]:
 
 
 def _error_plane(light: Halves, error: Planes) -> Planes:
-    """Relative error of each group's light, summed over bands: (group, h, w) float32; bands share their paths.
+    """Sum errors over bands, which share their paths, to each group's relative error: (group, h, w) float32.
 
-    A plane has less of an error than its bands apart: it is scaled so that the variance over the picture is theirs.
+    In the sum some of the bands' errors cancel. The plane is scaled up so that the bands' variance over the picture is
+    right.
     """
     total = light.mean.sum(axis=1)
     plane = np.divide(error.sum(axis=1), total, out=np.zeros_like(total), where=total > 0)
@@ -215,7 +216,7 @@ def _error_plane(light: Halves, error: Planes) -> Planes:
 def _unpacked(
     path: Path, arrays: Mapping[str, Any], groups: Mapping[str, LightGroup], camera: Node | None = None
 ) -> Reference:
-    """Light of a file; variances are pooled from the error plane as a render's from its difference."""
+    """Rebuild a reference from a file's arrays; the error plane serves as the difference of a render's halves."""
     certificate = json.loads(str(arrays["certificate"]))
     wavelength_nm, width_nm = (np.array(certificate[name]) for name in ("wavelength_nm", "width_nm"))
     light = arrays["light"] * arrays["scale"]
@@ -247,9 +248,9 @@ def _unpacked(
 def agreement(live: Transport, reference: Transport) -> Agreement:
     """Compare a short render with a reference of other paths, band by band, by chi-square over blocks of pixels.
 
-    A block's variance is the sum of its squared half differences. A short render may not have met a rare path yet
-    that brings a part of the light; then its halves don't tell, and the reference's variance, at as many samples,
-    does: the larger of the two counts. So the rate of false alarms is at most `FALSE_ALARM`.
+    A block's variance is the sum of its squared half differences. If a short render has not yet met a rare path that
+    brings part of the light, its halves don't show that variance. The reference's variance, scaled to as many samples,
+    does. The larger of the two counts, so that the rate of false alarms is at most `FALSE_ALARM`.
     """
     ratio = (reference.counts / live.counts).astype(np.float32)
     sums = partial(sums_over_blocks, side=BLOCK)
@@ -269,12 +270,12 @@ def agreement(live: Transport, reference: Transport) -> Agreement:
 
 
 def require_agreement(live: Transport, reference: Reference) -> str:
-    """Sentence that says how far a render made here agrees with a reference.
+    """Say in a sentence how well a render made on this machine agrees with a reference.
 
     Raises
     ------
     InputError
-        Where it disagrees: the engine, its libraries or the file are not what they were.
+        If it disagrees, because the engine, its libraries or the file have changed.
     """
     test = agreement(live, reference.transport)
     words = (
@@ -293,7 +294,7 @@ def require_agreement(live: Transport, reference: Reference) -> str:
 
 
 def halves_agree(transport: Transport) -> Agreement:
-    """Chi-square between a render's halves: whether errors of neighbouring pixels are independent of each other."""
+    """Compare a render's halves by chi-square, which tests whether errors of neighbouring pixels are independent."""
     # A half's error is sqrt(2) times that of the mean, which the halves' difference estimates.
     light = transport.light
     root = np.float32(np.sqrt(2))

@@ -1,4 +1,4 @@
-"""A scene as plain data: what `mitsuba.load_dict` takes, its light groups, and where illuminance is measured."""
+"""A scene as plain data: a dict for `mitsuba.load_dict`, light groups, and the plane where illuminance is measured."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -25,10 +25,10 @@ EMISSION_PARAMETER = {
     "spot": "intensity",
     "directional": "irradiance",
 }
-# Emitter plug-ins whose colour differs over directions: a spectrum can only filter them.
+# Emitter plug-ins whose colour varies with direction, so that a spectrum can only filter them.
 COLOURED_EMITTERS = ("envmap", "sunsky")
-OWN_SIDE = 256  # pixels, of a scene that states no size
-HELD_NM = (100.0, 20_000.0)  # as far as held ends go
+OWN_SIDE = 256  # side [pixels] of a scene that states no size
+HELD_NM = (100.0, 20_000.0)  # range to which a table's end values are continued
 _REFUSED_EMITTERS = ("projector", "directionalarea", "timed_sunsky")
 _NO_SURFACES = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS, "irradiancemeter")  # parts of a shape
 
@@ -42,12 +42,14 @@ class LightGroup:
     emitters : tuple of str
         Their keys in the scene's dict: ``"sun"``, or ``"panel/emitter"`` for one inside a shape.
     spectrum : Spectrum
-        Emission at power 1: W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, per m^2 less for the others. With
-        `coloured` a factor on what the emitters give by themselves, `flat()` to leave it as it is.
+        Emission at power 1. Its unit is W m^-2 sr^-1 nm^-1 for ``area`` and ``constant``, W sr^-1 nm^-1 for ``point``
+        and ``spot``, and W m^-2 nm^-1 for ``directional``. With `coloured` it is a factor on the emitters' own
+        emission; `flat()` leaves that unchanged.
     power : float
         Factor on the spectrum.
     coloured : bool
-        The emitters keep the emission that the scene's dict states: an ``envmap``, a ``sunsky``, a textured panel.
+        Whether the emitters keep the emission that the scene's dict states, such as an ``envmap``, a ``sunsky`` or a
+        textured panel.
     """
 
     emitters: tuple[str, ...]
@@ -63,31 +65,30 @@ class LightGroup:
 
 @dataclass(frozen=True)
 class Scene:
-    """A scene without light, and its lights.
+    """A scene whose lights have no spectrum yet, and its light groups, which give them one.
 
     Attributes
     ----------
     name : str
     geometry : dict
-        `mitsuba.load_dict` input with a perspective ``sensor``; emitters lack their spectrum. Lengths in metres.
+        Input of `mitsuba.load_dict` with a perspective ``sensor``; emitters have no spectrum. Lengths are in metres.
     groups : mapping of str to LightGroup
-        All of the scene's lights, each in one group.
+        The scene's lights; each belongs to one group.
     reference_plane : str or None
         Key of the shape on whose front illuminance is measured.
     extend : "hold" or None
-        What surfaces do outside their tables (reflectance, transmittance, refractive index): ``"hold"`` continues the
-        end values, None refuses bands beyond them.
+        What surfaces do outside their tables of reflectance, transmittance or refractive index: ``"hold"`` continues
+        the end values; with None, bands beyond them are refused.
     max_depth : int
-        Longest path in segments, 1 being emission alone and 2 direct light, where a render isn't asked for another.
+        Longest path in segments, unless a render asks for another; 1 is emission alone, 2 direct light.
     rr_depth : int
         Russian roulette ends paths from this depth on; 5 as in Mitsuba's `path`.
 
     Raises
     ------
     InputError
-        Where a light is missing, of a kind that can't be relit, or in no group; where an ``envmap``, ``sunsky`` or
-        textured ``spot`` is in a group without `coloured`; or the plane isn't in the scene; or `extend` is something
-        else.
+        If a light is missing, of a type that can't be relit, or in no group; if an ``envmap``, ``sunsky`` or textured
+        ``spot`` is in a group without `coloured`; if the plane isn't in the scene; if `extend` is something else.
     """
 
     name: str
@@ -132,7 +133,7 @@ class Scene:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Height and width of the camera's film, whose proportions the scene is made for; 256 x 256 without one."""
+        """Height and width of the camera's film, for whose proportions the scene is made; 256 x 256 without a film."""
         film = self.geometry["sensor"].get("film", {})
         return int(film.get("height", OWN_SIDE)), int(film.get("width", OWN_SIDE))
 
@@ -145,16 +146,16 @@ class Scene:
 
     @property
     def description(self) -> Node:
-        """Plain dict for `mitsuba.load_dict`, every light at its own spectrum and power.
+        """Plain dict for `mitsuba.load_dict`, with every light at its own spectrum and power.
 
-        Coloured emitters are left as they are: Mitsuba has no parameter for a factor on them. Bitmaps whose ``data``
-        are rows of bytes, as in `dead_leaves`, are for `render.loader.with_textures` to turn into Mitsuba's tensors.
+        Coloured emitters are unchanged, because Mitsuba has no parameter for a factor on them. Bitmaps whose ``data``
+        are rows of bytes, as in `dead_leaves`, become Mitsuba's tensors by `render.loader.with_textures`.
         """
         return self.lit({name: spectrum_node(group.spectrum * group.power) for name, group in self.groups.items()})
 
     @method
     def lit(self, emission: Mapping[str, Node]) -> Node:
-        """Plain dict with the named groups at the given emission (a Mitsuba spectrum); other groups are removed."""
+        """Return a plain dict with the named groups at given emissions (Mitsuba spectra), without the other groups."""
         result: Node = _copy(self.geometry)
         for name, group in self.groups.items():
             for path in group.emitters:
@@ -168,16 +169,16 @@ class Scene:
 
 
 def film_size(proportions: tuple[int, int], longest: int | None) -> tuple[int, int]:
-    """Height and width, or their proportions with the longer side that was asked for."""
+    """Scale height and width so that the longer side is `longest`; None leaves them."""
     scale = 1.0 if longest is None else longest / max(proportions)
     return max(1, round(proportions[0] * scale)), max(1, round(proportions[1] * scale))
 
 
 def spectrum_node(spectrum: Spectrum) -> Node:
-    """Write a spectrum for Mitsuba: the same points, linear between them.
+    """Convert a spectrum to Mitsuba's description, with the same points and linear between them.
 
-    Evenly spaced points become ``regular``, whose look-up is far cheaper than ``irregular``'s search; and materials
-    on one common grid compile to one piece of code, which keeps a scene of fifty materials from taking minutes.
+    Evenly spaced points become ``regular``, whose look-up is far cheaper than the search of ``irregular``. Materials on
+    one common grid also share compiled code, without which a scene of fifty materials would compile for minutes.
     """
     if not spectrum.values.any():
         return uniform_node(0.0)  # Mitsuba refuses a table without any value above 0
@@ -189,17 +190,17 @@ def spectrum_node(spectrum: Spectrum) -> Node:
 
 
 def uniform_node(value: float) -> Node:
-    """Write a spectrum of one value as Mitsuba's ``uniform`` plug-in."""
+    """Describe a spectrum of one value as Mitsuba's ``uniform`` plug-in."""
     return {"type": "uniform", "value": value}
 
 
 def table_of(node: Node) -> Spectrum | None:
-    """Spectrum that a node states point by point; None for one of another kind.
+    """Read a spectrum that a node states point by point; return None for a node of another type.
 
     Raises
     ------
     InputError
-        Where what it states is no such table.
+        If its table is malformed.
     """
     kind = node.get("type")
     keys = node.keys() - {"type", "id"}
@@ -220,10 +221,10 @@ def _numbers(text: Any) -> Floats:
 
 
 def _with_black_lamps(geometry: Node, emitters: Mapping[str, str]) -> Node:
-    """Copy of a scene in which the surface of every area light is stated.
+    """Copy a scene and give every area light without a surface a black one.
 
-    Mitsuba gives a shape without a BSDF a black surface where it emits and a grey one (0.5) where it doesn't. A lamp
-    that another light group shines on is such a shape without its emitter, and has to stay black.
+    Mitsuba makes a shape without a BSDF black if it emits, and otherwise grey (0.5). When another light group is
+    rendered, a lamp is such a shape without its emitter, and must stay black.
     """
     result = geometry
     for path in [path for path, kind in emitters.items() if kind == "area" and "/" in path]:
@@ -235,21 +236,21 @@ def _with_black_lamps(geometry: Node, emitters: Mapping[str, str]) -> Node:
 
 
 def _is_surface(part: Any) -> bool:
-    """Whether a part of a shape is its surface: a description, a reference, or one that Mitsuba has loaded."""
+    """Return whether a part of a shape is its surface: a description, a reference, or a BSDF of Mitsuba's."""
     if isinstance(part, dict):
         return part.get("type") not in _NO_SURFACES
     return any(kind.__name__ == "BSDF" for kind in type(part).__mro__)
 
 
 def _with_part(node: Node, way: Sequence[str], part: Node) -> Node:
-    """Copy of a node in which the part at the end of `way` is another."""
+    """Copy a node and replace the part at the end of the keys `way`."""
     if not way:
         return part
     return {**node, way[0]: _with_part(node[way[0]], way[1:], part)}
 
 
 def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
-    """Copy of a node in which the tables outside of lights continue at their end values."""
+    """Copy a node and continue all tables that don't belong to lights at their end values."""
     if (table := table_of(node)) is not None:
         return spectrum_node(_held(table))
     result: Node = {}
@@ -267,14 +268,14 @@ def _hold(node: Node, emitters: Mapping[str, str], prefix: str = "") -> Node:
 
 
 def _held(table: Spectrum) -> Spectrum:
-    """Table continued at its end values."""
+    """Continue a table at its end values."""
     nm = table.wavelength_nm
     far = np.unique([min(HELD_NM[0], nm[0]), *nm, max(HELD_NM[1], nm[-1])])
     return Spectrum(far, np.interp(far, nm, table.values))
 
 
 def walk(node: Node, path: Keys = ()) -> Iterator[tuple[Keys, Node]]:
-    """Every part under a node with its keys from there, parents first."""
+    """Yield every part under a node with its keys from there, parents first."""
     for key, child in node.items():
         if isinstance(child, dict):
             yield (*path, key), child
@@ -282,13 +283,13 @@ def walk(node: Node, path: Keys = ()) -> Iterator[tuple[Keys, Node]]:
 
 
 def emitter_paths(node: Node) -> dict[str, str]:
-    """Keys and type of each emitter in a scene's dict."""
+    """Return the type of each emitter in a scene's dict by its keys, joined by slashes."""
     kinds = (*EMISSION_PARAMETER, *COLOURED_EMITTERS, *_REFUSED_EMITTERS)
     return {"/".join(path): part["type"] for path, part in walk(node) if part.get("type") in kinds}
 
 
 def _copy(value: Any) -> Any:
-    """Copy nested dicts and lists, so that a description shares none with its scene."""
+    """Copy nested dicts and lists, so that a description shares none of them with its scene."""
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}
     return list(value) if isinstance(value, list) else value

@@ -1,4 +1,4 @@
-"""Whether the data of a scene's surfaces and lights reach as far as the bands asked for."""
+"""Checks that the data of a scene's surfaces and lights cover the bands asked for."""
 
 import warnings
 from collections.abc import Container, Iterator
@@ -12,17 +12,17 @@ from render.spectrum import VISIBLE_NM, Spectrum, optical_constant
 from rodcone.errors import InputError
 from rodcone.types import Floats
 
-SUNSKY_NM = (320.0, 720.0)  # Mitsuba's tables (Hosek & Wilkie 2012) end here, and give 0 beyond: found by evaluating it
-CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, likewise for the two below
+SUNSKY_NM = (320.0, 720.0)  # end of Mitsuba's sunsky (Hosek & Wilkie 2012), which evaluates to 0 beyond
+CIE_NM = (360.0, 830.0)  # Mitsuba's MI_CIE_MIN and MI_CIE_MAX, beyond which the plug-ins of the next two lines are 0
 _WITHIN_CIE = ("blackbody", "d65")
 _EMISSION_WITHIN_CIE = (*_WITHIN_CIE, "envmap", "rgb")  # as reflectance, rgb is known at every wavelength
-_SLACK_NM = 0.01  # a thousandth of a band: of rounded edges
+_SLACK_NM = 0.01  # a thousandth of a band, for rounded edges
 
 
 def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
-    """Raise `InputError` where data of a surface or a sunsky end within the bands asked for.
+    """Raise `InputError` if data of a surface or a sunsky end within the bands asked for.
 
-    Mitsuba makes a surface black outside its table, and a metal a perfect mirror: both would pass for knowledge.
+    Mitsuba makes a surface black outside its table, and a metal a perfect mirror. Both would look like real data.
     """
     prefix = f"scene {scene.name}: bands reach {shortest_nm:g}-{longest_nm:g} nm, and"
     paths = emitter_paths(scene.geometry)
@@ -39,7 +39,7 @@ def check_range(scene: Scene, shortest_nm: float, longest_nm: float) -> None:
 
 
 def known_range(scene: Scene) -> tuple[float, float] | None:
-    """Wavelengths that all tables of the surfaces cover; None without one, and where a table's ends can't be held."""
+    """Return the range that all surfaces' tables cover; None without tables, or if a table can't be continued."""
     tables = [(range_nm, extends) for _, range_nm, extends in _surfaces(scene.geometry, emitter_paths(scene.geometry))]
     if not tables or not all(extends for _, extends in tables):
         return None
@@ -47,7 +47,7 @@ def known_range(scene: Scene) -> tuple[float, float] | None:
 
 
 def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Warn (`UserWarning`) where data of a coloured light end within the bands."""
+    """Warn (`UserWarning`) if data of a coloured light end within the bands."""
     for path in (path for group in scene.groups.values() if group.coloured for path in group.emitters):
         light: Node = reduce(getitem, path.split("/"), scene.geometry)
         for part in (light, *(inner for _, inner in walk(light))):
@@ -57,7 +57,7 @@ def warn_of_coloured_lights(scene: Scene, wavelength_nm: Floats, width_nm: Float
 
 
 def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Warn (`UserWarning`) where a light's spectrum ends within the bands at a value other than 0."""
+    """Warn (`UserWarning`) if a light's spectrum ends within the bands at a value other than 0."""
     shortest = (wavelength_nm - width_nm / 2).min()
     longest = (wavelength_nm + width_nm / 2).max()
     low, high = spectrum.wavelength_nm[[0, -1]]
@@ -71,8 +71,8 @@ def warn_of_dark_ends(light: str, spectrum: Spectrum, wavelength_nm: Floats, wid
 
 
 def _surfaces(scene: Node, emitters: Container[str]) -> Iterator[tuple[str, tuple[float, float], bool]]:
-    """Path of each table outside of lights, the wavelengths that it covers, and whether its ends can be held."""
-    # A spectrum that stands in the scene itself counts where a surface refers to it.
+    """Yield for each table of a surface: its path, the wavelengths that it covers, and whether it can be continued."""
+    # A spectrum that stands in the scene itself counts only if a surface refers to it.
     pending = [(key, part) for key, part in scene.items() if isinstance(part, dict) and not _range_nm(part)]
     for path, node in pending:
         if path in emitters:
@@ -84,7 +84,7 @@ def _surfaces(scene: Node, emitters: Container[str]) -> Iterator[tuple[str, tupl
 
 
 def _range_nm(node: Node) -> tuple[float, float] | None:
-    """Wavelengths that a spectrum or a metal's index is known over; None for what isn't a table."""
+    """Return the range over which a spectrum or a metal's index is known; None if the node is no table."""
     if node.get("type") in _WITHIN_CIE:
         return CIE_NM
     table = table_of(node)
@@ -94,5 +94,5 @@ def _range_nm(node: Node) -> tuple[float, float] | None:
 
 
 def _named(scene: Node, name: str) -> Node:
-    """Part that stands in the scene under an id; empty where there is none."""
+    """Return the part of the scene with an id; an empty dict if there is none."""
     return next((x for key, x in scene.items() if isinstance(x, dict) and name in (key, x.get("id"))), {})

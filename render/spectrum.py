@@ -25,18 +25,18 @@ from rodcone.types import real_array
 
 VISIBLE_NM = (380.0, 780.0)
 SHORTEST_NM, LONGEST_NM = 100.0, 20_000.0  # what is taken for a wavelength in nm: from the far ultraviolet to heat
-MOST_OVERLAP = 0.01  # of the narrower of two bands: rounding of stated edges, not light that counts twice
+MOST_OVERLAP = 0.01  # share of the narrower of two bands that may overlap by rounding of stated edges
 LINE_BASE_NM = 0.1  # far under any band, so that a line's shape doesn't matter
 LINE_REACH_NM = 0.5  # from a line to the edges of its band: wide enough for a lamp's own width and tabulation
-LEAST_LINE = 1e-3  # of a light's power: less is noise of a curve that is measured finely
+LEAST_LINE = 1e-3  # least share of a light's power in a line; smaller peaks are noise of a finely measured curve
 OBSERVER_NM: Floats = np.arange(360.0, 831.0)  # corners of the CIE 1931 observer
 DEFAULT_WAVELENGTH_NM: Floats = np.arange(385.0, 780.0, 10.0)  # centres of 40 bands that fill 380-780 nm
-RENDER_BAND_NM = 20.0  # electrons of charts within 0.05 % under smooth light, 0.3 to 1.6 % under lamps of lines
+RENDER_BAND_NM = 20.0  # charts' electrons then err by 0.05 % under smooth light and 0.3 to 1.6 % under lamps of lines
 
 
 @dataclass(frozen=True)
 class Spectrum:
-    """A function of wavelength: linear between its points, zero outside them.
+    """A function of wavelength, linear between its points and zero outside them.
 
     Attributes
     ----------
@@ -48,7 +48,7 @@ class Spectrum:
     Raises
     ------
     InputError
-        Where the points are not as above, or not within 100 to 20 000 nm.
+        If the points are not as above, or not within 100 to 20 000 nm.
 
     Examples
     --------
@@ -92,13 +92,13 @@ class Spectrum:
 
     @method
     def band_average(self, wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
-        """Mean over each band ``wavelength_nm +- width_nm / 2``, shape (band,); exact for the linear pieces."""
+        """Average over each band ``wavelength_nm +- width_nm / 2``, shape (band,); exact for the linear pieces."""
         centre = np.asarray(wavelength_nm, dtype=np.float64)
         half = np.asarray(width_nm, dtype=np.float64) / 2
         return (self._integral_to(centre + half) - self._integral_to(centre - half)) / (2 * half)
 
     def _integral_to(self, nm: Floats) -> Floats:
-        """Integral from the first point to `nm`."""
+        """Integrate from the first point to `nm`."""
         at = np.clip(nm, self.wavelength_nm[0], self.wavelength_nm[-1])
         steps = np.diff(self.wavelength_nm) * (self.values[1:] + self.values[:-1]) / 2
         before = np.concatenate([[0.0], np.cumsum(steps)])
@@ -108,17 +108,17 @@ class Spectrum:
 
 
 def flat(value: float = 1.0) -> Spectrum:
-    """Spectrum of one value over 300-1100 nm: wider than any band the project uses."""
+    """Return a spectrum of one value over 300-1100 nm, which covers all bands that the project uses."""
     return Spectrum(np.array([300.0, 1100.0]), np.array([value, value]))
 
 
 def line_spectrum(lines_nm: ArrayLike, powers: ArrayLike) -> Spectrum:
-    """Emission lines as triangles 0.1 nm wide at the base; `powers` are their integrals over wavelength.
+    """Make a spectrum of emission lines, each a triangle 0.1 nm wide at the base; `powers` are their integrals.
 
     Raises
     ------
     InputError
-        Where lines aren't increasing, or less than 0.1 nm apart.
+        If lines aren't increasing, or are less than 0.1 nm apart.
     """
     lines = np.atleast_1d(lines_nm).astype(np.float64)
     heights = np.atleast_1d(powers) * (2 / LINE_BASE_NM)
@@ -129,7 +129,7 @@ def line_spectrum(lines_nm: ArrayLike, powers: ArrayLike) -> Spectrum:
 
 
 def even_bands(range_nm: tuple[float, float], count: int) -> tuple[Floats, Floats]:
-    """Centres and widths of bands of one width that fill a range, shape (band,) each."""
+    """Divide a range into bands of one width; return their centres and widths, shape (band,) each."""
     edges = np.linspace(*range_nm, count + 1)
     return (edges[1:] + edges[:-1]) / 2, np.diff(edges)
 
@@ -137,10 +137,10 @@ def even_bands(range_nm: tuple[float, float], count: int) -> tuple[Floats, Float
 def line_bands(
     lines_nm: ArrayLike, range_nm: tuple[float, float] = VISIBLE_NM, width_nm: float = 10.0
 ) -> tuple[Floats, Floats]:
-    """Bands that fill a range, each line in a narrow one of its own: centres and widths, shape (band,) each.
+    """Divide a range into bands so that each line has a narrow one; return centres and widths, shape (band,) each.
 
-    A line's band reaches 0.5 nm to either side; lines less than 1 nm apart share one. The others are `width_nm` wide,
-    cut where a line's band begins; a piece of under 1 nm between the two joins its neighbour.
+    A line's band reaches 0.5 nm to either side; lines less than 1 nm apart share one. All other bands are `width_nm`
+    wide, or end where a line's band begins. A piece of less than 1 nm that is left over joins its neighbour.
 
     Raises
     ------
@@ -168,7 +168,7 @@ def line_bands(
 
 
 def emission_lines_nm(spectrum: Spectrum) -> Floats:
-    """Wavelengths of a spectrum's emission lines (`line_spectrum`): peaks under 0.2 nm wide, twice their sides."""
+    """Find a spectrum's emission lines [nm] (`line_spectrum`): peaks under 0.2 nm wide and twice their neighbours."""
     nm, values = spectrum.wavelength_nm, spectrum.values
     beside = np.maximum(values[:-2], values[2:])
     power = values[1:-1] * (nm[2:] - nm[:-2]) / 2
@@ -179,7 +179,7 @@ def emission_lines_nm(spectrum: Spectrum) -> Floats:
 def fine_bands(
     spectra: Iterable[Spectrum], range_nm: tuple[float, float] = VISIBLE_NM, width_nm: float = 10.0
 ) -> tuple[Floats, Floats]:
-    """Band centres and widths that follow lights: even bands, and a narrow one for each emission line of any."""
+    """Divide a range into even bands, and a narrow one for each emission line of any light: centres and widths."""
     lines = np.unique(np.concatenate([np.zeros(0), *map(emission_lines_nm, spectra)]))
     within = lines[(lines > range_nm[0] + 1) & (lines < range_nm[1] - 1)]
     even = even_bands(range_nm, max(1, round((range_nm[1] - range_nm[0]) / width_nm)))
@@ -187,13 +187,13 @@ def fine_bands(
 
 
 def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> Floats:
-    """Width of each band [nm]: as given, or the spacing of evenly spaced centres.
+    """Return the width of each band [nm]: as given, or the spacing of evenly spaced centres.
 
     Raises
     ------
     InputError
-        Where centres don't increase, widths aren't positive, or the spacing isn't even and no widths are given; where
-        bands reach beyond 100 to 20 000 nm, or overlap by more than 1 % of a width.
+        If centres don't increase, widths aren't positive, or the spacing is uneven and no widths are given; if bands
+        reach beyond 100 to 20 000 nm, or overlap by more than 1 % of a width.
     """
     nm = real_array("wavelength_nm", wavelength_nm).astype(np.float64)
     if nm.ndim != 1 or nm.size == 0 or not np.all(np.isfinite(nm)) or np.any(np.diff(nm) <= 0) or nm[0] <= 0:
@@ -225,7 +225,7 @@ def band_widths(wavelength_nm: ArrayLike, width_nm: ArrayLike | None = None) -> 
 
 
 def _require_nm(shortest: float, longest: float) -> None:
-    """Raise `InputError` for wavelengths that are no nanometres, naming the unit that they seem to have."""
+    """Raise `InputError` for wavelengths that can't be nanometres, and name the unit that they seem to have."""
     if shortest >= SHORTEST_NM and longest <= LONGEST_NM:
         return
     fix = "give nanometres"
@@ -239,7 +239,7 @@ def _require_nm(shortest: float, longest: float) -> None:
 
 
 def black_body(temperature_k: float) -> Spectrum:
-    """Planck's law over 300-1100 nm, relative to its value at 560 nm."""
+    """Compute Planck's law over 300-1100 nm, relative to its value at 560 nm."""
     second_radiation_constant_nm_k = 1.438776877e7  # CODATA 2018, exact SI: h c / k
     nm = np.arange(300.0, 1101.0, 5.0)
     exponent = second_radiation_constant_nm_k / temperature_k
@@ -251,7 +251,7 @@ PUBLISHED = Path(__file__).parent / "data" / "published_spectra.json"
 
 @cache
 def published_spectra(collection: str) -> dict[str, tuple[Floats, Floats]]:
-    """Wavelengths [nm] and values of each table of a collection, in its published order.
+    """Read the wavelengths [nm] and values of each table of a collection, in its published order.
 
     Parameters
     ----------
@@ -272,9 +272,9 @@ _NAME = re.compile(r"[\w-]+")
 
 @cache
 def optical_constant(material: str, part: str) -> Spectrum | None:
-    """Table of one part, ``eta`` or ``k``, of a complex index; found without importing Mitsuba.
+    """Read one part, ``eta`` or ``k``, of a material's complex index without importing Mitsuba.
 
-    None for a material that Mitsuba has no table of, such as ``none``, its perfect mirror.
+    Return None for a material of which Mitsuba has no table, such as ``none``, its perfect mirror.
     """
     path = metadata.distribution("mitsuba").locate_file(f"mitsuba/data/ior/{material}.{part}.spd")
     if not _NAME.fullmatch(material) or not Path(str(path)).is_file():
@@ -291,20 +291,20 @@ LUMINOUS_EFFICACY_LM_W = 683.0  # SI: K_cd at 540 THz
 
 @cache
 def colour_matching_functions() -> tuple[Spectrum, Spectrum, Spectrum]:
-    """CIE 1931 2-degree x, y, z at 1 nm from 360 to 830 nm (CIE 018:2019)."""
+    """Return the CIE 1931 2-degree x, y and z in steps of 1 nm from 360 to 830 nm (CIE 018:2019)."""
     x, y, z = (Spectrum(nm, np.maximum(values, 0.0)) for nm, values in published_spectra("observer").values())
     return x, y, z
 
 
 def luminous_efficiency(wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
-    """Mean of V(lambda) in each band; V is the y of the CIE 1931 observer."""
+    """Average V(lambda), which is the y of the CIE 1931 observer, over each band."""
     return colour_matching_functions()[1].band_average(wavelength_nm, width_nm)
 
 
 def luminance(
     spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None
 ) -> NDArray[np.float64]:
-    """Photometric value of a spectral radiometric one over its last axis (band): K_m times the integral of L V.
+    """Convert spectral radiometric values to photometric ones over the last axis (band): K_m times the integral of L V.
 
     Radiance [W m^-2 sr^-1 nm^-1] gives luminance [cd m^-2]; irradiance [W m^-2 nm^-1] gives illuminance [lux].
 
@@ -314,7 +314,7 @@ def luminance(
         Band means.
     wavelength_nm, width_nm : (band,) array_like
     light : Spectrum, optional
-        The lamp that lies behind the band means, up to a factor (`render.band_weights`).
+        The lamp behind the band means, up to a factor (`render.band_weights`).
     """
     weights = observer_weights(wavelength_nm, width_nm, light)[1]
     return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
@@ -323,16 +323,16 @@ def luminance(
 def tristimulus(
     spectral: NDArray[np.floating], wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None
 ) -> NDArray[np.float64]:
-    """XYZ [cd m^-2] of spectral radiance over its last axis (band): shape (..., 3), Y is luminance.
+    """Convert spectral radiance, bands along the last axis, to XYZ [cd m^-2], shape (..., 3); Y is luminance.
 
-    Parameters as of `luminance`.
+    Parameters are those of `luminance`.
     """
     weights = observer_weights(wavelength_nm, width_nm, light).T
     return np.asarray(LUMINOUS_EFFICACY_LM_W * (spectral @ weights), dtype=np.float64)
 
 
 def observer_weights(wavelength_nm: ArrayLike, width_nm: ArrayLike, light: Spectrum | None = None) -> Floats:
-    """Weights of band means in the integrals of x, y and z over them, shape (3, band); parameters as of `luminance`."""
+    """Return the weights that turn band means into X, Y and Z, shape (3, band); parameters are those of `luminance`."""
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     widths = np.broadcast_to(np.asarray(width_nm, dtype=np.float64), nm.shape)
     return _observer_weights(by_bits((nm, widths), nm, widths), None if light is None else spectrum_by_bits(light))
@@ -346,25 +346,25 @@ def _observer_weights(bands: ByBits[tuple[Floats, Floats]], light: ByBits[Spectr
 
 
 def spectrum_by_bits(spectrum: Spectrum) -> ByBits[Spectrum]:
-    """Return a spectrum as a cache takes it."""
+    """Wrap a spectrum so that it can be the key of a cache."""
     return by_bits(spectrum, spectrum.wavelength_nm, spectrum.values)
 
 
 def observer(wavelength_nm: Floats) -> Floats:
-    """CIE 1931 x, y and z at wavelengths, shape (3, n)."""
+    """Evaluate CIE 1931 x, y and z at wavelengths, shape (3, n)."""
     return at_wavelengths(colour_matching_functions(), wavelength_nm)
 
 
 def at_wavelengths(curves: Iterable[Spectrum], wavelength_nm: Floats) -> Floats:
-    """Values of curves at wavelengths, shape (curve, n); 0 beyond their ends."""
+    """Evaluate curves at wavelengths, shape (curve, n); they are 0 beyond their ends."""
     return np.array([np.interp(wavelength_nm, x.wavelength_nm, x.values, left=0.0, right=0.0) for x in curves])
 
 
 def per_joule(curves: Iterable[Spectrum], wavelength_nm: Floats) -> Floats:
-    """What responses per photon give per joule of light at wavelengths, shape (curve, n)."""
+    """Convert responses per photon to responses per joule of light at wavelengths, shape (curve, n)."""
     return at_wavelengths(curves, wavelength_nm) * photons_per_joule(wavelength_nm)
 
 
 def photons_per_joule(wavelength_nm: ArrayLike) -> Floats:
-    """Photons in a joule of light: lambda / (h c)."""
+    """Compute the number of photons in a joule of light: lambda / (h c)."""
     return np.asarray(wavelength_nm, dtype=np.float64) * 1e-9 / (PLANCK_J_S * LIGHT_M_S)

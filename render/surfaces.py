@@ -1,4 +1,4 @@
-"""What the camera sees at the middle of each pixel: depth, normals, objects and materials, without any light."""
+"""Depth, normal, object and material at the middle of each pixel, whatever the light."""
 
 from dataclasses import dataclass
 from types import ModuleType
@@ -16,18 +16,18 @@ from rodcone.jit import dr
 
 @dataclass(frozen=True)
 class Surfaces:
-    """First surface of one ray through the middle of each pixel, no lens blur in it.
+    """First surface on a ray through the middle of each pixel, without lens blur.
 
     Attributes
     ----------
     depth_m : (h, w) float32
-        Distance along the camera's axis; 0 where the ray meets nothing.
+        Distance along the camera's axis; 0 if the ray meets nothing.
     normal : (h, w, 3) float32
-        Of length 1, towards the camera; x to the right, y down, z into the scene. 0 where the ray meets nothing.
+        Unit vector towards the camera, with x to the right, y down and z into the scene; 0 if the ray meets nothing.
     object_id, material_id : (h, w) uint16
-        Number in `objects` and `materials`, counted from 1; 0 where the ray meets nothing.
+        Number in `objects` and `materials`, counted from 1; 0 if the ray meets nothing.
     objects, materials : tuple of str
-        Names of the scene's shapes; and of each material the first shape that is made of it.
+        Names of the scene's shapes; for each material, the name of the first shape that is made of it.
     """
 
     depth_m: NDArray[np.float32]
@@ -42,7 +42,7 @@ class Surfaces:
 
 @own_mitsuba_variant()
 def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
-    """Trace one ray a pixel to the first surface, glass and mirrors included.
+    """Trace one ray per pixel to the first surface; glass and mirrors count as surfaces.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
     Raises
     ------
     InputError
-        Where Mitsuba can't load the scene; without LLVM and CUDA.
+        If Mitsuba can't load the scene, or there is neither LLVM nor CUDA.
     """
     mi = mitsuba_module()
     mi_scene = load_unlit(scene, size)
@@ -92,12 +92,12 @@ def see_surfaces(scene: Scene, size: tuple[int, int]) -> Surfaces:
 
 
 def _number(mi: ModuleType, shape: Any) -> Any:
-    """Number under which Dr.Jit knows a shape; 0 for none."""
+    """Return the number under which Dr.Jit knows a shape; 0 for none."""
     return dr.reinterpret_array(mi.UInt32, shape)
 
 
 def _materials(scene: Scene, objects: tuple[str, ...]) -> dict[str, str]:
-    """For each object the first one that is made of the same: all parts of the two but lights are alike."""
+    """Find for each object the first object of the same material: all parts of the two except lights are equal."""
     first = dict[str, str]()
     result = {}
     for name in objects:

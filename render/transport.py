@@ -1,4 +1,4 @@
-"""Light transport of a scene, rendered once; any spectrum, power and level of its lights afterwards."""
+"""Light transport of a scene, rendered once, and its relighting by any spectrum, power and level of the lights."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -24,9 +24,9 @@ from rodcone.errors import InputError, require_keys, require_kind, require_range
 from rodcone.types import Floats, Planes
 
 Stop = Literal["samples", "noise", "seconds", "interrupt"]
-# By light group, or one in place of all lights; a name is an illuminant's.
+# A spectrum or an illuminant's name for each light group, or one in place of all lights.
 Spectra: TypeAlias = Mapping[str, Spectrum | str] | Spectrum | str
-Powers: TypeAlias = Mapping[str, float]  # by light group
+Powers: TypeAlias = Mapping[str, float]  # factor of each light group
 
 
 @dataclass(frozen=True)
@@ -36,17 +36,17 @@ class Transport:
     Attributes
     ----------
     light : Halves of (group, band, h, w)
-        Times a spectral emission it is radiance. Of a large photograph its mean isn't an array yet, but makes one band
-        at a time (`render.radiance_files.photo.PhotoPlanes`).
+        Radiance at unit spectral emission. For a large photograph its mean isn't an array, but computes one band at a
+        time (`render.radiance_files.photo.PhotoPlanes`).
     variance : (group, band, h, w) float32
         Variance of the light, from the difference of the halves, pooled over 3x3 pixels.
     coverage : Halves of (h, w)
-        Share of each pixel's samples in which a light is seen directly.
+        Share of each pixel's samples that see a light directly.
     seen : tuple of Halves of (1 or band, h, w)
-        The part of `light` that is seen directly, of each group: one plane for all bands, or by band where the group
-        has a colour of its own.
+        The directly visible part of each group's `light`: one plane for all bands, or one per band if the group is
+        `coloured`.
     scene_means : SceneMeans
-        What levels are computed from.
+        Means from which levels are computed.
     groups : mapping of str to LightGroup
         The scene's own spectra and powers, in the order of the first axis.
     wavelength_nm, width_nm : (band,) float64
@@ -54,20 +54,21 @@ class Transport:
         Samples of each pixel, both halves together; a pixel that is noisier than others has more.
     stopped_by : "samples", "noise", "seconds" or "interrupt"
     seconds : float
-        Of all the calls that it took.
+        Time of all calls of `render` that it took.
     integrator, variant : str
     relative_mc_error : float
         Error reached under the scene's own lights: median over pixels and bands of standard error over mean.
     shared : SharedPaths or None
         Two groups whose errors are correlated, since a constant environment is rendered along with another group.
     meter : callable or None
-        Gives the irradiance on the scene's reference plane, traced at its first call; None without a plane.
+        Function that gives the irradiance on the scene's reference plane, and traces it at the first call; None without
+        a plane.
     denoised : Denoised or None
-        Denoised light beside the unbiased, where it was asked for (`render.denoised.relight`).
+        Denoised light beside the unbiased light, if it was asked for (`render.denoised.relight`).
     horizontal_view_deg : float or None
-        Angle of view of the scene's camera across the picture; None where it has none.
+        Angle of view of the scene's camera across the picture; None if it has none.
     compile_s : float
-        Seconds in which kernels were compiled for it; 0 where they were there already, or the light was.
+        Time in which kernels were compiled for it; 0 if kernels or light were already there.
     """
 
     light: Halves
@@ -94,17 +95,17 @@ class Transport:
 
     @property
     def radiance(self) -> Planes:
-        """Mean of both halves, (group, band, h, w) float32: times a spectral emission it is radiance."""
+        """Mean of both halves, (group, band, h, w) float32, which times a spectral emission is radiance."""
         return np.asarray(self.light.mean)
 
     @property
     def spp(self) -> float:
-        """Samples a pixel in the mean over the picture, both halves together."""
+        """Samples per pixel of both halves together, averaged over the picture."""
         return float(self.counts.mean())
 
     @property
     def irradiance(self) -> Floats | None:
-        """On the scene's reference plane at unit spectral emission, shape (group, band); None without a plane."""
+        """Irradiance on the scene's reference plane at unit spectral emission, (group, band); None without a plane."""
         return None if self.meter is None else self.meter().mean
 
     def relight(
@@ -116,41 +117,41 @@ class Transport:
         illuminance_lux: float | None = None,
         lux: float | None = None,
     ) -> SpectralRadiance:
-        """Radiance under given lights: linear in emission, so no new render.
+        """Compute the radiance under given lights; it is linear in emission, so that nothing is rendered again.
 
         Parameters
         ----------
         spectra : mapping of group name to Spectrum or illuminant name, or one of these alone, or float, optional
             A mapping replaces the groups' own spectral emission. One lamp alone, such as ``"A"``, takes the place of
-            all lights, each of which keeps its luminance, as ``--light A`` does. A number is the power of all groups.
+            all lights, each at that light's luminance, as ``--light A`` does. A number is the power of all groups.
         powers : mapping of group name to float, optional
             Replaces the groups' own powers.
         luminance_cd_m2 : float, optional
-            Mean luminance to reach of what is no light (`level`); all groups are scaled together.
+            Mean luminance to reach, without the lights themselves (`level`); all groups are scaled by one factor.
         illuminance_lux : float, optional
-            Illuminance to reach on the scene's reference plane; the same. The first call that asks for it traces it.
+            Illuminance to reach on the scene's reference plane, likewise. It is traced when it is first asked for.
         lux : float, optional
-            `illuminance_lux` by a shorter name.
+            A shorter name for `illuminance_lux`.
 
         Returns
         -------
         SpectralRadiance
-            float32 over band-planar memory, each value rounded once from float64. `relative_level_error` is the error
+            Values in float32, stored band by band, each rounded once from float64. `relative_level_error` is the error
             of the level that was asked for.
 
         Raises
         ------
         InputError
             For an unknown group or illuminant, a negative power or level, two levels at once, a level of a scene
-            that gives no light, or illuminance without a reference plane; for one lamp in place of a light that is
-            dark or has colours of its own.
+            without light, or illuminance without a reference plane; for one lamp in place of a light that is dark or
+            coloured.
 
         Warns
         -----
         UserWarning
-            Where a light's spectrum ends within the bands at a value other than 0: outside it is dark.
+            If a light's spectrum ends within the bands at a value other than 0; beyond its end it is dark.
         WideBandsWarning
-            Where `band_error` of the CIE observer is over 1 %.
+            If `band_error` of the CIE observer is over 1 %.
         """
         if isinstance(spectra, float | int):
             powers = dict.fromkeys(self.groups, spectra)
@@ -159,7 +160,7 @@ class Transport:
         in_bands = self._in_bands(lights)
         light, level_error = self._at_level(in_bands, luminance_cd_m2, illuminance_lux, lux)
         planes = combine(light.maps, self.radiance)
-        if light.mixed:  # beside a line the map of a lamp takes light off its neighbour
+        if light.mixed:  # the map of a lamp with lines may subtract light from the bands beside a line
             np.maximum(planes, np.float32(0), out=planes)
         warn_of_wide_bands(self._curve_error(lights, in_bands), self.width_nm)
         return SpectralRadiance(
@@ -181,11 +182,11 @@ class Transport:
         illuminance_lux: float | None = None,
         lux: float | None = None,
     ) -> tuple[SpectralRadiance, SpectralRadiance]:
-        """Two independent estimates of `relight` with the same arguments, from the two halves of the samples.
+        """Compute two independent estimates of `relight` with the same arguments, from the two halves of the samples.
 
-        Their mean is `relight`'s result; a quarter of the squared difference of any linear function of them is an
-        unbiased estimate of that function's Monte Carlo variance. Where an error is larger than the value, a half may
-        be under 0: both are `signed`.
+        Their mean is the result of `relight`. A quarter of the squared difference of any linear function of them is an
+        unbiased estimate of that function's Monte Carlo variance. Both are `signed`, because a half is negative where
+        its error exceeds the light.
         """
         light, _ = self._at_level(self._emission(spectra, powers), luminance_cd_m2, illuminance_lux, lux)
         values, difference = combine(light.maps, self.radiance), combine(light.maps, self.light.difference)
@@ -201,9 +202,9 @@ class Transport:
         illuminance_lux: float | None = None,
         lux: float | None = None,
     ) -> SpectralRadiance:
-        """What some light groups give of `relight` with the same arguments; parts of all groups sum to it.
+        """Compute the part of `relight` that some light groups give; the parts of all groups add up to it.
 
-        Beside another lamp's line a part may be under 0 in a band, so it is `signed`.
+        The part is `signed`, because in a band beside another lamp's line it may be negative.
         """
         if not (isinstance(groups, list | tuple) and all(isinstance(name, str) for name in groups)):
             raise InputError(f"groups: a {type(groups).__name__} is not allowed; give a list of light groups' names")
@@ -224,7 +225,7 @@ class Transport:
         )
 
     def relight_variance(self, *, luminance_cd_m2: float) -> Planes:
-        """Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
+        """Compute the Monte Carlo variance of `relight` at a level of the scene's own lights, shape (band, h, w)."""
         coefficients = self._own_at(luminance_cd_m2).emitted
         independent = combine(coefficients[:, :, None] ** 2 * np.eye(self.wavelength_nm.size), self.variance)
         if self.shared is None:
@@ -238,19 +239,22 @@ class Transport:
         powers: Powers | None = None,
         responses: Mapping[str, Spectrum] | None = None,
     ) -> dict[str, float]:
-        """Relative error of the light that each curve collects, for want of what happens within bands; RMS over pixels.
+        """Estimate how far the width of the bands puts off the light that each curve collects, RMS over pixels.
 
-        Expected of surfaces as rough over wavelength as these (`render.bands.error`); lamps count to their lines. Of a
-        file of radiance whose lamp was named (`render.bands.known_lamp`) what its own bands left is no part of it: of
-        chart patches in bands of 20 nm 0.03 % RMS, 0.06 under high-pressure sodium. If the lamp isn't known the light
-        is taken to be as smooth within bands as between them. Under a lamp with lines the error is larger than what is
-        said then: of chart patches in bands of 20 nm up to 3.0 % under F2, 4.4 under high-pressure sodium, 5.6 under
-        F11 (`benchmarks/bands.py`).
+        The relative error is what is expected for surfaces as rough over wavelength as those of the scene
+        (`render.bands.error`); lamps are known to their lines.
+
+        For a file of radiance whose lamp was named (`render.bands.known_lamp`), the error of the file's own bands isn't
+        included. For chart patches in bands of 20 nm that error is 0.03 % RMS, and 0.06 % under high-pressure sodium.
+
+        If the lamp isn't known, the light is taken to be as smooth within bands as between them. Under a lamp with
+        lines the true error is then larger than this estimate: for chart patches in bands of 20 nm up to 3.0 % under
+        F2, 4.4 % under high-pressure sodium and 5.6 % under F11 (`benchmarks/bands.py`).
 
         Parameters
         ----------
         spectra, powers
-            As `relight`.
+            As in `relight`.
         responses : mapping of str to Spectrum, optional
             Electrons per photon of a camera's channels, as ``sensor.responses.curves``; left out, the CIE 1931
             observer's x, y and z.
@@ -270,30 +274,31 @@ class Transport:
         return self._curve_error(lights, self._in_bands(lights), responses)
 
     def level(self, spectra: Spectra | None = None, *, powers: Powers | None = None) -> Level:
-        """Mean luminance [cd m^-2] of what is no light, under given lights: what a level in cd/m^2 sets.
+        """Compute the mean luminance [cd m^-2] that a level in cd/m^2 sets, under given lights.
 
-        The light that is seen directly is left out of the sum, and what it covers out of the area.
+        Directly visible light is left out of the sum of light, and the part of the picture that it covers out of the
+        area.
 
         Raises
         ------
         InputError
-            As `relight`, and where lights fill the picture.
+            As `relight`, and if lights fill the picture.
         """
         return self.scene_means.luminance_level(self._luminance_weights(self._emission(spectra, powers)))
 
     def illuminance_lux(self, luminance_cd_m2: float) -> float | None:
-        """Illuminance on the reference plane at a mean luminance under the scene's own lights; None without a plane."""
+        """Compute the reference plane's illuminance at a mean luminance of the scene's lights; None without a plane."""
         if self.meter is None:
             return None
         return self.meter().level(self._luminance_weights(self._own_at(luminance_cd_m2))).value
 
     def mean_radiance(self, *, luminance_cd_m2: float) -> Floats:
-        """Mean radiance of what is no light, at a level of the scene's own lights, shape (band,)."""
+        """Compute the mean radiance, without visible lights, at a level of the scene's own lights, shape (band,)."""
         own = self._own_at(luminance_cd_m2)
         return np.asarray(np.einsum("gab,gb->a", own.maps, self.scene_means.mean_radiance()))
 
     def scattered_luminance(self, *, luminance_cd_m2: float | None = None) -> NDArray[np.float64]:
-        """Return each pixel's luminance [cd m^-2] without lamps in view, shape (h, w).
+        """Compute each pixel's luminance [cd m^-2] without directly visible lamps, shape (h, w).
 
         `luminance_cd_m2` is the scene's level under its own lights; None leaves them at their own powers.
         """
@@ -311,7 +316,7 @@ class Transport:
         return self.relight()._repr_png_()
 
     def _lights(self, spectra: Spectra | None, powers: Powers | None) -> dict[str, LightGroup]:
-        """Light groups as asked for."""
+        """Return the light groups with the spectra and powers asked for."""
         if isinstance(spectra, str | Spectrum):
             spectra = self._all_lit_by(illuminant(spectra) if isinstance(spectra, str) else spectra)
         for what, given in (("spectra", spectra), ("powers", powers)):
@@ -333,7 +338,7 @@ class Transport:
         return lights
 
     def _all_lit_by(self, lamp: Spectrum) -> dict[str, Spectrum | str]:
-        """One lamp in the place of every light, at the luminance of that light's own spectrum."""
+        """Give every light the spectrum of one lamp, scaled to the luminance of that light's own spectrum."""
         unit = unit_luminance(lamp)
         return {
             name: unit * replaceable_luminance(group, f"spectra: one lamp for light group {name!r}, which")
@@ -354,7 +359,7 @@ class Transport:
         return curve_error(lights, light, self.light.mean, self.wavelength_nm, self.width_nm, responses)
 
     def _own_at(self, luminance_cd_m2: float) -> BandLight:
-        """Emission of the scene's own lights brought to a level."""
+        """Scale the emission of the scene's own lights to a level."""
         return self._at_level(self._emission(), luminance_cd_m2)[0]
 
     def _at_level(
@@ -364,7 +369,7 @@ class Transport:
         illuminance_lux: float | None = None,
         lux: float | None = None,
     ) -> tuple[BandLight, float | None]:
-        """Emission brought to the level asked for, and the relative error of that level."""
+        """Scale emission to the level asked for; also return that level's relative error."""
         levels = {"luminance_cd_m2": luminance_cd_m2, "illuminance_lux": illuminance_lux, "lux": lux}
         given = [name for name, value in levels.items() if value is not None]
         if len(given) > 1:
@@ -386,7 +391,7 @@ class Transport:
         return light * (target / level.value), level.relative_error
 
     def _luminance_weights(self, light: BandLight) -> Floats:
-        """Luminance of a transport of 1 in each group and band, shape (group, band)."""
+        """Compute the luminance of a transport of 1 in each group and band, shape (group, band)."""
         return light.luminance_weights(self.wavelength_nm, self.width_nm)
 
 
@@ -397,13 +402,13 @@ def relight_by_band(
     luminance_cd_m2: float | None = None,
     illuminance_lux: float | None = None,
 ) -> BandRadiance:
-    """Return `Transport.relight` one band at a time, of the same bits; parameters, errors and warnings as of it."""
+    """Relight one band at a time; bits, parameters, errors and warnings are those of `Transport.relight`."""
     lights = transport._lights(spectra, None)
     in_bands = transport._in_bands(lights)
     light, level_error = transport._at_level(in_bands, luminance_cd_m2, illuminance_lux)
     warn_of_wide_bands(transport._curve_error(lights, in_bands), transport.width_nm)
 
-    planes = transport.light.mean  # alone: whoever holds the result doesn't hold the variance
+    planes = transport.light.mean  # the closure holds this alone, so that the variance can be freed
 
     def plane(band: int) -> Planes:
         values = _combined(light, band, planes)
@@ -416,7 +421,7 @@ def relight_by_band(
 
 
 def light_alone(transport: Transport) -> Transport:
-    """Return a transport that has let go of all planes but its light's: for what relights it and asks for no error."""
+    """Drop all planes of a transport except its light's, for a caller that relights it and needs no error."""
     none = np.zeros((0, 0), np.float32)
     return replace(transport, variance=none, shared=None, coverage=Halves(none, none), seen=(), denoised=None)
 
@@ -428,7 +433,7 @@ def halves_by_band(
     luminance_cd_m2: float | None = None,
     illuminance_lux: float | None = None,
 ) -> tuple[BandRadiance, BandRadiance]:
-    """Return `Transport.relight_halves` one band at a time, of the same bits; parameters and errors as of it."""
+    """Relight halves one band at a time; bits, parameters and errors are those of `Transport.relight_halves`."""
     light, _ = transport._at_level(transport._emission(spectra), luminance_cd_m2, illuminance_lux)
 
     planes = transport.light
@@ -454,7 +459,7 @@ def _by_band(transport: Transport, light: BandLight, plane: Callable[[int], Plan
 
 
 def _combined(light: BandLight, band: int, planes: Planes) -> Planes:
-    """Return one band of `combine`, (h, w), for which the planes that it takes are read alone."""
+    """Compute one band of `combine`, (h, w), and read only the planes that it needs."""
     chosen = np.argwhere(light.maps[:, band]).tolist()
     if not chosen:
         return np.zeros(planes.shape[2:], np.float32)
@@ -465,12 +470,12 @@ def _combined(light: BandLight, band: int, planes: Planes) -> Planes:
 
 
 def replaceable_luminance(group: LightGroup, place: str) -> float:
-    """Luminance of a light group's spectrum, which another spectrum takes over.
+    """Return the luminance of a light group's spectrum, so that another spectrum can take its place.
 
     Raises
     ------
     InputError
-        For a group that is dark or has colours of its own.
+        For a group that is dark or coloured.
     """
     luminance = spectral_luminance(group.spectrum)
     if group.coloured or luminance <= 0:

@@ -1,8 +1,9 @@
-"""Error that is left of light in bands: in what the eye and a camera's channels collect of it.
+"""Error that remains because light is known only by its band means, in what the eye and a camera's channels collect.
 
-Lamps are followed to their lines (`render.band_weights`); what is lost is how surfaces go within a band, beyond what
-neighbouring bands tell. It is what a Gaussian process leaves open whose variance is that of the scene: the squared
-second differences of its transport over wavelength, over what the process expects of them.
+A lamp's spectrum is known to its lines (`render.band_weights`). What isn't known is how surfaces vary within a band,
+beyond what neighbouring bands tell. The error is the expected error of a Gaussian process. Its variance is estimated
+from the scene: the squared second differences of the transport over wavelength, divided by their expected value for a
+process of variance 1.
 """
 
 import warnings
@@ -20,30 +21,30 @@ from render.scene import LightGroup
 from render.spectrum import OBSERVER_NM, Spectrum, observer, per_joule
 from rodcone.types import Floats, Planes
 
-MOST_BAND_ERROR = 0.01  # of what the eye's x, y or z collects: a larger error of wide bands is said
-LEAST_SIGNAL = 0.02  # of x, y and z together: less isn't seen beside them
+MOST_BAND_ERROR = 0.01  # share of what the eye's x, y or z collects; a larger error of wide bands is reported
+LEAST_SIGNAL = 0.02  # share of x, y and z together; an observer curve that collects less isn't judged
 
 
 class WideBandsWarning(UserWarning):
-    """Bands within which surfaces vary by more than neighbouring bands tell."""
+    """Warning that surfaces vary within bands by more than neighbouring bands tell."""
 
 
 @dataclass(frozen=True)
 class CurveTerms:
-    """What the integral of curves over one lamp's light needs and leaves open.
+    """Weights for the integral of curves over one lamp's light, and what its expected error is computed from.
 
     Attributes
     ----------
     weights : (curve, band) float64
-        Of the transport's band means.
+        Weights of the transport's band means.
     deviation : (curve,) float64
-        Expected error for transport of variance 1.
+        Expected error of each integral, for transport of variance 1.
     differences : (difference, band) float64
-        From band means to what the neighbours of each band don't tell of it.
+        Matrix that takes band means to the part of each band's mean that its neighbours don't predict.
     expected : (difference,) float64
-        Their mean square for transport of variance 1.
+        Expected square of each difference, for transport of variance 1.
     centre : (difference,) int
-        The band of each.
+        Index of the band of each difference.
     """
 
     weights: Floats
@@ -61,7 +62,7 @@ def curve_error(
     width_nm: Floats,
     responses: Mapping[str, Spectrum] | None = None,
 ) -> dict[str, float]:
-    """Relative error of the integral of each curve over the light, RMS over lit pixels.
+    """Estimate the relative error of the integral of each curve over the light, RMS over lit pixels.
 
     Parameters
     ----------
@@ -103,7 +104,7 @@ def curve_error(
 def curve_terms(
     curves: Curves, knots_nm: Floats, wavelength_nm: Floats, width_nm: Floats, light: Spectrum
 ) -> CurveTerms:
-    """Terms of the integral of curves over a lamp's light; parameters as of `render.band_weights.band_weights`."""
+    """Compute the terms of one lamp; the parameters are those of `render.band_weights.band_weights`."""
     weights, deviation = transport_weights(curves, knots_nm, wavelength_nm, width_nm, light)
     if not deviation.any():
         none = np.zeros(0)
@@ -134,13 +135,16 @@ def _observer_terms(nm: bytes, width_nm: bytes, light_nm: bytes, light: bytes) -
 
 
 def _of_photons(responses: Mapping[str, Spectrum]) -> tuple[Curves, Floats]:
-    """Curves over energy of responses per photon, and their corners."""
+    """Convert responses per photon to curves per joule; also return the wavelengths of their corners."""
     curves = tuple(responses.values())
     return partial(per_joule, curves), np.concatenate([x.wavelength_nm for x in curves])
 
 
 def _differences(nm: Floats) -> tuple[Floats, NDArray[np.intp]]:
-    """What each inner band differs by from the line through its neighbours; of two bands or one, what there is."""
+    """Return the matrix of each inner band's difference from the line through its neighbours, and the bands' indices.
+
+    With two bands it holds the difference between them, with one band the band itself.
+    """
     if nm.size < 3:
         rows = np.array([[1.0]]) if nm.size == 1 else np.array([[-1.0, 1.0]])
         return rows, np.zeros(1, np.intp)
@@ -152,7 +156,7 @@ def _differences(nm: Floats) -> tuple[Floats, NDArray[np.intp]]:
 
 
 def _missed(terms: CurveTerms, transport: Floats) -> Floats:
-    """Expected error of each curve's integral in each pixel, shape (curve, h, w)."""
+    """Estimate the error of each curve's integral in each pixel, shape (curve, h, w)."""
     if not terms.expected.size:
         return np.zeros((len(terms.weights), *transport.shape[1:]))
     squared = np.square(np.tensordot(terms.differences, transport, 1))

@@ -1,4 +1,4 @@
-"""Radiance whose lamp is known, as what surfaces make of that lamp: a file's light can then be followed to its lines.
+"""Radiance under a known lamp, converted to transport, so that a file's light follows the lamp to its lines.
 
 A file of another program, or of a spectrometer, holds the mean of the light in each band. Which share of it lies at a
 lamp's lines depends on how surfaces vary within the band, which `render.band_weights` estimates from all bands at once.
@@ -16,23 +16,23 @@ from render.spectrum import Spectrum
 from rodcone.types import Floats
 
 WIDEST_NM = 10.0  # bands in which transport is kept
-MOST_UNEXPLAINED = 1e-3  # of the light: where a lamp leaves dark more of it, it isn't the lamp behind the picture
+MOST_UNEXPLAINED = 1e-3  # share of a picture's light in bands that its lamp leaves dark; with more it is another lamp
 
 
 class OtherLampWarning(UserWarning):
-    """A picture that holds light where the lamp which was named gives none."""
+    """Warning that a picture holds light at wavelengths where the named lamp gives none."""
 
 
 def over_lamp(radiance: SpectralRadiance, lamp: Spectrum) -> SpectralRadiance | None:
-    """Transport that makes the radiance of a lamp, in the place of radiance.
+    """Convert radiance to the transport that gives this radiance under a lamp.
 
-    None where the lamp can't be behind the picture, and of an even one, which tells nothing.
+    Return None if the lamp can't be behind the picture, or if its spectrum is constant, which tells nothing.
 
     Parameters
     ----------
     radiance : SpectralRadiance
-        Values are products of band means where it states its lamp itself, as a relit picture does, and true means of
-        the light in each band otherwise.
+        If it states its lamp itself, as a relit picture does, its values are products of band means. Otherwise they are
+        true means of the light in each band.
     lamp : Spectrum
 
     Warns
@@ -73,7 +73,7 @@ def over_lamp(radiance: SpectralRadiance, lamp: Spectrum) -> SpectralRadiance | 
 
 
 def _finer(nm: Floats, width_nm: Floats) -> tuple[Floats, Floats]:
-    """Centres and widths of bands of at most `WIDEST_NM` that fill the given ones."""
+    """Split bands into equal parts of at most `WIDEST_NM`; return their centres and widths."""
     parts = np.ceil(width_nm / WIDEST_NM - 1e-9).astype(np.intp)
     widths = np.repeat(width_nm / parts, parts)
     place = np.concatenate([np.arange(count) + 0.5 for count in parts])

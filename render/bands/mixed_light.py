@@ -18,9 +18,9 @@ from render.scene import LightGroup
 from render.spectrum import LUMINOUS_EFFICACY_LM_W, Spectrum, observer_weights
 from rodcone.types import Floats
 
-_ALIKE = 1e-9  # of a spectrum's largest value
+_ALIKE = 1e-9  # largest difference of two spectra that count as one, over their largest value
 _LEAST_SINGULAR = 1e-2  # share of the largest singular value; curves as wide as a band don't resolve smaller ones
-_LEAST_SHARE = 1e-5  # share of a band's light, below which moving it into another band is left out
+_LEAST_SHARE = 1e-5  # share of the brightest band's light; smaller amounts aren't moved into another band
 
 
 @dataclass(frozen=True)
@@ -30,9 +30,9 @@ class BandLight:
     Attributes
     ----------
     spectrum : Spectrum or None
-        That of all lights, or their mixture, up to a factor; None where nothing shines.
+        Spectrum that all lights share, or that of their mixture, up to a factor; None where nothing shines.
     maps : (group, band, band) float64
-        From each group's transport to what it adds to the picture's bands; diagonal for lights of one spectrum.
+        Matrix from each group's transport to what it adds to the picture's bands; diagonal for lights of one spectrum.
     emitted : (group, band) float64
         Band means of each group's emission.
     mixed : bool
@@ -49,7 +49,7 @@ class BandLight:
         return BandLight(self.spectrum, self.maps * factor, self.emitted * factor, self.mixed)
 
     def luminance_weights(self, wavelength_nm: Floats, width_nm: Floats) -> Floats:
-        """Luminance of a transport of 1 in each group and band, shape (group, band)."""
+        """Compute the luminance of a transport of 1 in each group and band, shape (group, band)."""
         luminous = LUMINOUS_EFFICACY_LM_W * observer_weights(wavelength_nm, width_nm, self.spectrum)[1]
         return np.asarray(luminous @ self.maps)
 
@@ -57,7 +57,7 @@ class BandLight:
 def band_light(
     lights: Mapping[str, LightGroup], transport: Floats, wavelength_nm: Floats, width_nm: Floats
 ) -> BandLight:
-    """Light of several groups, referred to one spectrum.
+    """Refer the light of several groups to one spectrum.
 
     Parameters
     ----------
@@ -107,7 +107,7 @@ def band_light(
 
 
 def _alike(one: Spectrum, other: Spectrum) -> bool:
-    """Whether two spectra differ by a factor."""
+    """Return whether two spectra differ only by a factor."""
     if not np.array_equal(one.wavelength_nm, other.wavelength_nm):
         return False
     return bool(np.allclose(one.values * other.values.max(), other.values * one.values.max(), rtol=0.0,

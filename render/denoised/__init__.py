@@ -1,1 +1,1 @@
-"""Light without most of its noise, and its measured error."""
+"""Denoised light and the measurement of its error."""

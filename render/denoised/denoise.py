@@ -1,7 +1,8 @@
-"""Indirect light denoised by Intel's Open Image Denoise, six spectra of it, guided by the surfaces that are seen.
+"""Indirect light denoised by Intel's Open Image Denoise in six spectral planes, guided by the visible surfaces.
 
-Indirect light over albedo is smooth where surfaces are, whatever their texture. Its spectra are few: six planes hold
-them, made of the bands by hat functions. A least-squares matrix, fitted to the picture itself, leads back to the bands.
+Indirect light divided by albedo is smooth on a smooth surface, whatever its texture. Its spectra vary little: hat
+functions sum the bands to six planes, and a least-squares matrix, fitted to the picture itself, leads back to the
+bands.
 """
 
 from dataclasses import dataclass
@@ -18,24 +19,24 @@ from rodcone.types import Planes
 
 EXTRA = "denoise"
 SPECTRA = 6  # two calls of the denoiser, with three planes each
-LEAST_ALBEDO = 0.02  # smallest albedo that light is divided by: divided by a darker surface's it would be noise alone
+LEAST_ALBEDO = 0.02  # smallest albedo that light is divided by; on darker surfaces the quotient would be mere noise
 SURFACE_POINTS = 64
 SURFACE_THREADS = 1 << 20
 MIXING_PIXELS = 2.0  # standard deviation of the window that averages squared errors
-ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values: squares of single-precision numbers
+ROUNDING = 1e-10  # relative limit of the pseudo-inverse's singular values, which are squares of single precision
 _PLANES = 3  # planes that the denoiser takes in one call
 
 
 @dataclass(frozen=True)
 class Denoised:
-    """Denoised light of each group at unit spectral emission, and what its error is measured by.
+    """Denoised light of each group at unit spectral emission, and two folds that measure its error.
 
     Attributes
     ----------
     radiance : (group, band, h, w) float32
         The unbiased light with its indirect part denoised, each group by itself.
     indirect : Halves of (group, band, h, w)
-        That part of the unbiased light, with its noise.
+        The indirect part before it was denoised.
     folds : Halves of (group, band, h, w)
         Two independent renders that measure the error of `radiance`; no part of them is in it.
     fold_points : int
@@ -64,7 +65,7 @@ def denoiser() -> Any:
 def first_surfaces(loaded: LoadedScene, film: Film, seed: int) -> tuple[Planes, Planes]:
     """Return each pixel's mean albedo (band, h, w) and normal (3, h, w) of the first surfaces that scatter light.
 
-    Pass another seed than the light's paths have: with that one the two would share their noise.
+    `seed` must differ from that of the light's paths, because the two would otherwise share their noise.
     """
     once = np.ones(film.size, np.uint32)
     span = Span(0, SURFACE_POINTS, 1)
@@ -121,16 +122,17 @@ def denoised(indirect: Planes, difference: Planes, albedo: Planes, normal: Plane
 
 
 def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
-    """Share s of denoised light in each pixel (h, w): V / (V + E), as of a Wiener filter.
+    """Compute the share s of denoised light in each pixel (h, w): V / (V + E), as in a Wiener filter.
 
-    V is the variance of the noisy light, E the squared error of the denoised, both means over a Gaussian window.
+    V is the variance of the noisy light and E the squared error of the denoised light, both averaged over a Gaussian
+    window.
 
     Parameters
     ----------
     error : (spectrum, h, w) float32
         Half the difference of the halves.
     residuals : pair of (spectrum, h, w) float32
-        Each half, denoised, less the other: its error, and the noise of the other.
+        Each half, denoised, minus the other half: the error of the one plus the noise of the other.
     """
     from scipy.ndimage import gaussian_filter  # imported here, because a render without denoiser doesn't need it
 
@@ -146,7 +148,7 @@ def _denoised_share(error: Planes, residuals: tuple[Planes, Planes]) -> Planes:
 
 
 def _hats(bands: int) -> Planes:
-    """Hat functions over the bands, each of sum 1: (spectrum, band)."""
+    """Return hat functions over the bands, each of sum 1: (spectrum, band)."""
     count = min(SPECTRA, bands)
     place = np.linspace(0, count - 1, bands)
     hats = np.maximum(0, 1 - np.abs(place - np.arange(count)[:, None]))

@@ -15,7 +15,7 @@ _FOLDS, _SURFACES = 0xF01D, 0x5F0A  # streams of the seed that the render itself
 def denoise_means(
     scene: Scene, loaded: list[LoadedScene], film: Film, means: Means, seed: int, earlier: Denoised | None
 ) -> Denoised:
-    """Denoise the means of a render and draw its folds; those of an earlier call are continued.
+    """Denoise the means of a render and draw its folds; the folds of an earlier call are continued.
 
     Raises
     ------

@@ -98,6 +98,6 @@ def measured_error(
 
 
 def sums_over_blocks(planes: Floats, side: int) -> Floats:
-    """Sum over blocks of so many pixels on a side; pixels that are left over at the ends form smaller blocks."""
+    """Sum over square blocks of `side` pixels; the pixels left over at the far edges form smaller blocks."""
     rows, columns = (np.arange(0, length, side) for length in planes.shape)
     return np.asarray(np.add.reduceat(np.add.reduceat(planes, rows, axis=0), columns, axis=1))

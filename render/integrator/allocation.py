@@ -1,4 +1,4 @@
-"""Samples where they are needed: how many more a pixel gets than the others, by the noise of a pilot."""
+"""Allocation of samples: how many more a pixel gets than the others, by its noise in a pilot render."""
 
 import numpy as np
 import scipy
@@ -8,24 +8,24 @@ from rodcone.types import Floats, Planes
 
 LEAST_SHARE = 4  # every pixel gets at least one sample in four of the mean number
 MOST_RATE = 64
-POOL = 5  # pixels each way, over which the pilot's noise is pooled
-UNSEEN = 0.3  # of the mean weight, everywhere: noise of rare paths that the pilot hasn't met
-FLOOR = 0.01  # of the mean light: dark noise, which a sensor adds to shot noise
+POOL = 5  # side of the window [pixels] over which the pilot's noise is pooled
+UNSEEN = 0.3  # share of the mean weight that every pixel gets, for the noise of rare paths that the pilot missed
+FLOOR = 0.01  # share of the mean light that is added everywhere, for a sensor's dark noise
 STEPS = 8  # from one power of two to the next, in the search for the rates' common factor
 
 
 def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
-    """Rates of the pixels, powers of two from 1 on, shape (h, w).
+    """Choose the pixels' rates, which are powers of two from 1 on, shape (h, w).
 
-    A pixel's weight is Monte Carlo variance over mean, the largest over the light groups: in proportion to the share
-    of shot noise, at every level and for every sensor. With samples in proportion to its root, the mean of that
-    share over the picture is least.
+    A pixel's weight is Monte Carlo variance over mean, of the light group where that is largest. At every level and for
+    every sensor it is proportional to the variance relative to that of shot noise. If samples are proportional to the
+    weight's square root, the mean of that ratio over the picture is least.
 
     Parameters
     ----------
     scattered : (group, set, h, w) float32
-        Radiance pooled over bands, at the scene's own power, without light that is seen directly; in sets of
-        samples.
+        Radiance summed over bands at the scene's own power, without light that is seen directly, from several
+        independent sets of samples.
     seen : (group, h, w) float32
         Light that is seen directly.
     """
@@ -40,7 +40,10 @@ def rates_of(scattered: Planes, seen: Planes) -> NDArray[np.uint32]:
 
 
 def _powers_of_two(densities: Floats) -> NDArray[np.uint32]:
-    """Powers of two from 1 on, nearest to numbers times the largest factor that keeps their mean at `LEAST_SHARE`."""
+    """Round numbers, times a common factor, to powers of two from 1 on.
+
+    The factor is the largest with which the mean of the powers doesn't exceed `LEAST_SHARE`.
+    """
     if not densities.any():
         return np.ones(densities.shape, np.uint32)
     logarithm = np.log2(np.maximum(densities / densities.max(), 1e-30))

@@ -1,8 +1,9 @@
 """Path integrator that carries every wavelength band along each path.
 
-Stock spectral integrators give four wavelengths to a path, so that a narrow band gets few samples. Here a path is
-traced once, and emission and BSDF are evaluated for all bands along it, four at a time: every band gets every path.
-Band wavelengths are jittered by one common offset a path, which makes each band an unbiased band average.
+Mitsuba's own spectral integrators give four wavelengths to a path, so that a narrow band gets few samples. Here a path
+is traced once, and emission and BSDF are evaluated for all bands along it, four at a time: every band gets every path.
+The wavelengths of a path are the bands' centres, shifted by one random share of each width. The mean over paths is
+therefore an unbiased average over each band.
 
 Mitsuba is handed in by `render.loader`, which alone imports it.
 """
@@ -35,32 +36,32 @@ from render.integrator.variant_types import (
 from render.loader import Film, LoadedScene
 from rodcone.jit import dr, syntax
 
-# Sampling decides by the first four wavelengths. Where another's density differs by more than this, a BSDF chooses
-# lobes by wavelength and one path can't serve all bands. Densities count by their size: below the horizon `measured`
-# gives negative ones.
+# A BSDF is sampled at the first four wavelengths. If the density at another wavelength differs by more than this
+# relative amount, the BSDF chooses lobes by wavelength, and one path can't serve all bands. The difference is relative
+# to the density's absolute value, because Mitsuba's `measured` gives negative densities below the horizon.
 PDF_TOLERANCE = 1e-3
 CHOSEN = "chosen"  # the channel that counts such paths
 
 
 class Tracer:
-    """Traces paths of one light group: all wavelengths of a path are a list of `Spectrum`, four bands an entry.
+    """Tracer of one light group's paths. A path's wavelengths are a list of `Spectrum`, four bands per entry.
 
-    A plain class: Dr.Jit takes apart the arrays that it finds in a loop's variables.
+    It is no dataclass, because Dr.Jit takes a dataclass's arrays for variables of a loop.
 
     Parameters
     ----------
     mi : module
     loaded : LoadedScene
-        What is rendered: `coloured` emission is evaluated at all wavelengths, else once; directions towards lights are
-        sampled with `sample_lights`; with a second group the light of a constant environment, which isn't in the
-        scene, is carried by the paths that escape.
+        What is rendered. If it is `coloured`, emission is evaluated at all wavelengths, otherwise once. If it has
+        `sample_lights`, directions towards lights are sampled. A second group is a constant environment, which isn't
+        in the scene: paths that escape bring its light.
     film : Film
-        Size, bands, the longest path and where roulette begins. The number of bands is filled up to a multiple of four
-        by repeating the last.
+        Size, bands, the longest path and the depth at which roulette begins. The last band is repeated until the number
+        of bands is a multiple of four.
     seed : int
-        Decides where in the bands the paths' wavelengths lie, for a scene whose reflectances are read from a table.
+        Seed of the paths' wavelengths within the bands, for a scene whose reflectances are read from a table.
     split : bool
-        Whether indirect light is also given by itself.
+        Whether indirect light is also given separately.
     """
 
     def __init__(self, mi: ModuleType, loaded: LoadedScene, film: Film, seed: int, *, split: bool = False) -> None:
@@ -79,15 +80,16 @@ class Tracer:
             self.table = TableReader(mi, reflectance_table(loaded.curves, nm))
 
     def camera(self, pixel: UInt, points: Points) -> Channels:
-        """Trace paths from the camera, one a thread.
+        """Trace paths from the camera, one per thread.
 
         Returns
         -------
         dict of lists of Float
-            ``scattered``: bands without the light that is seen directly, then the environment's; with ``split``
-            ``indirect``: as many of indirect light; ``shares`` of paths that meet a lamp first, at unit emission also
-            the lamp's radiance, and that meet the environment; with ``coloured`` ``lamps``: the light's bands;
-            ``chosen``: the share of paths whose BSDF chose by wavelength.
+            ``scattered``: bands of light that isn't seen directly, first of the group, then of the environment.
+            ``indirect``: if `split`, as many bands of indirect light. ``shares``: share of paths that meet a lamp
+            first, which is also the lamp's radiance at unit emission, and share that meet the environment first.
+            ``lamps``: for coloured light, bands of the lamp that is met first. ``chosen``: share of paths whose BSDF
+            chose by wavelength.
         """
         wavelengths, step = self._wavelengths(points)
         ray = self._camera_ray(pixel, points)
@@ -103,9 +105,9 @@ class Tracer:
         }
 
     def meter(self, _: UInt, points: Points) -> Channels:
-        """Trace paths from the shape of the scene's irradiance meter: irradiance over pi, as `camera`'s ``scattered``.
+        """Trace paths from the scene's irradiance meter: ``scattered``, as of `camera`, is irradiance over pi.
 
-        The pixel isn't asked for: each path starts anywhere on the shape.
+        Each path starts at a random place on the meter's shape, whatever its pixel.
         """
         wavelengths, step = self._wavelengths(points)
         start = self._start_on_meter(points, wavelengths)
@@ -114,12 +116,13 @@ class Tracer:
 
     @syntax
     def first_surface(self, pixel: UInt, points: Points) -> Channels:
-        """Trace paths from the camera to the first surface that scatters light, through glass and by mirrors.
+        """Trace paths from the camera, through glass and over mirrors, to the first surface that scatters light.
 
         Returns
         -------
         dict of lists of Float
-            ``albedo``: bands of it, through all that lies before it; ``normal``; ``chosen`` as of `camera`.
+            ``albedo``: bands of the surface's albedo, times what glass and mirrors before it leave; ``normal``;
+            ``chosen`` as of `camera`.
         """
         mi = self.mi
         wavelengths, step = self._wavelengths(points)
@@ -151,11 +154,11 @@ class Tracer:
         return {"albedo": self._flat(albedo), "normal": normals, CHOSEN: [self.mi.Float(chosen)]}
 
     def _flat(self, *spectra: Spectra) -> list[Float]:
-        """Bands one by one, of each spectrum in turn, without those that fill up the last four."""
+        """List the bands of each spectrum one by one, without the repeated ones at its end."""
         return [value for spectrum in spectra for value in _flat(spectrum)[: self.bands]]
 
     def _camera_ray(self, pixel: UInt, points: Points) -> Ray:
-        """Ray through a point of each thread's pixel."""
+        """Sample a ray through each thread's pixel."""
         mi, size = self.mi, self.size
         row = pixel // size[1]
         at = points.pair(FILM)
@@ -164,10 +167,10 @@ class Tracer:
         return ray
 
     def _wavelengths(self, points: Points) -> tuple[Spectra, UInt]:
-        """Wavelengths of a path, and the index of their offset, for which reflectances are tabulated.
+        """Choose a path's wavelengths; also return the index of their offset in the table of reflectances.
 
-        The offset from the bands' centres is one of those that the table is made for, if there is one. Centres and
-        widths reach the kernel as data: other bands don't compile it anew.
+        If there is a table, the offset is one of those that it holds. Centres and widths reach the kernel as data, so
+        that other bands don't compile it again.
         """
         mi = self.mi
         sample = points.at(WAVELENGTH)
@@ -184,9 +187,9 @@ class Tracer:
         return [mi.Spectrum(*bands[i : i + SPECTRUM_SIZE]) for i in range(0, len(bands), SPECTRUM_SIZE)], step
 
     def _start_on_meter(self, points: Points, wavelengths: Spectra) -> Start:
-        """Start of a path on the irradiance meter: a white matte surface whose lights are sampled as any other's.
+        """Start a path on the irradiance meter: a white matte surface from which lights are sampled as from any other.
 
-        Mitsuba's own meter only waits for its rays to meet a light: the sun is met once in 50 000, a point light never.
+        Mitsuba's own meter doesn't sample lights: of its rays one in 50 000 meets the sun, and none a point light.
 
         Returns
         -------
@@ -215,24 +218,24 @@ class Tracer:
     def _trace(
         self, scene: MitsubaScene, points: Points, start: Start, wavelengths: Spectra, step: UInt, bounced: int
     ) -> tuple[list[Spectra], list[Spectra], tuple[Mask, Mask, Spectra], Mask]:
-        """Radiance of all wavelengths along one path (multiple importance sampling, as Mitsuba's ``path``).
+        """Trace one path at all wavelengths (multiple importance sampling, as in Mitsuba's ``path``).
 
-        A path that starts on the meter has `bounced` once.
+        `bounced` is 1 for a path that starts on the meter, otherwise 0.
 
-        A path that escapes meets the environment, and then carries what that would give it: its throughput. A light
-        that the camera's ray meets first is kept by itself: whether it is a lamp, whether it is the environment, and
-        with ``coloured`` its bands.
+        A path that escapes meets the environment; its light at unit radiance is the path's throughput. A light that the
+        camera's ray meets first is kept separately: whether it is a lamp, whether it is the environment, and for
+        coloured light its bands.
 
-        Light is direct that reaches the camera from the first surface that scatters it (by a lobe that isn't a delta),
-        or from the lamp itself, each perhaps through glass and by mirrors; all else is indirect.
+        Light is direct if it comes from the lamp itself, or from the first surface that scatters it (by a lobe that
+        isn't a delta), perhaps through glass and over mirrors. All other light is indirect.
         """
         mi = self.mi
-        # State of the path
+        # The path's state.
         ray, previous, previous_pdf, previous_delta, result = start
         ray.wavelengths = wavelengths[0]
         throughput = [mi.Spectrum(1.0) for _ in wavelengths]
         indirect = [mi.Spectrum(0.0) for _ in wavelengths] if self.split else []
-        # of the light met next; of the path so far, one vertex ahead
+        # `direct`: whether light met next counts as direct. `unscattered`: the same, one vertex further on.
         direct, unscattered = mi.Bool(True), mi.Bool(True)
         lamp_first, sky_first = mi.Bool(False), mi.Bool(False)
         first = [mi.Spectrum(0.0) for _ in wavelengths] if self.coloured else []
@@ -240,7 +243,7 @@ class Tracer:
         depth = mi.UInt32(0)
         chosen, escaped, active = mi.Bool(False), mi.Bool(False), mi.Bool(True)
         while dr.hint(active, label="dense path"):
-            # Light that the path meets
+            # Add the light that the path meets.
             si = scene.ray_intersect(ray, mi.RayFlags.All, coherent=(depth == 0))
             mis_weight = self._mis_weight(scene, si, previous, previous_pdf, previous_delta)
             emitted = self._emitted(scene, si, wavelengths)
@@ -252,7 +255,7 @@ class Tracer:
             result = _plus(result, throughput, emitted, dr.select(beyond_first, mis_weight, 0.0))
             indirect = self._indirect(indirect, throughput, emitted, dr.select(direct, 0.0, mis_weight))
 
-            # Light that is sampled from here, and the direction to go on in
+            # Add light that is sampled from here, and choose the direction in which the path goes on.
             go_on = (depth + 1 < self.max_depth) & si.is_valid()
             escaped = beyond_first & ~si.is_valid()
             received, sample, weights, by_wavelength = self._bounce(
@@ -275,7 +278,7 @@ class Tracer:
             onward, survives = _roulette(onward, eta, depth >= self.rr_depth, points.roulette(depth))
             throughput = _select(escaped & self.environment, throughput, onward)
             active = go_on & survives
-        # Environment of the paths that escaped
+        # Give the environment's light to the paths that escaped.
         dark = [mi.Spectrum(0.0) for _ in wavelengths]
         sky = _select(escaped, throughput, dark)
         indirect_sky = _select(escaped & ~direct, throughput, dark)
@@ -284,13 +287,13 @@ class Tracer:
         return scattered, indirects, (lamp_first, sky_first, first), chosen
 
     def _indirect(self, indirect: Spectra, throughput: Spectra, light: Spectra, factor: Float) -> Spectra:
-        """Add indirect light where it is asked for by itself."""
+        """Add indirect light, if it is wanted separately."""
         return _plus(indirect, throughput, light, factor) if self.split else indirect
 
     def _mis_weight(
         self, scene: MitsubaScene, si: Interaction, previous: Interaction, previous_pdf: Float, previous_delta: Mask
     ) -> Float:
-        """Weight of the light that a path meets, against sampling that light from the point before."""
+        """Weigh light that a path meets by chance against sampling that light from the point before."""
         if not self.sample_lights:
             return self.mi.Float(1.0)
         direction = self.mi.DirectionSample3f(scene, si, previous)
@@ -298,7 +301,7 @@ class Tracer:
         return dr.select(previous_delta, 1.0, _power_heuristic(previous_pdf, light_pdf))
 
     def _emitted(self, scene: MitsubaScene, si: Interaction, wavelengths: Spectra) -> Spectra:
-        """Emission of the light that a path meets."""
+        """Evaluate the emission of the light that a path meets."""
         emitter = si.emitter(scene)
         if self.coloured:
             return list(dr.dispatch(emitter, _emission, si, wavelengths))
@@ -307,7 +310,7 @@ class Tracer:
     def _arriving(
         self, direction: DirectionSample, sampled: Spectrum4, interaction: Interaction, wavelengths: Spectra
     ) -> Spectra:
-        """Emission towards a point from the sampled position on a light, over the density of the sample."""
+        """Evaluate the emission of a light's sampled position towards a point, divided by the sample's density."""
         if self.coloured:
             values = dr.dispatch(direction.emitter, _emission_towards, interaction, direction, wavelengths)
             return [dr.select(direction.pdf != 0, value / direction.pdf, 0.0) for value in values]
@@ -323,7 +326,12 @@ class Tracer:
         wavelengths: Spectra,
         step: UInt,
     ) -> tuple[Spectra, BsdfSample, Spectra, Mask]:
-        """Light from a sampled position on a lamp; next direction, its weights, whether wavelength chose it."""
+        """Sample a lamp's light and the next direction at a surface.
+
+        Returns
+        -------
+        received light, direction's sample, its weights, whether the BSDF chose by wavelength
+        """
         mi = self.mi
         bsdf = si.bsdf(ray)
         towards_light, lobe, angle = drawn
@@ -342,8 +350,9 @@ class Tracer:
         received = [value * (light * factor) for value, light in zip(values, arriving, strict=True)]
         return received, sample, weights, by_wavelength
 
-    # A surface at all wavelengths, within one virtual call: what no wavelength changes is then computed once.
-    # `render.integrator.matte` brings `scatter_bands` and `sample_bands`: its sampling knows no wavelength.
+    # A surface is evaluated at all wavelengths within one virtual call, so that what doesn't depend on wavelength is
+    # computed once. `render.integrator.matte` has `scatter_bands` and `sample_bands`, because its sampling doesn't
+    # depend on wavelength at all.
 
     def _eval_and_sample(
         self,
@@ -355,7 +364,12 @@ class Tracer:
         wavelengths: Spectra,
         step: UInt,
     ) -> tuple[Spectra, Float, BsdfSample, Spectra, Mask]:
-        """Values towards a light, density, sampled direction, its weights, and whether wavelength chose it."""
+        """Evaluate a BSDF towards a light and sample it.
+
+        Returns
+        -------
+        values towards the light, density of that direction, sample, its weights, whether the BSDF chose by wavelength
+        """
         if hasattr(bsdf, "scatter_bands"):
             values, pdf, sample, weights = bsdf.scatter_bands(si, towards_light, angle, wavelengths, self.table, step)
             return values, pdf, sample, weights, dr.zeros(dr.mask_t(pdf))
@@ -370,7 +384,7 @@ class Tracer:
     def _sampled(
         self, bsdf: Bsdf, si: Interaction, lobe: Float, angle: Point2, wavelengths: Spectra, step: UInt
     ) -> tuple[BsdfSample, Spectra, Mask]:
-        """Sampled direction, its weights, and whether wavelength chose it: where no light is sampled."""
+        """Sample a BSDF only; return the sample, its weights, and whether the BSDF chose by wavelength."""
         if hasattr(bsdf, "sample_bands"):
             sample, weights = bsdf.sample_bands(si, angle, wavelengths, self.table, step)
             return sample, weights, dr.zeros(dr.mask_t(sample.pdf))
@@ -380,7 +394,7 @@ class Tracer:
 
 
 def _differs(sample: BsdfSample, others: list[BsdfSample]) -> Mask:
-    """Whether the BSDF sampled another component, or with another density, at other wavelengths."""
+    """Return whether the BSDF sampled another component, or with another density, at other wavelengths."""
     chosen = dr.zeros(dr.mask_t(sample.pdf))
     for other in others:
         chosen |= abs(other.pdf - sample.pdf) > PDF_TOLERANCE * abs(sample.pdf)
@@ -400,17 +414,17 @@ def _emission_towards(
 
 
 def _flat(groups: Spectra) -> list[Float]:
-    """All wavelengths one by one."""
+    """List all wavelengths one by one."""
     return [value for group in groups for value in group]
 
 
 def _power_heuristic(a: Float, b: Float) -> Float:
-    """Weight a^2 / (a^2 + b^2), by the ratio: the squares of densities near a light's rim leave float32's range."""
+    """Compute a^2 / (a^2 + b^2) from the ratio b / a, because the squares of large densities exceed float32's range."""
     weight = dr.rcp(1 + dr.square(b / a))
     return dr.select((a > 0) & dr.isfinite(weight), weight, 0)
 
 
-def _times(first: Spectra, second: Spectra) -> Spectra:  # Dr.Jit's syntax knows no pairs in a comprehension
+def _times(first: Spectra, second: Spectra) -> Spectra:  # a function, because `dr.syntax` allows no such comprehension
     return [a * b for a, b in zip(first, second, strict=True)]
 
 
@@ -419,12 +433,12 @@ def _select(mask: Mask, if_true: Spectra, if_false: Spectra) -> Spectra:
 
 
 def _plus(result: Spectra, throughput: Spectra, light: Spectra, factor: Float) -> Spectra:
-    """Add light, times a factor that all wavelengths share, seen through the path's throughput."""
+    """Add light times the path's throughput and a factor that all wavelengths share."""
     return [r + t * (x * factor) for r, t, x in zip(result, throughput, light, strict=True)]
 
 
 def _roulette(throughput: Spectra, eta: Float, plays: Mask, sample: Float) -> tuple[Spectra, Mask]:
-    """Russian roulette by the brightest wavelength, so that one decision serves all; gives the survivors."""
+    """Play Russian roulette by the brightest wavelength, so that one decision serves all; also return who survives."""
     brightest = dr.max(throughput[0])
     for group in throughput[1:]:
         brightest = dr.maximum(brightest, dr.max(group))

@@ -1,10 +1,10 @@
-"""A Lambertian surface for the dense path: its reflectance is looked up once for value, density and sample.
+"""A Lambertian surface for the dense path, whose reflectance is looked up once for value, density and sample.
 
-Looking up reflectance is most of what a band costs. Mitsuba's ``twosided`` evaluates front and back, and each of them
-reflectance twice, once for the light's direction and once for the sampled one: eight table look-ups a wavelength, where
-two do, and none where all surfaces stand in one table. They share a few wavelengths a pass: each band at `STEPS`
-offsets. A path draws one of them, and reads a row of all bands at once. Emission of a colour of its own may hold lines,
-which so few wavelengths would miss or hit for all paths alike: with it there is no table.
+Most of a band's cost is looking up reflectance. Mitsuba's ``twosided`` evaluates front and back, and each of them looks
+reflectance up twice, for the light's direction and for the sampled one: eight look-ups per wavelength, where two would
+do. If all surfaces stand in one table, none is needed. The table holds each band at `STEPS` offsets from its centre. A
+path draws one of these offsets and reads a row of all bands at once. Coloured emission may hold lines, which so few
+wavelengths would miss or hit for all paths alike; with it there is no table.
 """
 
 from collections.abc import Callable
@@ -34,14 +34,14 @@ from rodcone.jit import dr
 from rodcone.types import Floats
 
 T = TypeVar("T")
-STEPS = 16  # offsets within a band: a pass's mean over them is off by under 1e-4 of the steepest reflectance here
+STEPS = 16  # offsets within a band; their mean errs by less than 1e-4 for the steepest reflectance of these scenes
 
 
 def band_offsets(seed: int) -> Floats:
-    """Offsets from a band's centre in widths, one in each of `STEPS` equal parts of the band, shape (step,).
+    """Draw offsets from a band's centre in units of its width, one in each of `STEPS` equal parts, shape (step,).
 
-    The offset is uniform over its part, so that averages over passes are band averages without bias. Neighbours lie
-    mirrored, so that their mean is the centre's in each pass: a reflectance that rises evenly is then averaged exactly.
+    Each offset is uniform over its part, so that averages over seeds are unbiased band averages. The offsets in
+    neighbouring parts mirror each other, so that a reflectance that rises evenly is averaged exactly by any seed.
     """
     within = np.random.default_rng(seed).random()
     step = np.arange(STEPS)
@@ -49,27 +49,27 @@ def band_offsets(seed: int) -> Floats:
 
 
 def reflectance_table(curves: tuple[Spectrum, ...], wavelength_nm: Floats) -> NDArray[np.float32]:
-    """Reflectance of each curve at (step, band) wavelengths, 0 outside its points, shape (curve, step, band)."""
+    """Tabulate each curve at (step, band) wavelengths, 0 outside its points, shape (curve, step, band)."""
     return at_wavelengths(curves, wavelength_nm).astype(np.float32)
 
 
 class TableReader:
-    """The table on the device. A plain object: Dr.Jit takes arrays apart that it finds in a loop's variables."""
+    """The table in the device's memory; no dataclass, whose arrays Dr.Jit would take for variables of a loop."""
 
     def __init__(self, mi: ModuleType, table: NDArray[np.float32]) -> None:
         self._spectrum = mi.Spectrum
         self._groups = table.shape[2] // dr.size_v(mi.Spectrum)
-        # By way of a list, into memory of Dr.Jit's own: an array of NumPy's is used where it lies, and one that happens
-        # to lie on a multiple of 64 bytes is read by other code, which is compiled anew.
+        # A list is copied into Dr.Jit's own memory. A NumPy array would be used in place, and if it happens to lie on a
+        # multiple of 64 bytes, other code reads it, which is compiled again.
         self._values = mi.Float(table.ravel().tolist())
 
     def read(self, row: UInt, step: UInt, active: Mask) -> Spectra:
-        """Reflectance of a path's surface at all its wavelengths, four an entry."""
+        """Read the reflectances of a path's surface at all its wavelengths, four per entry."""
         first = (row * STEPS + step) * self._groups
         return [dr.gather(self._spectrum, self._values, first + group, active) for group in range(self._groups)]
 
 
-Table: TypeAlias = TableReader | None  # none where a scene has no matte surface of one spectrum
+Table: TypeAlias = TableReader | None  # None if no surface of the scene is in a table
 
 
 def matte_surface(mi: ModuleType) -> type[Bsdf]:
@@ -86,7 +86,7 @@ def matte_surface(mi: ModuleType) -> type[Bsdf]:
             self.reflectance = props.get_texture("reflectance")
             self.other, self.weight = (props.get_texture(x) if x in props else None for x in ("other", "weight"))
             self.twosided = bool(props.get("twosided", False))
-            # As data of the surface: written into the code, each would be compiled apart.
+            # Opaque numbers are data of the surface. Literal numbers would compile the code again for each surface.
             self.row = dr.opaque(mi.UInt32, int(props["row"])) if "row" in props else None
             self.other_row = dr.opaque(mi.UInt32, int(props["other_row"])) if "other_row" in props else None
             self.which = props.get("which", None)
@@ -99,7 +99,7 @@ def matte_surface(mi: ModuleType) -> type[Bsdf]:
         def scatter_bands(
             self, si: Interaction, wo: Vector, angle: Point2, wavelengths: Spectra, table: Table, step: UInt
         ) -> tuple[Spectra, Float, BsdfSample, Spectra]:
-            """Value and density towards a light; a sampled direction and its weights; at all wavelengths."""
+            """Evaluate value and density towards a light, and sample a direction and its weights."""
             density = _density(si.wi, wo, self.twosided)
             sample, weights = self.sample_bands(si, angle, wavelengths, table, step)
             return [weight * density for weight in weights], density, sample, weights
@@ -131,7 +131,7 @@ def matte_surface(mi: ModuleType) -> type[Bsdf]:
 
 
 def at_all(wavelengths: Spectra, interaction: Interaction, evaluate: Callable[[], T]) -> list[T]:
-    """What a call gives at all wavelengths of an interaction, four after four."""
+    """Evaluate a function of an interaction at all wavelengths, four at a time."""
     values = []
     for group in wavelengths:
         interaction.wavelengths = group
@@ -166,7 +166,7 @@ def _share_at(surface: Bsdf, si: Interaction) -> Float:
 
 
 def _density(wi: Vector, wo: Vector, twosided: bool) -> Float:
-    """Cosine over pi where both directions are on the same, open side: BRDF times cosine for a reflectance of 1."""
+    """Compute cosine over pi (BRDF times cosine for a reflectance of 1) if both directions are on one open side."""
     lit = wi.z * wo.z > 0 if twosided else (wi.z > 0) & (wo.z > 0)
     return dr.select(lit, dr.abs(wo.z) * dr.inv_pi, 0.0)
 
@@ -238,7 +238,7 @@ def _with_rows(node: Node, curves: dict[bytes, Spectrum]) -> Node:
 
 
 def _row(table: Spectrum, curves: dict[bytes, Spectrum]) -> int:
-    """Row of a spectrum; equal ones share it."""
+    """Find the row of a spectrum, or append it; equal spectra share a row."""
     key = np.stack([table.wavelength_nm, table.values]).tobytes()
     curves.setdefault(key, table)
     return list(curves).index(key)

@@ -1,4 +1,4 @@
-"""Numbers that paths are drawn from: one Sobol sequence, scrambled for each pixel by itself.
+"""Random numbers of the paths: one Sobol sequence, which is scrambled for each pixel independently.
 
 The sequence is Sobol's with the direction numbers of Joe and Kuo (2008), as SciPy has them: they lie in a file of this
 package, since importing `scipy.stats` takes 1 s (``python tests/render/integrator/test_points.py`` writes it). Each
@@ -23,15 +23,15 @@ LOG2_POINTS = 15
 DIMENSIONS = 34  # of the sequence; paths that need more get independent numbers
 # What the dimensions are for: the film or the meter's plate, then the bounces, then the rest.
 FILM, FIRST_BOUNCE, FURTHER_BOUNCES, WAVELENGTH, FIRST_LOBE, APERTURE = 0, 2, 6, 30, 31, 32
-A_BOUNCE = 6  # light 2, direction 2, lobe, and one that stays unused: blocks of even numbers keep pairs together
-EVEN_BOUNCES = 5  # that the sequence reaches
+A_BOUNCE = 6  # dimensions per bounce: 2 for the light, 2 for the direction, 1 for the lobe, and 1 unused to be even
+EVEN_BOUNCES = 5  # bounces whose dimensions lie within the sequence
 
 
 @cache
 def sequence() -> NDArray[np.uint32]:
-    """First points of Sobol's sequence in Gray's order as numbers of 32 bits, shape (dimension, point).
+    """Compute the first points of Sobol's sequence in Gray code's order as numbers of 32 bits: (dimension, point).
 
-    The number of a point is the exclusive or of its dimension's directions at the bits of its Gray code.
+    A point's number is the exclusive or of those direction numbers of the dimension at which its Gray code has a 1.
     """
     directions = np.array(json.loads(DIRECTIONS.read_text(encoding="utf-8")), dtype=np.uint32)
     index = np.arange(1 << LOG2_POINTS)
@@ -44,7 +44,7 @@ def sequence() -> NDArray[np.uint32]:
 
 @cache
 def _reversed_bits() -> NDArray[np.uint32]:
-    """The sequence with each number's bits reversed: (dimension x point,), a point's number varies fastest."""
+    """Reverse the bits of each number of the sequence: (dimension x point,), dimension by dimension."""
     reversed_bytes = np.array([int(f"{byte:08b}"[::-1], 2) for byte in range(256)], np.uint8)
     turned = reversed_bytes[sequence()[..., None].view(np.uint8)[..., ::-1]]
     return np.ascontiguousarray(turned).view(np.uint32).ravel()
@@ -52,24 +52,24 @@ def _reversed_bits() -> NDArray[np.uint32]:
 
 @cache
 def _on_device(mi: ModuleType) -> UInt:
-    """The sequence in memory of Dr.Jit's own: a kernel reads NumPy's, which may be aligned or not, by other code."""
+    """Copy the sequence into Dr.Jit's own memory, because code that reads a NumPy array depends on its alignment."""
     sequence = mi.UInt32(_reversed_bits()) ^ dr.opaque(mi.UInt32, 0)
     dr.eval(sequence)
     return sequence
 
 
 class Points:
-    """Points of a wavefront, one a thread.
+    """Points of a wavefront, one per thread.
 
-    A plain class: Dr.Jit takes arrays apart that it finds in a loop's variables.
+    It is no dataclass, because Dr.Jit takes a dataclass's arrays for variables of a loop.
 
     Parameters
     ----------
     mi : module
     index : UInt32
-        Number of the point in its pixel's sequence. Past the sequence's end it begins anew, with another scramble.
+        Number of the point in its pixel's sequence. Past its end the sequence begins again with another scramble.
     key : UInt32
-        Of the pixel: decides the scramble.
+        Key of the pixel, which decides the scramble.
     """
 
     def __init__(self, mi: ModuleType, index: UInt, key: UInt) -> None:
@@ -78,7 +78,7 @@ class Points:
         self.sequence = _on_device(mi)
 
     def at(self, dimension: UInt) -> Float:
-        """Number in [0, 1) of each thread's point in a dimension, 0 or more."""
+        """Return the coordinate, in [0, 1), of each thread's point in a dimension."""
         mi = self.mi
         dimension = mi.UInt32(dimension)
         held = dimension < DIMENSIONS
@@ -94,11 +94,11 @@ class Points:
         return dr.minimum(mi.Float(dr.brev(number)) * 2.0**-32, 1 - 2.0**-24)
 
     def pair(self, dimension: UInt) -> Point2:
-        """Two numbers, in a dimension and the next."""
+        """Return the coordinates in a dimension and the next one."""
         return self.mi.Point2f(self.at(dimension), self.at(dimension + 1))
 
     def bounce(self, depth: UInt) -> tuple[Point2, Float, Point2]:
-        """Light (2D), lobe and direction (2D) of a bounce, the first at depth 0."""
+        """Return the coordinates of a bounce: light (2D), lobe and direction (2D). The first bounce has depth 0."""
         mi = self.mi
         further = FURTHER_BOUNCES + (depth - 1) * A_BOUNCE
         further = dr.select(depth < EVEN_BOUNCES, further, further + DIMENSIONS)
@@ -108,17 +108,17 @@ class Points:
         return self.pair(base), self.at(lobe), self.pair(base + 2)
 
     def roulette(self, depth: UInt) -> Float:
-        """Number that decides whether a path goes on."""
+        """Return the coordinate that decides whether a path goes on."""
         return self.at(depth + 0x10000)
 
 
 def pixel_keys(mi: ModuleType, pixel: UInt, seed: int) -> UInt:
-    """Key of each pixel, from its number and a seed of 32 bits."""
+    """Derive each pixel's key from its number and a seed of 32 bits."""
     return _mixed(pixel * 0x9E3779B1 + dr.opaque(mi.UInt32, seed))
 
 
 def _mixed(number: UInt) -> UInt:
-    """Hash of 32 bits (Wellons, "lowbias32", 2018)."""
+    """Hash 32 bits (Wellons, "lowbias32", 2018)."""
     number ^= number >> 16
     number *= 0x7FEB352D
     number ^= number >> 15

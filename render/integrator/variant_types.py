@@ -1,7 +1,7 @@
 """Names for the types of Mitsuba's variant and of Dr.Jit's kernels, which hold one value per thread.
 
-Their classes depend on the variant that is set while the program runs. A type checker therefore takes each for `Any`,
-and the names tell a reader which one is meant. `mi` is Mitsuba's module with that variant.
+Their classes depend on the variant, which is set while the program runs. To a type checker each is therefore `Any`; the
+names tell a reader which class is meant. `mi` is Mitsuba's module with that variant.
 """
 
 from typing import Any, TypeAlias

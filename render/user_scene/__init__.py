@@ -1,1 +1,1 @@
-"""Scenes from outside: Mitsuba files, checked before anything in them is instantiated."""
+"""Mitsuba files of users' scenes, checked before anything in them is instantiated."""

@@ -1,8 +1,8 @@
 """Mitsuba plug-ins that a user's scene may name, and why some of Mitsuba's own are left out.
 
-Mitsuba loads ``plugins/<type>.so`` for any type that a scene names, from any folder on its search path: a name outside
-this list may be native code. The list is what Mitsuba 3.9 ships, less what the integrator doesn't simulate and less
-``blender``, which reads memory at addresses that the scene states.
+Mitsuba loads ``plugins/<type>.so`` for any type that a scene names, from any folder on its search path, so that a name
+outside this list may be foreign native code. The list is what Mitsuba 3.9 ships, without what the integrator doesn't
+simulate, and without ``blender``, which reads memory at addresses that the scene states.
 """
 
 import tomllib
@@ -13,7 +13,7 @@ from render.scene import COLOURED_EMITTERS, EMISSION_PARAMETER
 from rodcone.errors import InputError, unknown
 
 CAMERAS = ("perspective", "thinlens", "orthographic")
-UNUSED_CAMERAS = ("batch", "distant", "radiancemeter")  # read, and left out where another one can be rendered
+UNUSED_CAMERAS = ("batch", "distant", "radiancemeter")  # allowed, but ignored if there is a camera that can be rendered
 METER = "irradiancemeter"  # in a shape it marks the plane on which illuminance is measured
 SPECTRA = ("blackbody", "d65", "irregular", "rawconstant", "regular", "srgb", "uniform")
 
@@ -27,13 +27,13 @@ _REASONS = {name: (row["reason"], row["fix"]) for row in _TABLES["refused"] for 
 
 
 def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
-    """Raise `InputError` for a plug-in that isn't simulated, or, unless the scene is trusted, isn't on the list.
+    """Raise `InputError` for a plug-in that isn't simulated, or that isn't on the list and the scene isn't trusted.
 
     Parameters
     ----------
     plugin : str
     tag, name : str
-        Kind of the scene's element, and its own name, empty where it has none.
+        Type of the scene's element, and its name, which may be empty.
     trust : bool
     """
     what = f"{tag} {name!r} of type" if name else f"{tag} type"
@@ -46,12 +46,12 @@ def require_allowed(plugin: str, *, tag: str, name: str, trust: bool) -> None:
 
 
 def kind_of(mi: ModuleType, plugin: str) -> str:
-    """Kind of a plug-in that has been allowed; Mitsuba itself is asked, and loads it, only where it isn't listed.
+    """Return the kind of an allowed plug-in. Only for one that isn't listed, Mitsuba is asked, which loads it.
 
     Raises
     ------
     InputError
-        For an emitter or sensor of a trusted scene's own.
+        For an emitter or sensor that a trusted scene brings itself.
     """
     if plugin in _KIND:
         return _KIND[plugin]

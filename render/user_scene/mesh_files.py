@@ -1,6 +1,6 @@
-"""Mesh files, read before Mitsuba reads them: a face that names a vertex which isn't there ends its process.
+"""Checks of mesh files before Mitsuba reads them, because a face with a missing vertex crashes Mitsuba's process.
 
-Mitsuba checks the rest itself: files cut short, faces that are no triangles.
+Mitsuba itself checks the rest, such as truncated files and faces that are no triangles.
 """
 
 import re
@@ -24,19 +24,19 @@ _PLY_TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _BYTE_ORDER = {"binary_little_endian": "<", "binary_big_endian": ">"}
-# Sections of Mitsuba's serialized meshes: bit of the flags, numbers a vertex. Positions are always there.
+# Optional sections of Mitsuba's serialized meshes: bit in the flags, and numbers per vertex. Positions always exist.
 _SERIALIZED_SECTIONS = ((0x1, 3), (0x2, 2), (0x8, 3))
 _SERIALIZED_DOUBLE = 0x2000
-_MOST_BYTES = 4 << 30  # of a mesh unpacked
+_MOST_BYTES = 4 << 30  # largest size of an unpacked mesh
 
 
 def check_mesh_file(kind: str, path: Path) -> None:
-    """Raise `InputError` for a face that names a vertex which its mesh hasn't.
+    """Raise `InputError` for a face with a vertex that its mesh doesn't have.
 
     Parameters
     ----------
     kind : str
-        Plug-in that reads the file; others than ``ply`` and ``serialized`` pass.
+        Plug-in that reads the file; only files of ``ply`` and ``serialized`` are checked.
     path : Path
     """
     damage = (ValueError, KeyError, struct.error, zlib.error)
@@ -68,7 +68,7 @@ def _check_ply(path: Path) -> None:
     for words in lines:
         if words[:1] == ["element"]:
             element, counts[words[1]], fields[words[1]] = words[1], int(words[2]), []
-        elif words[:2] == ["property", "list"]:  # of triangles: a count of 3, then three numbers
+        elif words[:2] == ["property", "list"]:  # a triangle's vertices: a count of 3, then three indices
             fields[element] += [(f"{words[4]} count", _PLY_TYPES[words[2]])]
             fields[element] += [(words[4], f"3{_PLY_TYPES[words[3]]}")]
         elif words[:1] == ["property"]:
@@ -100,7 +100,7 @@ def _check_ply(path: Path) -> None:
 def _check_serialized(path: Path) -> None:
     content = path.read_bytes()
     (meshes,) = struct.unpack_from("<I", content, len(content) - 4)
-    wide = struct.unpack_from("<HH", content)[1] > 3  # from version 4 on places have 8 bytes, and meshes names
+    wide = struct.unpack_from("<HH", content)[1] > 3  # from version 4 on, positions have 8 bytes and meshes have names
     place_bytes = 8 if wide else 4
     directory = len(content) - 4 - place_bytes * meshes
     for mesh in range(meshes):

@@ -23,8 +23,8 @@ from render.user_scene.scene_parts import SceneFile, assemble
 from render.user_scene.scene_paths import find_file, screen, search_path
 from rodcone.errors import InputError, require_name
 
-# Numbers that may be below 0: angles, offsets in a picture, the depth of bumps, paths without a limit (-1). Points and
-# directions are vectors.
+# Numbers that may be negative: angles, offsets in a picture, the depth of bumps, and -1 for paths without a limit.
+# Points and directions aren't listed, because they are vectors.
 _SIGNED = {
     "latitude",
     "longitude",
@@ -35,8 +35,8 @@ _SIGNED = {
     "timezone",
 }
 _SIGNED_OF = {("bumpmap", "scale")}
-HELD_NM = 400.0, 700.0  # tables that reach as far are held beyond
-_LISTS = {"wavelengths", "values"}  # of regular and irregular spectra, as texts
+HELD_NM = 400.0, 700.0  # range that a table must cover so that its ends are continued without being asked for
+_LISTS = {"wavelengths", "values"}  # texts that hold the numbers of regular and irregular spectra
 _NUMBER = re.compile(r"[-+]?(?:[\d.]+(?:[eE][-+]?\d+)?|nan|inf)", re.IGNORECASE)
 _RESERVED = re.compile(r"[./\s]")  # Mitsuba's and our own separators in paths of a scene's dict
 
@@ -47,20 +47,20 @@ def load_scene_file(
 ) -> SceneFile:
     """Read a Mitsuba XML scene.
 
-    A Mitsuba scene can load native code. So it is read without Mitsuba first, then by Mitsuba's parser, which
-    instantiates nothing; every plug-in has to be one of Mitsuba's own, every file has to lie in the scene's folder, or
-    in one that it names by ``<path>``, from which files are read and no plug-in is loaded. RGB colours are upsampled to
-    spectra by Mitsuba. Films, samplers and integrators are left out: the engine brings its own, and the film gives the
-    size.
+    A Mitsuba scene can load native code. It is therefore first read without Mitsuba, then by Mitsuba's parser, which
+    instantiates nothing. Every plug-in has to be one of Mitsuba's own. Every file has to lie in the scene's folder, or
+    in one that it names by ``<path>``, from which files are read but no plug-in is loaded. Mitsuba converts RGB colours
+    to spectra. Films, samplers and integrators are left out, because the engine has its own; only the film's size
+    counts.
 
     Parameters
     ----------
     path : path
     trust : bool
-        Lets the scene name plug-ins of its own and files anywhere. Its native code then runs.
+        Whether the scene may name its own plug-ins, whose native code then runs, and files anywhere.
     extend : "hold", optional
-        As of `Scene`: surfaces go on at their end values outside their tables. So they do, with a note, where all of
-        them are known over 400 to 700 nm at least.
+        As in `Scene`: surfaces keep their end values outside their tables. If all tables cover at least 400 to 700 nm,
+        they do so in any case, with a note.
     define : mapping of str to str, optional
         Values of the file's ``$parameters``, as Mitsuba's ``-D name=value``.
 
@@ -87,7 +87,7 @@ def load_scene_file(
 
 
 def _with_held_ends(opened: SceneFile) -> SceneFile:
-    """Hold the ends of tables that cover 400 to 700 nm: beyond lies less than 0.1 % of luminance."""
+    """Continue tables that cover 400 to 700 nm at their end values; beyond lies less than 0.1 % of luminance."""
     known = known_range(opened.scene)
     if known is None or known[0] > HELD_NM[0] or known[1] < HELD_NM[1]:
         return opened
@@ -98,7 +98,10 @@ def _with_held_ends(opened: SceneFile) -> SceneFile:
 
 
 def _parse(mi: ModuleType, file: Path, trust: bool, define: Mapping[str, str]) -> Any:
-    """Mitsuba's parser state. The scene's folders are on the search path only while no plug-in is loaded."""
+    """Parse a file; return the parser's state. The scene's folder is on Mitsuba's search path only meanwhile.
+
+    Parsing loads no plug-in.
+    """
     resolver = search_path(mi)
     config = mi.parser.ParserConfig(mi.variant())
     mi.set_file_resolver(search_path(mi, file.parent))
@@ -118,12 +121,12 @@ def _parse(mi: ModuleType, file: Path, trust: bool, define: Mapping[str, str]) -
 
 
 def _from_xml(mi: ModuleType, state: Any, bases: list[Path], folders: list[Path] | None) -> Node:
-    """Nested dict of a parsed scene: every part is checked before they are put together."""
+    """Check every part of a parsed scene, then put them together as a nested dict."""
     nodes = list(state.nodes)
     index_of = state.id_to_index
     if nodes[0].props.plugin_name() != "scene":
         raise InputError(f"{state.files[0]}: its root is {nodes[0].props.plugin_name()!r}; allowed: <scene>")
-    # A part without an id goes by its key in what holds it.
+    # Messages name a part without an id by the key under which its parent holds it.
     keys = {
         value.index(): key
         for node in nodes
@@ -153,7 +156,7 @@ def _from_xml(mi: ModuleType, state: Any, bases: list[Path], folders: list[Path]
 def _xml_part(
     node: Any, nodes: list[Any], index_of: Mapping[str, int], bases: list[Path], folders: list[Path] | None
 ) -> Node:
-    """One node of a parsed scene without its children."""
+    """Convert one node of a parsed scene, without its children, to a dict."""
     properties = node.props
     result: Node = {"type": properties.plugin_name()}
     if properties.id():
@@ -178,7 +181,10 @@ def _xml_part(
 
 
 def _key(part: Node, ids: Mapping[str, int], numbers: Counter[str], label: str, tag: str) -> str:
-    """Key of a part: the name wanted, else its kind; without separators of paths, numbered where a part has it."""
+    """Choose a key for a child of `part`: its label, or else its tag.
+
+    Separators of paths become underscores. A number is appended if the key is taken.
+    """
     stem = _RESERVED.sub("_", label) or tag
     name = stem if label else ""
     while not name or name in part or (name != label and name in ids):
@@ -188,12 +194,12 @@ def _key(part: Node, ids: Mapping[str, int], numbers: Counter[str], label: str, 
 
 
 def _xml_value(key: str, kind: str, value: Any, *, signed: bool) -> Any:
-    """Value of a property as `mitsuba.load_dict` takes it in every variant.
+    """Convert a property's value to the form that `mitsuba.load_dict` takes in every variant.
 
     Raises
     ------
     InputError
-        For numbers that Mitsuba would take, and render as black, NaN or nonsense.
+        For numbers that Mitsuba would accept, but render as black, NaN or nonsense.
     """
     numbers: list[Any] = []
     if kind in ("Float", "Integer"):
@@ -206,7 +212,7 @@ def _xml_value(key: str, kind: str, value: Any, *, signed: bool) -> Any:
         value = np.array(value.matrix, dtype=np.float64)
         numbers = value.ravel().tolist()
     elif kind == "String" and key in _LISTS:
-        numbers = _NUMBER.findall(value)  # Mitsuba refuses what is none
+        numbers = _NUMBER.findall(value)  # Mitsuba itself refuses words that aren't numbers
     signed = signed or kind in ("Vector", "Transform")
     wrong = [x for x in map(float, numbers) if not isfinite(x) or (x < 0 and not signed)]
     if wrong:

@@ -1,6 +1,4 @@
-"""From a checked scene's dict to a `Scene`: its camera, its reference plane, its light groups, and the spectrum of each
-light as Mitsuba evaluates it.
-"""
+"""Conversion of a checked scene's dict to a `Scene`: camera, reference plane, and light groups with their spectra."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -19,11 +17,11 @@ from rodcone.file_keys import require_known
 from rodcone.jit import dr
 from rodcone.types import Floats
 
-FILM_SIZE = 576, 768  # height and width of Mitsuba's films where a scene states none
-DEEPEST = 1 << 16  # paths of integrators without a limit; Russian roulette ends them long before
-LONGEST_CHAIN = 100  # of nested and referenced parts: Mitsuba follows them by recursion
-_UNSEEN_BY_METER = ("directional", "point", "spot")  # it sends rays out, which meet none of these: it would read 0
-# Integrators with a max_depth, and the longest path of those that state none; -1 is without a limit.
+FILM_SIZE = 576, 768  # height and width of Mitsuba's film if a scene states none
+DEEPEST = 1 << 16  # longest path of integrators without a limit; Russian roulette ends paths long before
+LONGEST_CHAIN = 100  # most nested and referenced parts in a chain, which Mitsuba follows by recursion
+_UNSEEN_BY_METER = ("directional", "point", "spot")  # lights without size, which no ray of Mitsuba's meter can meet
+# Integrators with a max_depth, and its default; -1 means no limit.
 _PATHS = {
     **dict.fromkeys(("path", "volpath", "volpathmis", "ptracer"), -1),
     **dict.fromkeys(("prb", "prb_basic", "prb_projective", "prbvolpath"), 6),
@@ -41,7 +39,7 @@ class SceneFile:
     size : (int, int)
         Height and width of the camera's film in pixels.
     notes : tuple of str
-        What was read and left out, in words.
+        What was read but is left out, in words.
     """
 
     scene: Scene
@@ -54,8 +52,9 @@ class SceneFile:
 def assemble(mi: ModuleType, name: str, description: Node, extend: str | None = None) -> SceneFile:
     """Build the scene: its first camera, light groups by id, a shape with an ``irradiancemeter`` as reference plane.
 
-    Lights belong to a group by their own id, or else their shape's, up to a colon: ``lamp:left`` and ``lamp:right``
-    are dimmed together. One spectrum that differs over place or direction, or several in a group, make it `coloured`.
+    A light's group is named by its own id, or else its shape's, up to a colon: ``lamp:left`` and ``lamp:right`` are
+    dimmed together. A group is `coloured` if a spectrum in it varies over position or direction, or if its lights have
+    different spectra.
 
     Parameters
     ----------
@@ -63,9 +62,9 @@ def assemble(mi: ModuleType, name: str, description: Node, extend: str | None = 
         Mitsuba, with its variant set.
     name : str
     description : dict
-        Plain nested dict, its plug-ins and files already checked.
+        Plain nested dict, whose plug-ins and files have been checked.
     extend : str, optional
-        As of `Scene`.
+        As in `Scene`.
 
     Raises
     ------
@@ -116,9 +115,9 @@ def assemble(mi: ModuleType, name: str, description: Node, extend: str | None = 
 
 
 def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
-    """Return the longest path and the depth at which Russian roulette begins, as the first path integrator states them.
+    """Return the longest path and the depth at which Russian roulette begins, by the first path integrator.
 
-    It may stand by itself or within another integrator.
+    That integrator may stand by itself or within another one.
     """
     nodes = [node for integrator in integrators for _, node in walk({"": integrator}) if node["type"] in _PATHS]
     if not nodes:
@@ -133,7 +132,7 @@ def _depths(name: str, integrators: list[Node]) -> tuple[int, int]:
 
 
 def _check_left_out(mi: ModuleType, name: str, description: Node) -> None:
-    """Raise `InputError` for a property that would change the picture, of a part that this engine replaces."""
+    """Raise `InputError` if a part that this engine replaces has a property that would change the picture."""
     for _, node in walk(description):
         kind = _kind(mi, node).replace("reconstructionfilter", "rfilter")
         if kind in _LEFT_OUT:
@@ -151,7 +150,7 @@ def _kind(mi: ModuleType, part: Any) -> str:
 def _camera(mi: ModuleType, name: str, description: Node, notes: list[str]) -> tuple[Node, tuple[int, int]]:
     """Return the first camera that this engine renders, without its film and sampler, and the size of its film."""
     sensors = [part for part in description.values() if _kind(mi, part) == "sensor"]
-    # A film or sampler may stand in the scene itself, and be referred to.
+    # A film or sampler may stand in the scene itself, and the camera refers to it.
     named = {part.get("id", key): part for key, part in description.items() if _kind(mi, part) in _LEFT_OUT}
     camera = next((sensor for sensor in sensors if sensor["type"] in CAMERAS), None)
     if camera is None:
@@ -176,7 +175,7 @@ def _camera(mi: ModuleType, name: str, description: Node, notes: list[str]) -> t
 
 
 def _check_references(name: str, geometry: Node) -> dict[str, Node]:
-    """Parts by id and by dotted path, as Mitsuba names them; raises for references that can't be followed."""
+    """Raise `InputError` for a reference that can't be followed; return all parts by id and by dotted path."""
     parts: dict[str, Node] = {}
     in_emitters: set[int] = set()
     emitter: Keys | None = None
@@ -201,7 +200,7 @@ def _check_references(name: str, geometry: Node) -> dict[str, Node]:
 
 
 def _height(name: str, node: Node, parts: Mapping[str, Node], heights: dict[int, int], level: int) -> int:
-    """Longest chain of parts and references under a node, each node visited once."""
+    """Return the length of the longest chain of parts and references under a node; visit each node once."""
     if id(node) not in heights and level <= LONGEST_CHAIN:
         children = (parts[part["id"]] if type_of(part) == "ref" else part for part in node.values() if type_of(part))
         heights[id(node)] = max((1 + _height(name, child, parts, heights, level + 1) for child in children), default=0)
@@ -210,23 +209,23 @@ def _height(name: str, node: Node, parts: Mapping[str, Node], heights: dict[int,
     return heights[id(node)]
 
 
-# MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more,
-# which makes 472, by fours.
+# MI_CIE_MIN to MI_CIE_MAX, outside of which Mitsuba's own spectra (rgb, d65, blackbody) are zero, and one point more:
+# 472 wavelengths can be evaluated four at a time.
 _GRID_NM: Floats = np.arange(360.0, 832.0)
 
 
 def type_of(part: Any) -> str:
-    """Plug-in that a value in a scene's dict names; empty where it is a plain value."""
+    """Return the plug-in that a value in a scene's dict names; an empty text for a plain value."""
     return str(part["type"]) if isinstance(part, dict) else ""
 
 
 def attach_area_lights(name: str, geometry: Node) -> None:
-    """Move area lights that stand in the scene into the shape that refers to them, as Mitsuba does itself.
+    """Move each area light that stands in the scene itself into the shape that refers to it, as Mitsuba does.
 
     Raises
     ------
     InputError
-        For one that no shape or several refer to.
+        For a light to which no shape refers, or several.
     """
     for key in [key for key, part in geometry.items() if type_of(part) == "area"]:
         light: Node = {"id": key, **geometry.pop(key)}
@@ -246,7 +245,7 @@ def attach_area_lights(name: str, geometry: Node) -> None:
 
 
 def light_groups(mi: ModuleType, name: str, geometry: Node, parts: Mapping[str, Node]) -> dict[str, LightGroup]:
-    """Light groups of a scene, by the lights' ids.
+    """Form the light groups of a scene by its lights' ids.
 
     Parameters
     ----------
@@ -254,9 +253,9 @@ def light_groups(mi: ModuleType, name: str, geometry: Node, parts: Mapping[str, 
         Mitsuba, with its variant set.
     name : str
     geometry : dict
-        The spectra that relighting replaces are taken out of it.
+        Scene, from which the spectra that relighting replaces are removed.
     parts : mapping of str to dict
-        What references point to.
+        Parts to which references point.
 
     Raises
     ------
@@ -287,7 +286,7 @@ def _same(a: Spectrum | None, b: Spectrum | None) -> bool:
 
 
 def _emission(mi: ModuleType, where: str, emitter: Node, parts: Mapping[str, Node]) -> Spectrum | None:
-    """Spectrum of an emitter, as Mitsuba evaluates it; None where its colour varies over position or direction."""
+    """Find an emitter's spectrum as Mitsuba evaluates it; return None if it varies over position or direction."""
     if emitter["type"] not in EMISSION_PARAMETER or "texture" in emitter:  # a spot's texture varies by direction
         return None
     value: Any = emitter.get(EMISSION_PARAMETER[emitter["type"]])
@@ -296,7 +295,7 @@ def _emission(mi: ModuleType, where: str, emitter: Node, parts: Mapping[str, Nod
     inner = [node["type"] for _, node in walk({"": value} if isinstance(value, dict) else {})]
     if any(kind not in (*SPECTRA, "rgb") for kind in inner):
         return None
-    try:  # the `constant` emitter: its emission depends on wavelength alone
+    try:  # by an emitter of type `constant`, whose emission depends on wavelength alone
         probe = mi.load_dict({"type": "constant"} | ({} if value is None else {"radiance": value}))
     except RuntimeError as error:
         raise InputError(f"{where}: {mitsuba_words(error)}; correct its spectrum") from None
@@ -304,14 +303,14 @@ def _emission(mi: ModuleType, where: str, emitter: Node, parts: Mapping[str, Nod
 
 
 def _stated(value: Any) -> Spectrum | None:
-    """Spectrum given by its own points, taken as it is: a line may lie between the points of any grid."""
+    """Return a spectrum by the points that it states, because a line may lie between the points of any other grid."""
     if type_of(value) == "uniform" and set(value) - {"type", "id"} == {"value"}:
         return flat(float(value["value"]))
     return table_of(value) if isinstance(value, dict) else None
 
 
 def _evaluate(mi: ModuleType, emitter: Any) -> Floats:
-    """Emission on `_GRID_NM`, four wavelengths to an evaluation; all at once where the variant holds arrays."""
+    """Evaluate an emitter at all wavelengths of `_GRID_NM`, four per element of one array."""
     fours = _GRID_NM.reshape(-1, 4)
     interaction = dr.zeros(mi.SurfaceInteraction3f, len(fours))
     interaction.wavelengths = mi.Spectrum(*(mi.Float(column) for column in fours.T))

@@ -1,9 +1,10 @@
-"""Reading a scene's XML before Mitsuba does, and the files that a scene may name.
+"""Checks of a scene's XML before Mitsuba reads it, and of the files that it names.
 
 Mitsuba's parser acts while it reads: ``<include>`` and ``<spectrum filename>`` open files, ``$parameters`` multiply
-text, and deep nesting ends the process. So expat, which only reads, goes first. ``<path>`` adds a folder in which files
-are looked for, and from which plug-ins would be loaded: the folders are on Mitsuba's search path while it parses, which
-loads none, and off it before anything is instantiated. Files are then named by their whole path.
+text, and deep nesting crashes the process. Therefore expat, which only reads, goes first. ``<path>`` adds a folder in
+which files are looked for, and from which plug-ins would be loaded. These folders are on Mitsuba's search path only
+while it parses, which loads no plug-in. Before anything is instantiated they are removed, and files are named by their
+absolute paths.
 """
 
 import os
@@ -17,8 +18,8 @@ from xml.parsers import expat
 
 from rodcone.errors import InputError
 
-# These limits are far above any scene written by hand or by an exporter, and far below what ends the process: Mitsuba
-# 3.9 dies of 100 000 nested elements.
+# These limits are far above any scene that a person or an exporter writes, and far below what crashes the process:
+# Mitsuba 3.9 crashes at 100 000 nested elements.
 MOST_NESTED = 64
 MOST_FILES = 200
 MOST_BYTES = 64 << 20
@@ -27,7 +28,9 @@ TRUST = "if you trust the scene, trust=True or --trust-scene"
 
 
 def find_file(name: str, bases: Sequence[Path], folders: Sequence[Path] | None) -> Path:
-    """Path of a file that a scene names, links not followed: what is named in it is looked for beside the link.
+    """Find a file that a scene names; return its path without resolving links.
+
+    Files that this file names are then looked for beside the link.
 
     Parameters
     ----------
@@ -35,12 +38,12 @@ def find_file(name: str, bases: Sequence[Path], folders: Sequence[Path] | None) 
     bases : sequence of Path
         Folders in which a relative name is looked for, in this order.
     folders : sequence of Path or None
-        The file has to lie inside one of them, links followed; None allows any folder.
+        Folders in one of which the file has to lie after links are resolved; None allows any folder.
 
     Raises
     ------
     InputError
-        For a file outside the folder, a missing one, or what isn't a plain file.
+        For a file outside the folders, a missing file, or one that isn't a plain file.
     """
     if not name or "\0" in name:
         raise InputError(f"file {name!r} is not allowed; name a file in the scene's folder")
@@ -60,9 +63,9 @@ def find_file(name: str, bases: Sequence[Path], folders: Sequence[Path] | None) 
 
 
 def search_path(mi: ModuleType, *folders: Path) -> Any:
-    """Mitsuba's search path of the given folders, its own, and the one that holds scikit-image and its pictures.
+    """Make Mitsuba's search path: given folders, Mitsuba's own, and the one of scikit-image, whose pictures scenes use.
 
-    Not the working directory, which Mitsuba puts first: a ``plugins/diffuse.so`` in it would be loaded as native code.
+    The working directory, which Mitsuba puts first, is left out: a ``plugins/diffuse.so`` in it would be loaded.
     """
     resolver = mi.FileResolver()
     resolver.clear()
@@ -77,7 +80,7 @@ def search_path(mi: ModuleType, *folders: Path) -> Any:
 
 @dataclass
 class _Spent:
-    """Running totals of the files read so far, includes counted."""
+    """Running totals over the scene file and all its includes."""
 
     files: int = 0
     bytes: int = 0
@@ -86,22 +89,22 @@ class _Spent:
 
 
 def screen(path: Path, trust: bool, define: Mapping[str, str]) -> list[Path]:
-    """Read a scene file and what it includes, and raise `InputError` for what Mitsuba's parser shouldn't see.
+    """Read a scene file and its includes, and raise `InputError` for anything that Mitsuba's parser mustn't see.
 
     Returns
     -------
     list of Path
-        Folders in which the scene's files are looked for: those of its ``<path>`` elements, the latest first, then its
-        own.
+        Folders in which the scene's files are looked for: those of its ``<path>`` elements, the last one first, then
+        its own.
 
     Parameters
     ----------
     path : Path
         Scene file, absolute.
     trust : bool
-        Lets files anywhere through; else they have to lie in those folders.
+        Whether files may lie anywhere, instead of only in those folders.
     define : mapping of str to str
-        Values of $parameters, before those of <default>.
+        Values of $parameters, which take precedence over those of <default>.
     """
     folders = [path.parent]
     _screen(path, folders, None if trust else folders, 0, _Spent(parameters=dict(define)))
@@ -121,14 +124,14 @@ def _screen(path: Path, bases: list[Path], allowed: list[Path] | None, level: in
         nonlocal depth
         depth += 1
         try:
-            # As Mitsuba: a file's own folder counts for its includes alone, its includer's for both.
+            # As in Mitsuba, a file's own folder counts only for its includes, that of the including file for all files.
             places = [path.parent, *bases] if tag == "include" else bases
             named = _checked_element(tag, attributes, depth, places, allowed, spent)
             if tag == "path":  # the latest comes first
                 named_folder = _named_folder(attributes.get("value", ""), [path.parent, *bases], spent)
                 bases.insert(0, named_folder)
                 if allowed is not None and named_folder not in allowed:
-                    allowed.insert(0, named_folder)  # an included file's paths count for the files of all
+                    allowed.insert(0, named_folder)  # a <path> in an included file counts for all files
         except InputError as error:
             refuse(error)
         if named and tag == "include":
@@ -159,7 +162,7 @@ def _content(path: Path, spent: _Spent) -> bytes:
         )
     content = path.read_bytes()
     try:
-        content.decode("utf-8")  # of other encodings expat and Mitsuba could read different elements
+        content.decode("utf-8")  # in another encoding, expat and Mitsuba might read different elements
     except UnicodeDecodeError as error:
         raise InputError(f"{path}: byte {error.start} is no UTF-8; allowed: XML in UTF-8; save it so") from None
     return content
@@ -168,11 +171,11 @@ def _content(path: Path, spent: _Spent) -> bytes:
 def _checked_element(
     tag: str, attributes: dict[str, str], depth: int, bases: list[Path], allowed: list[Path] | None, spent: _Spent
 ) -> Path | None:
-    """Check one element; gives the file that Mitsuba's parser would open for it."""
+    """Check one element; return the file that Mitsuba's parser would open for it, or None."""
     if depth > MOST_NESTED:
         raise InputError(f"elements are nested over {MOST_NESTED} deep; flatten the scene")
     longest = max(map(len, spent.parameters.values()), default=0)
-    # Each parameter may hold earlier ones, so that ten lines of <default> could fill the memory.
+    # A parameter's value may contain earlier parameters, so that ten lines of <default> could fill the memory.
     spent.substituted += sum(value.count("$") for value in attributes.values()) * longest
     if spent.substituted > MOST_SUBSTITUTED:
         raise InputError(f"$parameters grow past {MOST_SUBSTITUTED} characters; write the values out")
@@ -185,7 +188,7 @@ def _checked_element(
 
 
 def _named_folder(value: str, bases: list[Path], spent: _Spent) -> Path:
-    """Folder that a ``<path>`` adds to the search path."""
+    """Return the folder that a ``<path>`` adds to the search path."""
     name = _substitute(value, spent.parameters)
     for base in bases:
         if (base / name).is_dir():
@@ -194,7 +197,7 @@ def _named_folder(value: str, bases: list[Path], spent: _Spent) -> Path:
 
 
 def _substitute(text: str, parameters: Mapping[str, str]) -> str:
-    """Put in ``$parameters`` as Mitsuba does, longest names first."""
+    """Replace ``$parameters`` by their values as Mitsuba does, longest names first."""
     if "\\$" in text:
         raise InputError(f"{text!r} holds an escaped $, which is not allowed here; name files without it")
     for name in sorted(parameters, key=len, reverse=True):
