@@ -1,1 +1,3 @@
-"""From raw data to a picture: interleaved reconstruction (Parmar & Wandell 2009) and the Bayer reference."""
+"""Development of raw data to a picture: the interleaved camera of Parmar & Wandell 2009, piecewise linear estimation,
+and the processors they are compared with.
+"""

@@ -1,4 +1,4 @@
-"""The generalised Anscombe transform, from electrons to units of noise, and its exact inverse, which has no bias."""
+"""The generalised Anscombe transform from electrons to units of noise, and its exact unbiased inverse."""
 
 from dataclasses import replace
 from functools import partial
@@ -11,20 +11,20 @@ from sensor.calibration import ChannelNoise, NoiseStep
 from sensor.cfa import mask
 from sensor.raw import RawImage, gains_shot
 
-# Under it PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) runs out of digits.
+# A smaller PRNU adds less than 1 % to shot noise up to a million electrons, and ln(1 + p) loses its digits.
 LEAST_PRNU = 1e-4
-_LEAST = 2.0 * np.sqrt(0.375)  # what stands for 0 electrons: the Anscombe transform of 0
+_LEAST = 2.0 * np.sqrt(0.375)  # the Anscombe transform of 0 electrons, smaller values are raised to it
 
 
 def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDArray[Any]:
-    """Mosaic in units of its own noise: generalised Anscombe transform at unit gain, with PRNU.
+    """Transform a mosaic to units of its own noise: generalised Anscombe transform at unit gain, with PRNU.
 
-    The integral of 1 / sqrt(s^2 + e + 3/8 + (p e)^2), shot noise, dark noise s and PRNU p:
+    It is the integral of 1 / sqrt(s^2 + e + 3/8 + (p e)^2), for e electrons, dark noise s and PRNU p:
 
         t = ln(1 + 2 p sqrt(v) + 2 p^2 e') / p,    e' = e + 3/8,    v = s^2 + e' + (p e')^2
 
-    which for p -> 0 is 2 sqrt(e + 3/8 + s^2) (Murtagh, Starck & Bijaoui 1995, eq. 7) less a constant. Its standard
-    deviation is 1 from a few electrons on. Where e' is under 0 PRNU is left out; under -s^2 t stays 0.
+    which for p -> 0 is 2 sqrt(e + 3/8 + s^2) (Murtagh, Starck & Bijaoui 1995, eq. 7) minus a constant. From a few
+    electrons on, the standard deviation of t is 1. Where e' is negative, PRNU is left out; below -s^2, t stays 0.
 
     Parameters
     ----------
@@ -48,12 +48,13 @@ def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDAr
 
 
 def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
-    """`stabilise` by the noise of a raw image, with its steps where a pixel was read several times.
+    """Apply `stabilise` with the noise of a raw image, which has steps if pixels were read several times.
 
-    From a step on the variance is k e + s^2 + (p e)^2 with another k, s and p, whose integral is the transform at k e
-    with PRNU p / k, over k. The pieces join where they meet. Of a channel that is read apart, e / k electrons are what
-    its sites count, and have the transform of any others. The same holds where columns' gains act on dark current too,
-    which makes k of 1 (`sensor.raw.gains_shot`): variance k e + s^2 + (p e)^2 is k^2 times that of e / k.
+    From a step on, the variance is k e + s^2 + (p e)^2 with other k, s and p. Its integral is the transform at k e with
+    PRNU p / k, divided by k. Each piece is shifted so that it meets the one before. A channel with its own readings
+    counts e / k electrons at its sites, to which the transform applies as to any others. The same holds if columns'
+    gains also act on dark current, which changes k from 1 (`sensor.raw.gains_shot`): the variance
+    k e + s^2 + (p e)^2 is k^2 times that of e / k.
 
     Parameters
     ----------
@@ -68,7 +69,7 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
 
 
 def stabilise_channel(electrons: NDArray[Any], raw: RawImage, channel: str) -> NDArray[Any]:
-    """Take a plane of `channel` [e-] into units of the noise of its samples, as `stabilise_raw` takes the samples."""
+    """Transform a plane of `channel` [e-] to units of its samples' noise, as `stabilise_raw` transforms the samples."""
     if channel in _read_apart(raw):
         return _counted(electrons, raw.noise_of(channel))
     return _stabilise_in_steps(electrons, raw)
@@ -94,7 +95,7 @@ def _electrons(stable: NDArray[np.floating], noise: ChannelNoise) -> NDArray[np.
 
 
 def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
-    """Steps of a raw image's noise, each with what its piece of the transform is moved by to meet the one before."""
+    """Return a raw image's noise steps, each with the offset by which its piece of the transform joins the last."""
     joined: list[tuple[NoiseStep, float]] = []
     both = gains_shot(raw, raw.dark_current_e)
     below = partial(_counted, noise=raw.plain_noise)
@@ -113,7 +114,7 @@ def _piece(electrons: NDArray[Any], step: NoiseStep) -> NDArray[Any]:
 
 
 def without_prnu(raw: RawImage) -> RawImage:
-    """Raw image of which `unstabilise_raw` has the inverse: the same, its PRNU left out."""
+    """Return a raw image without PRNU, for which `unstabilise_raw` inverts `stabilise_raw`."""
     return replace(
         raw,
         prnu=0.0,
@@ -123,10 +124,10 @@ def without_prnu(raw: RawImage) -> RawImage:
 
 
 def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.float64]:
-    """Inverse of `stabilise_raw` of a raw image `without_prnu`.
+    """Invert `stabilise_raw` for a raw image `without_prnu`.
 
-    Before the first step `unstabilise`. Beyond one, where noise is tens of electrons and more, its mean is k / 4
-    electrons off at most.
+    Below the first step this is `unstabilise`. Above a step, where noise is tens of electrons or more, the mean is at
+    most k / 4 electrons off.
     """
     electrons = _electrons(stable, raw.plain_noise)
     for step, offset in _joined(raw):
@@ -140,23 +141,24 @@ def unstabilise_raw(stable: NDArray[np.floating], raw: RawImage) -> NDArray[np.f
 
 
 def unstabilise(stable: NDArray[np.floating], dark_noise_e: float) -> NDArray[np.float64]:
-    """Electrons whose noisy samples have this mean after the generalised Anscombe transform.
+    """Compute the electrons whose noisy samples have a given mean after the generalised Anscombe transform.
 
-    The mean of a root is not the root of a mean: the algebraic inverse would be 1/4 e- too low. The closed form of the
-    exact unbiased inverse (Makitalo & Foi 2011), shifted by the dark noise's variance (Makitalo & Foi, "Optimal
-    inversion of the generalized Anscombe transformation for Poisson-Gaussian noise", IEEE TIP 22(1), 2013).
+    Because the mean of a root is not the root of a mean, the algebraic inverse would be 1/4 e- too low. This is the
+    closed form of the exact unbiased inverse (Makitalo & Foi 2011), shifted by the dark noise's variance (Makitalo &
+    Foi, "Optimal inversion of the generalized Anscombe transformation for Poisson-Gaussian noise", IEEE TIP 22(1),
+    2013).
 
     Parameters
     ----------
     stable : array
         Denoised values [standard deviations of noise].
     dark_noise_e : float
-        The standard deviation that `stabilise` took, with no PRNU [e-].
+        Dark noise that was given to `stabilise`, where PRNU was 0 [e-].
 
     Returns
     -------
     array of float64
-        Electrons; not under ``-dark_noise_e**2``, where the transform ends.
+        Electrons, at least ``-dark_noise_e**2``, where the transform ends.
     """
     root = np.maximum(np.asarray(stable, dtype=np.float64), _LEAST)
     inverse = 1.0 / root

@@ -1,4 +1,4 @@
-"""Threads of BLAS, the library behind NumPy's products of matrices."""
+"""Control of the threads of BLAS, the library behind NumPy's matrix products."""
 
 from contextlib import AbstractContextManager
 from functools import cache
@@ -15,5 +15,5 @@ def one_thread() -> AbstractContextManager[Any]:
 
 @cache
 def _blas() -> ThreadpoolController:
-    """Find the BLAS that is loaded, which takes milliseconds."""
+    """Find the loaded BLAS; the search takes milliseconds, so that its result is kept."""
     return ThreadpoolController().select(user_api="blas")

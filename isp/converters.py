@@ -1,4 +1,4 @@
-"""Raw files as other programs develop them: a negative, and a 16-bit Bayer one beside it where it isn't one itself."""
+"""Raw files for other programs: a negative, and beside it a 16-bit Bayer negative unless it is one itself."""
 
 from dataclasses import replace
 from math import ceil, log2
@@ -11,14 +11,14 @@ from sensor.cfa import is_bayer
 from sensor.raw import RawImage
 from sensor.raw_files.raw_file import write_raw
 
-MOST_STEP = 3.0  # of 16-bit numbers, in standard deviations of dark noise: a mean is then off by 4 % of a step at most
+MOST_STEP = 3.0  # largest step of 16-bit numbers, in standard deviations of dark noise; means then err by 4 % of a step
 
 
 def for_converters(raw: RawImage) -> RawImage | None:
-    """Bayer raw image of 16-bit whole numbers, which every raw converter develops; None where `raw` is one.
+    """Convert a raw image to Bayer in 16-bit whole numbers, which every raw converter develops; None if it is that.
 
-    Another mosaic is re-mosaiced (`isp.remosaic`). Floats become whole numbers where steps of 16 bits are at most
-    `MOST_STEP` standard deviations of dark noise; elsewhere they stay floats, which some converters refuse.
+    Another mosaic is re-mosaiced (`isp.remosaic`). Floats become whole numbers if the steps of 16 bits are at most
+    `MOST_STEP` standard deviations of dark noise. Otherwise they stay floats, which some converters refuse.
 
     Raises
     ------
@@ -40,31 +40,31 @@ def for_converters(raw: RawImage) -> RawImage | None:
 
 
 def sixteen_bit_step_e(raw: RawImage) -> float:
-    """Step of a raw image's samples as whole numbers of 16 bits, a power of two of its own digital numbers [e-]."""
+    """Return the step of a raw image's samples in 16 bits [e-]: a power of two of its own digital numbers."""
     return float(raw.gain_e_per_dn * 2.0 ** max(ceil(log2(raw.white_dn / 65_535)), 0))
 
 
 def write_with_bayer(raw: RawImage, path: str | Path, *, frame: int | None = None) -> tuple[Path, ...]:
-    """Write a raw file and, beside a .dng that not every converter develops, NAME_bayer.dng; gives their paths.
+    """Write a raw file and, if it is a .dng that not every converter develops, NAME_bayer.dng; return their paths.
 
-    Of RGBW, quad mosaics and merged readings the .dng is for rodcone and software that reads mosaics; converters are
-    given NAME_bayer.dng (`for_converters`). A .tif has its .json beside it.
+    A .dng of RGBW, a quad mosaic or merged readings is for rodcone and software that reads mosaics. Raw converters take
+    NAME_bayer.dng (`for_converters`). A .tif has its .json beside it.
 
     Parameters
     ----------
     raw : RawImage
-        For a .dng with colours, such as `capture` gives it.
+        Raw image; a .dng needs its colours, which `capture` states.
     path : str or Path
-        Ends in .dng, .tif or .tiff.
+        Path that ends in .dng, .tif or .tiff.
     frame : int, optional
-        Number of the exposure in a burst, which a .dng notes.
+        Number of the exposure in a burst, which a .dng records.
 
     Raises
     ------
     InputError
         For another ending, or a raw image that the format can't hold.
     OSError
-        Where the folder is missing or can't be written.
+        If the folder is missing or can't be written.
     """
     path = Path(path)
     written = write_raw(raw, path, frame=frame)
@@ -73,14 +73,15 @@ def write_with_bayer(raw: RawImage, path: str | Path, *, frame: int | None = Non
 
 
 def bayer_name(path: Path) -> Path:
-    """Name of the Bayer negative beside a negative."""
+    """Return the path of the Bayer negative beside a negative."""
     return path.with_stem(f"{path.stem}_bayer")
 
 
 def converter_note(raw: RawImage, path: Path) -> str:
-    """Say which file a converter is given in place of a negative of merged samples, and how it differs; else empty.
+    """Say which file to give to a converter instead of a negative of merged samples, and how it differs.
 
-    That another mosaic than Bayer's is re-mosaiced for it goes without saying: `rodcone --help` says so once.
+    The text is empty if samples aren't merged. For another mosaic than Bayer's alone there is no note, because
+    `rodcone --help` explains it.
     """
     ways = [] if is_bayer(raw.cfa) else ["re-mosaiced"]
     if raw.dn.dtype.kind == "f":

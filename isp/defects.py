@@ -1,4 +1,4 @@
-"""Defective pixels of a raw image's list, replaced before anything else is done with it."""
+"""Replacement of a raw image's listed defective pixels, before anything else is done with it."""
 
 from dataclasses import replace
 from functools import cache
@@ -9,14 +9,15 @@ from numpy.typing import NDArray
 from sensor.cfa import channel_map
 from sensor.raw import RawImage
 
-_RINGS = 3  # tiles around a pixel that are searched for its channel before the whole frame's median serves
+_RINGS = 3  # distance [tiles] to which sound samples are searched before the whole frame's median is used
 
 
 def interpolate_defects(raw: RawImage) -> RawImage:
-    """Replace each listed pixel by the median of the nearest sound samples of its channel; the list is gone then.
+    """Replace each listed pixel by the median of the nearest sound samples of its channel, and drop the list.
 
-    Nearest: all in a window of one tile's period to either side, which grows until it holds one. A median, since a
-    cluster may hold a defect that isn't listed. Black stands where the channel has no sound sample at all.
+    The nearest samples are all those in a window that reaches one tile to either side, or more until it holds one. The
+    median is taken because a cluster may hold a defect that isn't listed. A channel without any sound sample gets the
+    black level.
     """
     if raw.defects is None:
         return raw

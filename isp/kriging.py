@@ -1,10 +1,9 @@
 """Every channel at every pixel as the best linear estimate of any mosaic: universal kriging (Matheron 1969).
 
-Channels are taken for random fields that vary together around a plane of their own, whose three numbers are unknown:
-so weights are found that give back every mosaic of planes, constant or linear, exactly, and among these the ones of
-least error. Samples are weighed in units of their noise (`isp.anscombe`). Where the interleaved reconstruction
-chooses among samples that look alike, this is one filter for each pixel of the tile and frame, and a second one,
-channel by channel, near lamps.
+Channels are modelled as correlated random fields, each around a plane with three unknown numbers. Of all weights that
+reproduce a mosaic of planes, constant or linear, exactly, those of least expected error are taken. Samples are in units
+of their noise (`isp.anscombe`). Unlike the interleaved reconstruction, which chooses samples that look alike, this is
+one fixed filter for each pixel of the tile and frame, and a second one, channel by channel, near lamps.
 """
 
 from collections.abc import Iterator
@@ -24,31 +23,31 @@ from rodcone.types import Plane
 from sensor.cfa import Tile, channels, mask
 from sensor.raw import RawImage
 
-# Of 3 radii, 6 correlations and 4 lengths on three scenes in two lights (docs/decisions/0048).
-RADIUS = 6  # of the window that samples are taken from [pixels]: a corner shows every channel on three lines or more
-SIDE = 2 * RADIUS + 1  # of the window
-CORRELATION = 0.93  # of two channels' values at one pixel
-LENGTH = 6.0  # of the exponential covariance [pixels]
-BESIDE_LAMPS = 1e3  # what a channel shows beside a lamp [standard deviations of noise]
-OUTLYING = 8.0  # half widths of the middle two thirds, above which a sample is a lamp's
-STRIP_ROWS = 256  # that are estimated together: what lies between is no whole frame of every channel
-LEAST_DEVIATION = 0.1  # of what a channel shows [standard deviations of noise]: a flat field shows nothing
+# The best of 3 radii, 6 correlations and 4 lengths on three scenes in two lights (docs/decisions/0048).
+RADIUS = 6  # radius [pixels] of the window of samples; a corner then has every channel on three lines or more
+SIDE = 2 * RADIUS + 1  # side of the window
+CORRELATION = 0.93  # correlation of two channels' values at one pixel
+LENGTH = 6.0  # length of the exponential covariance [pixels]
+BESIDE_LAMPS = 1e3  # assumed variation of a channel beside a lamp [standard deviations of noise]
+OUTLYING = 8.0  # a lamp's sample lies so many half widths of the middle two thirds above them
+STRIP_ROWS = 256  # rows that are estimated together, so that memory never holds a whole frame of every channel
+LEAST_DEVIATION = 0.1  # least assumed variation of a channel, which a flat field lacks [standard deviations of noise]
 
 
 def reconstruct_linear(raw: RawImage) -> Reconstruction:
     """Estimate every channel at every pixel of a raw image of any mosaic.
 
-    How much channels show beside noise is taken from the middle two thirds of their samples: a lamp is no measure of
-    the dark around it. Where a saturated or such an outlying sample lies in the window, each channel is estimated from
-    its own samples alone, for a full W says nothing of G, and interpolated without smoothing, or a lamp would glow over
-    the whole window. An even field comes out within 0.1 e- of its mean, from the dark on.
+    The variation of each channel is measured on the middle two thirds of its samples, so that a lamp doesn't influence
+    it. If a saturated or an outlying sample lies in the window, each channel is estimated from its own samples alone,
+    because a full W says nothing about G. It is then interpolated without smoothing, because otherwise a lamp would
+    spread over the whole window. The estimate of an even field, however dark, is within 0.1 e- of its mean.
     """
     estimates, noise_gains = zip(*(strip[1:] for strip in linear_strips(raw)), strict=True)
     return Reconstruction(np.concatenate(estimates), np.concatenate(noise_gains), engine="numpy")
 
 
 def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
-    """Yield the rows of each strip of `reconstruct_linear`, its estimate [e-] and its noise gain; bits are the same."""
+    """Yield `reconstruct_linear` strip by strip: rows, estimate [e-] and noise gain, with the same bits."""
     names = raw.channels
     plain = replace(without_prnu(raw), noise_steps=())
     values = stabilise_raw(raw.electrons, plain)
@@ -68,8 +67,8 @@ def linear_strips(raw: RawImage) -> Iterator[tuple[slice, Plane, Plane]]:
             estimate, noise_gain = (
                 np.where(beside[strip][..., None], *both) for both in zip(apart, (estimate, noise_gain), strict=True)
             )
-        # The inverse adds the 1/4 e- that a mean of roots has lost, and what the estimate keeps of the noise has not.
-        # A channel that is read apart counts its own electrons, 1 over its factor of shot noise.
+        # The inverse adds the 1/4 e- that a mean of roots loses. The noise that remains in the estimate hasn't lost it,
+        # so its part is subtracted. A channel with its own readings counts electrons over its factor of shot noise.
         electrons = np.empty_like(estimate)
         for index, noise in enumerate(noises):
             counted = unstabilise(estimate[..., index], noise.dark_noise_e / noise.shot) - noise_gain[..., index] / 4
@@ -91,22 +90,22 @@ def krige(
     Parameters
     ----------
     values : (h, w) float64
-        Begins at the tile's first pixel.
+        Mosaic that begins at the tile's first pixel.
     tile : tuple of str
     deviation : (channel,) float64
-        Standard deviation of what each channel shows, above 0.
+        Standard deviation of each channel's signal, above 0.
     correlation : float
-        Of two channels at one pixel.
+        Correlation of two channels at one pixel.
     rows : range, optional
-        That are estimated; all of them where left out.
+        Rows to estimate, by default all.
     where : (h, w) bool, optional
-        Pixels that are asked for, all by default; others may come out as 0.
+        Pixels to estimate, by default all; others may be 0.
 
     Returns
     -------
     estimate, noise_gain : (row, w, channel) float64
-        Of the rows that are asked for, channels in the order of `sensor.cfa.channels`. The gain is the sum of the
-        squared weights, the noise's variance in the estimate.
+        Results for these rows, channels in the order of `sensor.cfa.channels`. The gain is the sum of the squared
+        weights, which is the noise's variance in the estimate.
     """
     height, width = values.shape
     count = len(channels(tile))
@@ -131,12 +130,12 @@ def krige(
 
 
 def _reach(at: int, side: int) -> tuple[int, int]:
-    """Offsets of the window around a pixel that lie in the frame: first, and one after the last."""
+    """Return the offsets of a window around a pixel that lie in the frame: the first, and one after the last."""
     return -min(RADIUS, at), min(RADIUS, side - 1 - at) + 1
 
 
 def _alike(side: int, period: int) -> list[slice]:
-    """Positions along one axis that the same weights serve: of one phase inside, each by itself near the border."""
+    """Group the positions along one axis that share weights: inside by phase, near the border each by itself."""
     inside = range(RADIUS, max(side - RADIUS, RADIUS))
     border = [at for at in range(side) if at not in inside]
     phases = [slice(first, inside.stop, period) for first in inside[:period]]
@@ -144,7 +143,7 @@ def _alike(side: int, period: int) -> list[slice]:
 
 
 def _within(positions: slice, asked: range) -> slice:
-    """Those of `positions` that are asked for."""
+    """Restrict `positions` to those that are in `asked`."""
     first = positions.start + max(-(-(asked.start - positions.start) // positions.step), 0) * positions.step
     return slice(first, max(min(positions.stop, asked.stop), first), positions.step)
 
@@ -152,12 +151,12 @@ def _within(positions: slice, asked: range) -> slice:
 def _weighted(
     values: Plane, weights: Plane, rows: slice, columns: slice, window: tuple[tuple[int, int], tuple[int, int]]
 ) -> Plane:
-    """Sums of each window's samples by the same weights, shape (channel, row, column)."""
+    """Sum the samples of each window with the same weights, shape (channel, row, column)."""
     (top, bottom), (left, right) = window
     around = values[rows.start + top : rows.stop - 1 + bottom, columns.start + left : columns.stop - 1 + right]
     windows = sliding_window_view(around, (bottom - top, right - left))[:: rows.step, :: columns.step]
     total = np.empty((len(weights), *windows.shape[:2]))
-    for row, samples in enumerate(windows):  # by itself: BLAS's last bits depend on how many it takes together
+    for row, samples in enumerate(windows):  # one at a time, because BLAS's last bits depend on the matrix's size
         total[:, row] = weights @ samples.reshape(-1, weights.shape[1]).T
     return total
 
@@ -173,20 +172,20 @@ def _nearness() -> Plane:
 def _weights(
     tile: Tile, phase: tuple[int, int], down: tuple[int, int], across: tuple[int, int], scales: tuple[float, ...]
 ) -> Plane:
-    """Weights of the window's samples, row by row, for each channel, shape (channel, sample)."""
+    """Compute each channel's weights of a window's samples, row by row, shape (channel, sample)."""
     names, (*deviation, correlation) = channels(tile), scales
     rows, columns = (x.ravel() for x in np.mgrid[slice(*down), slice(*across)])
     cells = np.array([[names.index(name) for name in row] for row in tile])
     channel = cells[(phase[0] + rows) % len(tile), (phase[1] + columns) % len(tile[0])]
 
-    # Covariance between samples, and of samples with what is asked for.
+    # Covariance between samples, and of samples with the channels' values at the pixel.
     between = np.where(np.eye(len(names)), 1.0, correlation) * np.outer(deviation, deviation)
     near = _nearness()
     at = (RADIUS + rows) * SIDE + RADIUS + columns
     covariance = between[channel[:, None], channel] * near[at[:, None], at] + np.eye(rows.size)
     target_covariance = between[:, channel] * near[len(near) // 2, at]
 
-    # Lagrange's multipliers: planes of each channel by itself come out exactly.
+    # With Lagrange multipliers each channel's own plane is reproduced exactly.
     sampled = channel == np.arange(len(names))[:, None]
     planes = np.concatenate([sampled, sampled * rows, sampled * columns]).astype(np.float64)
     system = np.block([[covariance, planes.T], [planes, np.zeros((len(planes), len(planes)))]])
@@ -194,5 +193,5 @@ def _weights(
     right_side = np.concatenate([target_covariance, target], axis=1).T
     if np.linalg.matrix_rank(planes) == len(planes):
         return np.asarray(np.linalg.solve(system, right_side)[: rows.size].T)
-    # A small frame shows too few samples of a channel for its slope: the least squares then.
+    # In a small frame a channel may have too few samples for its slope; then least squares are taken.
     return np.asarray(np.linalg.lstsq(system, right_side, rcond=None)[0][: rows.size].T)

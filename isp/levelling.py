@@ -1,8 +1,8 @@
-"""Sites of one channel with other neighbours, levelled by what a flat field says, before anything else is developed.
+"""Levelling of a channel's sites that have different neighbours, before anything else is developed.
 
-In Bayer and in 2x2 RGBW all sites of a channel have the same neighbours. In larger tiles they may not: crosstalk then
-makes some read more of an even field than others, which shows as a pattern of the tile. In the project's mosaics that
-is up to 6 % in RCCC at a crosstalk of 5 %, and 0.1 % in the others.
+In Bayer and in 2x2 RGBW all sites of a channel have the same neighbours. In larger tiles they may not. Crosstalk then
+makes some sites read more from an even field than others, which shows as a pattern of the tile. In the project's
+mosaics the difference is up to 6 % in RCCC at a crosstalk of 5 %, and 0.1 % in the others.
 """
 
 from dataclasses import replace
@@ -14,20 +14,20 @@ from rodcone.types import Floats
 from sensor.cfa import unmixed
 from sensor.raw import RawImage, full_at_sites
 
-LEAST_GAIN = 1e-9  # by which a site has to differ from its channel's mean
+LEAST_GAIN = 1e-9  # least relative difference of a site from its channel's mean
 
 
 def levelled(raw: RawImage, neutral: Floats) -> RawImage:
-    """Raw image in which all sites of a channel read the same of an even neutral field.
+    """Scale samples so that all sites of a channel read the same from an even neutral field.
 
-    A sample whose gain would take it over or under the level of saturation stays as it is. The noise profile stays that
-    of the channel's mean site: a sample's own standard deviation differs from it by the gain.
+    A sample that would become saturated, or cease to be, isn't scaled. The noise profile remains that of the channel's
+    mean site; a sample's own standard deviation differs from it by the gain.
 
     Parameters
     ----------
     raw : RawImage
     neutral : (channel,) float64
-        What the channels read of a neutral, in any unit.
+        Response of the channels to a neutral, in any unit.
     """
     if not raw.crosstalk:
         return raw
@@ -43,10 +43,10 @@ def levelled(raw: RawImage, neutral: Floats) -> RawImage:
 
 
 def site_gains(raw: RawImage, neutral: Floats) -> Floats:
-    """Factor on the electrons of each site of the tile, (row, column): the channel's mean over what the site reads.
+    """Compute the gain of each site of the tile, (row, column): the channel's mean over what the site reads.
 
-    Both are of the same unmixed neutral: where crosstalk can't be undone (at 25 % no charge stays), sites of a channel
-    that have the same neighbours still read the same.
+    Both are computed from the same unmixed neutral. So even if crosstalk can't be undone (at 25 % no charge stays),
+    sites of a channel with the same neighbours have the same gain.
     """
     reads = np.asarray(raw.site_mixing @ unmixed(raw.channel_mixing, neutral))
     letters = np.array([list(row) for row in raw.cfa])

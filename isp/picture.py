@@ -1,4 +1,4 @@
-"""A developed picture, and how linear planes of three colours become one."""
+"""A developed picture, and the last steps from linear planes of three colours to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,20 +22,20 @@ from sensor.raw import RawImage
 
 @dataclass(frozen=True)
 class Picture:
-    """A developed picture, and what was decided on the way; to NumPy it is its linear RGB.
+    """A developed picture and the decisions made for it; NumPy takes it as its linear RGB.
 
     Attributes
     ----------
     rgb : (h, w, 3) float64
-        Linear sRGB, not clipped to the display; a neutral reads the electrons of a green pixel.
+        Linear sRGB, not clipped to the display; a neutral has the electrons of a green pixel.
     balance : mapping of str to str
-        Where each channel's gain comes from: ``gray world``, ``calibrated`` or ``given``.
+        Origin of each channel's gain: ``gray world``, ``calibrated`` or ``given``.
     engine : "cuda", "llvm" or "numpy"
-        What ran the reconstruction.
+        Engine that ran the reconstruction.
     snr : float or None
-        Frame SNR of green, on which substitution is decided; None where W substitutes nothing, as in a Bayer camera.
+        SNR of the frame's green, by which substitution is decided; None if W substitutes nothing, as in a Bayer camera.
     substitution : float or None
-        W's share of the luminance, 0 to 1; None likewise.
+        Share of W in the luminance, 0 to 1; None if W substitutes nothing.
     """
 
     rgb: Image
@@ -58,12 +58,12 @@ class Picture:
 
     @property
     def substituted(self) -> bool | None:
-        """Whether W gave most of the luminance; None where nothing is substituted."""
+        """Whether W gave most of the luminance; None if W substitutes nothing."""
         return None if self.substitution is None else self.substitution > 0.5
 
     @property
     def snr_db(self) -> float | None:
-        """`snr` in decibels; None where there is none, or no signal."""
+        """`snr` in decibels; None without an SNR or without signal."""
         return 20 * float(np.log10(self.snr)) if self.snr is not None and self.snr > 0 else None
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[np.floating]:
@@ -79,10 +79,10 @@ class Picture:
         Parameters
         ----------
         white : float, optional
-            Level of `rgb` that is shown as white [e-]; left out, the 99th percentile of its luminance comes to 90 % of
-            white.
+            Level of `rgb` that is shown as white [e-]. By default the 99th percentile of the luminance is shown at 90 %
+            of white.
         encoding : str
-            Of `isp.colour.encoding.ENCODINGS`.
+            Name in `isp.colour.encoding.ENCODINGS`.
         """
         level = (white_of(self.rgb) or 1.0) if white is None else white
         require_range("white", level, 1e-12, 1e12, "give electrons of green")
@@ -117,12 +117,12 @@ def finish(
     planes : (h, w, 3) float64
         Demosaicked channels [e-].
     matrix, neutral, balance
-        As `isp.processors.catalogue.Processor.develop`.
+        As in `isp.processors.catalogue.Processor.develop`.
     engine : "cuda", "llvm" or "numpy"
-        What made the planes.
+        Engine that made the planes.
     noise_gain : (h, w, 3) array, optional
-        As `isp.interleaved.reconstruction.reconstruct_with_noise` returns it: with a `ColourFit` as `matrix`, colours
-        that know this noise.
+        Noise gain as `isp.interleaved.reconstruction.reconstruct_with_noise` returns it. If `matrix` is a `ColourFit`,
+        the colours take this noise into account.
     """
     shape = *raw.shape, len(raw.channels)
     if planes.shape != shape or (noise_gain is not None and np.shape(noise_gain) != shape):

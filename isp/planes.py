@@ -1,7 +1,7 @@
-"""From the mosaic to one full plane a channel: where the paper reads the patches h_i of eq. (5).
+"""Interpolation of the mosaic to one full plane per channel, from which the paper reads the patches h_i of eq. (5).
 
-Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samples with a tent, so a flat field stays
-flat up to the border.
+Planes are filled by normalised convolution (Knutsson & Westin 1993) of the samples with a tent, so that a flat field
+stays flat up to the border.
 """
 
 from collections.abc import Sequence
@@ -15,17 +15,17 @@ from rodcone.types import Mosaic, Plane
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 
-BLOCK_ROWS = 128  # rows that go through several sums together, for what lies between to stay in the cache
+BLOCK_ROWS = 128  # rows that go through several sums together, so that intermediate results stay in the cache
 
 
 def tent(radius: int) -> Plane:
-    """Weights 1 .. radius + 1 .. 1 along one axis: [1 2 1] for radius 1."""
+    """Return the weights 1 .. radius + 1 .. 1 along one axis, such as [1 2 1] for radius 1."""
     return radius + 1.0 - np.abs(np.arange(-radius, radius + 1))
 
 
 @lru_cache(maxsize=64)
 def tent_radius(tile: Tile, channel: str) -> int:
-    """Smallest radius of a tent that reaches a sample of `channel` from every phase of an endless mosaic."""
+    """Return the smallest radius of a tent that reaches a sample of `channel` from every phase of an endless mosaic."""
     sampled = np.array([list(row) for row in tile]) == channel
     for radius in range(int(max(sampled.shape))):
         reached: NDArray[np.bool_] = sampled
@@ -38,7 +38,7 @@ def tent_radius(tile: Tile, channel: str) -> int:
 
 
 def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
-    """One full plane from the samples of `channel`; a sampled site keeps its sample.
+    """Interpolate the samples of `channel` to a full plane; a sampled site keeps its sample.
 
     Parameters
     ----------
@@ -48,8 +48,8 @@ def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
     Returns
     -------
     (h, w) of the same type
-        Where the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one serves.
-        The sums run in one order at every pixel: a part of the frame gives the same bits.
+        The plane. If the frame's edge cuts off every sample within the tent's radius, the next radius that reaches one
+        is taken. Sums have the same order at every pixel, so that a part of the frame gives the same bits.
     """
     result = np.empty_like(values)
     down, across = len(tile), len(tile[0])
@@ -71,13 +71,13 @@ def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
 def _tent_sums(
     values: NDArray[Any], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
-    """Sums of tent times sample, and of the tent, over the samples in the frame, for the pixels at one phase."""
+    """Sum tent times sample, and the tent, over the samples in the frame, for the pixels at one phase of the tile."""
     size = (len(tile), len(tile[0]))
     tents = _phase_tent(tile, channel, phase, radius).astype(values.dtype)
     counts = [len(range(first, length, pace)) for first, length, pace in zip(phase, values.shape, size, strict=True)]
     total, weight = np.zeros(counts, values.dtype), np.zeros(counts, values.dtype)
     for i, j in np.argwhere(tents).tolist():
-        # Pixels whose sample at this step of the tent lies in the frame, and these samples.
+        # Find the pixels whose sample at this step of the tent lies in the frame, and these samples.
         pixels, samples = [], []
         for start, length, pace, count in zip((phase[0] + i, phase[1] + j), values.shape, size, counts, strict=True):
             low = max(-((start - radius) // pace), 0)
@@ -91,7 +91,7 @@ def _tent_sums(
 
 @lru_cache(maxsize=256)
 def _phase_tent(tile: Tile, channel: str, phase: tuple[int, ...], radius: int) -> Plane:
-    """Tent around a pixel of some phase of the tile, 0 where there is no sample of the channel."""
+    """Return the tent around a pixel of one phase of the tile, 0 where there is no sample of the channel."""
     size = 2 * radius + 1
     rows, columns = (
         (np.arange(size) - radius + first) % n for first, n in zip(phase, (len(tile), len(tile[0])), strict=True)
@@ -101,12 +101,12 @@ def _phase_tent(tile: Tile, channel: str, phase: tuple[int, ...], radius: int) -
 
 
 def rows_at(values: NDArray[Any], pixels: NDArray[np.bool_]) -> NDArray[Any]:
-    """`values[pixels]` of an (h, w, channel) array, in a tenth of the time: one row of channels a pixel."""
+    """Return `values[pixels]` of an (h, w, channel) array, one row of channels per pixel, ten times as fast."""
     return np.compress(pixels.ravel(), values.reshape(-1, values.shape[-1]), axis=0)
 
 
 def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
-    """Sum of each box of `size` that lies in the array, added up in one order everywhere: pairs, fours, eights."""
+    """Sum each box of `size` that lies in the array, everywhere in the same order: pairs, fours, eights."""
     height, width = (length - count + 1 for length, count in zip(values.shape, size, strict=True))
     result = np.empty((height, width), values.dtype)
     for first in range(0, height, BLOCK_ROWS):
@@ -116,7 +116,7 @@ def box_sums(values: NDArray[Any], size: tuple[int, int]) -> NDArray[Any]:
 
 
 def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
-    """Sums of `count` rows that follow each other, from sums of a power of two of them."""
+    """Sum each `count` consecutive rows, from sums over powers of two."""
     rows = len(values) - count + 1
     start = 0
     power = 1
@@ -133,14 +133,14 @@ def _line_sums(values: NDArray[Any], count: int) -> NDArray[Any]:
 
 
 def bilinear(raw: RawImage) -> NDArray[np.float64]:
-    """Every channel at every pixel by bilinear interpolation, shape (h, w, channel) [e-].
+    """Interpolate every channel at every pixel bilinearly, shape (h, w, channel) [e-].
 
-    A sampled pixel keeps its sample; the frame's border is normalised by the samples that exist, so a flat field stays
-    flat up to it.
+    A sampled pixel keeps its sample. At the frame's border the existing samples are normalised, so that a flat field
+    stays flat.
     """
     return fill_channels(raw.electrons, raw.cfa, raw.channels)
 
 
 def fill_channels(mosaic: Mosaic, tile: Tile, names: Sequence[str]) -> NDArray[np.float64]:
-    """As `bilinear`, of a mosaic's channels `names`."""
+    """Interpolate a mosaic's channels `names` as `bilinear` does."""
     return np.stack([fill(mosaic, tile, name) for name in names], axis=-1)

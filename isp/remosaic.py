@@ -1,4 +1,4 @@
-"""Mosaics turned into others, for programs that know no W and no 4x4 tile: "re-mosaic", as chips do it inside
+"""Conversion of a mosaic to another one, for programs that know neither W nor 4x4 tiles; chips call it "re-mosaic"
 (arXiv:2209.08471).
 """
 
@@ -14,10 +14,10 @@ from sensor.raw import RawImage
 
 
 def bayer_tile(tile: Tile) -> Tile:
-    """Bayer phase that a mosaic becomes.
+    """Return the Bayer tile to which a mosaic is converted.
 
-    Of quad Bayer the plain one. Of RGBW, 2x2 or quad, R where the (plain) tile has it, B on R's diagonal, G at the two
-    other sites.
+    For quad Bayer it is the plain Bayer tile. For RGBW, 2x2 or quad, R stands where the plain tile has it, B diagonal
+    to R, and G at the two other sites.
 
     Raises
     ------
@@ -37,22 +37,22 @@ def bayer_tile(tile: Tile) -> Tile:
 
 
 def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
-    """Raw image of another mosaic, of the same size and levels.
+    """Convert a raw image to another mosaic of the same size and levels.
 
-    Where the two mosaics agree the sample stays as it is; elsewhere stands the best linear estimate of that channel
-    (`isp.kriging`). Those pixels hold other noise than the noise profile says, and are correlated with their
-    neighbours. Defective pixels are mended first.
+    Where the two mosaics agree, the sample is kept; elsewhere the channel's best linear estimate is taken
+    (`isp.kriging`). The noise of these pixels isn't that of the noise profile, and is correlated with their
+    neighbours'. Defective pixels are replaced first.
 
     Parameters
     ----------
     raw : RawImage
     tile : tuple of str, optional
-        Mosaic to get, of channels that `raw` has; left out, `bayer_tile`.
+        Tile to convert to, of channels that `raw` has; by default `bayer_tile`.
 
     Raises
     ------
     InputError
-        Where no tile is given, and the mosaic is neither RGBW nor quad Bayer.
+        If no tile is given, and the mosaic is neither RGBW nor quad Bayer.
 
     Examples
     --------
@@ -80,5 +80,5 @@ def remosaic(raw: RawImage, tile: Tile | None = None) -> RawImage:
     order = [raw.channels.index(channel) for channel in channels(tile)]
     colour = None if raw.colour is None else raw.colour.part(order)
     apart = tuple(noise for noise in raw.channel_noise if noise.channel in channels(tile))
-    # The estimates are of the old tile's channels, which `colour` knows as they read.
+    # The estimates are values of the old tile's channels with their crosstalk, which `colour` already includes.
     return replace(raw, dn=dn, cfa=tile, colour=colour, channel_noise=apart, crosstalk=0.0)

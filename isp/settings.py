@@ -1,4 +1,4 @@
-"""The reconstruction's settings, checked once, and its results."""
+"""Settings of the interleaved reconstruction, checked when they are made, and its results."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ from sensor.raw import RawImage
 
 Distance = Literal["noise", "raw"]
 
-NEIGHBOURHOOD = 21  # Parmar & Wandell 2009, section 3.1: the only one of the four that the paper gives
-# Best of 45 over light levels, sensors and scenes (`benchmarks/bench_quality.py settings`, docs/decisions/0015):
-# fine texture rarely repeats, and a patch of one pixel, the bilateral filter, finds what is alike in any light.
+NEIGHBOURHOOD = 21  # from Parmar & Wandell 2009, section 3.1; the paper states no other of these four settings
+# The best of 45 settings over light levels, sensors and scenes (`benchmarks/bench_quality.py settings`,
+# docs/decisions/0015). Fine texture rarely repeats, so that a patch of one pixel, the bilateral filter, is best.
 PATCH = 1
 SIGMA_D = 6.0
 SIGMA_S = 3.0
-SMALLEST_SIGMA = 1e-3  # below it the spatial weight of the next pixel is exp(-5e5) or less: nothing new to ask for
+SMALLEST_SIGMA = 1e-3  # the next pixel's spatial weight is then exp(-5e5), so that smaller values change nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,20 +32,21 @@ class Settings:
     Attributes
     ----------
     neighbourhood, patch : int
-        Odd widths of Omega and of the patches h_i [pixels]. The time grows with the square of the first.
+        Odd widths of Omega and of the patches h_i [pixels]. The time grows with the square of `neighbourhood`.
     sigma_d : float
         Standard deviation of the spatial weight, eq. (4) [pixels]; 0.001 to inf.
     sigma_s : float
         Standard deviation of the similarity weight, eq. (5) [standard deviations of one pixel's noise, or electrons];
         0.001 to inf.
     distance : {"noise", "raw"}
-        Whether one guide serves all channels, in units of noise (`isp.interleaved.panchromatic`), or as the paper has
-        it each channel its own plane, in electrons, for which W's stands by eq. (6), alpha counted over the patch.
+        With "noise" one guide serves all channels, in units of noise (`isp.interleaved.panchromatic`). With "raw", as
+        in the paper, distances are in electrons between planes of W, or by eq. (6) of the channel itself, with alpha
+        counted over the patch.
 
     Raises
     ------
     InputError
-        Where a width is even or not positive, a sigma under 0.001 or NaN, or the distance is neither of the two.
+        If a width is even or not positive, a sigma is under 0.001 or NaN, or the distance is neither of the two.
     """
 
     neighbourhood: int = NEIGHBOURHOOD
@@ -71,7 +72,7 @@ class Settings:
         require_name("distance", self.distance, get_args(Distance))
 
     def check_reaches(self, tile: Tile) -> None:
-        """Raise `InputError` where Omega, cut at a corner of the frame, may hold no sample of some channel."""
+        """Raise `InputError` if Omega, cut off at a corner of the frame, may hold no sample of some channel."""
         smallest = 2 * max(len(tile), len(tile[0])) - 1
         if self.neighbourhood < smallest:
             raise InputError(
@@ -81,8 +82,8 @@ class Settings:
 
 
 DEFAULTS = Settings()
-# The paper's own method. It gives neither patch nor sigmas: these sigma_s are the best of 30, 100, 300 and 1000 e-, one
-# for all light (docs/decisions/0037-lamps-in-the-dark.md).
+# The paper's own method. The paper states neither patch nor sigmas. For each patch, sigma_s is the best of 30, 100, 300
+# and 1000 e-, the same for all levels of light (docs/decisions/0037-lamps-in-the-dark.md).
 PAPER = Settings(distance="raw", sigma_s=300.0)
 PAPER_5X5 = Settings(distance="raw", sigma_s=1000.0, patch=5)
 
@@ -98,9 +99,9 @@ class Reconstruction:
     noise_gain : (h, w, channel) ndarray
         sum w^2 / (sum w)^2, 0 to 1: the factor by which the weights reduce the variance of white noise on the samples.
     engine : {"cuda", "llvm", "numpy"}
-        What computed it.
+        Engine that computed it.
     white : WhiteReading or None
-        The guide; None where each channel has its own.
+        The guide; None if each channel has its own.
     """
 
     estimate: NDArray[np.floating]
@@ -116,7 +117,7 @@ class WhiteReading:
     Attributes
     ----------
     raw : RawImage
-        The frame; a full sample of W is what the colours around say of a neutral, and full at least.
+        The frame, in which full samples of W are raised to what the colours around say of a neutral.
     shares : (rows, columns, channel) float
         Each channel's electrons per electron of W in the surroundings of every tile, in the order of
         `sensor.cfa.channels`.

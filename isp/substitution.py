@@ -1,8 +1,8 @@
-"""Luminance substitution: in the deepest dark W gives the picture its luminance (Parmar & Wandell 2009, 3.1.3).
+"""Luminance substitution: in deep darkness W gives the picture its luminance (Parmar & Wandell 2009, 3.1.3).
 
-The paper switches. Here the weight falls smoothly with the frame's SNR, so that a sweep over light shows no step; over
-a half counts as on, which is the switch's decision. W is not luminance: what it sees besides is taken out by the matrix
-fitted on surfaces (`isp.colour.colour_fit`), as far as the noise of the colours allows.
+The paper switches W's luminance on or off. Here its weight falls smoothly with the frame's SNR, so that a sweep over
+light shows no step; a weight over a half counts as on. W is not exactly luminance. The matrix that was fitted on
+surfaces (`isp.colour.colour_fit`) corrects this as far as the noise of the colours allows.
 """
 
 import numpy as np
@@ -13,30 +13,32 @@ from rodcone.colour_spaces import luminance_of_srgb
 from rodcone.errors import InputError
 from sensor.raw import RawImage
 
-# Figure 6 fixes them: Table 1 at 25 cd/m^2 substitutes at 5 ms, and not at 10 and 20 ms. The geometric mean of the
-# expected SNR at 5 and 10 ms on `still_life`, under each reading of the table (docs/decisions/0005).
-SUBSTITUTION_SNR = 4.95  # `table1_output`: 3.59 and 6.82
-SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # `table1_pixel`: 0.476 and 0.951
-OCTAVES = 1.0  # on either side: narrower shows as a step over light, wider leaves W in bright pictures
+# The thresholds follow from the paper's Figure 6, where the camera of Table 1 substitutes at 25 cd/m^2 and 5 ms, but
+# not at 10 and 20 ms. Each is the geometric mean of the SNR that is expected on `still_life` at 5 and 10 ms, for one of
+# two interpretations of Table 1 (docs/decisions/0005).
+SUBSTITUTION_SNR = 4.95  # preset `table1_output`, with SNRs of 3.59 and 6.82
+SUBSTITUTION_SNR_TABLE1_PIXEL = 0.672  # preset `table1_pixel`, with SNRs of 0.476 and 0.951
+OCTAVES = 1.0  # half width of the transition; if narrower, it shows as a step; if wider, W remains in bright pictures
 
-# Factors from the noise variance of the reconstructed colours to their squared error. The error is larger, because each
-# colour is sampled at one pixel in four, and pixels that are alike in W may differ in colour. The first factor counts
-# in the substituted luminance and in the matrix, the second where the colour is the surroundings'
+# Ratios of the reconstructed colours' squared error to their noise variance. The error is larger, because each colour
+# is sampled at one pixel in four, and pixels that are alike in W may differ in colour. The first ratio counts in the
+# substituted luminance and in the matrix, the second where the colour is that of the surroundings
 # (docs/decisions/0015).
 COLOUR_ERROR = 10.0
 SMOOTH_COLOUR_ERROR = 3.0
 
 
 def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
-    """SNR of the frame's green: median over unsaturated pixels of reconstructed green over the noise of a sample there.
+    """Compute the SNR of the frame's green: the median over unsaturated pixels of green over a sample's noise.
 
-    Every seventh of them counts. From the raw image alone, and one number a frame: a rule per pixel would flicker. The
-    noise is that of one green sample at the reconstructed level, shot noise and dark noise. NaN where all is saturated.
+    Every seventh of these pixels counts. The SNR depends on the raw image alone and is one number per frame, because a
+    rule per pixel would flicker. The noise is the shot and dark noise of one green sample at the reconstructed level.
+    If all pixels are saturated, the SNR is NaN.
 
     Parameters
     ----------
     estimate : (h, w, channel) array
-        Of `isp.interleaved.reconstruction.reconstruct` [e-].
+        Result of `isp.interleaved.reconstruction.reconstruct` [e-].
     """
     kept = estimate[..., raw.channels.index("G")][~raw.saturated][::MEDIAN_STEP]
     green = np.asarray(kept, dtype=np.float64)
@@ -46,14 +48,14 @@ def green_snr(raw: RawImage, estimate: NDArray[np.floating]) -> float:
 
 
 def substitution_weight(snr: float, threshold: float) -> float:
-    """Share of W in the luminance, 0 to 1: smoothstep in log2(snr / threshold); over 0.5 counts as on.
+    """Compute the share of W in the luminance, 0 to 1: a smoothstep in log2(snr / threshold); over 0.5 counts as on.
 
     Parameters
     ----------
     snr : float
-        Of `green_snr`; NaN (all saturated) gives 0; no signal, 0 or less, gives 1.
+        Result of `green_snr`. NaN (all is saturated) gives 0; an SNR of 0 or less (no signal) gives 1.
     threshold : float
-        SNR at a weight of one half; 0 never substitutes, inf always does.
+        SNR at which the share is one half; 0 never substitutes, inf always does.
 
     Raises
     ------
@@ -71,22 +73,22 @@ def substitution_weight(snr: float, threshold: float) -> float:
 
 
 def matrix_with_white(fit: ColourFit, noise: NDArray[np.float64], weight: float) -> NDArray[np.float64]:
-    """Matrix from balanced R, G, B and W to linear sRGB, with its luminance substituted by `weight`.
+    """Compute the matrix from balanced R, G, B and W to linear sRGB, with luminance from W in the share `weight`.
 
-    W joins the colours by weights that minimise the expected error at the noise; a plain matrix leaves it out of them,
-    and W as it is gives the luminance.
+    W contributes to the colours by weights that minimise the expected error at the given noise. A plain matrix doesn't
+    use W for the colours, and takes W itself as the luminance.
 
     Parameters
     ----------
     noise : (4,) float64
-        Variance of the balanced channels, as `isp.colour.colour_fit.relative_noise`.
+        Variance of the balanced channels from `isp.colour.colour_fit.relative_noise`.
     weight : float
-        Of `substitution_weight`.
+        Result of `substitution_weight`.
 
     Returns
     -------
     (3, 4) float64
-        Rows sum to 1, where those of a plain matrix do.
+        The matrix. Its rows sum to 1, if those of a plain matrix do.
     """
     colours = fit.matrix("RGBW", noise * SMOOTH_COLOUR_ERROR)
     noisy = noise * [*[COLOUR_ERROR] * 3, 1.0]

@@ -1,1 +1,1 @@
-"""From camera channels to colour."""
+"""Conversion of camera channels to colour."""

@@ -1,4 +1,4 @@
-"""The colours of a raw file whose curves nobody knows: a `ColourFit` from its calibration's matrices."""
+"""Colours of a raw file whose response curves are unknown: a `ColourFit` from its calibration's matrices."""
 
 import numpy as np
 
@@ -15,25 +15,26 @@ WIDTH = band_widths(NM)
 # Mean and mean product of the ColorChecker's 24 patches in linear sRGB under D65 (`scenes.reflectances`).
 MEAN_SRGB = np.array([0.3295, 0.2602, 0.2292])
 MOMENTS_SRGB = np.array([[0.1875, 0.1203, 0.0822], [0.1203, 0.1140, 0.0838], [0.0822, 0.0838, 0.0969]])
-# The part of W that three colours don't explain, as a share of white: our curve on the ColorChecker leaves 0.043 under
-# D65, 0.046 under F11 and 0.066 under A. Without it the fit would trust W where it has no noise.
+# RMS part of W that three colours don't explain, as a share of white: for the project's curve on the ColorChecker it is
+# 0.043 under D65, 0.046 under F11 and 0.066 under A. Without it the fit would trust W too much where W has no noise.
 UNEXPLAINED = 0.05
 
 
 def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing: Floats | None = None) -> ColourFit:
-    """Colours of a camera that is known by matrices alone.
+    """Fit the colours of a camera that is known only by matrices.
 
-    R, G and B answer to linear sRGB by the inverse of `colour.to_srgb`; any other channel by its row of the matrix from
-    XYZ, under the one of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three colours
-    is lost; `UNEXPLAINED` stands for it. One or two channels, all by their rows, give grey.
+    R, G and B respond to linear sRGB by the inverse of `colour.to_srgb`. Any other channel responds by its row of the
+    matrix from XYZ, under that of A and D65 whose neutral is nearer to the exposure's. What a channel sees beyond three
+    colours isn't known, and `UNEXPLAINED` stands for it. With one or two channels all respond by their rows, and the
+    colours are grey.
 
     Parameters
     ----------
     names : tuple of str
-        The channels, as `sensor.cfa.channels` gives them: R, G and B first, or others in their place.
+        The channels in the order of `sensor.cfa.channels`: R, G and B first, or others in their place.
     mixing : (channel, channel) float64, optional
-        Of pixels that exchange charge, `RawImage.channel_mixing`. With more than three channels all then go by their
-        rows, and what W sees beyond three colours is in its neighbours too.
+        For pixels that exchange charge, `RawImage.channel_mixing`. If there are more than three channels, all then
+        respond by their rows, and what W sees beyond three colours is also in its neighbours.
     """
     three = len(names) >= 3
     share = np.eye(len(names))
@@ -61,15 +62,15 @@ def fit_of_calibration(colour: ColourCalibration, names: tuple[str, ...], mixing
 
 
 def neutral_under(colour: ColourCalibration, light: Spectrum) -> Floats:
-    """Response of each channel to a neutral under a light, green 1, from a camera's matrices alone, shape (channel,).
+    """Compute each channel's response to a neutral under a light from a camera's matrices; green is 1, (channel,).
 
-    As the DNG specification 1.7 has it: the matrices from XYZ under A and D65, interpolated by the light's inverse
-    correlated colour temperature, which is McCamy's (1992); under A and D65 themselves within 4e-4.
+    As the DNG specification 1.7 says, the matrices from XYZ under A and D65 are interpolated by the light's inverse
+    correlated colour temperature. That is computed by McCamy's formula (1992), which is within 4e-4 under A and D65.
 
     Parameters
     ----------
     light : Spectrum
-        At any level.
+        Light of any level.
     """
     white = tristimulus(light.band_average(NM, WIDTH), NM, WIDTH)
     a, d65, at = (_inverse_temperature(xyz) for xyz in (xyz_from_xy(A_XY), xyz_from_xy(D65_XY), white))
@@ -79,7 +80,7 @@ def neutral_under(colour: ColourCalibration, light: Spectrum) -> Floats:
 
 
 def _inverse_temperature(xyz: Floats) -> float:
-    """Inverse of McCamy's correlated colour temperature [1/K]."""
+    """Compute the inverse of McCamy's correlated colour temperature [1/K]."""
     x, y = xyz[:2] / xyz.sum()
     n = (x - 0.3320) / (0.1858 - y)
     return float(1 / (449 * n**3 + 3525 * n**2 + 6823.3 * n + 5520.33))

@@ -1,4 +1,4 @@
-"""Camera channels to colour: the least-squares matrix, and the fit that knows the noise of a frame.
+"""Conversion of camera channels to colour: the least-squares matrix, and a fit that takes a frame's noise into account.
 
 A matrix fitted without noise takes differences of channels to show saturated colours, and so amplifies noise.
 `ColourFit` minimises the expected squared error of surface and noise together (Wiener 1949): where the colours carry
@@ -22,31 +22,31 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.raw import RawImage, channel_variance
 
-# Noise variance that is always there, far under any camera's. Under a light of one wavelength balanced channels are all
-# the same, and without noise any matrix fits; with the same noise in each they count alike.
+# Noise variance that is always added, far below that of any camera. Under a light of one wavelength all balanced
+# channels are equal, so that any matrix would fit; with the same noise in each channel they get equal weights.
 LEAST_NOISE = 1e-13
-MEDIAN_STEP = 7  # every so many pixels tell a median; odd, so that all cells of the tile do
-WHITE_REST = 3.0  # variance of what W sees besides the colours, over the training surfaces': scenes hold others
-LEAST_SIGNAL = 1e-3  # of the noise: keeps the fit's equations solvable in a frame of pure noise
+MEDIAN_STEP = 7  # medians take every seventh pixel; the step is odd, so that all cells of the tile take part
+WHITE_REST = 3.0  # variance of what W sees beyond the colours, over its variance for the training surfaces
+LEAST_SIGNAL = 1e-3  # least signal over noise, which keeps the equations solvable in a frame of pure noise
 
 
 @dataclass(frozen=True)
 class ColourFit:
-    """What balanced channels say about colour: moments over training surfaces under one light.
+    """Relation of balanced channels to colour, as moments over training surfaces under one light.
 
     Attributes
     ----------
     channels : tuple of str
-        The three colours first, where there are as many.
+        Channels; the three colours come first, if there are so many.
     mean : (channel,) float64
-        Mean balanced signal; a surface that reflects all light reads 1.
+        Mean balanced signal; a surface that reflects all light has a signal of 1.
     moments : (channel, channel) float64
         Mean product of two signals.
     cross : (channel, 3) float64
         Mean product of a signal and linear sRGB under the light, adapted to D65.
     plain : (3, 3) float64 or None
-        A matrix of the three colours that stands in place of the moments: it knows nothing of noise, and takes W as it
-        is for luminance.
+        A matrix of the three colours that replaces the moments. It takes no noise into account, and uses W directly as
+        luminance.
     """
 
     channels: tuple[str, ...]
@@ -59,7 +59,7 @@ class ColourFit:
 
     @classmethod
     def of(cls, matrix: ArrayLike | ColourFit) -> ColourFit:
-        """Make the value from what a pipeline is given; a `ColourFit` is taken as it is.
+        """Convert a pipeline's argument, a matrix or a `ColourFit`, to a `ColourFit`.
 
         Raises
         ------
@@ -76,19 +76,19 @@ class ColourFit:
         return cls(("R", "G", "B", "W"), mean=np.ones(4), moments=np.eye(4), cross=np.eye(4, 3), plain=plain)
 
     def matrix(self, names: Sequence[str] = (), noise: ArrayLike = 0.0) -> Floats:
-        """Matrix from balanced channels to linear sRGB with the least expected squared error.
+        """Compute the matrix from balanced channels to linear sRGB that has the least expected squared error.
 
         Parameters
         ----------
         names : sequence of str
-            Channels to use, some of `channels`; the three colours where left out.
+            Channels to use, by default the three colours.
         noise : (channel,) array_like
-            Noise variance of each [(signal of a surface that reflects all light)^2].
+            Noise variance of each channel [(signal of a surface that reflects all light)^2].
 
         Returns
         -------
         (3, channel) float64
-            Rows sum to 1, so that a neutral stays neutral at any noise.
+            The matrix. Its rows sum to 1, so that a neutral stays neutral at any noise.
 
         Raises
         ------
@@ -102,7 +102,7 @@ class ColourFit:
             return np.hstack([self.plain, np.zeros((3, len(used) - 3))])
         index = [self.channels.index(name) for name in used]
         moments = self.moments[np.ix_(index, index)] + np.diag(np.broadcast_to(noise, len(index)) + LEAST_NOISE)
-        # Rows sum to 1: the last coefficient is 1 minus the others, so fit differences from the last channel.
+        # Rows sum to 1 since the last coefficient is 1 minus the others: differences from the last channel are fitted.
         difference = np.hstack([np.eye(len(index) - 1), -np.ones((len(index) - 1, 1))])
         target = difference @ (self.cross[index] - moments[:, -1:])
         free = np.linalg.solve(difference @ moments @ difference.T, target)
@@ -110,15 +110,15 @@ class ColourFit:
 
 
 def mixed_fit(fit: ColourFit, mixing: Floats, neutral: Floats) -> ColourFit:
-    """Fit of channels that exchange charge, from that of the light behind each filter alone.
+    """Convert a fit of the light behind each filter to one of channels that exchange charge.
 
-    What W sees beyond the colours is then in its neighbours too, so that W tells how much of it to take off them.
+    What W sees beyond the colours is then also in its neighbours, and W tells how much of it to subtract from them.
 
     Parameters
     ----------
     fit : ColourFit
     mixing : (channel, channel) float64
-        Electrons that the fit's channels read of an even field, over those behind each filter (`sensor.cfa`).
+        Electrons that the fit's channels read from an even field, over those behind each filter (`sensor.cfa`).
     neutral : (channel,) float64
         Electrons behind each filter from a neutral, in any unit.
     """
@@ -136,12 +136,13 @@ def fit_colours(
     width_nm: ArrayLike | None = None,
     lamp: Spectrum | None = None,
 ) -> ColourFit:
-    """Fit a camera's colours under a light; parameters as `training`, the responses those of the channels `names`.
+    """Fit a camera's colours under a light; parameters are those of `training`, responses those of channels `names`.
 
-    Beside three colours W counts as a_R R + a_G G + a_B B and an independent rest, where a, of sum 1, has the least
-    squares. So W tells nothing of the colours that they don't tell with less noise: fitted freely to a chart's two
-    dozen surfaces, it was 4.7 dB behind the three colours on `night_street` without noise. One or two channels tell no
-    colours: they are fitted to luminance, and the picture is grey.
+    Beside three colours, W is modelled as a_R R + a_G G + a_B B plus an independent rest, where a sums to 1 and is
+    fitted by least squares. W then adds nothing to the colours except where it has less noise than they have. (When W
+    was fitted freely to a chart's two dozen surfaces, the result was 4.7 dB worse than with the three colours on
+    `night_street` without noise.) One or two channels can't tell colours; they are fitted to luminance, and the picture
+    is grey.
 
     Raises
     ------
@@ -167,7 +168,7 @@ def fit_colours(
 
 
 def grey_of(srgb: Floats) -> Floats:
-    """Grey of the same luminance, in the place of linear sRGB (..., 3)."""
+    """Replace linear sRGB (..., 3) by a grey of the same luminance."""
     return np.repeat(luminance_of_srgb(srgb)[..., None], 3, axis=-1)
 
 
@@ -178,42 +179,43 @@ def fit_matrix(
     reflectances: ArrayLike,
     width_nm: ArrayLike | None = None,
 ) -> Floats:
-    """Matrix from white-balanced camera channels to linear sRGB, least squares over reflectances.
+    """Fit the matrix from white-balanced camera channels to linear sRGB by least squares over reflectances.
 
-    Responses are balanced so that a spectrally flat surface gives equal channels: what Gray World does to a scene
-    whose mean is grey. The fit keeps that neutral exactly neutral. The target is XYZ under the light, adapted to D65.
+    Responses are balanced so that a spectrally flat surface gives equal channels, as Gray World does for a scene whose
+    mean is grey. The fit keeps that neutral exactly neutral. The target is XYZ under the light, adapted to D65.
 
     Parameters
     ----------
     responses : (channel, band) array_like
-        Electrons per photon; three channels, or four with W.
+        Electrons per photon of three channels, or of four with W.
     wavelength_nm : (band,) array_like
-        Centres; evenly spaced where `width_nm` is left out.
+        Band centres, evenly spaced if `width_nm` is left out.
     illuminant_spd : (band,) array_like
-        Spectral power of the light, any scale.
+        Spectral power of the light at any scale.
     reflectances : (patch, band) array_like
-        Training surfaces, such as the ColorChecker's. This and `responses` may also come transposed.
+        Training surfaces, such as those of the ColorChecker. This array and `responses` may also be transposed.
     width_nm : (band,) array_like, optional
-        Widths of bands that aren't evenly spaced.
+        Band widths, if the bands aren't evenly spaced.
 
     Returns
     -------
     (3, channel) float64
-        Rows sum to 1.
+        The matrix, whose rows sum to 1.
 
     Raises
     ------
     InputError
-        Where a shape doesn't fit the wavelengths, or there are too few surfaces.
+        If a shape doesn't fit the wavelengths, or there are too few surfaces.
     """
     signals, target = training(responses, wavelength_nm, illuminant_spd, reflectances, width_nm)
     return fit_through_neutral(signals, target)
 
 
 def fit_through_neutral(signals: Floats, target: Floats) -> Floats:
-    """Least-squares matrix (output, channel) from signals (patch, channel) to targets (patch, output); rows sum to 1.
+    """Fit a matrix (output, channel) from signals (patch, channel) to targets (patch, output); its rows sum to 1.
 
-    So a neutral stays neutral. The last coefficient is 1 minus the others: differences from the last one are fitted.
+    A neutral therefore stays neutral. Because the last coefficient is 1 minus the others, differences from the last
+    channel are fitted.
     """
     free, *_ = np.linalg.lstsq(signals[:, :-1] - signals[:, -1:], target - signals[:, -1:], rcond=None)
     return np.concatenate([free, 1.0 - free.sum(axis=0, keepdims=True)]).T
@@ -227,16 +229,16 @@ def training(
     width_nm: ArrayLike | None = None,
     lamp: Spectrum | None = None,
 ) -> tuple[Floats, Floats]:
-    """Balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces.
+    """Compute the balanced signals (patch, channel) and linear sRGB (patch, 3) of training surfaces.
 
     Parameters
     ----------
     responses, wavelength_nm, illuminant_spd, reflectances, width_nm
-        As `fit_matrix` takes them.
+        As in `fit_matrix`.
     lamp : Spectrum, optional
-        The light within the bands, up to a factor, where the responses are weights that follow it
-        (`sensor.response.electrons_per_irradiance`). Left out, camera and eye alike are averages over bands: what both
-        miss within a band is nearly the same.
+        The light within the bands, up to a factor, if the responses are weights that follow its spectrum
+        (`sensor.response.electrons_per_irradiance`). If it is left out, camera and eye are both averages over bands,
+        and their errors within a band are nearly the same.
     """
     nm = np.asarray(wavelength_nm, dtype=np.float64)
     width = band_widths(nm, width_nm)
@@ -255,7 +257,7 @@ def training(
 
 
 def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:
-    """Two-dimensional array with the band on the last axis, transposed if it came on the first."""
+    """Return a two-dimensional array with the band on the last axis; transpose it if the band is on the first."""
     array = np.atleast_2d(np.asarray(values, dtype=np.float64))
     if array.ndim == 2 and array.shape[1] == bands:
         return array
@@ -269,17 +271,17 @@ def _band_last(name: str, values: ArrayLike, bands: int) -> Floats:
 def relative_noise(
     raw: RawImage, estimate: NDArray[np.floating], noise_gain: NDArray[np.floating], gains: Floats, fit: ColourFit
 ) -> Floats:
-    """Noise variance of a frame's balanced channels, as `ColourFit.matrix` takes it.
+    """Estimate the noise variance of a frame's balanced channels, for `ColourFit.matrix`.
 
-    One number a channel and frame: a matrix per pixel would flicker. Noise at the frame's mean, over the signal of a
-    surface that reflects all light, on which the frame's mean green (`sensor.cfa.unit_channel`) would be the training
-    surfaces' mean.
+    Each channel has one number per frame, because a matrix per pixel would flicker. It is the noise at the frame's
+    mean, relative to the signal of a surface that reflects all light. That signal is estimated from the frame's mean
+    green (`sensor.cfa.unit_channel`), which is taken for the mean of the training surfaces.
 
     Parameters
     ----------
     estimate, noise_gain : (h, w, channel) array
-        Of `isp.interleaved.reconstruction.reconstruct_with_noise`; the median gain counts. A gain (channel,) is that
-        of every pixel.
+        As `isp.interleaved.reconstruction.reconstruct_with_noise` returns them; the median gain counts. A gain of shape
+        (channel,) holds for every pixel.
     gains : (channel,) float64
         White balance.
 
@@ -299,5 +301,5 @@ def relative_noise(
         medians = np.median(noise_gains, axis=1, overwrite_input=True)
     variance = channel_variance(raw, mean) * medians * gains**2
     white = mean[green] * gains[green] / fit.mean[fit.channels.index(unit)]
-    # A frame without any signal is all noise: there W alone decides, whatever the ratio.
+    # A frame without any signal is all noise; there W alone decides, whatever the ratio is.
     return np.asarray(variance / max(white**2, LEAST_SIGNAL**2 * float(variance.max())))

@@ -1,4 +1,4 @@
-"""Pictures encoded for a display: sRGB, or Display P3, whose primaries hold more of the colours that cameras see."""
+"""Encoding of pictures for a display: sRGB, or Display P3, whose primaries cover more of the colours of cameras."""
 
 import warnings
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from isp.strips import strips
 from rodcone.colour_spaces import DISPLAY_P3_PRIMARIES_XY, SRGB_PRIMARIES_XY, SRGB_TO_XYZ, encode_srgb, rgb_to_xyz
 from rodcone.errors import InputError, require_name
 
-STRIP_ROWS = 128  # that are encoded together
+STRIP_ROWS = 128  # rows that are encoded together
 
 
 @dataclass(frozen=True)
@@ -22,7 +22,7 @@ class Encoding:
     Attributes
     ----------
     title : str
-        Its name as profiles give it.
+        Name of the space, as in colour profiles.
     primaries_xy : (3, 2) float64
         Chromaticities of red, green and blue.
     """
@@ -59,17 +59,17 @@ def encode(
 
 
 def quantise(encoded: ArrayLike, bits: int = 8) -> NDArray[np.unsignedinteger]:
-    """Samples of 8 or 16 bits, (h, w, 3), of an encoded picture (h, w, 3), or of a grey one (h, w), in [0, 1].
+    """Round an encoded picture in [0, 1], (h, w, 3) or grey (h, w), to samples of 8 or 16 bits, (h, w, 3).
 
     Raises
     ------
     InputError
-        For another shape, values that are no real fractions, NaN and infinity.
+        For another shape, values of another type than floats, NaN and infinity.
 
     Warns
     -----
     UserWarning
-        Where values are clipped: how many.
+        If values are clipped; the message says how many.
     """
     given = np.asarray(encoded)
     if given.dtype.kind != "f":

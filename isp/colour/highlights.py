@@ -1,10 +1,11 @@
-"""Highlights that stay neutral: colours are held where the first is full, and small full lamps are white.
+"""Highlights that stay neutral: colours are limited where one of them is full, and small full lamps become white.
 
-A full sample is a lower bound of the light. Within a wide highlight samples of every colour tell its hue. A lamp of a
-few pixels holds samples of some colours alone; the others' planes are filled from the dark around it, and it would come
-out in the colour of the samples that it happens to cover. So a full pixel is white unless a sample of its lamp says
-otherwise. A sample is of the lamp where it is lit, or lies in a rectangle with lit samples at two opposite corners, at
-most a tile apart: so the dark blue sites of a sodium lamp of 2x2 pixels are.
+A full sample is a lower bound of the light. Within a wide highlight, samples of every colour tell its hue. A lamp of a
+few pixels may cover samples of only some colours. The planes of the others are then filled from the dark around it, and
+the lamp would get the colour of the samples that it happens to cover. Therefore a full pixel becomes white, unless a
+sample of its lamp shows a colour. A sample belongs to the lamp if it is lit, or if it lies in a rectangle, at most a
+tile wide and high, with lit samples at two opposite corners. This is how the dark blue sites of a sodium lamp of 2x2
+pixels belong to it.
 """
 
 from dataclasses import dataclass
@@ -17,21 +18,21 @@ from isp.planes import box_sums, rows_at
 from sensor.cfa import channel_map, mask
 from sensor.raw import RawImage
 
-# Shares of the level of highlights.
-LIT = 0.25  # a sample above it belongs to a lamp; dark samples beside a sharp lamp, and its halo, are below
-FULL = 0.97  # a sample above it may be at that level itself, because shot noise and unequal gains move it as much
+# Limits as shares of `highlight_level`.
+LIT = 0.25  # a brighter sample belongs to a lamp; samples beside a sharp lamp and in its halo are darker
+FULL = 0.97  # a brighter sample may be at the level itself, because shot noise and unequal gains shift it that much
 
 
 def saturated_nearby(raw: RawImage, channels: str, reach: int | None = None) -> NDArray[np.bool_]:
-    """Pixels with a saturated sample of one of `channels` within `reach` pixels along either axis, shape (h, w).
+    """Mark pixels with a saturated sample of one of `channels` within `reach` pixels along either axis, (h, w).
 
-    Left out, the reach is one tile.
+    By default the reach is one tile.
     """
     return _nearby(raw.saturated & mask(raw.cfa, channels, raw.shape), _tile_side(raw) - 1 if reach is None else reach)
 
 
 def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
-    """Balanced electrons at which the first colour is full: green's well, or less of one that sees the light better."""
+    """Return the balanced electrons at which the first colour is full: green's well, or a smaller balanced well."""
     wells_e = {name: raw.noise_of(name).full_well_e for name in raw.colour_channels}
     return float(min(gains[raw.channels.index(name)] * well_e for name, well_e in wells_e.items()))
 
@@ -39,39 +40,39 @@ def highlight_level(raw: RawImage, gains: NDArray[np.float64]) -> float:
 def clip_highlights(
     raw: RawImage, balanced: NDArray[np.float64], gains: NDArray[np.float64], reach: int | None = None
 ) -> NDArray[np.float64]:
-    """Hold every balanced colour at `highlight_level` near a saturated colour sample, and make white lamps neutral.
+    """Limit balanced colours to `highlight_level` near a saturated colour sample, and make white lamps neutral.
 
     Parameters
     ----------
     raw : RawImage
     balanced : (h, w, channel) float64
-        Planes times gains [e-]: of every channel, or of the first ones in the order of `raw.channels`.
+        Planes times gains [e-], of all channels or of the first ones in the order of `raw.channels`.
     gains : (channel,) float64
         White balance of each of `raw.channels`.
     reach : int, optional
-        As in `saturated_nearby`: that of the filter which made the planes.
+        Reach of the filter that made the planes, as in `saturated_nearby`.
 
     Returns
     -------
     (h, w, channel) float64
-        A pixel of `white_lamps` has its brightest colour's value in every channel, the level at least where its own
-        sample is a colour's. Where nothing is held, the array itself.
+        In a pixel of `white_lamps` every channel has the value of the brightest colour, and at least the level if the
+        pixel's own sample is of a colour. If nothing is limited, the array itself is returned.
     """
     return Highlights.of(raw, gains, reach).held(balanced)
 
 
 @dataclass(frozen=True)
 class Highlights:
-    """Where and how a frame's highlights are held, so that its rows can be held one strip after the other.
+    """Places and level of a frame's highlights, so that they can be limited strip by strip.
 
     Attributes
     ----------
     level : float
         `highlight_level`.
     colours : list of int
-        Places of the colours among the channels.
+        Indices of the colours among the channels.
     clipped, white, own : (h, w) bool
-        Pixels near a saturated colour sample, `white_lamps`, and sites of colours.
+        Pixels near a saturated colour sample, pixels of `white_lamps`, and sites of colours.
     """
 
     level: float
@@ -82,7 +83,7 @@ class Highlights:
 
     @classmethod
     def of(cls, raw: RawImage, gains: NDArray[np.float64], reach: int | None = None) -> "Highlights":
-        """Look for a frame's highlights; parameters as of `clip_highlights`."""
+        """Find a frame's highlights; the parameters are those of `clip_highlights`."""
         names = "".join(raw.colour_channels)
         clipped = saturated_nearby(raw, names, reach)
         white = white_lamps(raw, gains) if clipped.any() else clipped
@@ -90,7 +91,7 @@ class Highlights:
         return cls(highlight_level(raw, gains), colours, clipped, white, mask(raw.cfa, names, raw.shape))
 
     def held(self, balanced: NDArray[np.float64], rows: slice = slice(None)) -> NDArray[np.float64]:
-        """Return what `clip_highlights` does of some rows, (row, w, channel)."""
+        """Apply `clip_highlights` to some rows, (row, w, channel)."""
         clipped, white = self.clipped[rows], self.white[rows]
         if not clipped.any() and not white.any():
             return balanced
@@ -103,9 +104,9 @@ class Highlights:
 
 
 def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
-    """Full pixels near a full colour sample, about which no sample of their lamp says a colour, shape (h, w).
+    """Mark full pixels near a full colour sample whose lamp has no sample that shows a colour, shape (h, w).
 
-    A sample of a colour says one where it is under the level of highlights; those within one tile are asked.
+    A lamp's colour sample within one tile shows a colour if it is below the level of highlights.
     """
     colours = "".join(raw.colour_channels)
     full = raw.saturated
@@ -120,7 +121,7 @@ def white_lamps(raw: RawImage, gains: NDArray[np.float64]) -> NDArray[np.bool_]:
 
 
 def _enclosed(lit: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
-    """Rectangles of at most `side` steps along either axis, of which two opposite corners are lit."""
+    """Mark all rectangles of at most `side` steps along either axis that have two opposite lit corners."""
     height, width = lit.shape
     result = lit.copy()
     for down, across in product(range(side + 1), range(-side, side + 1)):
@@ -135,7 +136,7 @@ def _enclosed(lit: NDArray[np.bool_], side: int) -> NDArray[np.bool_]:
 
 
 def _nearby(hit: NDArray[np.bool_], reach: int) -> NDArray[np.bool_]:
-    """Pixels with a hit within `reach` pixels along either axis."""
+    """Mark pixels with a hit within `reach` pixels along either axis."""
     if not hit.any():
         return hit
     return box_sums(np.pad(hit, reach).astype(np.uint16), (2 * reach + 1, 2 * reach + 1)) > 0

@@ -1,9 +1,9 @@
-"""Noise-aware colours for processors that don't know the noise of their own planes: gains measured beforehand.
+"""Noise-aware colours for processors that don't state the noise of their planes, by gains that were measured before.
 
-A processor's planes differ from the true ones by what is left of the noise and by blur. How much, in units of one
-sample's noise variance, is measured on training pictures over light (``python benchmarks/measure_noise_gains.py``), and
-kept in ``noise_gains.toml`` with the command and versions that made it. Beside it stands the factor on it that makes
-the best pictures there, no kind of them worse than by the plain matrix, which is a factor of 0.
+A processor's planes differ from the true ones by remaining noise and by blur. This error, in units of one sample's
+noise variance, is measured on training pictures at several levels (``python benchmarks/measure_noise_gains.py``) and
+kept in ``noise_gains.toml`` with the command and versions. The file also holds a factor on the error, which makes the
+training pictures best on condition that no kind of them gets worse than by the plain matrix, which is a factor of 0.
 """
 
 from collections.abc import Mapping
@@ -25,27 +25,27 @@ TABLE = Path(__file__).with_name("noise_gains.toml")
 
 @dataclass(frozen=True)
 class NoiseGains:
-    """Variance that a processor's colour matrix takes its planes to have, over one sample's noise variance.
+    """Variance of a processor's planes that its colour matrix assumes, over one sample's noise variance.
 
     Attributes
     ----------
     snr_db : (level,) float64
-        SNR of the frame's mean, as `mean_snr` has it, increasing [dB].
+        SNR of the frame's mean by `mean_snr`, increasing [dB].
     gains : (level, 3) float64
-        Of the three channels that the matrix takes; the ends hold beyond.
+        Gains of the three channels that the matrix takes; beyond the ends the last ones hold.
     """
 
     snr_db: Floats
     gains: Floats
 
     def at(self, snr: float) -> Floats:
-        """Gains at an SNR (a ratio), linear in decibels, shape (3,)."""
+        """Interpolate the gains at an SNR (a ratio), linearly in decibels, shape (3,)."""
         db = 20 * np.log10(max(snr, 1e-9))
         return np.array([np.interp(db, self.snr_db, column) for column in self.gains.T])
 
 
 def measured_gains() -> Mapping[str, NoiseGains]:
-    """Gains by processor, as they were measured."""
+    """Read the measured gains of each processor."""
     table = read_toml(TABLE)
     return {
         name: NoiseGains(
@@ -57,7 +57,7 @@ def measured_gains() -> Mapping[str, NoiseGains]:
 
 
 def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
-    """Mean electrons of a channel's unsaturated samples, not under 0, and their SNR by shot and dark noise."""
+    """Return the mean electrons of a channel's unsaturated samples, at least 0, and its SNR by shot and dark noise."""
     sampled = mask(raw.cfa, unit, raw.shape)
     kept = sampled & ~raw.saturated
     mean_e = max(float(raw.electrons[kept if kept.any() else sampled].mean()), 0.0)
@@ -66,17 +66,18 @@ def mean_snr(raw: RawImage, unit: str) -> tuple[float, float]:
 
 
 def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit: str, gains: NoiseGains) -> ColourFit:
-    """Fit whose matrix knows the error of a frame's planes; a plain matrix stays what it is.
+    """Add the error of a frame's planes to a fit's noise; a plain matrix is returned unchanged.
 
-    One number a channel and frame: a matrix per pixel would flicker. The error is that of a grey scene with the frame's
-    mean in `unit`, over the signal of a surface that reflects all light, as `isp.colour.colour_fit.relative_noise`.
+    Each channel has one number per frame, because a matrix per pixel would flicker. The error is that of a grey scene
+    with the frame's mean in `unit`, relative to the signal of a surface that reflects all light, as in
+    `isp.colour.colour_fit.relative_noise`.
 
     Parameters
     ----------
     balance : WhiteBalance
-        Its given or calibrated response says what a grey scene is.
+        White balance whose given or calibrated response is that of a grey scene.
     unit : str
-        Channel that a neutral reads in the developed picture.
+        Channel whose electrons a neutral has in the developed picture.
     """
     if fit.plain is not None:
         return fit
@@ -90,6 +91,6 @@ def colours_in_noise(raw: RawImage, fit: ColourFit, balance: WhiteBalance, unit:
     variance = (channel_variance(raw, mean_e * response) / response**2)[index] * gains.at(snr)
     white_e = mean_e / fit.mean[fit.channels.index(unit)]
     noise = np.zeros(len(fit.channels))
-    # A frame without any signal is all noise.
+    # The divisor isn't 0 even for a frame without any signal.
     noise[:3] = variance / max(white_e**2, LEAST_SIGNAL**2 * float(variance.max()), np.finfo(float).tiny)
     return replace(fit, moments=fit.moments + np.diag(noise))

@@ -1,6 +1,7 @@
-"""White balance of a developed frame: by Gray World, as calibrated, or as given.
+"""White balance of a developed frame: by Gray World, by a calibrated neutral, or by a given one.
 
-Gray World (Buchsbaum 1980) makes the channels' means alike; where it is too dark for that the calibrated neutral holds.
+Gray World (Buchsbaum 1980) makes the channels' means equal. If a picture is too dark for it, the calibrated neutral
+applies.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ BalanceSource = Literal["gray world", "calibrated", "given"]
 
 @dataclass(frozen=True)
 class WhiteBalance:
-    """What a frame is balanced by: the calibrated neutral beside Gray World, or a response in its place.
+    """Responses by which a frame is balanced: a calibrated neutral beside Gray World, or a given one instead of it.
 
     Attributes
     ----------
     neutral : (channel,) float64 or None
-        Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures too dark for Gray World;
-        None: the project's own curves under D65.
+        Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for pictures that are too dark for Gray
+        World. None stands for the project's own curves under D65.
     given : (channel,) float64 or None
-        Response to what should come out neutral, in place of Gray World's means.
+        Response to what should become neutral, in place of Gray World's means.
     """
 
     neutral: Floats | None = None
@@ -47,46 +48,45 @@ class WhiteBalance:
     def of(
         cls, raw: RawImage, neutral: ArrayLike | None, balance: ArrayLike | WhiteBalance | None = None
     ) -> WhiteBalance:
-        """Make the value from a pipeline's keywords; a `WhiteBalance` as `balance` is taken as it is.
+        """Make a `WhiteBalance` from a pipeline's arguments; if `balance` is one, return it.
 
         Raises
         ------
         InputError
-            For a response that is not one positive number a channel of the mosaic.
+            For a response that isn't one positive number per channel of the mosaic.
         """
         if isinstance(balance, WhiteBalance):
             return balance
         return cls(_response("neutral", neutral, raw), _response("balance", balance, raw))
 
     def response(self, raw: RawImage) -> Floats:
-        """Calibrated response to a neutral, the project's own curves' where none was given, shape (channel,)."""
+        """Return the calibrated response to a neutral, by default that of the project's own curves, (channel,)."""
         return raw.channel_mixing @ neutral_response(raw.channels) if self.neutral is None else self.neutral
 
     def expected(self, raw: RawImage) -> Floats:
-        """Response to a neutral before the picture is known: the given one, else the calibrated, shape (channel,)."""
+        """Return the response to a neutral before the picture is known: given or else calibrated, (channel,)."""
         return self.response(raw) if self.given is None else self.given
 
     def gains(self, raw: RawImage, planes: NDArray[np.floating]) -> tuple[Floats, Mapping[str, BalanceSource]]:
-        """Gains of a frame, and where they come from.
+        """Compute the gains of a frame, and state where they come from.
 
         Parameters
         ----------
         planes : (h, w, channel) float
-            The pipeline's own linear planes [e-], channels in the order of `sensor.cfa.channels`.
+            The pipeline's linear planes [e-], channels in the order of `sensor.cfa.channels`.
 
         Returns
         -------
         (channel,) float64
-            Factor on each channel; green's is 1, or that of `sensor.cfa.unit_channel`.
+            Factor on each channel; the factor of green, or else of `sensor.cfa.unit_channel`, is 1.
         mapping of str to str
-            Where each channel's factor comes from: ``gray world``, ``calibrated`` where the picture was too dark to
-            tell, or ``given``.
+            Origin of each channel's factor: ``gray world``, ``calibrated`` if the picture was too dark, or ``given``.
 
         Notes
         -----
-        Gray World takes colours over the pixels without a saturated colour sample nearby, W over those it leaves as
-        well. W saturates first; taking its pixels out of the colours' means too would leave them the dark part of the
-        scene.
+        Gray World averages colours over the pixels without a saturated colour sample nearby. It averages W over those
+        of them that also have no saturated W nearby. W saturates first, and if its saturated pixels were left out of
+        the colours' means as well, only the dark part of the scene would remain.
         """
         names, unit = raw.channels, raw.unit_channel
         colours = "".join(raw.colour_channels)
@@ -112,7 +112,7 @@ class WhiteBalance:
 
 
 def neutral_response(names: Sequence[str], responses: Responses | None = None) -> Floats:
-    """Relative electrons of curves, the project's own by default, from a neutral under D65, shape (channel,)."""
+    """Compute the relative electrons of curves, by default the project's own, from a neutral under D65, (channel,)."""
     return electrons_from_neutral(responses or built_in(), names, illuminant("D65"))
 
 
@@ -126,29 +126,29 @@ def _response(name: str, values: ArrayLike | None, raw: RawImage) -> Floats | No
     return response
 
 
-LEAST_STANDARD_ERRORS = 5.0  # a channel whose mean is less certain than this can't set its own gain
+LEAST_STANDARD_ERRORS = 5.0  # Gray World sets a channel's gain if the mean is at least so many standard errors
 
 
 def gray_world(
     means: NDArray[np.float64], standard_errors: NDArray[np.float64], neutral: NDArray[np.float64], green: int
 ) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-    """Gains that make the mean of each channel equal to green's.
+    """Compute the gains that make the mean of each channel equal to green's.
 
     Parameters
     ----------
     means : (channel,) float64
-        Of the pipeline's own linear planes over the pixels that count, the unsaturated ones [e-].
+        Means of the pipeline's linear planes over unsaturated pixels [e-].
     standard_errors : (channel,) float64
-        Of each mean [e-].
+        Standard error of each mean [e-].
     neutral : (channel,) float64
-        Calibrated response to a neutral, in any unit: serves where a mean is under five standard errors.
+        Calibrated response to a neutral, in any unit, which applies where a mean is under five standard errors.
     green : int
-        Index of the green channel; where it is too dark all gains are the calibrated ones.
+        Index of the green channel; if green is too dark, all gains are the calibrated ones.
 
     Returns
     -------
     (channel,) float64, (channel,) bool
-        Factor on each channel, and whether Gray World set it; `neutral` did where not.
+        Factor on each channel, and whether Gray World set it, rather than `neutral`.
     """
     certain = (means >= LEAST_STANDARD_ERRORS * standard_errors) & (means > 0)
     certain &= bool(certain[green])

@@ -1,1 +1,1 @@
-"""Closed forms of what a mosaic can tell: arrays in, arrays out; no sensor, light or exposure is known here."""
+"""Closed forms of a mosaic's expected error, as functions of arrays without any sensor, light or exposure."""

@@ -1,16 +1,18 @@
 """Expected error of the best estimate of a picture from a mosaic's samples, under a prior over patches.
 
-A patch x of coefficients is one of several Gaussians, x ~ N(mu_k, C_k) with probability pi_k. Its samples are
-y = H x + n, n of variance N, which shot noise makes depend on the component's own mean. Where the component is known,
-the estimate of the least squared error is linear, and its error has the covariance
+A patch x of coefficients comes from one of several Gaussians, x ~ N(mu_k, C_k) with probability pi_k. Its samples are
+y = H x + n, where n has the variance N_k, which depends on the component's mean by shot noise. If the component is
+known, the estimate of least squared error is linear, and its error has the covariance
 
     P_k = C_k - C_k H' (H C_k H' + N_k)^-1 H C_k                                                    (textbook LMMSE)
 
-so that the expected error is sum_k pi_k tr(W_k P_k), e' W_k e the squared error of a colour that is e off the
-component's mean. No estimator knows the component, so a real one does worse. One that uses mean and covariance of all
-patches together, and so is linear in the samples, can be built: its error, by the same formula for one Gaussian, is an
-upper bound. Both are expectations over the prior: an easy scene has less error. With a lens L the estimate is that of
-L x, a picture whose blur nobody undoes, and is compared with x: with V_k = C_k - P_k, what the samples tell,
+so that the expected error is sum_k pi_k tr(W_k P_k), where e' W_k e is the squared error of a colour that is e off the
+component's mean. No estimator knows the component, so that this is a lower bound. An estimator that uses the mean and
+covariance of all patches together is linear in the samples and can be built. Its error, by the same formula for one
+Gaussian, is an upper bound. Both are expectations over the prior; an easy scene has less error.
+
+With a lens L, what is estimated is L x, because the blur isn't undone, but it is compared with x. With V_k = C_k - P_k,
+the part of the covariance that the samples explain, the error is
 
     C_k + L V_k L' - V_k L' - L V_k + (L mu_k - mu_k)(L mu_k - mu_k)'
 """
@@ -25,8 +27,8 @@ from numpy.typing import NDArray
 from rodcone.types import Floats
 from sensor.noise_law import NoiseLaw
 
-LEAST_SHARE = 1e-8  # of a sample's variance that reading it explains, at the least
-FAR = 8.0  # standard deviations below the well: never full
+LEAST_SHARE = 1e-8  # least share of information that a clipped sample keeps
+FAR = 8.0  # a mean so many standard deviations below the well is never full
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +38,14 @@ class Gaussians:
     Attributes
     ----------
     weights : (component,) float64
-        Sum 1.
+        Probabilities pi_k, of sum 1.
     means : (component, pixel, coefficient) float64
     factors : (component, pixel, coefficient, direction) float64
-        F, as (pixel * coefficient, direction).
+        F, which as a matrix has the shape (pixel * coefficient, direction).
     rest : (component,) float64
-        r: a component's covariance is C = F F' + r I + b^2 mu mu'.
+        r. The covariance of a component is C = F F' + r I + b^2 mu mu'.
     brightness : float
-        b: relative standard deviation of a patch's brightness.
+        b, the relative standard deviation of a patch's brightness.
     """
 
     weights: Floats
@@ -54,20 +56,20 @@ class Gaussians:
 
     @property
     def directions(self) -> Floats:
-        """F and b mu, as `factors`."""
+        """F and b mu together, in the form of `factors`."""
         return np.concatenate([self.factors, self.brightness * self.means[..., None]], axis=-1)
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Noise of a patch's samples, and where they are full.
+    """Noise of a patch's samples, and the level at which they are full.
 
     Attributes
     ----------
     law : NoiseLaw
-        Of numbers, or of (sample,) float64.
+        Law whose parameters are numbers, or arrays (sample,) float64.
     full_e : float or (sample,) float64
-        Electrons at which a sample is full; inf for none.
+        Electrons at which a sample is full; inf if it never is.
     """
 
     law: NoiseLaw
@@ -76,10 +78,11 @@ class Noise:
 
 @cache
 def single_gaussian(prior: Gaussians) -> Gaussians:
-    """One Gaussian with the mean and covariance of the whole mixture."""
+    """Return one Gaussian with the mean and covariance of the whole mixture."""
     mean = np.tensordot(prior.weights, prior.means, 1)
     root = np.sqrt(prior.weights)[:, None, None]
-    # b^2 mu mu' of the components is b^2 of the pooled mean's square, and b^2 of the deviations' squares: hence 1 + b^2
+    # Averaged over components, b^2 mu mu' is b^2 times the square of the pooled mean plus b^2 times the squared
+    # deviations from it. Hence the deviations count 1 + b^2 times.
     spread = np.hypot(1.0, prior.brightness) * root * (prior.means - mean)
     wide = np.concatenate([*(root[..., None] * prior.factors), np.moveaxis(spread, 0, -1)], axis=-1)
     left, sizes, _ = np.linalg.svd(wide.reshape(mean.size, -1), full_matrices=False)
@@ -103,11 +106,12 @@ def opening(distance: Floats) -> tuple[Floats, Floats]:
 
 
 def sample_variance(mean_e: Floats, spread_e2: Floats, noise: Noise) -> Floats:
-    """Return the noise variance of an unclipped sample that would say as little as this one, which may clip [e-^2].
+    """Return the noise variance [e-^2] of an unclipped sample with as little information as this one, which may clip.
 
     Let w be the variance of signal and noise together. Clipping leaves the share o of the sample's information
-    (`opening`), as if w were w / o; what of it isn't the signal's own variance is the equivalent noise, w / o - spread.
-    This is exact for a sample alone. Where neighbouring samples determine the signal already, it is slightly too large.
+    (`opening`), as if w were w / o. Without the signal's own variance (the spread) that is the equivalent noise,
+    w / o - spread. It is exact for a single sample, and slightly too large where neighbouring samples already determine
+    the signal.
 
     Parameters
     ----------
@@ -121,24 +125,24 @@ def sample_variance(mean_e: Floats, spread_e2: Floats, noise: Noise) -> Floats:
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """A prior's patches as samples of a mosaic in unit light, with what the estimate of the middle pixels needs.
+    """Moments of a mosaic's samples of a prior's patches in unit light, for the estimate of the middle pixels.
 
     Attributes
     ----------
     weights : (component,) float64
-        Of the mixture.
+        Weights of the mixture.
     means : (component, sample) float64
         H mu_k.
     signal : (component, sample, sample) float64
         H C_k H'.
     spread : (component, sample) float64
-        Variance of a sample, the brightness given.
+        Variance of a sample at known brightness.
     cross : (component, sample, pixel, coefficient) float64
         H C_k L' at the middle pixels.
     error_cross : (component, sample, pixel, coefficient) float64
-        H C_k (2 I - L)' there: with the estimate's gain it gives C_k less the error's covariance.
+        H C_k (2 I - L)' at these pixels; with the estimate's gain it gives C_k minus the error's covariance.
     within : (component, pixel, coefficient, coefficient) float64
-        C_k of each middle pixel's coefficients, and (L mu_k - mu_k)(L mu_k - mu_k)' there.
+        Sum of C_k and (L mu_k - mu_k)(L mu_k - mu_k)' for each middle pixel's coefficients.
     """
 
     weights: Floats
@@ -157,11 +161,11 @@ def sampled(prior: Gaussians, sampling: Floats, middle: NDArray[np.intp], lens: 
     ----------
     prior : Gaussians
     sampling : (sample, pixel, coefficient) float64
-        H: electrons of each sample from each pixel's coefficients.
+        H, the electrons of each sample from each pixel's coefficients.
     middle : (pixel,) intp
-        Pixels whose error counts: the others lack neighbours.
+        Pixels whose error counts, because the others lack neighbours.
     lens : (pixel, pixel) float64
-        L: share of one pixel's light (second axis) that falls on another (first axis); `sampling` has it too.
+        L, the share of one pixel's light (second axis) that falls on another (first axis); `sampling` includes it.
     """
     components, pixels, coefficients = prior.means.shape
     h = sampling.reshape(len(sampling), -1)
@@ -185,15 +189,16 @@ def sampled(prior: Gaussians, sampling: Floats, middle: NDArray[np.intp], lens: 
 
 
 def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Floats, Floats]:
-    """G of the best linear estimate, (component, sample, pixel, coefficient), and its error's matrix, as `within`.
+    """Compute the gain of the best linear estimate, (component, sample, pixel, coefficient), and its error's matrix.
 
-    With a lens that matrix isn't symmetric; a quadratic form takes its symmetric part.
+    The matrix has the form of `Samples.within`. With a lens it isn't symmetric; in a quadratic form only its symmetric
+    part counts.
 
     Parameters
     ----------
     samples : Samples
     scale : float
-        Light times exposure, over the unit of `samples`.
+        Light times exposure, in units of that of `samples`.
     noise : Noise
     """
     variance = sample_variance(scale * samples.means, scale**2 * samples.spread, noise)
@@ -204,14 +209,14 @@ def best_estimate(samples: Samples, scale: float, noise: Noise) -> tuple[Floats,
 
 
 def expected_error(samples: Samples, scale: float, noise: Noise, forms: Floats) -> Floats:
-    """Expected squared error of a middle pixel's best estimate where the component is known, shape (metric,).
+    """Compute the expected squared error of a middle pixel's best estimate if the component is known, (metric,).
 
     Parameters
     ----------
     samples, scale, noise
-        As `best_estimate` has them.
+        As in `best_estimate`.
     forms : (metric, component, pixel, coefficient, coefficient) float64
-        W: the squared error of a pixel is e' W e, e that of its coefficients.
+        W. The squared error of a pixel is e' W e, where e is the error of its coefficients.
     """
     left = best_estimate(samples, scale, noise)[1]
     return np.asarray(np.einsum("k,mkpce,kpce->m", samples.weights, forms, left, optimize=True) / left.shape[1])

@@ -1,4 +1,4 @@
-"""The prior over patches of spectral reflectance, which serves any curves: its file, and the mixture in it."""
+"""The prior over patches of spectral reflectance, which applies to any response curves, and its file."""
 
 from dataclasses import dataclass
 from functools import cache
@@ -9,26 +9,26 @@ import numpy as np
 from isp.design.expected_error import Gaussians
 from rodcone.types import Floats
 
-PATCH = 8  # pixels a side
+PATCH = 8  # side of a patch [pixels]
 PRIORS = {"drawn": Path(__file__).with_name("drawn.npz"), "photographs": Path(__file__).with_name("photographs.npz")}
 
 
 @dataclass(frozen=True, eq=False)
 class SpectralPrior:
-    """A mixture of Gaussians over patches of 8x8 pixels, each of some coefficients of a basis of reflectances.
+    """A mixture of Gaussians over patches of 8x8 pixels; a pixel is a few coefficients of a basis of reflectances.
 
     Attributes
     ----------
     edges_nm : (band + 1,) float64
-        Of the basis's bands.
+        Edges of the basis's bands.
     spectra : (band, coefficient) float64
         Reflectance of a coefficient of 1 in each band.
     patches : Gaussians
-        Of patches whose mean luminous reflectance is 1.
+        Mixture over patches whose mean luminous reflectance is 1.
     reflectances : (quantile,) float64
-        Mean luminous reflectances of patches, equally likely.
+        Quantiles of the mean luminous reflectance of patches, all equally likely.
     source : str
-        Command, versions, seed and hashes of what it was trained from, as JSON.
+        Command, versions, seed and hashes of the training data, as JSON.
     """
 
     edges_nm: Floats
@@ -40,7 +40,7 @@ class SpectralPrior:
 
 @cache
 def load_spectral_prior(name: str) -> SpectralPrior:
-    """Prior of `PRIORS` by name."""
+    """Read one of `PRIORS` by its name."""
     with np.load(PRIORS[name], allow_pickle=False) as file:
         arrays = {key: np.asarray(file[key], dtype=np.float64) for key in file.files if key != "source"}
         source = str(file["source"])

@@ -1,4 +1,4 @@
-"""The camera of Parmar & Wandell, "Interleaved imaging" (Proc. SPIE 7250, 2009), and what this project does otherwise.
+"""The camera of Parmar & Wandell, "Interleaved imaging" (Proc. SPIE 7250, 2009), and this project's additions to it.
 
 | the paper | here |
 |---|---|
@@ -9,7 +9,7 @@
 | 3.1.3, W in place of luminance | `isp.substitution` |
 | 3.2, the conventional camera | `pipeline.picture_bayer` |
 
-The paper has none of this: `panchromatic` reads every sample as W, and that one plane guides all channels; `brightest`
-bounds what a sample may add; `edges` sharpens. `kernel` computes the same formulas in Dr.Jit, and is tested against
-`numpy_form` and the NumPy forms of the others.
+Three modules aren't in the paper: `panchromatic` reads every sample as W, and this one plane guides all channels;
+`brightest` limits how bright a sample may be to count; `edges` sharpens. `kernel` computes the same formulas in Dr.Jit,
+and is tested against `numpy_form` and the NumPy forms of the others.
 """

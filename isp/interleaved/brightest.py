@@ -1,7 +1,7 @@
-"""How bright a sample may be to count at a pixel: as its channel's brightest near there, and noise on top.
+"""Upper limit of the samples that count at a pixel: its channel's brightest sample nearby, plus noise.
 
-What guides the similarity doesn't see all light. Where W's SNR is under 1 the similarity fades, and a lamp of one pixel
-on a colour's site never reaches W. Without this bound either would be spread over all of Omega
+The similarity doesn't see all light: where W's SNR is below 1 it fades, and a lamp of one pixel on a colour's site
+never reaches W. Without this limit the light of such a lamp would be spread over all of Omega
 (docs/decisions/0037-lamps-in-the-dark.md).
 """
 
@@ -14,23 +14,23 @@ from isp.planes import BLOCK_ROWS
 from isp.settings import SIGMA_S, Settings
 from sensor.raw import RawImage, noise_at_sites
 
-# With these numbers a pixel of a flat field leaves out at most 3 of 10 000 samples, and at most 0.3 % of the light,
-# which it does at 0.2 e-.
-SIGMAS = 2.5  # noise above the brightest of the 9 or more samples around, up to which a sample counts
-MOST_SIGMAS = 1e3  # from here on there is no bound
+# With these numbers, a pixel of a flat field leaves out at most 3 of 10 000 samples and at most 0.3 % of the light; the
+# worst case is 0.2 e-.
+SIGMAS = 2.5  # standard deviations that a sample may lie above the brightest of the 9 or more samples around
+MOST_SIGMAS = 1e3  # from this number on there is no limit
 FEWEST_E = 2.25  # without dark noise, samples of 1 and 2 electrons count even where all samples around hold none
 
 
 def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings) -> NDArray[Any]:
-    """Electrons up to which a sample counts at each pixel, by where its channel's samples lie from there.
+    """Compute the electrons up to which samples count at each pixel, for each position of a sample in the tile.
 
-    With m the brightest sample of the channel up to 2 tiles less a pixel away along either axis, as far on one side as
-    on the other, s the dark noise and p the PRNU
+    With m the brightest sample of the channel that is less than 2 tiles away along either axis, s the dark noise and p
+    the PRNU, the limit is
 
         B = m + z sqrt(m + s^2 + (p m)^2) + 2.25 / (1 + s^2)^2.
 
-    z is `SIGMAS` up to the default sigma_s, and rises in proportion beyond it. Where settings let all patches count as
-    similar, and for the paper's distance, there is no bound. The noise is `sensor.raw.noise_at_sites`.
+    z is `SIGMAS` up to the default sigma_s, and grows in proportion beyond it. If settings let all patches count as
+    similar, and for the paper's distance, there is no limit. The noise is that of `sensor.raw.noise_at_sites`.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
     Returns
     -------
     (th, tw, h, w) of the same type
-        A sample y counts at x up to the value [(y - x) mod (th, tw), x].
+        The limit of a sample y at a pixel x stands at [(y - x) mod (th, tw), x].
     """
     tile = (len(raw.cfa), len(raw.cfa[0]))
     shape = electrons.shape
@@ -56,10 +56,10 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
         np.sqrt(bound, out=bound)
         bound *= z
         bound += FEWEST_E / (1.0 + raw.dark_noise_e**2) ** 2
-        # B rises with m: the largest m has the largest B.
+        # B increases with m, so that the largest m has the largest B.
         np.add(bound, part, out=allowed[ends[0] + first : ends[0] + first + len(part), ends[1] : ends[1] + shape[1]])
     result = np.empty((*tile, *shape), electrons.dtype)
-    # Steps to the samples at each phase from x, from -(2 tiles - 1) on, counted from there.
+    # Steps from x to the samples at each phase, counted from -(2 tiles - 1).
     rows, columns = ([range((p - 1) % n, 2 * end + 1, n) for p in range(n)] for n, end in zip(tile, ends, strict=True))
     for first in range(0, shape[0], BLOCK_ROWS):
         last = min(first + BLOCK_ROWS, shape[0])
@@ -71,7 +71,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
 
 
 def _most(parts: list[NDArray[Any]], out: NDArray[Any]) -> NDArray[Any]:
-    """Largest of some arrays, two or more; `np.maximum.reduce` would copy all of them first."""
+    """Return the largest of two or more arrays, element by element; `np.maximum.reduce` would copy all of them."""
     np.maximum(parts[0], parts[1], out=out)
     for part in parts[2:]:
         np.maximum(out, part, out=out)

@@ -1,8 +1,8 @@
-"""Sharp edges, and lamps smaller than the tile: the best linear estimate from the nine samples around each pixel.
+"""Sharp edges and lamps smaller than the tile, by the best linear estimate from the nine samples around each pixel.
 
-Each channel's plane is a mean over its own samples, one pixel in four, and its edge falls on another pixel than the
-others': a fringe. Yet every pixel was read in some channel, and light and shade go together in all of them
-(docs/decisions/0053-strong-edges.md).
+Each channel's plane is a mean over its own samples, one pixel in four, so that its edge falls on another pixel than the
+edges of the others and a coloured fringe appears. Yet every pixel was read in some channel, and light and shade are
+common to all channels (docs/decisions/0053-strong-edges.md).
 """
 
 from typing import Any
@@ -36,11 +36,11 @@ from rodcone.types import Floats
 from sensor.cfa import mask
 from sensor.raw import RawImage
 
-STRIP_ROWS = 32  # that are computed together: 2 kB a pixel
+STRIP_ROWS = 32  # rows that are computed together, with 2 kB per pixel
 
 
 def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain: NDArray[Any]) -> NDArray[np.float32]:
-    """Every channel at each pixel from the nine samples around it.
+    """Estimate every channel at each pixel from the nine samples around it.
 
     With m and C the mean and the covariance of the channels' planes P over 5 x 5 pixels and N = m + s^2 a sample's
     noise, s the dark noise, the contrast of the window is
@@ -129,7 +129,7 @@ def _sharpen(
     planes: Floats,
     *samples: NDArray[Any],
 ) -> Floats:
-    """Sharpen in double precision; planes and samples reach `FAR` pixels further. `.kernel.edges` does it in single."""
+    """Sharpen in double precision (`.kernel.edges` uses single); planes and samples reach `FAR` pixels further."""
     far = sliding_window_view(planes, (2 * FAR + 1,) * 2, axis=(0, 1))[..., ::STEP, ::STEP]
     middle = slice(FAR - REACH, REACH - FAR)
     planes, electrons, sites = (values[middle, middle] for values in (planes, *samples))

@@ -12,7 +12,7 @@ g_i(y) in the neighbourhood Omega of x, where S_i(y) is 1 at the sites of i and 
 with h_i(x) the patch around x of channel i's filled plane, and alpha of eq. (6) (`isp.interleaved.saturation`). With
 one guide for all channels h is that guide's patch, and alpha is 0.
 
-Slow and plain: the kernel is tested against it, and it runs where Dr.Jit can't.
+This form is slow and plain. The kernel is tested against it, and it runs where Dr.Jit can't.
 """
 
 from dataclasses import dataclass
@@ -30,12 +30,12 @@ from rodcone.types import Mosaic, Plane
 from sensor.cfa import mask
 from sensor.raw import RawImage
 
-LEFT_OUT = -1e28  # log weight of a sample that doesn't count; finite, as the first one may be
+LEFT_OUT = -1e28  # log weight of a sample that doesn't count; it is finite, because the first sample may be such a one
 
 
 @dataclass(frozen=True)
 class _Inputs:
-    """What eqs. (1)-(6) read."""
+    """Arrays that eqs. (1)-(6) read."""
 
     electrons: Mosaic  # g_i(y) of the channel i that is sampled at y
     channel: NDArray[np.intp]  # that channel's number: where it is i, S_i(y) is 1
@@ -63,13 +63,14 @@ def reference_with_noise(
     Parameters
     ----------
     guide : (h, w) float64, optional
-        The one plane that patches are read from, as `isp.interleaved.panchromatic.read_as_white` returns it. Left out,
-        each channel has its own as the paper writes, W's stands for it by eq. (6), and distances are in electrons.
+        The plane from which all patches are read, as `isp.interleaved.panchromatic.read_as_white` returns it. If it is
+        left out, the paper's method applies: each channel has its own plane, eq. (6) mixes it with that of W, and
+        distances are in electrons.
 
     Raises
     ------
     InputError
-        Where Omega may miss a channel of the tile.
+        If Omega may miss a channel of the tile.
     """
     settings.check_reaches(raw.cfa)
     sums = sum_weights(raw, settings, guide)

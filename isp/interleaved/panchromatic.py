@@ -1,9 +1,10 @@
-"""Every sample read as W: one guide for the similarity of all channels, and each channel's share of W around a pixel.
+"""Every sample read as W, which gives one guide for all channels, and each channel's share of W around a pixel.
 
-A channel's own plane knows its samples alone, one pixel in four, and its edges fall on other pixels than the other
-channels' edges do. Yet light and shade go together in all channels. So a sample S of channel o, over the share that the
-channel has of W around it, tells what W would read there: v = S / r_o (docs/decisions/0057-every-sample-as-w.md).
-Where a mosaic has no W, its unit channel (`sensor.cfa.unit_channel`) stands for W.
+A channel's own plane is made of its samples alone, one pixel in four, and its edges fall on other pixels than those of
+the other channels. Yet light and shade are common to all channels. Therefore a sample S of channel o, divided by the
+ratio r_o of that channel to W around it, tells what W would read there: v = S / r_o
+(docs/decisions/0057-every-sample-as-w.md). In a mosaic without W, the unit channel (`sensor.cfa.unit_channel`) stands
+for W.
 """
 
 from dataclasses import replace
@@ -81,9 +82,9 @@ def read_as_white(raw: RawImage, neutral: Floats) -> WhiteReading:
 
 
 def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:
-    """Give each full sample of W what the colours around say of a neutral, n_W sum(t S) / sum(t n), if that is more.
+    """Raise each full sample of W to a neutral's value by the colours around, n_W sum(t S) / sum(t n), if it is more.
 
-    The tent t reaches one pixel less than the tile. Beyond a full sample W knows nothing, and the colours do.
+    The tent t reaches one pixel less than the tile. Of light beyond the well only the colours tell.
     """
     if not {"W", "G"} <= set(raw.channels):
         return raw
@@ -107,7 +108,7 @@ def with_full_white(raw: RawImage, ratios: Floats) -> RawImage:
 
 
 def _mean(values: Floats, weights: Floats, across: Floats | None = None) -> Floats:
-    """Weighted mean down and across around each pixel of each plane, mirrored at the border; weights sum to 1."""
+    """Average around each pixel, down and across, with weights of sum 1; planes are mirrored at the border."""
     lines = scipy.ndimage.correlate1d(values, weights, 0, mode="mirror")
     return np.asarray(scipy.ndimage.correlate1d(lines, weights if across is None else across, 1, mode="mirror"))
 
@@ -117,13 +118,13 @@ def _box(values: Floats, size: int) -> Floats:
 
 
 def _comb(steps: range) -> Floats:
-    """Equal weights at some steps from the middle."""
+    """Return equal weights at some steps from the middle, 0 elsewhere."""
     weights = (np.arange(steps[0], steps[-1] + 1) - steps[0]) % steps.step == 0
     return np.asarray(weights / weights.sum())
 
 
 def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floats]:
-    """Return the surroundings' shares and the guide [e-] in double precision; `.kernel.panchromatic` in single."""
+    """Compute the surroundings' shares and the guide [e-] in double precision; `.kernel.panchromatic` uses single."""
     site = np.argmax([mask(raw.cfa, name, raw.shape) for name in raw.channels], axis=0)
     shot, dark, _ = channel_noise(raw)
     electrons = raw.electrons
@@ -184,6 +185,6 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
 
 
 def at_pixels(shares: NDArray[Any], raw: RawImage) -> NDArray[Any]:
-    """Shares by tile, at every pixel (h, w, channel)."""
+    """Repeat shares by tile for every pixel, (h, w, channel)."""
     repeated = shares.repeat(len(raw.cfa), axis=0).repeat(len(raw.cfa[0]), axis=1)
     return repeated[: raw.shape[0], : raw.shape[1]]

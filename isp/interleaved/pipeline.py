@@ -1,4 +1,4 @@
-"""Pipelines of the paper's two cameras, from a raw image to linear sRGB: interleaved RGBW, and conventional Bayer."""
+"""Pipelines from a raw image to linear sRGB for the paper's two cameras: interleaved RGBW and conventional Bayer."""
 
 from isp.colour.colour_fit import ColourFit, relative_noise
 from isp.colour.highlights import clip_highlights
@@ -29,19 +29,20 @@ def picture_interleaved(
     raw : RawImage
         Mosaic with R, G, B and W.
     colours : ColourFit
-        A fit of all channels (`isp.colour.colour_fit.fit_colours`) lets W into the colours as far as the noise
-        asks; one of a plain matrix (`ColourFit.of`) doesn't.
+        A fit of all channels (`isp.colour.colour_fit.fit_colours`) uses W for the colours as far as their noise makes
+        it useful; a plain matrix (`ColourFit.of`) doesn't.
     balance : WhiteBalance
-        Gray World's, or a response to what should come out neutral, such as a file's as-shot neutral.
+        Gray World, or a response to what should become neutral, such as a file's as-shot neutral.
     settings : Settings
-        Of `isp.interleaved.reconstruction.reconstruct`.
+        Settings of `isp.interleaved.reconstruction.reconstruct`.
     substitution_snr : float
-        W gives half of the luminance where the frame's green SNR is this, more under it; 0 never, inf always.
+        SNR of the frame's green at which W gives half of the luminance; below it W gives more. 0 means never, inf
+        always.
 
     Returns
     -------
     Picture
-        Linear sRGB, not clipped to the display, and the decisions; a neutral reads the electrons of a green pixel.
+        Linear sRGB, not clipped to the display, and the decisions. A neutral has the electrons of a green pixel.
 
     Raises
     ------
@@ -70,10 +71,11 @@ def picture_interleaved_paper(
     settings: Settings = PAPER,
     substitution_snr: float = SUBSTITUTION_SNR,
 ) -> Picture:
-    """Develop an interleaved RGBW raw image as the paper writes it; parameters as `picture_interleaved`.
+    """Develop an interleaved RGBW raw image as in the paper; parameters are those of `picture_interleaved`.
 
-    Distances in electrons, alpha counted over the patch, a plain 3x3 matrix without W, and a switch to W's luminance.
-    `settings` is `isp.settings.PAPER`, one pixel, the bilateral filter; `PAPER_5X5` is its non-local means.
+    Distances are in electrons, alpha is counted over the patch, a plain 3x3 matrix doesn't use W, and the luminance is
+    switched to W. By default `settings` is `isp.settings.PAPER`, whose patch of one pixel makes it a bilateral filter;
+    `PAPER_5X5` is the paper's non-local means.
     """
     require_letters(raw, ("R", "G", "B", "W"))
     colours = ColourFit.of(colours.matrix())
@@ -84,7 +86,7 @@ def picture_interleaved_paper(
     weight = float(substitution_weight(snr, substitution_snr) > 0.5)
     balanced = clip_highlights(raw, result.estimate * gains, gains)
 
-    # W leaves the colours as eq. (6) leaves it out of the similarity: by the share of saturated pixels around.
+    # By the share of saturated pixels around, eq. (6), W is left out of the colours as it is out of the similarity.
     rgb = balanced @ matrix_with_white(colours, noise, weight).T
     alpha = saturated_fraction(raw, settings.patch)
     mixed = alpha > 0.0
@@ -95,6 +97,6 @@ def picture_interleaved_paper(
 
 
 def picture_bayer(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a Bayer raw image: bilinear demosaicking, Gray World, matrix; parameters as `picture_interleaved`."""
+    """Develop a Bayer raw image: bilinear demosaicking, Gray World, matrix; see `picture_interleaved`."""
     require_letters(raw, ("R", "G", "B"))
     return finish(raw, bilinear(raw), colours, balance=balance)

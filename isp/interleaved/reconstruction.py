@@ -1,15 +1,16 @@
-"""The interleaved reconstruction of Parmar & Wandell (2009), section 3.1: every channel at every pixel.
+"""The interleaved reconstruction of Parmar & Wandell (2009), section 3.1, which gives every channel at every pixel.
 
     f_i(x) = (1 / W_y) sum_{y in Omega} G(beta_d, sigma_d) G(beta_s, sigma_s) S_i(y) g_i(y)      eqs. (1), (3)
 
-What the paper leaves open is settled so:
+What the paper leaves open is decided as follows:
 
-- One guide serves all channels: every sample read as W (`isp.interleaved.panchromatic`), in units of noise by the
-  Anscombe transform. The paper's own method fills a plane per channel (`isp.planes`), in electrons, and eq. (6) mixes
-  them.
-- Patches go on beyond the border by reflection without repeating the edge.
+- One guide serves all channels: every sample is read as W (`isp.interleaved.panchromatic`), in units of noise by the
+  Anscombe transform. The paper's own method instead fills a plane per channel (`isp.planes`), in electrons, and eq. (6)
+  mixes it with that of W.
+- Patches continue beyond the border by reflection without repeating the edge.
 - Omega ends at the border, where W_y normalises. Samples are averaged in electrons.
-- The largest weight counts as 1, so W_y is never 0: where all others underflow, the most similar sample is the result.
+- The largest weight counts as 1, so that W_y is never 0. If all others underflow, the most similar sample is the
+  result.
 """
 
 from dataclasses import replace
@@ -33,12 +34,12 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | 
     Parameters
     ----------
     raw : RawImage
-        One exposure; any tile of channels.
+        One exposure with any tile of channels.
     settings : Settings
-        Widths of Omega and the patches, sigmas, units of the distance.
+        Widths of Omega and of the patches, sigmas, and units of the distance.
     neutral : (channel,) float64, optional
-        Response to a neutral in any unit, in the order of `sensor.cfa.channels`; the project's own curves' under D65
-        by default. The paper's own method doesn't ask for it.
+        Response to a neutral in any unit, in the order of `sensor.cfa.channels`; by default that of the project's own
+        curves under D65. The paper's own method doesn't use it.
 
     Returns
     -------
@@ -48,12 +49,12 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | 
     Raises
     ------
     InputError
-        Where Omega may miss a channel of the tile.
+        If Omega may miss a channel of the tile.
 
     Notes
     -----
-    Other sizes, sigmas and neighbourhoods run the kernels compiled already; another patch or size of tile compiles its
-    own. Besides the result a call takes 32 bytes per pixel and some 0.6 GB.
+    Other frame sizes, sigmas and neighbourhoods use the kernels that are already compiled; another patch or tile size
+    compiles new ones. Besides the result a call takes 32 bytes per pixel and some 0.6 GB.
     """
     return reconstruct_with_noise(raw, settings, neutral).estimate.astype(np.float32, copy=False)
 
@@ -61,7 +62,7 @@ def reconstruct(raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | 
 def reconstruct_with_noise(
     raw: RawImage, settings: Settings = DEFAULTS, neutral: Floats | None = None
 ) -> Reconstruction:
-    """As `reconstruct`, with the factor by which the weights reduce white noise, the guide, and the engine that ran."""
+    """Reconstruct as `reconstruct`; also return by which factor the weights reduce white noise, guide and engine."""
     settings.check_reaches(raw.cfa)
     engine = backend()
     white = None

@@ -1,4 +1,4 @@
-"""Which plane the paper's similarity compares at each pixel, W's or the channel's own: alpha of eq. (6).
+"""Alpha of eq. (6), which chooses the plane that the paper's similarity compares: W's or the channel's own.
 
 alpha(y) = saturated pixels in h_W(y) / all pixels in h_W(y)                                    (6)
 """
@@ -11,20 +11,20 @@ from rodcone.types import Plane
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 
-WINDOW = 9  # pixels a side over which a frame's share of saturated pixels is counted; the paper counts the patch
+WINDOW = 9  # side [pixels] of the window over which saturated pixels are counted; the paper counts the patch
 
 
 def saturated_fraction(raw: RawImage, window: int = WINDOW) -> Plane:
-    """Alpha of eq. (6): the share of saturated pixels in h_W around each pixel, over `window` pixels a side.
+    """Compute alpha of eq. (6): the share of saturated pixels in h_W over a window around each pixel.
 
-    A pixel of h_W counts as saturated where any sample that fills it is: between a full sample and another the filled
-    value is too low. Only pixels inside the frame count. A mosaic without W has 1 everywhere: each channel is its own
-    guide.
+    A pixel of h_W counts as saturated if any sample from which it is filled is saturated, because between a full sample
+    and another one the filled value is too low. Only pixels inside the frame count. For a mosaic without W alpha is 1,
+    because each channel is its own guide.
 
     Returns
     -------
     (h, w) float64
-        0 where W alone guides, 1 where the channel alone does.
+        Alpha: 0 where W alone guides, 1 where the channel alone does.
     """
     return fraction_of_full(raw.saturated, raw.cfa, window)
 
@@ -37,13 +37,13 @@ def fraction_of_full(full: NDArray[np.bool_], tile: Tile, window: int) -> Plane:
     box = []
     if not full.any():
         return alpha
-    # Only the rectangle around full samples is computed. Its margin is what a window and the interpolation reach.
+    # Only the rectangle around full samples is computed, with a margin as wide as a window and the interpolation reach.
     margin = window + 2 * max(len(tile), len(tile[0]))
     for axis, step in enumerate((len(tile), len(tile[0]))):
         lines = np.flatnonzero(full.any(axis=1 - axis))
         box.append(slice(max(int(lines[0]) - margin, 0) // step * step, int(lines[-1]) + margin + 1))
     saturated = fill(full[box[0], box[1]].astype(np.float32), tile, "W") > 0.0
-    # Eq. (6). Numerator and denominator are small whole numbers, so 0 and 1 are exact.
+    # Numerator and denominator of eq. (6) are small whole numbers, so that 0 and 1 are exact.
     half = window // 2
     count = box_sums(np.pad(saturated, window // 2).astype(np.uint16), (window, window))
     pixels = [np.arange(size) for size in saturated.shape]

@@ -1,4 +1,4 @@
-"""Mosaics of any channels, RCCB, RCCC, RYYB, quads, a camera without colours, one's own: interleaved."""
+"""Interleaved reconstruction for mosaics of any channels: RCCB, RCCC, RYYB, quads, monochrome, or a user's own."""
 
 import numpy as np
 
@@ -22,24 +22,24 @@ def picture_any_mosaic(
     mosaic: str | None = None,
     settings: Settings = DEFAULTS,
 ) -> Picture:
-    """Develop a raw image of any mosaic: eqs. (1)-(5), Gray World, a matrix over all channels that knows their noise.
+    """Develop a raw image of any mosaic: eqs. (1)-(5), Gray World, and a noise-aware matrix over all channels.
 
-    With three channels or more the picture has colours as far as these tell them; one or two give a grey picture of
-    luminance. Every sample guides the similarity, read as W, or as the mosaic's unit, such as C of RCCB.
+    With three channels or more the picture has colours as far as these tell them; with one or two it is a grey picture
+    of luminance. Every sample guides the similarity, read as W or as the mosaic's unit, such as C of RCCB.
 
     Parameters
     ----------
     raw : RawImage
     colours : ColourFit
-        Of the mosaic's channels.
+        Fit of the mosaic's channels.
     balance : WhiteBalance
     mosaic : str, optional
-        Name of `sensor.cfa.MOSAICS`; other channels than its own are refused.
+        Name in `sensor.cfa.MOSAICS`, whose channels the raw image must have.
 
     Returns
     -------
     Picture
-        A neutral reads the electrons of `sensor.cfa.unit_channel`.
+        A neutral has the electrons of `sensor.cfa.unit_channel`.
     """
     if mosaic is not None:
         require_letters(raw, channels(tile_of(mosaic)))
@@ -55,11 +55,11 @@ def picture_any_mosaic(
 
 
 def rgb_of_channels(raw: RawImage, balanced: Plane, colours: ColourFit, noise: Floats) -> Plane:
-    """Take balanced planes of a mosaic's channels to linear sRGB (h, w, 3), by a matrix that knows their noise."""
+    """Convert balanced planes of a mosaic's channels to linear sRGB (h, w, 3) by a noise-aware matrix."""
     names = raw.channels
     if colours.plain is None:
         return np.asarray(balanced @ colours.matrix(names, noise).T)
-    # It knows three colours, and no noise.
+    # A plain matrix takes three colours, and doesn't take noise into account.
     unit = names.index(raw.unit_channel)
     three = balanced[..., :3] if len(names) >= 3 else np.repeat(balanced[..., unit : unit + 1], 3, axis=-1)
     return np.asarray(three @ colours.plain.T)

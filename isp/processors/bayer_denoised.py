@@ -1,8 +1,9 @@
 """Bayer opponents with a denoiser: the interleaved camera's non-local means, and BM3D before or after demosaicking.
 
-Before, on the mosaic's sub-images (`isp.processors.sub_images`). After, as Q. Jin, G. Facciolo, J.-M. Morel, "A review
-of an old dilemma: demosaicking first, or denoising first?", CVPR Workshops 2020, find better: the demosaicked picture
-is denoised as if its noise were white and stronger, 1.5 times with them. Ours: 1.75, in units of noise from before.
+Before demosaicking, BM3D denoises the mosaic's sub-images (`isp.processors.sub_images`). Q. Jin, G. Facciolo, J.-M.
+Morel, "A review of an old dilemma: demosaicking first, or denoising first?", CVPR Workshops 2020, find the other order
+better: the demosaicked picture is denoised as if its noise were white and stronger, in their paper 1.5 times. This
+project takes 1.75 times the mosaic's noise.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,17 +23,17 @@ from sensor.cfa import Tile, channel_map
 from sensor.raw import RawImage
 
 Demosaic = Callable[[Plane, Tile], Image]
-Denoise = Callable[[Image, Sequence[float]], Image]  # planes and the standard deviation of each one's noise
-# Noise to state to BM3D after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
+Denoise = Callable[[Image, Sequence[float]], Image]  # takes planes and the standard deviation of each plane's noise
+# Noise that BM3D is told after demosaicking, over the mosaic's noise (docs/decisions/0039-the-strongest-opponents.md).
 NOISE_AFTER_DEMOSAICKING = 1.75
-# Mean and two differences of R, G and B: orthonormal rows, the mean first.
+# Orthonormal rows that turn R, G and B into their mean and two differences.
 OPPONENT = np.array([[1, 1, 1], [1, 0, -1], [1, -2, 1]]) / np.sqrt([[3], [2], [6]])
 
 
 def picture_bayer_nlm(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop a Bayer raw image with `isp.interleaved.reconstruction.reconstruct`; every sample, read as green, guides.
 
-    The colours know their noise, as the interleaved camera's do.
+    The colour matrix is noise-aware, as in the interleaved camera.
     """
     require_bayer(raw.cfa)
     result = reconstruct_with_noise(raw, neutral=balance.expected(raw))
@@ -51,10 +52,10 @@ def picture_denoised_first(
 def picture_demosaicked_first(
     raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, demosaic: Demosaic, denoise: Denoise | None = bm3d
 ) -> Picture:
-    """Develop a Bayer raw image by demosaicking its noisy mosaic, then BM3D, or another denoiser or none.
+    """Develop a Bayer raw image by demosaicking its noisy mosaic, followed by BM3D, another denoiser or none.
 
-    A balanced channel of gain g has sqrt(g) times the noise: so scaled, stabilised samples of a neutral agree between
-    channels but for the dark noise, as demosaicking supposes.
+    A balanced channel of gain g has sqrt(g) times the noise. Stabilised samples are scaled by it, so that except for
+    dark noise a neutral has equal samples in all channels, as demosaicking presupposes.
     """
     require_bayer(raw.cfa)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)

@@ -30,7 +30,7 @@ from rodcone.errors import InputError
 from sensor.cfa import OWN, Tile
 from sensor.raw import RawImage
 
-_LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # what an extra brings
+_LIBRARIES = {DEMOSAICKING: ("colour_demosaicing",), BM3D: ("bm3d", "colour_demosaicing")}  # libraries of each extra
 
 
 @dataclass(frozen=True)
@@ -40,23 +40,24 @@ class Processor:
     Attributes
     ----------
     mosaic : str
-        Name that `sensor.presets.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with curves of its own, or
-        ``own``, the sensor's own.
+        Name that `sensor.presets.vary` takes: one of `sensor.cfa.MOSAICS`, a variation with its own curves, or ``own``
+        for the sensor's own mosaic.
     picture : callable
-        ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`; `develop` calls it.
+        Function ``picture(raw, colours, *, balance) -> Picture`` with a `ColourFit` and a `WhiteBalance`, which
+        `develop` calls.
     source : str
-        Where it is published.
+        Publication of the method.
     extra : str or None
-        What ``pip install rodcone[...]`` has to bring; None: nothing.
+        Extra that ``pip install rodcone[...]`` has to install, if any.
     colours : tuple of str
-        Channels whose balanced planes the matrix takes to linear sRGB; empty: all of the mosaic's.
+        Channels from which the matrix computes linear sRGB; empty for all channels of the mosaic.
     unit : str
-        Channel whose electrons a neutral reads in the developed picture; empty: `sensor.cfa.unit_channel`.
+        Channel whose electrons a neutral has in the developed picture; empty for `sensor.cfa.unit_channel`.
     on_backend : bool
-        Whether it runs in Dr.Jit where there is a backend; NumPy else.
+        Whether it runs in Dr.Jit, if there is a backend, rather than in NumPy.
     noise_gains : NoiseGains or None
-        What was measured of its planes, for a colour matrix that knows their error; None: the processor says itself
-        what its matrix knows.
+        Measured error of its planes, for a noise-aware colour matrix; None if the processor decides itself which noise
+        its matrix takes into account.
     """
 
     mosaic: str
@@ -77,7 +78,7 @@ class Processor:
         balance: ArrayLike | WhiteBalance | None = None,
         **options: Any,
     ) -> Picture:
-        """Develop a raw image. First defective pixels are replaced, and a channel's sites levelled.
+        """Replace defective pixels, level the sites of each channel, and develop the picture.
 
         Parameters
         ----------
@@ -85,13 +86,13 @@ class Processor:
         matrix : (3, 3) array_like or ColourFit
             From the balanced channels `colours` to linear sRGB (`isp.colour.colour_fit.fit_matrix`, `fit_colours`).
         neutral : (channel,) array_like, optional
-            Calibrated response to a neutral, in the order of `sensor.cfa.channels`: the white balance of pictures that
-            are too dark for Gray World. The project's own curves under D65 by default.
+            Calibrated response to a neutral, in the order of `sensor.cfa.channels`, for the white balance of pictures
+            that are too dark for Gray World; by default that of the project's own curves under D65.
         balance : (channel,) array_like or WhiteBalance, optional
-            Response to what should come out neutral, such as a file's as-shot neutral, in place of Gray World's means.
-            Or both as one `WhiteBalance`.
+            Response to what should become neutral, such as a file's as-shot neutral, instead of Gray World's means. A
+            `WhiteBalance` holds both responses.
         **options
-            The processor's own, such as `substitution_snr`.
+            The processor's own options, such as `substitution_snr`.
         """
         raw = interpolate_defects(raw)
         white_balance = WhiteBalance.of(raw, neutral, balance)
@@ -112,7 +113,8 @@ _RESIDUAL_BM3D = partial(picture_demosaicked_first, demosaic=residual_interpolat
 _EARLY = "W as luminance by early fusion"
 _PIECEWISE = "piecewise linear: Yu, Sapiro & Mallat 2012 with a fixed prior, Zoran & Weiss 2011"
 _ANY = "interleaved reconstruction, a matrix over all channels; one or two give a grey picture"
-# With the matrix as published. The first is the default, the next two are the paper's.
+# Processors with the plain matrix of their publications. The first is the default; the next two are the paper's
+# cameras.
 _PLAIN: Mapping[str, Processor] = MappingProxyType(
     {
         "ple": Processor(
@@ -160,8 +162,8 @@ _GAINS = measured_gains()
 PROCESSORS: Mapping[str, Processor] = MappingProxyType(
     {name: replace(processor, noise_gains=_GAINS.get(name)) for name, processor in _PLAIN.items()}
 )
-# Names that a study may use. A processor with measured noise gains also goes by NAME_published, with the plain colour
-# matrix of its source.
+# Names that a study may use. Under NAME_published a processor with measured noise gains has the plain colour matrix of
+# its publication instead.
 NAMED: Mapping[str, Processor] = MappingProxyType(
     {
         **PROCESSORS,
@@ -170,20 +172,21 @@ NAMED: Mapping[str, Processor] = MappingProxyType(
 )
 
 
-# What studies compare where they name no processors: both mosaics by one method.
+# Processors of a study that names none: one method on both mosaics.
 DEFAULT_PAIR = ("ple_rgbw", "ple_bayer")
 
 
 def default_processor(tile: Tile) -> str:
-    """Processor of a mosaic where none is named: ``ple``, so that all mosaics are developed by one method.
+    """Return the default processor of a mosaic: ``ple``, so that all mosaics are developed by one method.
 
-    ``any_mosaic`` for tiles that ``ple`` doesn't take, with channels beside R, G, B and W or another size.
+    For tiles that ``ple`` doesn't take, because of other channels than R, G, B and W or of another size, it is
+    ``any_mosaic``.
     """
     return "ple" if takes(tile) else "any_mosaic"
 
 
 def processor_names() -> tuple[str, ...]:
-    """Names of all processors, installed or not.
+    """List the names of all processors, whether or not their libraries are installed.
 
     Examples
     --------
@@ -195,13 +198,13 @@ def processor_names() -> tuple[str, ...]:
 
 
 def libraries(name: str) -> tuple[str, ...]:
-    """Libraries that a processor of `NAMED` needs beside rodcone's own; a user's own file tells none."""
+    """Return the libraries that a processor of `NAMED` needs beside rodcone's own; for a user's file, none."""
     extra = NAMED[name].extra if name in NAMED else None
     return () if extra is None else _LIBRARIES[extra]
 
 
 def require_libraries(name: str) -> None:
-    """Raise `InputError` where the extra of a processor of `NAMED` is not installed."""
+    """Raise `InputError` if the extra of a processor of `NAMED` is not installed."""
     for library in libraries(name):
         if find_spec(library) is None:
             raise InputError(

@@ -1,4 +1,4 @@
-"""Filters of learned networks, on arrays in memory: each block of rows is one matrix product."""
+"""Filters of learned networks, computed by one matrix product for each block of rows."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -18,10 +18,10 @@ def convolve(
     step: int = 1,
     run: Callable[[Callable[[int], None], Iterable[int]], Iterable[Any]] = map,
 ) -> Singles:
-    """Correlate (h, w, in) with a layer's filters (out, in, side, side), only where they fit in.
+    """Correlate (h, w, in) with a layer's filters (out, in, side, side) at all places where they fit into the array.
 
-    Each row of a product's left matrix holds what one filter position sees. `run` is ``map``, or that of a pool of
-    threads; the blocks, and so the result, don't depend on it.
+    Each row of a product's left matrix holds the values under one position of the filters. `run` is ``map``, or the
+    same method of a pool of threads; blocks and result don't depend on it.
     """
     filters = filters.transpose(2, 3, 1, 0)
     side, _, seen, out = filters.shape

@@ -1,13 +1,13 @@
 """Bayer opponents that carry detail between colours: Malvar's linear filters and Menon's directional ones.
 
-Both from the library `colour-demosaicing`:
+Both come from the library `colour-demosaicing`:
 H. S. Malvar, L.-W. He, R. Cutler, "High-quality linear interpolation for demosaicing of Bayer-patterned color images",
 ICASSP 2004; D. Menon, S. Andriani, G. Calvagno, "Demosaicing with directional filtering and a posteriori decision",
 IEEE Trans. Image Process. 16(1), 2007.
 
-Ours is what is done before: the mosaic is balanced first (`isp.processors.mosaic`), and reflected about its outermost
-pixels, which keeps the phase of the tile. The library's own border repeats the outermost pixel and so puts a colour
-where another belongs.
+The preparation is this project's: the mosaic is balanced first (`isp.processors.mosaic`), and reflected about its
+outermost pixels, which keeps the phase of the tile. The library itself repeats the outermost pixel, which puts one
+colour where another belongs.
 """
 
 from collections.abc import Callable
@@ -25,29 +25,29 @@ from sensor.cfa import BAYER, Tile, is_bayer
 from sensor.raw import RawImage
 
 EXTRA = "opponents"
-# How far away [pixels along an axis] a mosaic's value may still change a result. Malvar's filters are 5 pixels wide.
-# Menon's steps add up: 2 for green, 2 for its difference, 2 for the decision, 2 for R and B, 4 for the refinement.
+# Distance [pixels along an axis] at which a mosaic's value may still change a result. Malvar's filters are 5 pixels
+# wide. Menon's steps add up: 2 for green, 2 for its difference, 2 for the decision, 2 for R and B, 4 for refinement.
 MALVAR_REACH, MENON_REACH = 2, 12
 
 
 def malvar(mosaic: Mosaic, cfa: Tile) -> Image:
-    """Planes of R, G and B by Malvar's 5x5 filters, shape (h, w, 3).
+    """Demosaic by Malvar's 5x5 filters to planes of R, G and B, shape (h, w, 3).
 
     Parameters
     ----------
     mosaic : (h, w) float64
-        Balanced.
+        Balanced mosaic.
 
     Raises
     ------
     InputError
-        For a tile that isn't Bayer's, or without `colour-demosaicing`.
+        For a tile that isn't Bayer's, or if `colour-demosaicing` isn't installed.
     """
     return _demosaic("demosaicing_CFA_Bayer_Malvar2004", mosaic, cfa, MALVAR_REACH)
 
 
 def menon(mosaic: Mosaic, cfa: Tile) -> Image:
-    """Planes of R, G and B by Menon's directional filters with refinement, shape (h, w, 3); as `malvar`."""
+    """Demosaic by Menon's directional filters with refinement; parameters and result are those of `malvar`."""
     return _demosaic("demosaicing_CFA_Bayer_Menon2007", mosaic, cfa, MENON_REACH)
 
 
@@ -59,7 +59,7 @@ def picture_demosaicked(
     demosaic: Callable[[Plane, Tile], Image],
     electrons: Mosaic | None = None,
 ) -> Picture:
-    """Develop a Bayer raw image with `malvar` or `menon`: its mosaic, or a denoised one [e-], is balanced first."""
+    """Balance a Bayer raw image's mosaic, or a denoised one [e-], demosaic it and develop the picture."""
     require_bayer(raw.cfa)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     return Picture(to_rgb(raw, demosaic(mosaic, raw.cfa), gains, colours, MALVAR_REACH), sources)
@@ -73,7 +73,7 @@ def require_bayer(cfa: Tile) -> None:
 
 def _demosaic(function: str, mosaic: Mosaic, cfa: Tile, reach: int) -> Image:
     require_bayer(cfa)
-    pad = reach + reach % 2  # whole tiles: the pattern stays what it is
+    pad = reach + reach % 2  # whole tiles, so that the pattern keeps its phase
     library = optional_library("colour_demosaicing", EXTRA)
     planes = getattr(library, function)(np.pad(mosaic, pad, mode="reflect"), "".join(cfa))
     return np.asarray(planes, dtype=np.float64)[pad:-pad, pad:-pad]

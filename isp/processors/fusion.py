@@ -1,19 +1,19 @@
-"""RGBW prior art that takes W's samples for the luminance: Sato 1983, Yamagami 1994, Kijima 2007.
+"""RGBW prior art that uses W's samples as luminance: Sato 1983, Yamagami 1994, Kijima 2007.
 
-Sato: I. Sato et al., "Color image pick-up apparatus", US patent 4 390 895, 1983. Taken: elements for luminance at every
-other place of both directions, whose signal, with its high frequencies, is the picture's luminance; colour comes from
-the other elements.
+Sato: I. Sato et al., "Color image pick-up apparatus", US patent 4 390 895, 1983. From it are the elements for luminance
+at every other place in both directions, whose signal, with its high frequencies, is the picture's luminance; colour
+comes from the other elements.
 
-Yamagami: T. Yamagami et al., 1994, as Parmar & Wandell 2009 cite it (US patent 5 323 233 to our knowledge; its text
-could not be consulted). Taken from their account: luminance and colour differences, with the sensitivities matched by a
-neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
+Yamagami: T. Yamagami et al., 1994, as Parmar & Wandell 2009 cite it (to our knowledge US patent 5 323 233, whose text
+could not be consulted). From their account are luminance and colour differences, and sensitivities that are matched by
+a neutral density in front of W or by complementary filters (`sensor.curves`), so that W doesn't saturate first.
 
 Kijima: T. Kijima et al., "Image sensor with improved light sensitivity", US patent application 11/341 210, 2006
-(published 2007). Taken: a picture of W in full resolution and one of the colours in less, colour samples of one kind
-being combined until they gather about as much light as W does, then one from both.
+(published 2007). From it are a picture of W in full resolution and a picture of the colours in lower resolution, which
+are then fused. Samples of one colour are combined until they gather about as much light as W does.
 
-Ours in all of them: white balance before, interpolation by normalised convolution, the way back to linear sRGB, and
-what happens to highlights. None of the three handles a saturated W: its luminance ends at W's full well.
+In all three, white balance before, interpolation by normalised convolution, the conversion to linear sRGB and the
+treatment of highlights are this project's. None of the three handles a saturated W: luminance ends at W's full well.
 """
 
 from dataclasses import replace
@@ -35,10 +35,11 @@ from sensor.cfa import Tile, channels, mask
 from sensor.curves import complementary, matched_transmittance, rgbw
 from sensor.raw import RawImage, renamed
 
-# A tent of 7 over samples 2 apart averages like (8^2 / 24)^2 = 7.1 of them: W gathers 6 to 10 times a colour's light.
+# A tent of 7 pixels over samples 2 apart averages like 7.1 of them, (8^2 / 24)^2; W gathers 6 to 10 times a colour's
+# light.
 MATCHED_RADIUS = 3
 CHANNELS = ("R", "G", "B", "W")
-# Channels that stand for the complementary ones: yellow, the brightest, for green, the unit of the picture.
+# Names under which the complementary channels are processed: yellow, the brightest, as green, the picture's unit.
 _STANDS_FOR = {"C": "R", "Y": "G", "M": "B", "W": "W"}
 
 
@@ -53,7 +54,7 @@ def picture_sato(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) ->
 def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
     """Develop an RGBW raw image whose W is behind a neutral density: W's luminance, low-passed colour differences.
 
-    The default neutral knows the density of `sensor.curves`.
+    The default neutral takes the density of `sensor.curves` into account.
     """
     require_letters(raw, CHANNELS)
     if balance.neutral is None:
@@ -66,9 +67,9 @@ def picture_yamagami(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance
 
 
 def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop a CMYW raw image as `picture_yamagami`: W's luminance, differences of the complementary colours.
+    """Develop a CMYW raw image like `picture_yamagami`, by W's luminance and differences of complementary colours.
 
-    `colours` takes balanced C, Y and M, in this order, to linear sRGB. White balance scales every channel so that a
+    `colours` converts balanced C, Y and M, in this order, to linear sRGB. White balance scales every channel so that a
     neutral surface has the electrons of a yellow pixel.
     """
     names = raw.channels
@@ -86,7 +87,7 @@ def picture_complementary(raw: RawImage, colours: ColourFit, *, balance: WhiteBa
 
 
 def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) -> Picture:
-    """Develop an RGBW raw image by early fusion: combined differences of each colour from W, added to W."""
+    """Develop an RGBW raw image by early fusion: averaged differences of each colour from W are added to W."""
     require_letters(raw, CHANNELS)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons, balance)
     white = fill(mosaic, raw.cfa, "W")
@@ -96,9 +97,9 @@ def picture_kijima(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance) 
 
 
 def tent_means(values: Plane, cfa: Tile, channel: str) -> Plane:
-    """Plane of tent-weighted means of one channel's samples, at its own sites too, of a mosaic, shape (h, w).
+    """Average one channel's samples by a tent at every pixel, its own sites included, shape (h, w).
 
-    The tent reaches `MATCHED_RADIUS` pixels: at least one sample is in reach everywhere.
+    The tent reaches `MATCHED_RADIUS` pixels, so that at least one sample is in reach everywhere.
     """
     sampled = mask(cfa, channel, (values.shape[0], values.shape[1]))
     total: NDArray[np.float64] = np.where(sampled, values, 0.0)
@@ -110,10 +111,10 @@ def tent_means(values: Plane, cfa: Tile, channel: str) -> Plane:
 
 
 def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
-    """W's luminance with the colours' differences; where W is full, with their ratios.
+    """Combine W's luminance with the colours' differences, or with their ratios where W is full.
 
-    A full W says only that the luminance is at least so much. Differences that belong to a much larger luminance would
-    then turn noise into colour, which ratios don't.
+    A full W is only a lower bound of luminance. The differences may then belong to a much larger luminance and would
+    amplify noise in the colours, which ratios don't.
     """
     of_colours = luminance_of_srgb(rgb)
     scale = np.where(of_colours > luminance, luminance / np.maximum(of_colours, 1e-12), 1.0)
@@ -122,5 +123,5 @@ def _fused(raw: RawImage, rgb: Image, luminance: Plane) -> Image:
 
 
 def with_luminance(rgb: Image, luminance: Plane) -> Image:
-    """Linear sRGB with another luminance and the same colour differences."""
+    """Give linear sRGB another luminance and keep its colour differences."""
     return np.asarray(rgb + (luminance - luminance_of_srgb(rgb))[..., None])

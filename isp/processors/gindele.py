@@ -1,18 +1,17 @@
 """RGBW prior art that recovers colours where W is full: Gindele & Gallagher 2002, on Adams' demosaicking.
 
 E. B. Gindele, A. C. Gallagher, "Sparsely sampled image sensing device with color and luminance photosites", US patent
-6 476 865, 2002. Taken, from its claims: R, G, B and luminance sites in equal numbers; missing colours come by a first
-interpolation that uses the neighbouring luminance values where these aren't clipped, and by a second that doesn't where
-they are.
+6 476 865, 2002. By its claims there are R, G, B and luminance sites in equal numbers. Missing colours are interpolated
+by a first method, which uses the neighbouring luminance values, or where these are clipped by a second, which doesn't.
 
-The first interpolation follows J. E. Adams and J. F. Hamilton (US patent 5 629 734, 1997): along the direction of the
-smaller gradient, with a Laplacian of the site's own colour; then differences of each colour from luminance. Ours: the
-balance before, the two steps in which W's quarter of the sites is filled (diagonals first), ties averaged, and bilinear
-interpolation by normalised convolution as the second.
+The first method follows J. E. Adams and J. F. Hamilton (US patent 5 629 734, 1997): it interpolates along the direction
+of the smaller gradient, with a Laplacian of the site's own colour, and then differences of each colour from luminance.
+This project adds white balance before, filling W from its quarter of the sites in two steps (diagonals first), averages
+for ties, and bilinear interpolation by normalised convolution as the second method.
 
 S. H. Park, H. S. Kim, S. Lansel, M. Parmar, B. A. Wandell, "A case for denoising before demosaicking color filter array
-data", Asilomar 2009, is about Bayer; `isp.processors.sub_images` takes any 2x2 tile. Ours: W's sub-image as the fourth,
-and Adams' interpolation after it. Where W is full its sub-image is flat, and the others keep what they differ by.
+data", Asilomar 2009, is about Bayer; `isp.processors.sub_images` takes any 2x2 tile. Here W's sub-image is the fourth,
+and Adams' interpolation follows. Where W is full, its sub-image is flat, and the others keep their differences.
 """
 
 import numpy as np
@@ -30,8 +29,8 @@ from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import Tile, is_rgbw, mask
 from sensor.raw import RawImage
 
-_PAD = 4  # two steps of two pixels each, in whole tiles
-REACH = 3  # pixels: two for W at a colour's site, one more for the difference
+_PAD = 4  # pixels for two steps of two pixels each, in whole tiles
+REACH = 3  # pixels: two for W at a colour's site, and one for the difference
 _DIAGONALS = ((1, 1), (1, -1))
 _AXES = ((0, 1), (1, 0))
 
@@ -39,7 +38,7 @@ _AXES = ((0, 1), (1, 0))
 def picture_gindele(
     raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, electrons: Mosaic | None = None
 ) -> Picture:
-    """Develop a 2x2 RGBW raw image: its mosaic, or a denoised one [e-]."""
+    """Develop a 2x2 RGBW raw image from its mosaic, or from a denoised one [e-]."""
     require_letters(raw, CHANNELS)
     mosaic, gains, sources = balance_mosaic(raw, raw.electrons if electrons is None else electrons, balance)
     clipped = saturated_nearby(raw, "W", REACH)[..., None]
@@ -48,19 +47,19 @@ def picture_gindele(
 
 
 def adams_planes(mosaic: Mosaic, cfa: Tile) -> Image:
-    """First interpolation: R, G and B through W, shape (h, w, 3) [as `mosaic`, which is balanced].
+    """Interpolate R, G and B with the help of W, shape (h, w, 3), in the unit of the balanced `mosaic`.
 
     Raises
     ------
     InputError
-        Where the tile isn't 2x2 with R, G, B and W once each.
+        If the tile isn't 2x2 with R, G, B and W once each.
     """
     white = luminance_plane(mosaic, cfa)
     return white[..., None] + fill_channels(mosaic - white, cfa, "RGB")
 
 
 def luminance_plane(mosaic: Mosaic, cfa: Tile) -> Plane:
-    """W everywhere, along the smaller gradient: first at the sites diagonal to W's, then at those beside them."""
+    """Interpolate W along the smaller gradient, first at the sites diagonal to W, then at those beside W."""
     require_rgbw(cfa)
     padded = np.pad(mosaic, _PAD, mode="reflect")
     row, column = divmod("".join(cfa).index("W"), 2)
@@ -78,9 +77,9 @@ def require_rgbw(cfa: Tile) -> None:
 
 
 def _along_smaller_gradient(white: Plane, colour: Plane, directions: tuple[tuple[int, int], ...]) -> Plane:
-    """Mean of the two neighbours in `white`, corrected by a quarter of the own colour's Laplacian.
+    """Average the two neighbours in `white` and correct by a quarter of the Laplacian of the site's own colour.
 
-    Adams & Hamilton's classifier: difference of the neighbours plus the Laplacian's size.
+    Adams & Hamilton's classifier of a direction is the neighbours' difference plus the Laplacian, as absolute values.
     """
     estimates, classifiers = [], []
     for down, right in directions:

@@ -1,4 +1,4 @@
-"""Balanced mosaics: what demosaicking works on, and how its planes become a picture."""
+"""White balance of a mosaic before demosaicking, and conversion of its planes to a picture after it."""
 
 from collections.abc import Mapping
 
@@ -18,27 +18,27 @@ def balance_mosaic(
 ) -> tuple[Plane, Floats, Mapping[str, BalanceSource]]:
     """Balance a mosaic before it is demosaicked, as raw converters do.
 
-    Demosaicking that carries detail from one colour to another supposes that their differences are smooth, which only
-    holds where a neutral gives all of them the same.
+    Demosaicking that carries detail from one colour to another presupposes that their differences are smooth. That is
+    true only if a neutral gives the same signal in all of them.
 
     Parameters
     ----------
     raw : RawImage
-        The exposure; Gray World is taken over its bilinear planes.
+        The exposure, over whose bilinear planes Gray World averages.
     electrons : (h, w) float64
-        Its mosaic [e-], as it is or denoised.
+        Its mosaic [e-], perhaps denoised.
     balance : WhiteBalance
 
     Returns
     -------
     (h, w) float64
-        Mosaic in which a neutral reads the same electrons in every channel: green's [e-]. Beside a saturated colour
-        sample no colour reads more than `isp.colour.highlights.highlight_level`, so that a neutral highlight is
-        neutral in the mosaic already.
+        Mosaic in which a neutral has the electrons of green in every channel [e-]. Beside a saturated colour sample
+        colours are limited to `isp.colour.highlights.highlight_level`, so that a neutral highlight is already neutral
+        in the mosaic.
     (channel,) float64
         Gain of each channel.
     mapping of str to str
-        Where each channel's gain comes from, as `Picture.balance` has it.
+        Origin of each channel's gain, as in `Picture.balance`.
     """
     gains, sources = balance.gains(raw, bilinear(raw))
     sites = channel_map(raw.cfa, raw.shape)
@@ -51,5 +51,5 @@ def balance_mosaic(
 
 
 def to_rgb(raw: RawImage, planes: Image, gains: Floats, colours: ColourFit, reach: int) -> Image:
-    """Linear sRGB of balanced planes of three colours that a filter of this reach made: highlights, matrix."""
+    """Convert balanced planes of three colours, made by a filter of given reach, to linear sRGB: highlights, matrix."""
     return np.asarray(clip_highlights(raw, planes, gains, reach) @ colours.matrix().T)

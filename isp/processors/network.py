@@ -1,10 +1,11 @@
-"""Demosaicking by a learned network on Bayer: the opponent that is no closed form.
+"""Demosaicking of Bayer by a learned network, the one opponent without a closed form.
 
 M. Gharbi, G. Chaurasia, S. Paris, F. Durand, "Deep joint demosaicking and denoising", ACM Trans. Graph. 35(6), 2016, in
 the form that its authors released as the package `demosaicnet` (MIT License). Its weights stay in the wheel that a user
 fetched, ``pip download --no-deps demosaicnet``, and named as a processor: ``FILE.whl:bayer_net``.
 
-Ours: weights are read as arrays, and nothing is unpickled; reflection about the outermost pixels; what reads as 1.
+This project adds that weights are read as arrays, so that nothing is unpickled, that the mosaic is reflected about its
+outermost pixels, and the level that the network is given as 1.
 """
 
 import io
@@ -39,10 +40,10 @@ LAYERS = {  # shape of each layer's weights: out, in, height, width
     "fullres_processor.post_conv": (64, 6, 3, 3),
     "fullres_processor.output": (3, 64, 1, 1),
 }
-REACH = 32  # pixels that a value depends on along one axis: fifteen 3x3 filters of 2x2 tiles, and one of pixels
-WHITE = 0.999  # share of a frame's samples under what the network is given as 1
-MOST_BYTES = 1 << 24  # of a wheel: demosaicnet's has 3.7 MB
-_LEAST = 1e-6  # units of noise, to divide by
+REACH = 32  # distance [pixels] on which a value depends: fifteen 3x3 filters of 2x2 tiles, and one of pixels
+WHITE = 0.999  # quantile of a frame's samples that the network is given as 1
+MOST_BYTES = 1 << 24  # largest wheel that is read; demosaicnet's has 3.7 MB
+_LEAST = 1e-6  # least divisor [units of noise]
 NAMES = ("bayer_net", "bayer_net_bm3d")
 SOURCE = "Gharbi, Chaurasia, Paris & Durand 2016, learned"
 Weights = Mapping[str, NDArray[np.float32]]
@@ -50,7 +51,7 @@ Weights = Mapping[str, NDArray[np.float32]]
 
 @cache
 def network_processor(name: str, wheel: bytes) -> Processor:
-    """Processor ``bayer_net``, or ``bayer_net_bm3d``, which denoises its pictures by colour BM3D.
+    """Make the processor ``bayer_net``, or ``bayer_net_bm3d``, which denoises its pictures by colour BM3D.
 
     Raises
     ------
@@ -62,12 +63,12 @@ def network_processor(name: str, wheel: bytes) -> Processor:
     denoise, extra, gains = (None, None, name) if name == NAMES[0] else (bm3d, BM3D, "bayer_residual_bm3d")
     network = partial(demosaic, weights=read_weights(wheel))
     picture = partial(picture_demosaicked_first, demosaic=network, denoise=denoise)
-    # What BM3D leaves hardly depends on what demosaicked.
+    # The noise that BM3D leaves hardly depends on the demosaicking before, so that those gains apply here too.
     return Processor("bayer", picture, SOURCE, extra=extra, noise_gains=measured_gains()[gains])
 
 
 def read_weights(wheel: bytes) -> Weights:
-    """Arrays by name out of a wheel of demosaicnet; `ValueError` for anything else."""
+    """Read the arrays of demosaicnet's wheel by name; raise `ValueError` for another file."""
     shapes: dict[str, tuple[int, ...]] = {f"{name}.weight": shape for name, shape in LAYERS.items()}
     shapes |= {f"{name}.bias": (3 if name == "upsampler" else shape[0],) for name, shape in LAYERS.items()}
     most = 8 * sum(math.prod(shape) for shape in shapes.values())  # bytes: twice what they take
@@ -80,15 +81,15 @@ def read_weights(wheel: bytes) -> Weights:
 
 
 def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weights:
-    """Arrays of 32-bit floats by name out of a file of torch's first format.
+    """Read arrays of 32-bit floats by name from a file of torch's first format.
 
-    The pickle that names them is walked for its texts; nothing that it would call is looked at.
+    Only the texts are taken from the pickle that names them; nothing that it would call is executed.
 
     Parameters
     ----------
     content : bytes
     shapes : mapping of str to tuple of int
-        Of the arrays to read, which the reader knows.
+        Names and shapes of the arrays to read.
 
     Raises
     ------
@@ -112,15 +113,16 @@ def read_network(content: bytes, shapes: Mapping[str, tuple[int, ...]]) -> Weigh
 
 
 def demosaic(mosaic: Mosaic, cfa: Tile, weights: Weights) -> Image:
-    """Planes of R, G and B, shape (h, w, 3).
+    """Demosaic by the network to planes of R, G and B, shape (h, w, 3).
 
     Parameters
     ----------
     mosaic : (h, w) float64
-        Balanced, encoded as pictures are: roots of light, or sRGB. The network knows 0 to 1; `WHITE` says what is 1.
+        Balanced mosaic, encoded like a picture by roots of light or sRGB. It is scaled so that the quantile `WHITE` is
+        1, because the network was trained on values of 0 to 1.
     """
     require_bayer(cfa)
-    # Phase: the network's tile begins with G in a row of R.
+    # The network's tile begins with G in a row of R; the mosaic is padded to this phase.
     phase = ["".join(cfa).index("R") // 2, 1 - "".join(cfa).index("R") % 2]
     before = [REACH + offset for offset in phase]
     after = [REACH + (size + offset) % 2 for size, offset in zip(mosaic.shape, phase, strict=True)]
@@ -129,7 +131,7 @@ def demosaic(mosaic: Mosaic, cfa: Tile, weights: Weights) -> Image:
     sites = np.zeros((*padded.shape, 3), np.float32)
     for row, column, colour in ((0, 0, 1), (0, 1, 0), (1, 0, 2), (1, 1, 1)):
         sites[row::2, column::2, colour] = padded[row::2, column::2]
-    # Two by two pixels to four features, fifteen filters, the product of two halves, and back to pixels.
+    # Pack 2x2 pixels into four features, apply fifteen filters, multiply two halves, and unpack to pixels.
     features = _convolve(sites, weights, "main_processor.pack_mosaic", step=2)
     for n in range(1, 16):
         features = np.maximum(_convolve(features, weights, f"main_processor.conv{n}"), 0.0)
@@ -140,7 +142,7 @@ def demosaic(mosaic: Mosaic, cfa: Tile, weights: Weights) -> Image:
     )
     finer = blocks.reshape(high, wide, 3, 2, 2).transpose(0, 3, 1, 4, 2).reshape(2 * high, 2 * wide, 3)
     finer = finer + weights["upsampler.bias"]
-    # The mosaic beside it, one filter of pixels, and the picture.
+    # Put the mosaic beside the result, and apply one filter of pixels and the output layer.
     both = np.concatenate([sites[30:-30, 30:-30], finer], axis=-1)
     features = np.maximum(_convolve(both, weights, "fullres_processor.post_conv"), 0.0)
     planes = _convolve(features, weights, "fullres_processor.output").astype(np.float64)

@@ -1,8 +1,8 @@
-"""Processors by name: of the catalogue, from a Python file of the user's own, ``mine.py:develop``, or from a wheel.
+"""Processors by name: those of the catalogue, and users' own from a Python file, ``mine.py:develop``, or a wheel.
 
-A wheel holds weights (`isp.processors.network`), read as arrays. A Python file is code that runs with all that its user
-may do. The doors (studies, `develop`) ask for consent before anything here loads one; a worker of a sweep loads a file
-only where its bytes are those that the sweep began with.
+A wheel holds weights (`isp.processors.network`), which are read as arrays. A Python file is code that may do all that
+its user may do. Studies and `develop` therefore ask for consent before this module loads one. A worker of a sweep loads
+a file only if its bytes are those with which the sweep began.
 """
 
 import platform
@@ -26,19 +26,19 @@ from rodcone.files import read_bounded
 from sensor.cfa import OWN
 from sensor.raw import RawImage
 
-MOST_BYTES = 1 << 20  # of a file; a processor takes some thousand
+MOST_BYTES = 1 << 20  # largest file that is read; a processor takes a few thousand bytes
 _NAME = re.compile(r"(.+\.(?:py|whl)):([A-Za-z_]\w*)")
-_RENAMED = {"bayer_fair": "bayer_bilinear", "kriging": "ple or any_mosaic"}  # others resemble their new names
+_RENAMED = {"bayer_fair": "bayer_bilinear", "kriging": "ple or any_mosaic"}  # other old names resemble their new ones
 
 
 def user_file(name: str) -> tuple[Path, str] | None:
-    """File and function of a name such as ``mine.py:develop`` or ``FILE.whl:bayer_net``; None for any other name."""
+    """Split a name such as ``mine.py:develop`` or ``FILE.whl:bayer_net`` into file and function; None for others."""
     match = _NAME.fullmatch(name)
     return None if match is None else (Path(match[1]), match[2])
 
 
 def require_consent(what: str, name: str, trust_code: bool) -> None:
-    """Raise `InputError` for an unknown processor, or one of the user's own without consent to run it."""
+    """Raise `InputError` for an unknown processor, or for a user's own without consent to run it."""
     user_code = user_file(name)
     if user_code is None and name in _RENAMED:
         raise InputError(
@@ -57,7 +57,7 @@ def require_consent(what: str, name: str, trust_code: bool) -> None:
 
 
 def own_version(name: str) -> dict[str, str]:
-    """File of a user's own processor, with the hash of its bytes; nothing for one of the catalogue.
+    """Return the file name of a user's own processor with the hash of its bytes; empty for one of the catalogue.
 
     Raises
     ------
@@ -69,22 +69,22 @@ def own_version(name: str) -> dict[str, str]:
 
 
 def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Processor:
-    """Processor by name.
+    """Return a processor by name; a user's own is loaded from its file.
 
     Parameters
     ----------
     name : str
-        Of `NAMED`, or ``FILE.py:NAME`` with a function ``develop(raw, matrix, *, balance)`` that gives a `Picture`
-        or linear sRGB (h, w, 3), or with a `Processor`, which states more. A function develops the sensor's own mosaic.
-        Or ``FILE.whl:bayer_net``, as `isp.processors.network.network_processor`.
-        The file's folder is not searched for what it imports.
+        A name in `NAMED`; ``FILE.py:NAME``, where NAME is a function ``develop(raw, matrix, *, balance)`` that returns
+        a `Picture` or linear sRGB (h, w, 3), or a `Processor`; or ``FILE.whl:bayer_net``
+        (`isp.processors.network.network_processor`). A function develops the sensor's own mosaic; a `Processor` may
+        state another. Imports in the file are not looked for in its folder.
     expected : mapping of str to str, optional
-        `own_version` that the file has to have; other bytes are refused before they run.
+        Required `own_version` of the file. A file with other bytes is refused before it runs.
 
     Raises
     ------
     InputError
-        For a file that can't be read, is another than expected, fails, or holds no such function.
+        For a file that can't be read, isn't the expected one, fails, or holds no such function.
     """
     user_code = user_file(name)
     if user_code is None:
@@ -122,7 +122,7 @@ def _read(path: Path) -> bytes:
 
 @cache
 def _module(path: Path, content: bytes) -> ModuleType:
-    """Module made of a file's bytes, once for each content; what it prints or warns goes where it sends it."""
+    """Execute a file's bytes as a module, once for each content; its output isn't redirected."""
     module = ModuleType(f"own_{path.stem}_{digest_bytes(content)}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses look their module up by its name
@@ -143,7 +143,7 @@ def _run(path: Path, function: Any, raw: RawImage, colours: Any, **options: Any)
 
 
 def _failure(path: Path, error: BaseException) -> str:
-    """Words for an error in a user's file, with the last line of that file that was running."""
+    """Describe an error in a user's file, with the last line of that file that was running."""
     line = getattr(error, "lineno", None)
     trace = error.__traceback__
     while trace is not None:
@@ -155,7 +155,7 @@ def _failure(path: Path, error: BaseException) -> str:
 
 
 def _checked(name: str, raw: RawImage, output: Any) -> Picture:
-    """Picture of what a user's function gave, or `InputError` where that is none."""
+    """Convert the result of a user's function to a `Picture`, or raise `InputError` if that isn't possible."""
     picture = output if isinstance(output, Picture) else None
     try:
         rgb = np.asarray(output.rgb if picture is not None else output, dtype=np.float64)

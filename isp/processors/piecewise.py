@@ -2,9 +2,9 @@
 
 G. Yu, G. Sapiro, S. Mallat, "Solving inverse problems with piecewise linear estimators: from Gaussian mixture models to
 structured sparsity", IEEE Trans. Image Process. 21(5), 2012, with a prior that is fixed beforehand as in D. Zoran, Y.
-Weiss, "From learning models of natural image patches to whole image restoration", ICCV 2011. Ours: the mosaic's own
-patch in units of its noise, light as a factor, coarser scales, and full samples as lower bounds
-(docs/decisions/0036).
+Weiss, "From learning models of natural image patches to whole image restoration", ICCV 2011. This project adds that
+patches are those of the mosaic in units of its noise, that light is a factor, coarser scales, and full samples as lower
+bounds (docs/decisions/0036).
 """
 
 import warnings
@@ -30,11 +30,12 @@ from sensor.cfa import RGBW, Tile, channels, is_rgbw
 from sensor.raw import RawImage
 
 # Share of the posterior variance that counts in the colour matrix. The estimate is a posterior mean, which is greyer
-# than the truth by what noise hides; a matrix that counts all of the variance takes colours off a second time. To count
-# none would cost strong colours 0.1 dB. It was chosen on pictures that judge nothing (docs/decisions/0062).
+# than the truth where noise hides colour. A matrix that counts the whole variance would reduce colours a second time;
+# one that counts none would cost strong colours 0.1 dB. The share was chosen on pictures that no result is measured on
+# (docs/decisions/0062).
 INDEPENDENT = 0.25
-STRIP_ROWS = 128  # of planes that become a picture together
-OTHER_CURVES = 0.1  # in the logarithm of a channel over green: how far a neutral may lie from those of known lights
+STRIP_ROWS = 128  # rows that are converted from planes to a picture together
+OTHER_CURVES = 0.1  # largest difference of a neutral from those of known lights, in the logarithm of channel over green
 
 
 def picture_ple_rgbw(
@@ -45,9 +46,9 @@ def picture_ple_rgbw(
     Parameters
     ----------
     raw, colours, balance
-        As `isp.processors.catalogue.Processor.develop` makes them.
+        As `isp.processors.catalogue.Processor.develop` passes them.
     prior : Prior, optional
-        Of the camera's curves; that of the project's own ones where left out.
+        Prior of the camera's curves, by default that of the project's own curves.
 
     Raises
     ------
@@ -57,7 +58,7 @@ def picture_ple_rgbw(
     Warns
     -----
     UserWarning
-        Where the calibrated neutral can't be that of the prior's curves.
+        If the calibrated neutral can't belong to the prior's curves.
     """
     if not is_rgbw(raw.cfa):
         raise InputError(
@@ -70,15 +71,15 @@ def picture_ple_rgbw(
 def picture_ple_bayer(
     raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None
 ) -> Picture:
-    """Develop a Bayer raw image; as `picture_ple_rgbw`."""
+    """Develop a Bayer raw image; parameters are those of `picture_ple_rgbw`."""
     require_bayer(raw.cfa)
     return develop_planes(raw, colours, balance, prior or own_prior()).picture
 
 
 def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, prior: Prior | None = None) -> Picture:
-    """Develop a raw image of any tile of R, G, B and W that is 1, 2 or 4 pixels high and wide; as `picture_ple_rgbw`.
+    """Develop a raw image of any tile of R, G, B and W that is 1, 2 or 4 pixels high and wide; see `picture_ple_rgbw`.
 
-    Without R, G and B the matrix takes all channels; of one or two it makes a grey picture.
+    If R, G and B aren't all there, the matrix takes all channels; with one or two channels the picture is grey.
     """
     if not takes(raw.cfa) or min(raw.shape) < STRIDE:
         raise InputError(
@@ -89,19 +90,19 @@ def picture_ple(raw: RawImage, colours: ColourFit, *, balance: WhiteBalance, pri
 
 
 def takes(tile: Tile) -> bool:
-    """Whether `picture_ple` develops a tile: of R, G, B and W, 1, 2 or 4 pixels high and wide."""
+    """Return whether `picture_ple` takes a tile: one of R, G, B and W, 1, 2 or 4 pixels high and wide."""
     return {len(tile), len(tile[0])} <= set(SIDES) and set(channels(tile)) <= set(LETTERS)
 
 
 @dataclass(frozen=True)
 class PiecewisePicture:
-    """A picture, and the planes that it was made of.
+    """A picture, and the planes from which it was made.
 
     Attributes
     ----------
     picture : Picture
     planes : (h, w, channel) float32
-        Of every channel at every pixel [e-].
+        Every channel at every pixel [e-].
     gains : (channel,) float64
         White balance.
     """
@@ -112,7 +113,7 @@ class PiecewisePicture:
 
 
 def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, prior: Prior) -> PiecewisePicture:
-    """Develop a raw image as `picture_ple`, whose tile the caller has checked."""
+    """Develop a raw image as `picture_ple` does; the caller has checked its tile."""
     names, unit = raw.channels, raw.unit_channel
     index = [LETTERS.index(name) for name in names]
     prior = _as_it_reads(raw, prior, balance.neutral)
@@ -130,7 +131,7 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
     gains, sources = balance.gains(raw, planes)
     noise = relative_noise(raw, planes, INDEPENDENT * variance, gains, colours)
     coloured = {"R", "G", "B"} <= set(names)
-    # Where pixels exchange charge, W tells how much of it is in the colours.
+    # If pixels exchange charge, W takes part, because it tells how much of its charge is in the colours.
     used = 3 if coloured and not (raw.crosstalk and colours.plain is None) else len(names)
     matrix = colours.matrix(names[:used], noise[:used]) if coloured else None
     highlights = Highlights.of(raw, gains)
@@ -142,7 +143,7 @@ def develop_planes(raw: RawImage, colours: ColourFit, balance: WhiteBalance, pri
 
 
 def _as_it_reads(raw: RawImage, prior: Prior, neutral: Floats | None) -> Prior:
-    """Prior of the channels as crosstalk mixes them, under the light of the calibrated neutral."""
+    """Mix a prior's channels as crosstalk does, under the light of the calibrated neutral."""
     if not raw.crosstalk:
         return prior
     index = [LETTERS.index(name) for name in raw.channels]
@@ -155,9 +156,9 @@ def _as_it_reads(raw: RawImage, prior: Prior, neutral: Floats | None) -> Prior:
 
 
 def curves_differ(prior: Prior, neutral: Floats, index: Sequence[int]) -> bool:
-    """Whether a calibrated neutral lies far from those of the prior's curves, under any mix of two known lights.
+    """Return whether a calibrated neutral is far from that of the prior's curves under any mix of two known lights.
 
-    Of channels `index` among R, G, B and W; G counts as sure, or the last one where there is none.
+    The channels are those of `index` among R, G, B and W. They are compared relative to G, or without it to the last.
     """
     sure = index.index(LETTERS.index("G")) if LETTERS.index("G") in index else -1
     prior_log = np.log(prior.neutrals_e[:, index] / prior.neutrals_e[:, index[sure], None])

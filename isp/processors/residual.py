@@ -8,7 +8,7 @@ other colour in either direction, averaged on four sides by their gradients as i
 as in Y. Monno, D. Kiku, M. Tanaka, M. Okutomi, "Adaptive residual interpolation for color and multispectral image
 demosaicking", Sensors 17(12), 2017.
 
-After the papers' method, not their authors' program. Ours: reflection about the outermost pixels.
+This follows the papers, not their authors' program. Reflection about the outermost pixels is this project's.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from isp.processors.demosaic import require_bayer
 from rodcone.types import Image, Mosaic, Plane
 from sensor.cfa import Tile, mask
 
-REACH = 28  # how far away [pixels] the mosaic may still change a value: 15 for green, 13 more for R and B
+REACH = 28  # distance [pixels] at which the mosaic may still change a value: 15 for green, and 13 more for R and B
 _GREEN_WINDOW, _COLOUR_WINDOW = 7, 11  # pixels along a side of the guided filters' windows
 _SECOND = np.array([-1.0, 0.0, 2.0, 0.0, -1.0])  # Laplacian along one axis of samples two apart
 _BETWEEN = np.array([0.5, 1.0, 0.5])  # interpolates samples two apart
@@ -30,7 +30,7 @@ _LEAST = 1e-10  # added to divisors; far below any gradient or Laplacian of nois
 
 
 def residual_interpolation(mosaic: Mosaic, cfa: Tile) -> Image:
-    """Planes of R, G and B, shape (h, w, 3); parameters as `isp.processors.demosaic.menon`."""
+    """Demosaic to planes of R, G and B, shape (h, w, 3); parameters are those of `isp.processors.demosaic.menon`."""
     require_bayer(cfa)
     padded = np.pad(mosaic, REACH, mode="reflect")
     height, width = padded.shape
@@ -44,7 +44,7 @@ def residual_interpolation(mosaic: Mosaic, cfa: Tile) -> Image:
 
 
 def _green(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
-    """Green everywhere: at another colour's site its sample and the difference that the four sides tell."""
+    """Interpolate green: at another colour's site it is that sample plus the difference that the four sides give."""
     total, weights = np.zeros_like(mosaic), np.zeros_like(mosaic)
     for axis, difference in ((1, _differences(mosaic, green)), (0, _differences(mosaic.T, green.T).T)):
         gradient = np.abs(scipy.ndimage.convolve1d(difference, [1.0, 0.0, -1.0], axis))
@@ -59,7 +59,7 @@ def _green(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
 
 
 def _differences(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
-    """Green less the other colour of the same row, at every pixel, by residual interpolation along the rows."""
+    """Compute green minus the other colour of the same row at every pixel, by residual interpolation along rows."""
     between = scipy.ndimage.convolve1d(mosaic, [0.5, 0.0, 0.5], axis=1)
     as_green, as_colour = np.where(green, mosaic, between), np.where(green, between, mosaic)
     result = np.empty_like(mosaic)
@@ -76,7 +76,7 @@ def _differences(mosaic: Mosaic, green: NDArray[np.bool_]) -> Plane:
 
 
 def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tuple[int, ...], window: int) -> Plane:
-    """A colour that is linear in the guide within each window, the Laplacian of its residual being the least."""
+    """Predict a colour that is linear in the guide within each window, so that its residual's Laplacian is least."""
     slopes = [sum(scipy.ndimage.convolve1d(plane, _SECOND, axis) for axis in axes) for plane in (guide, samples)]
     guide_slope = np.where(sampled, slopes[0], 0.0)
     sample_slope = slopes[1]
@@ -85,7 +85,7 @@ def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tup
     sample, guides = (np.where(sampled, plane, 0.0) for plane in (samples, guide))
     mean, mean_guide = _sums(sample, window) / count, _sums(guides, window) / count
     offset = mean - gain * mean_guide
-    # Windows count by how well they fit: one that holds a lamp, or two surfaces, says little about a pixel beside them.
+    # Windows are weighted by how well they fit, because one with a lamp or two surfaces says little about other pixels.
     squares = _sums(sample**2, window) / count
     product = _sums(sample * guides, window) / count - mean * mean_guide
     missed = squares - mean**2 - 2 * gain * product + gain**2 * (_sums(guides**2, window) / count - mean_guide**2)
@@ -94,6 +94,6 @@ def _predict(samples: Plane, guide: Plane, sampled: NDArray[np.bool_], axes: tup
 
 
 def _sums(values: Plane, window: int) -> Plane:
-    """Sum of the window around each pixel, each summed anew: a running sum leaves rounding behind what was bright."""
+    """Sum the window around each pixel afresh, because a running sum would keep the rounding error of bright pixels."""
     ones = np.ones(window)
     return np.asarray(scipy.ndimage.convolve1d(scipy.ndimage.convolve1d(values, ones, 0), ones, 1))

@@ -1,14 +1,14 @@
-"""A mosaic as pictures of one site of the tile each, denoised together by BM3D in units of noise, and back.
+"""Denoising of a mosaic by BM3D: sub-images, one per site of the tile, are denoised together in units of noise.
 
 As in S. H. Park, H. S. Kim, S. Lansel, M. Parmar, B. A. Wandell, "A case for denoising before demosaicking color filter
 array data", Asilomar 2009, and H. Akiyama, M. Tanaka, M. Okutomi, "Pseudo four-channel image denoising for noisy CFA
-raw data", ICIP 2015: the pictures are mixed by an orthonormal matrix, which leaves independent noise independent and
-its variance 1, so that most of what they share stands in the first. Ours: Anscombe's transform before, its exact
-inverse after.
+raw data", ICIP 2015: the sub-images are mixed by an orthonormal matrix. Noise remains independent and of variance 1,
+and most of what the sub-images have in common is in the first mixture. Anscombe's transform before, and its exact
+inverse after, are this project's.
 
 BM3D: K. Dabov, A. Foi, V. Katkovnik, K. Egiazarian, "Image denoising by sparse 3-D transform-domain collaborative
 filtering", IEEE Trans. Image Process. 16(8), 2007, by the library `bm3d` (Y. Makinen, L. Azzari, A. Foi, IEEE TIP 29,
-2020). Its licence allows informational and non-commercial use alone, so it is an extra of its own.
+2020). Its licence allows only informational and non-commercial use, so that it is a separate extra.
 """
 
 from collections.abc import Callable, Sequence
@@ -25,15 +25,15 @@ Mix = Callable[[Image], NDArray[np.float64]]
 
 
 def hadamard(sites: Image) -> NDArray[np.float64]:
-    """Fixed orthonormal matrix of four pictures, whatever they show: their mean, twice, and three differences."""
+    """Return a fixed orthonormal matrix for four pictures: half their sum and half of three differences."""
     return np.array([[1, 1, 1, 1], [1, 1, -1, -1], [1, -1, 1, -1], [1, -1, -1, 1]]) / 2.0
 
 
 def principal_components(sites: Image) -> NDArray[np.float64]:
     """Return the orthonormal rows along which the pictures (h, w, site) vary most, in falling order.
 
-    Noise of one variance in all pictures adds a multiple of the unit matrix to their covariance, which leaves the rows
-    as they are.
+    Noise of equal variance in all pictures adds a multiple of the unit matrix to their covariance, which doesn't change
+    the rows.
     """
     _, rows = np.linalg.eigh(np.cov(sites.reshape(-1, sites.shape[-1]), rowvar=False))
     return rows[:, ::-1].T
@@ -46,15 +46,15 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
     ----------
     raw : RawImage
     mix : callable
-        Sub-images (h, w, site) [standard deviations of noise] to the matrix that mixes them: `hadamard` or
-        `principal_components`.
+        Function that chooses the mixing matrix from sub-images (h, w, site) [standard deviations of noise]: `hadamard`
+        or `principal_components`.
 
     Raises
     ------
     InputError
-        Without the library `bm3d`.
+        If the library `bm3d` isn't installed.
     """
-    plain = without_prnu(raw)  # for several readings per pixel it states the noise of each range of light
+    plain = without_prnu(raw)  # for several readings per pixel it has the noise of each range of light
     odd = [(0, size % 2) for size in raw.shape]
     stable = np.pad(stabilise_raw(raw.electrons, plain), odd, mode="reflect")
     sites = np.stack([stable[row::2, column::2] for row in (0, 1) for column in (0, 1)], axis=-1)
@@ -67,7 +67,7 @@ def bm3d_mosaic(raw: RawImage, mix: Mix) -> Plane:
 
 
 EXTRA = "bm3d"
-_SMALLEST = 32  # pixels along a side: the library fails on planes not much larger than its 8x8 blocks
+_SMALLEST = 32  # least side [pixels], because the library fails on planes hardly larger than its 8x8 blocks
 
 
 def bm3d(planes: Image, sigma: Sequence[float]) -> Image:
@@ -76,7 +76,7 @@ def bm3d(planes: Image, sigma: Sequence[float]) -> Image:
     Parameters
     ----------
     planes : (h, w, plane) float64
-        White noise in each, independent between planes. Blocks are matched on the first plane alone, for all.
+        Planes with white noise, independent between planes. Blocks are matched on the first plane for all of them.
     sigma : sequence of float
         Standard deviation of each plane's noise.
 

@@ -1,1 +1,1 @@
-"""The interleaved reconstruction in Dr.Jit, one source for processors and CUDA: see `isp.interleaved.kernel.run`."""
+"""The interleaved reconstruction in Dr.Jit, one source for CPUs and CUDA; it begins in `isp.interleaved.kernel.run`."""

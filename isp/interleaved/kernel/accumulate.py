@@ -1,8 +1,8 @@
-"""The sums of eqs. (1) and (3), one sample after the other, in units that don't underflow.
+"""The sums of eqs. (1) and (3), accumulated sample by sample in units that don't underflow.
 
-Fixed scale: weights count in units of 2^-HEADROOM of the largest possible one. Where a sum ends under LEAST_WEIGHT,
-nearly all of a pixel's weights may have underflowed. Running maximum (online soft-max), for those pixels: weights count
-in units of the largest one so far, so W_y is never 0.
+At the fixed scale, weights are in units of 2^-HEADROOM of the largest possible one. If a sum ends below LEAST_WEIGHT,
+nearly all of a pixel's weights may have underflowed. For such pixels there is the running maximum (online soft-max):
+weights are in units of the largest one so far, so that W_y is never 0.
 
 The reconstruction's limits, all of them (log weights and exponents are logarithms to base 2):
 
@@ -30,16 +30,16 @@ OUTSIDE = 1e13
 LEAST_INVERSE_VARIANCE = 2e-24
 ROOT_SCALE = 2.0**-32
 
-# Coefficients of 2^f for 0 <= f <= 1, lowest power first, by Remez exchange; each weight is wrong by 7.5e-5 at most. If
-# two samples of equal weight err by that in opposite ways, their mean errs by 1/4 * 2 * 7.5e-5 = 3.8e-5 of their
-# difference. A fourth power would take a tenth more time.
+# Coefficients of 2^f for 0 <= f <= 1, lowest power first, by Remez exchange. A weight errs by at most 7.5e-5. If two
+# samples of equal weight err by so much in opposite directions, their mean errs by 1/4 * 2 * 7.5e-5 = 3.8e-5 of their
+# difference. With a fourth power the kernel would take a tenth longer.
 EXP2 = (0.99992522, 0.69583354, 0.22606716, 0.07802452)
 
 Sums = tuple[Float, ...]  # of the weights, of weight times sample, of the squared weights[, largest log weight so far]
 
 
 def start_sums(running: bool) -> tuple[float, ...]:
-    """Sums before the first sample."""
+    """Return the sums before the first sample."""
     return (0.0, 0.0, 0.0) + (NO_LOG_WEIGHT,) * running
 
 
@@ -57,14 +57,14 @@ def add_samples(
 def squared_distances(
     at_x: dict[int, list[Float]], at_y: dict[int, list[Float]], pixels: list[tuple[int, int]], patch: int
 ) -> list[Float]:
-    """Squared distance of each pixel's patches.
+    """Compute the squared distance between the patches of each pixel.
 
     Parameters
     ----------
     at_x, at_y : mapping of int to list
-        Rows under the patches around x and y; a pixel's patch begins at its own row and column.
+        Rows that the patches around x and y cover; a pixel's patch begins at its own row and column.
     """
-    # y - x, not x - y: the x stay in memory, and a processor subtracts memory from a register.
+    # y - x and not x - y, because the x stay in memory, and a CPU subtracts memory from a register.
     squares = {i: [dr.square(y - x) for x, y in zip(at_x[i], at_y[i], strict=True)] for i in at_x}
     columns = sorted({c for _, c in pixels})
     lines = {c: {i: _sum(line, c, patch) for i, line in squares.items()} for c in columns}
@@ -72,7 +72,7 @@ def squared_distances(
 
 
 def mixed_squares(colour: list[Float], white: list[Float], alpha: list[Float]) -> list[Float]:
-    """Square of eq. (5) from both squared distances, expanded: exactly one of them where alpha is 0 or 1.
+    """Compute the square of eq. (5) from both squared distances; for alpha 0 or 1 it is exactly one of them.
 
     (a sqrt(colour) + (1 - a) sqrt(white))^2 = a^2 colour + (1 - a)^2 white + 2 a (1 - a) sqrt(colour white): one root.
     """
@@ -85,7 +85,7 @@ def mixed_squares(colour: list[Float], white: list[Float], alpha: list[Float]) -
 
 
 def _sum(values: list[Float] | dict[int, Float], first: int, count: int) -> Float:
-    """Sum of some values that follow each other: pairs, fours, eights, which Dr.Jit shares where sums overlap."""
+    """Sum consecutive values by pairs, fours and eights, which Dr.Jit shares between overlapping sums."""
     if count == 1:
         return values[first]
     power = 1 << (count - 1).bit_length() - 1
@@ -93,7 +93,7 @@ def _sum(values: list[Float] | dict[int, Float], first: int, count: int) -> Floa
 
 
 def larger(a: Float, b: Float) -> Float:
-    """The larger one; `dr.maximum` takes three instructions, for the sake of NaN."""
+    """Return the larger one; `dr.maximum` takes three instructions, because it handles NaN."""
     return dr.select(a > b, a, b)
 
 
@@ -120,10 +120,10 @@ def _add_to_running_maximum(sums: Sums, log_weight: Float, sample: Float, bright
 
 
 def _exp2(exponent: Float) -> Float:
-    """2^exponent for -125 <= exponent < 127, right to 8e-5.
+    """Compute 2^exponent for -125 <= exponent < 127 within 8e-5.
 
-    The bits of a float are its logarithm, but for the fraction: 2^n (1 + m) holds (n + 127 + m) 2^23. So n + 2^f - 1 is
-    formed for 0 <= f < 1, scaled and taken as bits (Schraudolph 1999, with a cubic in place of his straight line).
+    The bits of a float are nearly its logarithm: 2^n (1 + m) is stored as (n + 127 + m) 2^23. Therefore n + 2^f - 1 is
+    computed for 0 <= f < 1, scaled, and its value taken as bits (Schraudolph 1999, with a cubic for his straight line).
     """
     real = type(exponent)
     whole = dr.floor(exponent)

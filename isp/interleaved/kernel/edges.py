@@ -1,4 +1,4 @@
-"""The formula of `isp.interleaved.edges` in Dr.Jit: a thread a pixel, whose four channels lie together in a packet."""
+"""The formula of `isp.interleaved.edges` in Dr.Jit: one thread per pixel, whose four channels form a packet."""
 
 from functools import reduce
 from itertools import combinations_with_replacement, product
@@ -17,31 +17,36 @@ from sensor.raw import RawImage
 
 Packet: TypeAlias = Any  # four values of a pixel, one per channel
 
-REACH = 2  # pixels of a window to either side: 3 brings 0.02 dB more
+REACH = 2  # pixels of a window to either side; 3 would gain 0.02 dB
 SIDE = 2 * REACH + 1
 # a and b of C' = a C + b e m m^T. 2.5 and 0 lose 0.6 dB, 0 and 2.5 lose 0.1; 0.3 and 0.7 lose 0.2, twice both gains 0.1
 # and makes flats noisier.
 SPREAD = 0.75, 1.75
-FULL = 0.95  # of the well, from which on there may be more light than was read
-MISSED = 30.0  # chi^2 of planes that miss a lamp: at 10 windows have a grey ring, at 100 lamps of 5x2 pixels a red one
-FAR = 24  # pixels to either side from which the surroundings' colour comes
-STEP = 12  # pixels between their 5 x 5 places
-HIDDEN = 5.0  # chi^2 of a colour up to which noise hides it all: with 3, clouds stay in the dark; with 9, charts pale
-APART = 9.0  # squared standard deviations by which a sample stands out of its plane
-# Contrast from which on light is small: at 1 edges of windows show their tile, at 2 halos of lamps have 15 % more hues.
+FULL = 0.95  # share of the well from which on there may be more light than was read
+# chi^2 of planes that miss a lamp. With 10, windows get a grey ring; with 100, lamps of 5x2 pixels get a red one.
+MISSED = 30.0
+FAR = 24  # distance [pixels] to either side within which the surroundings' colour is found
+STEP = 12  # distance [pixels] between the 5 x 5 places at which it is found
+# chi^2 of a colour up to which noise hides it. With 3, coloured clouds remain in the dark; with 9, charts get paler.
+HIDDEN = 5.0
+APART = 9.0  # squared standard deviations by which a sample has to differ from its plane
+# Contrast from which on a light is small. With 1, edges of windows show the tile; with 2, halos of lamps have 15 % more
+# false hues.
 SMALL = 1.5
-FEW = 4.0  # samples; a plane that averages more is trusted. With 1, lamps get hues; with more, walls get the window's
-UNKNOWN = 1e12  # noise of a sample that is full [e-^2]
-TINY = 1e-9  # where there is neither light nor noise
-# Of the nine samples around a pixel, row by row: correlation exp(-r^2 / 2), r in pixels; of 0.8 pixels loses 0.01 dB,
-# of 1.5 0.3.
+# A plane that averages more samples than this is trusted. With 1, lamps get false hues; with more, walls take on the
+# colour of a window.
+FEW = 4.0
+UNKNOWN = 1e12  # noise variance of a full sample [e-^2]
+TINY = 1e-9  # least noise variance or light, if there is neither light nor noise
+# Correlation exp(-r^2 / 2), r in pixels, between the nine samples around a pixel, row by row. With a length of 0.8
+# pixels instead of 1, 0.01 dB is lost; with 1.5, 0.3 dB.
 OFFSETS = np.array(list(product((-1.0, 0.0, 1.0), repeat=2)))
 CORRELATION = np.exp(-((OFFSETS[:, None] - OFFSETS) ** 2).sum(axis=2) / 2.0)
 NEAR = CORRELATION[4] ** 4 / (CORRELATION[4] ** 4).sum()
 
 
 def channel_noise(raw: RawImage) -> NDArray[np.float64]:
-    """Shot noise's variance an electron (k), dark variance [e-^2], and from where full [e-]: (3, channel)."""
+    """Return shot noise's variance per electron k, the dark variance [e-^2] and the full level [e-]: (3, channel)."""
     noises = [raw.noise_of(name) for name in raw.channels]
     return np.array([(x.shot, x.dark_noise_e**2, FULL * x.full_well_e) for x in noises]).T
 
@@ -49,12 +54,12 @@ def channel_noise(raw: RawImage) -> NDArray[np.float64]:
 def sharpen_frame(
     white: WhiteReading, planes: NDArray[Any], noise_gain: NDArray[Any], scales: Floats
 ) -> NDArray[np.float32]:
-    """As `isp.interleaved.edges.sharpen`, with its names; `scales` are g and nu, (2, 4)."""
+    """Sharpen a frame as `isp.interleaved.edges.sharpen` does, by whose symbols `scales` are g and nu, (2, 4)."""
     jit = arrays()
     raw = white.raw
     names, (height, width) = raw.channels, raw.shape
     down, across = (np.uint32(length) for length in (len(raw.cfa), len(raw.cfa[0])))
-    # Mirrored at the borders: row r stands at FAR + r.
+    # Rows and columns are mirrored at the borders; row r stands at FAR + r.
     rows, columns = (np.pad(np.arange(length, dtype=np.uint32), FAR, mode="reflect") for length in raw.shape)
     frame, noise_gains, share_planes = upload(planes), upload(noise_gain), upload(white.shares)
     electrons = upload((raw.dn.astype(np.float32) - np.float32(raw.black_dn)) * np.float32(raw.gain_e_per_dn))
@@ -149,7 +154,7 @@ def sharpen_frame(
 
 
 def _moments(window: list[Packet]) -> tuple[Packet, list[Packet]]:
-    """M and the rows of C of a window, about its middle pixel, since squares of light have too many digits."""
+    """Compute m and the rows of C of a window, relative to its middle pixel, because squares of light lose digits."""
     middle = window[len(window) // 2]
     away = [value - middle for value in window]
     offset = sum(away[1:], away[0]) / SIDE**2
@@ -161,7 +166,7 @@ def _moments(window: list[Packet]) -> tuple[Packet, list[Packet]]:
 
 
 def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Packet, faint: Float) -> Packet:
-    """r, the colour of those of the places `far` whose light is like a window's; `faint` is the noise of W."""
+    """Compute r, the colour of those places `far` whose light resembles a window's; `faint` is the noise of W."""
 
     def in_noise(values: Packet) -> Packet:
         return 2.0 / shot * dr.sqrt(shot * larger(values, 0.0) + dark)
@@ -175,19 +180,20 @@ def _tint_of_like_places(mean: Packet, far: list[Packet], shot: Packet, dark: Pa
 
 
 def _lamp(white: list[Float], light: Float, contrast: Float, chi_squared: Float) -> Float:
-    """How far a lamp's colour isn't known, from the planes of W in its window and their mean."""
+    """Estimate to which degree a lamp's colour is unknown, from the planes of W in its window and their mean."""
     lines = [[larger(value, 0.0) for value in white[i : i + SIDE]] for i in range(0, SIDE**2, SIDE)]
     lattices = [[w for line in lines[i::2] for w in line[j::2]] for i, j in product((0, 1), repeat=2)]
     least = reduce(dr.minimum, [sum(x[1:], x[0]) / len(x) for x in lattices])
     near = [lines[i][j] for i, j in product(range(REACH - 1, REACH + 2), repeat=2)]
-    # Times 1.5: at 1 the dark beside corners of windows is greyed, at 3 more hues around lamps stay.
+    # With a factor of 1 instead of 1.5, the dark beside corners of windows turns grey; with 3, more hues remain around
+    # lamps.
     between = (sum(near[1:], near[0]) / 9.0 - 1.5 * least) / larger(light, TINY)
     missed = dr.minimum(larger(chi_squared / MISSED, between), 1.0)
     return (1.0 - 1.0 / dr.square(larger(contrast, 1.0))) * missed
 
 
 def _own_light(sample: Float, share: Float, of_white: Float, noise: tuple[Float, Float]) -> Float:
-    """What W would read by the pixel's own sample, as far as that stands out of W's plane."""
+    """Estimate what W would read from the pixel's own sample, as far as that differs from W's plane."""
     shot, dark = noise
     as_white_noise = larger((shot * larger(of_white, 0.0) + dark / share) / share, TINY)
     difference = sample / share - of_white
@@ -196,7 +202,7 @@ def _own_light(sample: Float, share: Float, of_white: Float, noise: tuple[Float,
 
 
 def at_site(values: list[Float], site: UInt) -> Float:
-    """That of four values whose number is `site`."""
+    """Return that one of four values whose number is `site`."""
     *rest, result = values
     for number, value in enumerate(rest):
         result = dr.select(site == number, value, result)
@@ -204,9 +210,9 @@ def at_site(values: list[Float], site: UInt) -> Float:
 
 
 def _solve(lower: list[list[Any]], noise: list[Any], residual: list[Any]) -> list[Any]:
-    """Solution z of (A + diag(noise)) z = residual by L D L^T, A symmetric, positive, and given by its lower half.
+    """Solve (A + diag(noise)) z = residual by L D L^T, for a symmetric positive A that is given by its lower half.
 
-    No pivot is under its noise, whatever rounding does.
+    Rounding can't make a pivot smaller than its noise.
     """
     factors, inverses, forward = list[list[Any]](), list[Any](), list[Any]()  # L, 1 / D, L^-1 residual
     for i, line in enumerate(lower):

@@ -1,9 +1,9 @@
-"""Eqs. (1) to (5) for many blocks of pixels: what one thread does, in Dr.Jit, for LLVM and CUDA alike.
+"""Eqs. (1) to (5) for one thread's block of pixels, in Dr.Jit for LLVM and CUDA.
 
-With a shared guide a thread owns all pixels of its block and reads one plane. Otherwise it owns those whose y lie at
-one cell of the tile, and reads the plane of the channel there. So one compiled kernel serves all phases and cells, and
-all mosaics with a tile of this size. Loading is what costs: at y whole rows are loaded, a packet each
-(`isp.interleaved.kernel.layout`).
+With a shared guide, a thread owns all pixels of its block and reads one plane. Otherwise it owns those whose y lie at
+one cell of the tile, and reads the plane of the channel there. Therefore one compiled kernel serves all phases and
+cells, and all mosaics with a tile of this size. Most of the time is spent on loading, so that at y whole rows are
+loaded, each as a packet (`isp.interleaved.kernel.layout`).
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from rodcone.jit import dr
 
 @dataclass(frozen=True)
 class Shape:
-    """What a kernel is compiled for.
+    """Sizes and options for which a kernel is compiled.
 
     Attributes
     ----------
@@ -34,9 +34,9 @@ class Shape:
     patch : int
         Width of the patches.
     guide : {"shared", "channel", "mixed"}
-        The plane that guides: one for all channels, that of the channel at y, or that and W's as alpha mixes them.
+        The guiding plane: one for all channels, that of the channel at y, or a mixture of that and W's by alpha.
     running : bool
-        Whether sums are in units of the largest weight so far, or at a fixed scale.
+        Whether sums are in units of the largest weight so far, rather than at a fixed scale.
     """
 
     tile: tuple[int, int]
@@ -48,9 +48,9 @@ class Shape:
 
 @dataclass(frozen=True)
 class KernelSums:
-    """What the threads of a strip give, Dr.Jit arrays [phase, row, column].
+    """Results of a strip's threads, as Dr.Jit arrays [phase, row, column].
 
-    In phase (a, b) the strip's pixel (r, c) stands at row r + a and column c + b, for blocks to begin at whole blocks.
+    In phase (a, b) the strip's pixel (r, c) is stored at row r + a and column c + b, so that blocks are aligned.
 
     Attributes
     ----------
@@ -59,9 +59,9 @@ class KernelSums:
     mean : Float
         Weighted mean of the samples.
     noise_gain : Float
-        Sum of the squared weights over the squared sum.
+        Sum of the squared weights over the squared sum of the weights.
     first_row, rows, columns : Int
-        The strip's first row in the frame; rows and columns of a phase.
+        The strip's first row in the frame, and the number of rows and columns of a phase.
     """
 
     weight: Any
@@ -74,21 +74,21 @@ class KernelSums:
 
 
 def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
-    """Start the threads; says which of them hold a pixel whose sums are too small for the fixed scale."""
+    """Start the threads; return which of them hold a pixel whose sums are too small for the fixed scale."""
     patch = shape.patch
     across = shape.tile[1]
     count = dr.width(threads.row)
     dense = shape.guide == "shared"
     rows, columns = (range(0, n, 1 if dense else step) for n, step in zip(shape.block, shape.tile, strict=True))
-    # Row by row: instructions come in the order in which sums are evaluated, and each row of patches is loaded when
-    # the first pixel needs it.
+    # Pixels are ordered row by row, because instructions follow the order in which sums are evaluated. Each row of
+    # patches is then loaded when the first pixel needs it.
     pixels = [(r, c) for r in rows for c in columns]
     window = sorted({r + i for r in rows for i in range(patch)})  # rows under the patches
-    # How many columns a packet of the plane reaches over, and one of samples.
+    # Columns that a packet of the plane covers, and columns that a packet of samples covers.
     under = shape.block[1] + patch - 1
     block = shape.block[1]
 
-    # Where things are
+    # Compute addresses.
     x_row, x_column = threads.row - inputs.top, threads.column - inputs.left
     x = jit.UInt(x_row) * inputs.stride + jit.UInt(x_column)  # pixel
     x_plane = jit.UInt(threads.plane)
@@ -104,7 +104,7 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     first_entry = offsets * inputs.length
     entries = dr.gather(jit.UInt, inputs.counts, offsets)
 
-    # What the thread reads at x, once
+    # Load once what the thread reads at x.
     patches_at_x = [
         {
             i: [
@@ -119,7 +119,7 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     brightest = [dr.gather(jit.Float, inputs.brightest, bound + r * inputs.stride + c) for r, c in pixels]
 
     def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
-        """First values of a packet, 8 at a time: part k of packet p is number p * (size / 8) + k."""
+        """Load the first values of a packet, 8 at a time; part k of packet p has the number p * (size / 8) + k."""
         part = min(size, 8)
         values = list[Any]()
         for k in range(-(-needed // part)):
@@ -137,7 +137,7 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
             patches_at_y = {}
             for line in lines:
                 own_rows = range(line * pair, (line + 1) * pair)
-                # Every plane's packets have the samples.
+                # The packets of every plane contain the samples.
                 needed = pair * (under + block) if n == 0 and any(i in rows for i in own_rows) else pair * under
                 values = load(inputs.packets, first_packet + y + below[line], inputs.packet_values, needed)
                 for j, i in enumerate(own_rows):
@@ -157,21 +157,24 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     start = [tuple(dr.full(jit.Float, value, count) for value in start_sums(shape.running))] * len(pixels)
     _, totals = dr.while_loop((jit.UInt(0), start), lambda k, _: k < entries, add_offset)
 
-    # What is stored first is evaluated first: a pixel's sample is used as soon as it is loaded. Were the weights asked
-    # for before the means, the samples of the whole block would wait in memory.
+    # Results are evaluated in the order in which they are stored, so that a pixel's sample is used as soon as it is
+    # loaded. If all weights were stored before the means, the samples of the whole block would wait in memory.
     targets = _store(jit, totals, pixels, threads, shape, sums)
     failed = dr.zeros(jit.Bool, count)
     if not shape.running:
         dr.scatter(failed, _failed(jit, totals, pixels, threads, inputs), dr.arange(jit.UInt, count))
-    dr.eval(targets, failed)  # all at once, for the loop to run once
+    dr.eval(targets, failed)  # all at once, so that the loop runs once
     return failed
 
 
 def _failed(jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
-    """Threads that hold a pixel of the frame with too small a sum; those of other strips too: all decide alike."""
+    """Mark threads that hold a pixel of the frame with too small a sum.
+
+    Pixels of other strips count as well, so that the result doesn't depend on how the frame is divided.
+    """
     failed = dr.full(jit.Bool, False, dr.width(threads.row))
     for (r, c), (weight, *_) in zip(pixels, totals, strict=True):
-        # In the frame: unsigned, a negative number is a large one.
+        # A pixel is in the frame if its unsigned row and column are small, because negative numbers become large.
         inside = (jit.UInt(threads.row + r) < inputs.height) & (jit.UInt(threads.column + c) < inputs.width)
         failed |= inside & (weight < LEAST_WEIGHT)
     return failed
@@ -180,16 +183,16 @@ def _failed(jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], t
 def _store(
     jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
 ) -> list[Any]:
-    """Store what the loop has summed up; what is stored into is returned, not evaluated yet."""
+    """Store the loop's sums; return the arrays they are stored into, which aren't evaluated yet."""
     targets = [sums.weight, sums.mean, sums.noise_gain] + [sums.unit] * shape.running
     stored = [
         (weight, value / weight, square / dr.square(weight), *largest) for weight, value, square, *largest in totals
     ]
-    # [phase, row, column]: (phase * rows + row) * columns + column, of the pixel (row + a, column + b)
+    # The pixel (row + a, column + b) is stored at [phase, row, column], (phase * rows + row) * columns + column.
     row = threads.row - sums.first_row + threads.phase // shape.tile[1]
     column = threads.column + threads.phase % shape.tile[1]
     first = (threads.phase * sums.rows + row) * sums.columns + column
-    # Values that are stored at once: the largest power of two that divides a row of the block.
+    # As many values are stored at once as the largest power of two that divides a row of the block.
     packet = shape.block[1] & -shape.block[1] if shape.guide == "shared" else 1
     for i in range(0, len(pixels), packet):
         index = jit.UInt(first + pixels[i][0] * sums.columns + pixels[i][1]) // packet

@@ -1,4 +1,4 @@
-"""Strips: some rows of a frame at a time, so that memory stays bounded, laid out for the kernel's loads.
+"""Layout of a strip in memory for the kernel's loads. A strip is some rows of a frame, so that memory stays bounded.
 
             left                                                                     right
       top    +------------------------------------------------------------------------+
@@ -17,14 +17,16 @@
     A row:      h0 h1 h2 h3 h4 h5 ...  of a plane,  s0 s1 s2 s3 s4 s5 ...  samples
     Packets:    |h0 h1 h2 h3 s0 s1 s2 s3|h2 h3 h4 h5 s2 s3 s4 s5| ...      (block 4 wide, patch 1, every 2nd column)
 
-A packet holds all that a thread reads of a row of y: the plane under the patches of its block, and the block's samples.
-Where one plane guides all channels it holds two rows (h of both, then s of both), which is a line of the cache. At x,
-which a thread reads once, planes are read pixel by pixel. The addresses, with `packet_step` = (down, across):
+A packet holds all that a thread reads in a row of y: the plane under the patches of its block, and the block's samples.
+If one plane guides all channels, a packet holds two rows (h of both, then s of both), which fill a line of the cache.
+At x, which a thread reads once, planes are read pixel by pixel. The addresses, with `packet_step` = (down, across),
+are:
     pixel   (row - top) * stride + column - left
     packet  (row - top) / down * row_packets + (column - left) / across
 
-Planes are stored half a patch early: where a pixel stands, its patch begins. Beyond the frame they go on by reflection
-for half a patch and are OUTSIDE further on. Nothing in a strip depends on where the strip begins or ends.
+Planes are stored half a patch early, so that a pixel's address is where its patch begins. Beyond the frame they
+continue by reflection for half a patch, and are OUTSIDE further on. Nothing in a strip depends on where it begins or
+ends.
 """
 
 from dataclasses import dataclass
@@ -44,32 +46,32 @@ from rodcone.device_arrays import aligned, upload
 from rodcone.jit import dr
 from sensor.raw import RawImage, full_at_sites
 
-STRIP_BYTES = 300_000_000  # of all that a strip takes, 0.75 megapixels of RGBW; larger arrays are new memory each time
+STRIP_BYTES = 300_000_000  # memory of a strip, 0.75 megapixels of RGBW; larger arrays would be allocated anew each time
 
 Array = NDArray[Any]
-Span = tuple[int, int]  # the first of some rows or columns, and past the last
+Span = tuple[int, int]  # first of some rows or columns, and one past the last
 
 
 @dataclass(frozen=True)
 class Strip:
-    """The part of a frame that some of its rows depend on, pixel by pixel.
+    """The part of a frame on which some of its rows depend, pixel by pixel.
 
     Attributes
     ----------
     shape : (int, int)
         Height and width of the whole frame [pixels].
     origin : (int, int)
-        Row and column of the frame where the arrays begin: whole tiles lie before it.
+        Row and column of the frame where the arrays begin, a whole number of tiles from its corner.
     samples : (h, w) float32
-        Mosaic over black [DN].
+        Mosaic above black [DN].
     electrons : (h, w) float32
-        Mosaic [e-], which fills the paper's planes h_i.
+        Mosaic [e-], from which the paper's planes h_i are filled.
     guide : (h, w) float32 or None
-        The one plane that patches are read from; None where each channel has its own.
+        The plane from which all patches are read; None if each channel has its own.
     alpha : (h, w) float64 or None
-        Eq. (6); None where it is 0 everywhere, and where one plane guides all channels.
+        Eq. (6); None if it is 0 everywhere, or one plane guides all channels.
     brightest : (th, tw, h, w) float32
-        Up to where samples count, of `isp.interleaved.brightest` [DN over black].
+        Upper limit of the samples that count, by `isp.interleaved.brightest` [DN above black].
     """
 
     shape: tuple[int, int]
@@ -88,29 +90,29 @@ class Inputs:
     Attributes
     ----------
     planes, brightest : Float
-        Read at x: planes h_i, [channel, row, column], the shared one alone; [phase, row, column].
+        Arrays that are read at x: planes h_i, or the shared one, [channel, row, column]; limits [phase, row, column].
     inverse_variance : Float
         log2(e) / (2 sigma_s^2), the factor on beta_s^2 of eq. (5).
     packets : Float
-        Read at y: [channel, row, packet, value].
+        Array that is read at y: [channel, row, packet, value].
     alpha : Float
-        Packets of alpha, [row, packet, value]. None with a shared guide, and where it is 0 everywhere.
+        Packets of alpha, [row, packet, value]. None with a shared guide, or if alpha is 0 everywhere.
     entries, counts : Float, UInt
-        Of `isp.interleaved.kernel.schedule.list_offsets`.
+        Result of `isp.interleaved.kernel.schedule.list_offsets`.
     length : UInt
-        Entries that a list has room for.
+        Number of entries for which a list has room.
     packet_rows, packet_columns : int
-        Of `packet_step`.
+        Result of `packet_step`.
     packet_values, alpha_values, entry_values : int
-        Floats of a packet, of one of alpha, and of an entry.
+        Number of floats in a packet, in a packet of alpha, and in an entry.
     top, left : Int
         Row and column of the frame where the arrays begin.
     stride, row_packets, plane_size, plane_packets : UInt
-        Pixels and packets in a row, and in a plane.
+        Number of pixels and of packets in a row, and in a plane.
     white : UInt
         Number of W's plane, or of the shared one.
     height, width : UInt
-        Of the whole frame.
+        Size of the whole frame.
     """
 
     planes: Any
@@ -138,15 +140,15 @@ class Inputs:
 
 
 def packet_width(count: int) -> int:
-    """Smallest power of two up to 8, or multiple of 8, that holds `count` values: 8 floats are one AVX register."""
+    """Round `count` up to a power of two up to 8, or to a multiple of 8, because an AVX register holds 8 floats."""
     return int(2 ** (count - 1).bit_length()) if count <= 8 else -(-count // 8) * 8
 
 
 def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
-    """Rows of strips that take STRIP_BYTES or less, as even as whole blocks allow."""
+    """Return the height of strips that take at most STRIP_BYTES and are as even as whole blocks allow."""
     channels = len(pattern.channels)
     block = pattern.block
-    # Planes and packets, packets of alpha, bounds and three sums a cell of the tile, results, the strip itself.
+    # Planes and packets, packets of alpha, limits and three sums per cell of the tile, results, and the strip itself.
     floats = channels * (packet_width(2 * block[1] + patch - 1) + 1) + packet_width(block[1])
     floats += 5 * len(pattern.cells) + 2 * channels + 10
     most = max(int(STRIP_BYTES / (4 * floats * shape[1])) // block[0], 1)
@@ -155,7 +157,7 @@ def strip_rows(shape: tuple[int, int], pattern: Pattern, patch: int) -> int:
 
 
 def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, guide: Array | None) -> Strip:
-    """What some rows of a frame depend on; without a `guide` the paper's planes a channel."""
+    """Cut out the part of a frame on which some rows depend; without a `guide` each channel has the paper's plane."""
     shape = raw.dn.shape
     part = _surroundings(shape, halo((rows, (0, shape[1])), pattern, settings), pattern, settings)
     dn = raw.dn[part]
@@ -180,11 +182,11 @@ def cut_strip(raw: RawImage, rows: Span, pattern: Pattern, settings: Settings, g
 
 
 def halo(region: tuple[Span, Span], pattern: Pattern, settings: Settings) -> tuple[Span, Span]:
-    """Rows and columns of the arrays for a region of the frame, (top, bottom) and (left, right); may lie beyond it.
+    """Return the rows (top, bottom) and columns (left, right) of a region's arrays; they may lie beyond the frame.
 
-    Blocks begin up to tile - 1 before the region and end up to block - 1 behind it; their y lie up to the reach away.
-    The arrays begin with a whole tile. Rows and columns of planes are stored half a patch early, so that patches end up
-    to patch - 1 behind.
+    Blocks begin up to tile - 1 before the region and end up to block - 1 after it, and their y are up to the reach
+    away. The arrays begin with a whole tile. Planes are stored half a patch early, so that patches end up to patch - 1
+    later.
     """
     spans = list[Span]()
     for (first, last), tile, block in zip(region, pattern.tile, pattern.block, strict=True):
@@ -197,18 +199,18 @@ def halo(region: tuple[Span, Span], pattern: Pattern, settings: Settings) -> tup
 def lay_out(
     jit: ModuleType, strip: Strip, region: tuple[Span, Span], pattern: Pattern, settings: Settings, guide: Guide
 ) -> Inputs:
-    """Fill planes, make packets and upload what the threads of a region of the strip's rows and columns read."""
+    """Fill planes, make packets and upload all that the threads of a region of the strip read."""
     (top, bottom), (left, right) = spans = halo(region, pattern, settings)
-    # The part of the strip that counts, and where the arrays begin in it.
+    # Find the part of the strip that counts, and where the arrays begin in it.
     part = _surroundings(strip.shape, spans, pattern, settings)
     box = tuple(slice(at.start - first, at.stop - first) for at, first in zip(part, strip.origin, strict=True))
     start, size = (top - part[0].start, left - part[1].start), (bottom - top, right - left)
     half = settings.patch // 2
     block = pattern.block[1]
-    names = pattern.channels if guide != "shared" else ["W"]  # whose planes are laid out
+    names = pattern.channels if guide != "shared" else ["W"]  # channels whose planes are laid out
     samples = _window(strip.samples[box], start, (size[0], size[1] + block), 0, 0.0)
 
-    # Packets: one or two rows of a plane under the patches of a block, then as many of the block's samples.
+    # A packet holds one or two rows of a plane under the patches of a block, then as many rows of the block's samples.
     down, across = packet_step(pattern, guide)
     row_packets = size[1] // across
     under = block + settings.patch - 1
@@ -259,10 +261,10 @@ def lay_out(
 
 
 def packet_step(pattern: Pattern, guide: Guide) -> tuple[int, int]:
-    """Rows in a packet, and columns from one packet to the next.
+    """Return the number of rows in a packet, and of columns from one packet to the next.
 
-    With a shared guide all y of a block begin at the tile's first cell: at its first column, and at an even row where
-    the tile's height is even. Two rows of planes and samples are then one line of the cache.
+    With a shared guide all y of a block begin at the tile's first column, and if the tile's height is even, at an even
+    row. Two rows of planes and samples then fill one line of the cache.
     """
     return (2 if pattern.tile[0] % 2 == 0 else 1, pattern.tile[1]) if guide == "shared" else (1, 1)
 
@@ -270,7 +272,7 @@ def packet_step(pattern: Pattern, guide: Guide) -> tuple[int, int]:
 def _surroundings(
     shape: tuple[int, ...], spans: tuple[Span, Span], pattern: Pattern, settings: Settings
 ) -> tuple[slice, slice]:
-    """Rows and columns of the frame that some depend on: half a patch for sums, twice a tile for tents."""
+    """Extend rows and columns by those on which they depend: half a patch for sums, and twice a tile for tents."""
     margin = settings.patch // 2 + 2 * max(pattern.tile)
     rows, columns = (
         slice(max(first - margin, 0) // size * size, min(last + margin, length))
@@ -280,7 +282,7 @@ def _surroundings(
 
 
 def _window(values: Array, start: Span, size: Span, reflected: int, outside: float, to: Array | None = None) -> Array:
-    """Rows and columns from `start` on, which may be negative: beyond the border reflected, then `outside`."""
+    """Copy a window that may begin or end beyond the border, where values are reflected and then `outside`."""
     source = np.pad(values, reflected, mode="reflect") if reflected else values
     result = np.empty(size, np.float32) if to is None else to
     into, out_of = list[slice](), list[slice]()
@@ -297,7 +299,7 @@ def _window(values: Array, start: Span, size: Span, reflected: int, outside: flo
 
 
 def _put_packets(target: Array, rows: Array, step: int) -> None:
-    """target[i, p, k] = rows[i, step * p + k], a few rows at a time, which stay in the cache."""
+    """Set target[i, p, k] = rows[i, step * p + k] for a few rows at a time, so that they stay in the cache."""
     for first in range(0, len(target), 16):
         part, source = target[first : first + 16], rows[first : first + 16]
         for k in range(target.shape[2]):

@@ -1,6 +1,6 @@
-"""The formulas of `isp.interleaved.panchromatic` in Dr.Jit, in bands of rows, so that memory stays bounded.
+"""The formulas of `isp.interleaved.panchromatic` in Dr.Jit, by bands of rows, so that memory stays bounded.
 
-Shares change more slowly than light: a thread a tile makes them, a thread a pixel the guide.
+One thread per tile computes shares, which change more slowly than light; one thread per pixel computes the guide.
 """
 
 from collections.abc import Iterable, Sequence
@@ -21,45 +21,45 @@ from rodcone.types import Floats
 from sensor.cfa import Tile
 from sensor.raw import RawImage
 
-WINDOW_PX = 6  # a side, or three tiles, over which a channel's share is taken: colours change more slowly than light
-APART_PX = 6  # between the 5 x 5 windows of the surroundings
-DETAIL_PX = 5  # a side, over which detail is told from noise
-FAINT = 12.0  # dark noises of W, under which light says nothing of colour
-LEAST_LIGHT = 0.3  # of m_W, which is 1 in light: under it colours go to a neutral's
-LEAST_SHARE = 0.02  # of a neutral's share, for a sample to be read as W
-BAND_PIXELS = 2_000_000  # that are read together: 60 bytes each
+WINDOW_PX = 6  # side of the window over which a channel's share is averaged, at least three tiles
+APART_PX = 6  # distance between the 5 x 5 windows of the surroundings
+DETAIL_PX = 5  # side of the window over which detail is told from noise
+FAINT = 12.0  # light, in units of W's dark noise, below which samples say nothing about colour
+LEAST_LIGHT = 0.3  # value of m_W, which is about 1 in good light, below which colours approach a neutral
+LEAST_SHARE = 0.02  # least share of a channel in W, as a fraction of a neutral's share
+BAND_PIXELS = 2_000_000  # pixels that are processed together, with 60 bytes each
 
-Numbers = list[Any]  # Dr.Jit arrays, such as one a channel
-EIGHT = [0.0625, 0.125, 0.0625, 0.125, 0.125, 0.0625, 0.125, 0.0625]  # [1 2 1] / 4 down and across, but the middle
+Numbers = list[Any]  # Dr.Jit arrays, such as one per channel
+EIGHT = [0.0625, 0.125, 0.0625, 0.125, 0.125, 0.0625, 0.125, 0.0625]  # [1 2 1] / 4 down and across, without the middle
 
 
 def window_steps(tile: int) -> range:
-    """Tiles of a share's window along one axis, from the middle one, for tiles of so many pixels."""
+    """Return the steps in tiles from the middle of a share's window along one axis, for tiles of `tile` pixels."""
     half = max(WINDOW_PX // tile // 2, 1)
     return range(-half, half + 1)
 
 
 def surroundings_steps(tile: int) -> range:
-    """Tiles from the middle one to the middles of the windows of the surroundings."""
+    """Return the steps in tiles to the middles of the windows of the surroundings along one axis."""
     step = max(round(APART_PX / tile), 1)
     return range(-2 * step, 2 * step + 1, step)
 
 
 def tent_radii(tile: Tile) -> tuple[int, int]:
-    """Pixels to either side, down and across, of the smallest tent that takes all cells of a tile alike."""
+    """Return the radii [pixels], down and across, of the smallest tent that weights all cells of a tile equally."""
     return max(len(tile) - 1, 1), max(len(tile[0]) - 1, 1)
 
 
 @dataclass(frozen=True)
 class Grid:
-    """Threads in rows, one a pixel or one a tile, and where a thread finds its neighbours, mirrored at the borders.
+    """A grid of threads, one per pixel or per tile, and the addresses of their neighbours, mirrored at the borders.
 
     Attributes
     ----------
     row, column : UInt
-        Of each thread.
+        Position of each thread.
     row_starts, columns : UInt
-        By row, and by column, from `margin` before the first: where it starts.
+        Address at which each row and each column starts, from `margin` before the first one on.
     margin, size : int
     """
 
@@ -71,14 +71,14 @@ class Grid:
     size: int
 
     def around(self, rows: Iterable[int], columns: Iterable[int]) -> Numbers:
-        """Places that many rows and columns away, row by row."""
+        """Return the addresses of neighbours at given steps in rows and columns, row by row."""
         number = type(self.row)
         of_rows = [dr.gather(number, self.row_starts, self.row + (self.margin + step)) for step in rows]
         of_columns = [dr.gather(number, self.columns, self.column + (self.margin + step)) for step in columns]
         return [r + c for r in of_rows for c in of_columns]
 
     def store(self, *values: Any) -> Any:
-        """Evaluate some values of each thread, which then lie together."""
+        """Evaluate some values of each thread and store them together."""
         real = type(values[0])
         width = packet_width(len(values))
         target = dr.empty(real, width * self.size)
@@ -89,7 +89,7 @@ class Grid:
         return target
 
     def load(self, source: Any, places: Sequence[Any], values: int) -> list[Numbers]:
-        """Read the values that were stored together at some places."""
+        """Load the values that were stored together at some addresses."""
         width = packet_width(values)
         kind = arrays().ArrayXf
         return [[*dr.gather(kind, source, place, shape=(width, self.size))][:values] for place in places]
@@ -104,7 +104,7 @@ def _grid(height: int, width: int, margin: int) -> Grid:
 
 @dataclass(frozen=True)
 class Frame:
-    """What is known of a frame.
+    """A frame with what its guide is computed from.
 
     Attributes
     ----------
@@ -124,16 +124,16 @@ class Frame:
 
 
 def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
-    """Shares of the surroundings, by tile (rows, columns, channel), and guide, (h, w) [deviations of W's noise].
+    """Compute the surroundings' shares, (tile row, tile column, channel), and the guide, (h, w) [units of W's noise].
 
-    As `isp.interleaved.panchromatic.read_as_white` states them.
+    The formulas are those of `isp.interleaved.panchromatic.read_as_white`.
     """
     height, width = raw.shape
     down, across = len(raw.cfa), len(raw.cfa[0])
     frame = Frame(raw, [raw.channels.index(name) for line in raw.cfa for name in line], white, ratios)
     shares = np.empty((-(-height // down), -(-width // across), len(ratios)), np.float32)
     guide = np.empty((height, width), np.float32)
-    # Rows that a pixel depends on: windows of the surroundings, in tiles, and tents and the window of detail.
+    # Rows on which a pixel depends: windows of the surroundings, in tiles, tents, and the window of detail.
     reach = (window_steps(down)[-1] + surroundings_steps(down)[-1] + 6) * down
     step = max(BAND_PIXELS // width // down, 1) * down
     for first in range(0, height, step):
@@ -156,7 +156,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     near = range(-1, 2)
 
     def opaque(values: Iterable[Any]) -> Numbers:
-        """Numbers that are data of the kernel, so that others don't compile it again."""
+        """Make numbers data of the kernel, so that other numbers don't compile it again."""
         return [dr.opaque(jit.Float, float(x)) for x in values]
 
     dn = raw.dn[rows[0] : rows[1]].astype(np.float32)
@@ -167,7 +167,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     cells = upload(np.array(frame.cells, np.uint32))
     site = dr.gather(jit.UInt, cells, tile_row[1] * np.uint32(across) + tile_column[1])
 
-    # Samples as a neutral's light, and beside the light around.
+    # Compute samples as a neutral's light, and relative to the light around.
     neutral = opaque(frame.ratios)
     plain = electrons / at_site(neutral, site)
     dr.eval(plain, site)
@@ -180,7 +180,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     tiles = _grid(-(-height // down), -(-width // across), max(*surroundings_steps(down), *surroundings_steps(across)))
     shares, around = _shares(frame, tiles, (height, width), samples, float(dark[frame.white]))
 
-    # The sample's own word v, and its weight.
+    # Compute v, what the sample itself says of W, and its weight.
     of_tile = tile_row[0] * dr.opaque(jit.UInt, -(-width // across)) + tile_column[0]
     own = at_site(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
     shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
@@ -191,7 +191,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
 
     weighed = pixels.store(electrons / own, 1.0 / variance(light))
 
-    # t, that of the eight around it.
+    # Compute t, the weighted mean of v over the eight samples around.
     eight = pixels.load(weighed, pixels.around(near, near), 2)
     value, _ = eight.pop(4)
     total = _weighted([w for _, w in eight], EIGHT)
@@ -203,7 +203,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     spread = pixels.store(dr.square(difference) * inverse, inverse)
     parts = pixels.store(mean, difference, mean_variance, own_variance)
 
-    # Detail that t misses.
+    # Estimate the variance of detail that t misses.
     steps = range(-(DETAIL_PX // 2), DETAIL_PX // 2 + 1)
     lines = pixels.store(*_sums(pixels.load(spread, pixels.around([0], steps), 2)))
     squares, inverse = _sums(pixels.load(lines, pixels.around(steps, [0]), 2))
@@ -216,9 +216,9 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
 
 
 def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dark: float) -> tuple[Any, Any]:
-    """Shares by tile, of the window and of the surroundings.
+    """Compute shares by tile, those of the window and those of the surroundings.
 
-    `samples` hold each pixel's as a neutral's light, and beside the light around.
+    `samples` hold each pixel's sample as a neutral's light, and relative to the light around.
     """
     jit = arrays()
     count = len(frame.ratios)
@@ -239,7 +239,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dar
         light_squares = light_squares + dr.square(plain)
     stored = [tiles.store(*values) for values in (sums, squares, counts, [light, light_squares])]
 
-    # Means over each channel's samples, and how far they can be wrong.
+    # Average over each channel's samples, and estimate the error of the mean.
     places = tiles.around(window_steps(down), window_steps(across))
     sums, squares, counts = (_sums(tiles.load(source, places, count)) for source in stored[:3])
     light, light_squares = _sums(tiles.load(stored[3], places, 2))
@@ -254,7 +254,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dar
     white = frame.white
     mean_planes, error_planes = tiles.store(*means), tiles.store(*error)
 
-    # The window's, as far as its samples tell; else those of the surroundings.
+    # Take the window's shares as far as its samples tell them, otherwise those of the surroundings.
     rows, columns = surroundings_steps(down), surroundings_steps(across)
     lines = tiles.store(*_sums(tiles.load(mean_planes, tiles.around([0], columns), count)))
     far = _sums(tiles.load(lines, tiles.around(rows, [0]), count))
@@ -274,7 +274,7 @@ def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dar
 
 
 def _lifted(means: Numbers, neutral: Numbers, white: int) -> Numbers:
-    """Means of channels with as much of a neutral's as W is too faint."""
+    """Add to the channels' means as much of a neutral as W lacks to `LEAST_LIGHT`."""
     missing = larger(LEAST_LIGHT - means[white], 0.0)
     return [mean + missing * n for mean, n in zip(means, neutral, strict=True)]
 

@@ -1,4 +1,4 @@
-"""The reconstruction of a frame, strip by strip.
+"""The reconstruction of a frame, one strip after the other.
 
 Kernels run beside Python. Therefore each strip is started before the one above it is finished: NumPy prepares it while
 the kernels of that other strip still run.
@@ -23,7 +23,7 @@ from sensor.raw import RawImage
 
 @dataclass(frozen=True)
 class Launch:
-    """Threads that run, and which of them must run again in units of the largest weight so far."""
+    """Running threads, and which of them must run again in units of the largest weight so far."""
 
     inputs: Inputs
     threads: Threads
@@ -33,7 +33,7 @@ class Launch:
 
 @dataclass(frozen=True)
 class StartedStrip:
-    """A strip whose kernels run: rows of the frame, where their sums go, and the launches."""
+    """A strip whose kernels run: its rows of the frame, the arrays of their sums, and the launches."""
 
     rows: Span
     sums: KernelSums
@@ -70,7 +70,8 @@ def _start(
     strip = cut_strip(raw, rows, pattern, settings, shared)
     sums = _empty_sums(jit, rows, columns[1], pattern)
     work = list_threads(pattern, strip.shape, rows, strip.alpha, strip.origin[0], settings.reach)
-    # Threads of a shared guide read that plane alone. For the others all planes are laid out, around them: mostly few.
+    # Threads with a shared guide read only that plane. For the others, which are mostly few, all planes around them are
+    # laid out.
     for guides in (["shared"], ["channel", "mixed"]):
         kinds: list[Guide] = [guide for guide in work if guide in guides and len(work[guide].row)]
         if not kinds:
@@ -92,8 +93,8 @@ def _start(
 
 
 def _empty_sums(jit: ModuleType, rows: Span, width: int, pattern: Pattern) -> KernelSums:
-    """Room for what the blocks of all phases give; at the fixed scale they leave the unit as it is."""
-    # Whole blocks that cover the strip and the tile - 1 rows and columns by which phases begin early.
+    """Allocate arrays for the results of the blocks of all phases; at the fixed scale the unit stays as it is here."""
+    # Whole blocks cover the strip and the tile - 1 rows and columns by which phases begin early.
     size = [
         -(-(length + tile - 1) // block) * block
         for length, tile, block in zip((rows[1] - rows[0], width), pattern.tile, pattern.block, strict=True)
@@ -111,9 +112,9 @@ def _empty_sums(jit: ModuleType, rows: Span, width: int, pattern: Pattern) -> Ke
 
 
 def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
-    """Put estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
+    """Write the estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
-        again: Any = dr.compress(one.failed)  # waits for the launch
+        again: Any = dr.compress(one.failed)  # this waits until the launch has finished
         if dr.width(again):
             threads = Threads(**{name: dr.gather(type(part), part, again) for name, part in vars(one.threads).items()})
             dr.eval(vars(threads))
@@ -129,9 +130,9 @@ def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Patt
     for channel in range(len(pattern.channels)):
         parts = []
         for cell in (cell for cell, number in enumerate(pattern.cells) if number == channel):
-            # y = x + d lies at the cell in phase (a, b) = cell - x, modulo the tile.
+            # The y = x + d at a cell belong to phase (a, b) = cell - x, modulo the tile.
             a, b = (cell // across + down - row % down) % down, (cell % across + across - column % across) % across
-            # [phase, row, column]: (phase * rows + row + a) * columns + column + b
+            # Their sums are at [phase, row, column], (phase * rows + row + a) * columns + column + b.
             index = ((a * across + b) * sums.rows + row + a) * sums.columns + column + b
             parts.append([dr.gather(jit.Float, array, jit.UInt(index)) for array in stored])
         mean, noise_gain = _merge(parts)
@@ -143,7 +144,7 @@ def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Patt
 
 
 def _merge(parts: list[list[Any]]) -> list[Any]:
-    """Mean and noise gain of the samples at several cells, whose weights are in units of their own."""
+    """Merge the means and noise gains of the samples at several cells, whose weights have different units."""
     if len(parts) == 1:
         return parts[0][2:]
     common = parts[0][1]

@@ -1,9 +1,9 @@
-"""Which thread does what: blocks of pixels, phases of offsets, and which plane guides the similarity.
+"""Division of the work between threads: blocks of pixels, phases of offsets, and the plane that guides.
 
-A thread owns the pixels x of one block and goes through the offsets d = y - x of one phase: those that are (a, b)
-modulo the size of the CFA's tile. The blocks of phase (a, b) begin a rows and b columns early. So their y begin at the
-tile's first cell whatever the phase, and y of the block's pixel (r, c) lies at cell (r mod th, c mod tw): a pixel's
-channel at y is known when the kernel is compiled, and each pair (x, y) is met once.
+A thread owns the pixels x of one block and goes through the offsets d = y - x of one phase, which are those that equal
+(a, b) modulo the size of the CFA's tile. The blocks of phase (a, b) begin a rows and b columns early. Therefore their y
+begin at the tile's first cell in every phase, and the y of the block's pixel (r, c) lies at cell (r mod th, c mod tw).
+The channel at y is thus known when the kernel is compiled, and each pair (x, y) occurs once.
 """
 
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ from sensor.cfa import Tile, channels
 Guide = Literal["shared", "channel", "mixed"]
 Index = NDArray[np.int32]
 
-# Pixels of a block: 8 x 4 at most, or one tile. Measured: more sharing than 4 x 4 (a tenth less time); 12 x 4 or 8 x 8
-# gain nothing more.
+# A block has at most 8 x 4 pixels, or one tile. By measurement 8 x 4 takes a tenth less time than 4 x 4, because more
+# is shared; 12 x 4 or 8 x 8 gain nothing more.
 BLOCK_ROWS, BLOCK_COLUMNS = 8, 4
 
 
@@ -32,13 +32,13 @@ class Pattern:
     ----------
     cfa : tuple of str
     channels : tuple of str
-        In the order of `sensor.cfa.channels`.
+        Channels in the order of `sensor.cfa.channels`.
     cells : tuple of int
         Number of the channel at each cell of the tile, row by row.
     white : int or None
-        W's number.
+        Number of W among the channels.
     tile, block : (int, int)
-        Rows and columns of the tile, and of a block: whole tiles.
+        Rows and columns of the tile, and of a block, which consists of whole tiles.
     """
 
     cfa: Tile
@@ -51,18 +51,19 @@ class Pattern:
 
 @dataclass(frozen=True)
 class Threads:
-    """What each thread does; NumPy arrays, or Dr.Jit arrays once they are uploaded.
+    """Work of each thread, as NumPy arrays, or as Dr.Jit arrays once they are uploaded.
 
     Attributes
     ----------
     row, column : (n,) int32
-        Its first pixel in the frame; may lie outside.
+        The thread's first pixel, which may lie outside the frame.
     cell : (n,) int32
-        With a shared guide 0: it owns all pixels of its block. Else those whose y lie at this cell of the tile.
+        Cell of the tile at which the y of the thread's pixels lie; 0 with a shared guide, where it owns the whole
+        block.
     plane : (n,) int32
         Number of the channel at that cell.
     phase : (n,) int32
-        Number of its phase: a * tw + b.
+        Number of its phase, a * tw + b.
     """
 
     row: Index
@@ -73,7 +74,7 @@ class Threads:
 
 
 def make_pattern(cfa: Tile) -> Pattern:
-    """Tile in numbers, with blocks of whole tiles."""
+    """Describe a tile by numbers, and choose blocks of whole tiles."""
     names = channels(cfa)
     tile = (len(cfa), len(cfa[0]))
     return Pattern(
@@ -86,16 +87,16 @@ def make_pattern(cfa: Tile) -> Pattern:
     )
 
 
-@lru_cache(maxsize=4)  # of two cameras, by W and by channels
+@lru_cache(maxsize=4)  # two cameras, each with a shared guide and with one per channel
 def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[NDArray[np.float32], NDArray[np.uint32]]:
-    """Every offset of Omega, a list for each phase.
+    """List the offsets of Omega, one list for each phase.
 
     Returns
     -------
     entries : (list, length, values) float32
         Row and column of the offset, and log2 G(beta_d, sigma_d) of eqs. (2) and (4).
     counts : (list,) uint32
-        Entries that hold; the rest is padding.
+        Number of valid entries in each list; the rest is padding.
     """
     down = pattern.tile[0]
     reach = settings.reach
@@ -105,7 +106,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
         rows, columns = (line[line % size == first] for size, first in zip(pattern.tile, phase, strict=True))
         row, column = (offset.ravel() for offset in np.meshgrid(rows, columns, indexing="ij"))
         if guide != "shared":
-            # Two rows of offsets in turn: they read mostly the same packets.
+            # Two rows of offsets alternate, because they read mostly the same packets.
             order = np.lexsort((row, column, (row - row[0]) // (2 * down)))
             row, column = row[order], column[order]
         log_spatial = -np.log2(np.e) * (row**2 + column**2) / (2.0 * settings.sigma_d**2)
@@ -114,7 +115,7 @@ def list_offsets(pattern: Pattern, settings: Settings, guide: Guide) -> tuple[ND
     entries = np.zeros((len(lists), int(counts.max()), lists[0].shape[1]), dtype=np.float32)
     for target, table in zip(entries, lists, strict=True):
         target[: len(table)] = table
-    entries.flags.writeable = counts.flags.writeable = False  # they are kept
+    entries.flags.writeable = counts.flags.writeable = False  # because they are cached
     return entries, counts
 
 
@@ -126,22 +127,22 @@ def list_threads(
     first_row: int,
     reach: int,
 ) -> dict[Guide, Threads]:
-    """Threads that reconstruct some rows of a frame, by what guides them.
+    """List the threads that reconstruct some rows of a frame, by their guides.
 
-    Where no alpha > 0 is in a block's reach, eq. (5) holds one distance for all channels, W's; where all alpha are 1,
-    the channel's own alone, as it does wherever that channel is W. Exact, at a part of the work.
+    If no alpha > 0 is in a block's reach, eq. (5) has one distance for all channels, that of W. If all alpha are 1, it
+    has only the channel's own distance, and so it has wherever that channel is W. The results are exact with less work.
 
     Parameters
     ----------
     shape : (int, int)
         Height and width of the frame [pixels].
     rows : (int, int)
-        First and past the last row to reconstruct; the first is a whole number of blocks.
+        First row to reconstruct, a whole number of blocks, and one past the last.
     alpha : (n, w) array or None
-        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None where all are 0, and where one
-        plane guides all channels.
+        Eq. (6) from row `first_row` of the frame on, as far as it is in reach; None if it is 0 everywhere, or one plane
+        guides all channels.
     """
-    # First row and column of the blocks that cover the rows in phase (0, 0), and in others that begin earlier.
+    # First rows and columns of the blocks that cover the rows in phase (0, 0), and in the phases that begin earlier.
     ends = rows[1] + pattern.tile[0] - 1, shape[1] + pattern.tile[1] - 1
     lines = [
         np.arange(first, end, step, dtype=np.int32)
@@ -149,7 +150,7 @@ def list_threads(
     ]
     any_full = all_full = np.zeros((len(lines[0]), len(lines[1])), bool)
     if alpha is not None:
-        # What a block may reach in any phase: [first - (tile - 1) - reach, first + block + reach).
+        # In any phase a block reaches at most [first - (tile - 1) - reach, first + block + reach).
         rows_of, columns_of = (
             np.clip([line - size + 1 - reach - first, line + block + reach - first], 0, length)
             for line, size, block, first, length in zip(
@@ -169,8 +170,8 @@ def list_threads(
 
 
 def _any_in_boxes(marked: NDArray[np.bool_], rows: NDArray[Any], columns: NDArray[Any]) -> NDArray[np.bool_]:
-    """Whether a box from row rows[0][i] and column columns[0][j] up to rows[1][i] and columns[1][j] holds a mark."""
-    for ends in (rows, columns):  # turned in between, and back: whole rows together are forty times faster than sums
+    """Return whether each box, from rows[0][i], columns[0][j] up to rows[1][i], columns[1][j], holds a mark."""
+    for ends in (rows, columns):  # with a transpose after each: combining whole rows is forty times faster than sums
         marked = np.array([np.logical_or.reduce(marked[first:last]) for first, last in ends.T]).T.copy()
     return marked
 
@@ -182,7 +183,7 @@ def _threads(
     ends: tuple[int, int],
     guide: Guide,
 ) -> Threads:
-    """Threads of the chosen blocks and cells, line by line of blocks; none that holds no pixel to reconstruct."""
+    """List the threads of chosen blocks and cells, by lines of blocks, without those that have no pixel."""
     down, across = pattern.tile
     parts = [np.empty((5, 0), np.int32)]
     for chosen, cells in shares:
@@ -191,14 +192,14 @@ def _threads(
             row, column = first[0] - phase[0], first[1] - phase[1]
             kept = (row < ends[0] - down + 1) & (column < ends[1] - across + 1)
             for cell in cells:
-                # Its first pixel is the block's first one whose y lies at the cell.
+                # A thread's first pixel is the first one of its block whose y lies at the cell.
                 part = np.empty((5, np.count_nonzero(kept)), np.int32)
                 part[0], part[1] = row[kept] + cell // across, column[kept] + cell % across
                 part[2], part[3] = cell, pattern.cells[cell]
                 part[4] = number
                 parts.append(part)
     together = np.concatenate(parts, axis=1)
-    # Line by line of blocks, all phases of a line in turn: what they read is still in the cache.
+    # All phases of a line of blocks follow each other, so that what they read is still in the cache.
     line = (together[0] + together[4] // across) // pattern.block[0]
     row, column, cell_of, plane, phases = together[:, np.argsort(line, kind="stable")]
     return Threads(row=row, column=column, cell=cell_of, plane=plane, phase=phases)
