@@ -209,14 +209,14 @@ def at_site(values: list[Float], site: UInt) -> Float:
     return result
 
 
-def _solve(lower: list[list[Any]], noise: list[Any], residual: list[Any]) -> list[Any]:
+def _solve(lower: list[list[Float]], noise: list[Float], residual: list[Float]) -> list[Float]:
     """Solve (A + diag(noise)) z = residual by L D L^T, for a symmetric positive A that is given by its lower half.
 
     Rounding can't make a pivot smaller than its noise.
     """
-    factors, inverses, forward = list[list[Any]](), list[Any](), list[Any]()  # L, 1 / D, L^-1 residual
+    factors, inverses, forward = list[list[Float]](), list[Float](), list[Float]()  # L, 1 / D, L^-1 residual
     for i, line in enumerate(lower):
-        scaled = list[Any]()  # L_ij D_j
+        scaled = list[Float]()  # L_ij D_j
         for j in range(i):
             scaled.append(line[j] - sum((scaled[k] * factors[j][k] for k in range(j)), 0.0))
         factors.append([value * inverse for value, inverse in zip(scaled, inverses, strict=True)])

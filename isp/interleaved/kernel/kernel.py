@@ -8,11 +8,11 @@ loaded, each as a packet (`isp.interleaved.kernel.layout`).
 
 from dataclasses import dataclass
 from types import ModuleType
-from typing import Any
 
 from isp.interleaved.kernel.accumulate import (
     HEADROOM,
     LEAST_WEIGHT,
+    Sums,
     add_samples,
     mixed_squares,
     squared_distances,
@@ -20,7 +20,7 @@ from isp.interleaved.kernel.accumulate import (
 )
 from isp.interleaved.kernel.layout import Inputs
 from isp.interleaved.kernel.schedule import Guide, Threads
-from rodcone.jit import dr
+from rodcone.jit import Float, Int, Mask, UInt, dr
 
 
 @dataclass(frozen=True)
@@ -64,16 +64,16 @@ class KernelSums:
         The strip's first row in the frame, and the number of rows and columns of a phase.
     """
 
-    weight: Any
-    unit: Any
-    mean: Any
-    noise_gain: Any
-    first_row: Any
-    rows: Any
-    columns: Any
+    weight: Float
+    unit: Float
+    mean: Float
+    noise_gain: Float
+    first_row: Int
+    rows: Int
+    columns: Int
 
 
-def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Any:
+def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums: KernelSums) -> Mask:
     """Start the threads; return which of them hold a pixel whose sums are too small for the fixed scale."""
     patch = shape.patch
     across = shape.tile[1]
@@ -118,21 +118,21 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     bound = jit.UInt(threads.phase) * inputs.plane_size + x
     brightest = [dr.gather(jit.Float, inputs.brightest, bound + r * inputs.stride + c) for r, c in pixels]
 
-    def load(source: Any, packet: Any, size: int, needed: int) -> list[Any]:
+    def load(source: Float, packet: UInt, size: int, needed: int) -> list[Float]:
         """Load the first values of a packet, 8 at a time; part k of packet p has the number p * (size / 8) + k."""
         part = min(size, 8)
-        values = list[Any]()
+        values = list[Float]()
         for k in range(-(-needed // part)):
             index = packet * (size // part) + k
             values.extend(dr.gather(jit.ArrayXf, source, index, shape=(part, count)))
         return values[:needed]
 
-    def add_offset(k: Any, totals: list[Any]) -> tuple[Any, list[Any]]:
+    def add_offset(k: UInt, totals: list[Sums]) -> tuple[UInt, list[Sums]]:
         """Add the samples at y = x + d for offset k of the list."""
         steps, log_spatial = load(inputs.entries, first_entry + k, inputs.entry_values, 2)
         y = x_packet + dr.reinterpret_array(jit.UInt, steps)  # packet
-        distances = list[list[Any]]()
-        samples = dict[int, list[Any]]()
+        distances = list[list[Float]]()
+        samples = dict[int, list[Float]]()
         for n, (first_packet, patches) in enumerate(zip(first_packets, patches_at_x, strict=True)):
             patches_at_y = {}
             for line in lines:
@@ -167,7 +167,9 @@ def launch(jit: ModuleType, inputs: Inputs, threads: Threads, shape: Shape, sums
     return failed
 
 
-def _failed(jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs) -> Any:
+def _failed(
+    jit: ModuleType, totals: list[Sums], pixels: list[tuple[int, int]], threads: Threads, inputs: Inputs
+) -> Mask:
     """Mark threads that hold a pixel of the frame with too small a sum.
 
     Pixels of other strips count as well, so that the result doesn't depend on how the frame is divided.
@@ -181,8 +183,8 @@ def _failed(jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], t
 
 
 def _store(
-    jit: ModuleType, totals: list[Any], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
-) -> list[Any]:
+    jit: ModuleType, totals: list[Sums], pixels: list[tuple[int, int]], threads: Threads, shape: Shape, sums: KernelSums
+) -> list[Float]:
     """Store the loop's sums; return the arrays they are stored into, which aren't evaluated yet."""
     targets = [sums.weight, sums.mean, sums.noise_gain] + [sums.unit] * shape.running
     stored = [

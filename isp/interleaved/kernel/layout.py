@@ -43,7 +43,7 @@ from isp.interleaved.saturation import fraction_of_full
 from isp.planes import fill
 from isp.settings import Settings
 from rodcone.device_arrays import aligned, upload
-from rodcone.jit import dr
+from rodcone.jit import Float, Int, UInt, dr
 from sensor.raw import RawImage, full_at_sites
 
 STRIP_BYTES = 300_000_000  # memory of a strip, 0.75 megapixels of RGBW; larger arrays would be allocated anew each time
@@ -115,28 +115,28 @@ class Inputs:
         Size of the whole frame.
     """
 
-    planes: Any
-    brightest: Any
-    inverse_variance: Any
-    packets: Any
-    alpha: Any
-    entries: Any
-    counts: Any
-    length: Any
+    planes: Float
+    brightest: Float
+    inverse_variance: Float
+    packets: Float
+    alpha: Float | None
+    entries: Float
+    counts: UInt
+    length: UInt
     packet_rows: int
     packet_columns: int
     packet_values: int
     alpha_values: int
     entry_values: int
-    top: Any
-    left: Any
-    stride: Any
-    row_packets: Any
-    plane_size: Any
-    plane_packets: Any
-    white: Any
-    height: Any
-    width: Any
+    top: Int
+    left: Int
+    stride: UInt
+    row_packets: UInt
+    plane_size: UInt
+    plane_packets: UInt
+    white: UInt
+    height: UInt
+    width: UInt
 
 
 def packet_width(count: int) -> int:

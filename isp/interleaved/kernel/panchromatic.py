@@ -5,7 +5,6 @@ One thread per tile computes shares, which change more slowly than light; one th
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,7 @@ from isp.interleaved.kernel.edges import TINY, at_site, channel_noise
 from isp.interleaved.kernel.layout import packet_width
 from isp.planes import tent
 from rodcone.device_arrays import divide, divisor, upload
-from rodcone.jit import arrays, dr
+from rodcone.jit import Float, UInt, arrays, dr
 from rodcone.types import Floats
 from sensor.cfa import Tile
 from sensor.raw import RawImage
@@ -29,7 +28,7 @@ LEAST_LIGHT = 0.3  # value of m_W, which is about 1 in good light, below which c
 LEAST_SHARE = 0.02  # least share of a channel in W, as a fraction of a neutral's share
 BAND_PIXELS = 2_000_000  # pixels that are processed together, with 60 bytes each
 
-Numbers = list[Any]  # Dr.Jit arrays, such as one per channel
+Numbers = list[Float]  # Dr.Jit arrays, such as one per channel
 EIGHT = [0.0625, 0.125, 0.0625, 0.125, 0.125, 0.0625, 0.125, 0.0625]  # [1 2 1] / 4 down and across, without the middle
 
 
@@ -63,21 +62,21 @@ class Grid:
     margin, size : int
     """
 
-    row: Any
-    column: Any
-    row_starts: Any
-    columns: Any
+    row: UInt
+    column: UInt
+    row_starts: UInt
+    columns: UInt
     margin: int
     size: int
 
-    def around(self, rows: Iterable[int], columns: Iterable[int]) -> Numbers:
+    def around(self, rows: Iterable[int], columns: Iterable[int]) -> list[UInt]:
         """Return the addresses of neighbours at given steps in rows and columns, row by row."""
         number = type(self.row)
         of_rows = [dr.gather(number, self.row_starts, self.row + (self.margin + step)) for step in rows]
         of_columns = [dr.gather(number, self.columns, self.column + (self.margin + step)) for step in columns]
         return [r + c for r in of_rows for c in of_columns]
 
-    def store(self, *values: Any) -> Any:
+    def store(self, *values: Float) -> Float:
         """Evaluate some values of each thread and store them together."""
         real = type(values[0])
         width = packet_width(len(values))
@@ -88,7 +87,7 @@ class Grid:
         dr.eval(target)
         return target
 
-    def load(self, source: Any, places: Sequence[Any], values: int) -> list[Numbers]:
+    def load(self, source: Float, places: Sequence[UInt], values: int) -> list[Numbers]:
         """Load the values that were stored together at some addresses."""
         width = packet_width(values)
         kind = arrays().ArrayXf
@@ -146,7 +145,7 @@ def guide_frame(raw: RawImage, ratios: Floats, white: int) -> tuple[NDArray[np.f
     return shares, guide
 
 
-def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[Any], NDArray[Any]]:
+def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     jit = arrays()
     raw = frame.raw
     shot, dark, _ = channel_noise(frame.raw)
@@ -155,7 +154,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     pixels = _grid(height, width, max(DETAIL_PX // 2, *tent_radii(raw.cfa)))
     near = range(-1, 2)
 
-    def opaque(values: Iterable[Any]) -> Numbers:
+    def opaque(values: Iterable[float]) -> Numbers:
         """Make numbers data of the kernel, so that other numbers don't compile it again."""
         return [dr.opaque(jit.Float, float(x)) for x in values]
 
@@ -185,7 +184,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     own = at_site(pixels.load(shares, [of_tile], len(frame.ratios))[0], site)
     shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
 
-    def variance(light: Any) -> Any:
+    def variance(light: Float) -> Float:
         """Variance of a sample read as W [e-^2], at some light."""
         return larger((shots * larger(light, 0.0) + darks / own) / own, TINY)
 
@@ -215,7 +214,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     return by_tile, guide.numpy().reshape(height, width)[inside]
 
 
-def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Any, dark: float) -> tuple[Any, Any]:
+def _shares(frame: Frame, tiles: Grid, shape: tuple[int, int], samples: Float, dark: float) -> tuple[Float, Float]:
     """Compute shares by tile, those of the window and those of the surroundings.
 
     `samples` hold each pixel's sample as a neutral's light, and relative to the light around.
@@ -279,7 +278,7 @@ def _lifted(means: Numbers, neutral: Numbers, white: int) -> Numbers:
     return [mean + missing * n for mean, n in zip(means, neutral, strict=True)]
 
 
-def _weighted(values: Numbers, weights: Sequence[float]) -> Any:
+def _weighted(values: Numbers, weights: Sequence[float]) -> Float:
     return sum((float(w) * value for w, value in zip(weights, values, strict=True)), 0.0)
 
 

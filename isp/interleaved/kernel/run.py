@@ -17,7 +17,7 @@ from isp.interleaved.kernel.layout import Inputs, Span, cut_strip, lay_out, stri
 from isp.interleaved.kernel.schedule import Guide, Pattern, Threads, list_threads, make_pattern
 from isp.settings import Settings
 from rodcone.device_arrays import upload
-from rodcone.jit import arrays, dr
+from rodcone.jit import Float, Mask, UInt, arrays, dr
 from sensor.raw import RawImage
 
 
@@ -28,7 +28,7 @@ class Launch:
     inputs: Inputs
     threads: Threads
     shape: Shape
-    failed: Any
+    failed: Mask
 
 
 @dataclass(frozen=True)
@@ -111,10 +111,10 @@ def _empty_sums(jit: ModuleType, rows: Span, width: int, pattern: Pattern) -> Ke
     )
 
 
-def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Any]) -> None:
+def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Pattern, results: list[Float]) -> None:
     """Write the estimate and noise gain of a strip into the frame's results, [row, column, channel]."""
     for one in started.launches:
-        again: Any = dr.compress(one.failed)  # this waits until the launch has finished
+        again: UInt = dr.compress(one.failed)  # this waits until the launch has finished
         if dr.width(again):
             threads = Threads(**{name: dr.gather(type(part), part, again) for name, part in vars(one.threads).items()})
             dr.eval(vars(threads))
@@ -126,7 +126,7 @@ def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Patt
     pixel = dr.arange(jit.Int, (last - first) * raw.dn.shape[1])
     row, column = pixel // width, pixel % width
     stored = [sums.weight, sums.unit, sums.mean, sums.noise_gain]
-    planes = list[list[Any]]()
+    planes = list[list[Float]]()
     for channel in range(len(pattern.channels)):
         parts = []
         for cell in (cell for cell, number in enumerate(pattern.cells) if number == channel):
@@ -143,7 +143,7 @@ def _finish(jit: ModuleType, started: StartedStrip, raw: RawImage, pattern: Patt
     dr.eval(results)
 
 
-def _merge(parts: list[list[Any]]) -> list[Any]:
+def _merge(parts: list[list[Float]]) -> list[Float]:
     """Merge the means and noise gains of the samples at several cells, whose weights have different units."""
     if len(parts) == 1:
         return parts[0][2:]
