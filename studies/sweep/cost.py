@@ -39,7 +39,8 @@ _DEVELOP_S = (
 )
 _ANY_DEVELOP_S = 1e-6, 0.3
 _FIRST_S = 0.7  # first captures and metrics of a process
-_REPORT_S = 2.5, 0.05  # the report, and each cell in it
+_REPORT_S = 2.5, 0.05, 1e-4  # the report, each cell whose picture it shows, and each other cell
+SHOWN = 1000  # cells whose pictures a report shows: `studies.pages.report_sweep.MOST_CELLS`, slow to import
 _HALF_SIZE = 0.25  # pixels of half the size
 
 
@@ -212,7 +213,7 @@ def _seconds(
     """Time of a sweep with a share `scale` of its pixels, on idle cores."""
     own = [(0.0, 0.0)] if frames else [_develop_s(name) for name in study.processors]
     pixel_s, least_s = _FRAME_S if frames else _CELL_S
-    report_s, of_cell_s = (0.0, 0.0) if frames else _REPORT_S
+    report_s, picture_s, row_s = (0.0, 0.0, 0.0) if frames else _REPORT_S
     first_s = _FIRST_S + sum(costs[1] for costs in own)
     images = len(study.sensors) * len(study.spectra) * len(study_mosaics(study))
     behind_tables = sum(bool(study.lens.table or preset(name).lens.table) for name in study.sensors)
@@ -229,8 +230,9 @@ def _seconds(
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor
         at_once = max(1, min(workers, cores()))
         seconds += pixels * part.bands * (shared_s * images * exposed + _READ_S * (part.spp == 0))
-        seconds += cells / len(parts) * (each / at_once + of_cell_s)
+        seconds += cells / len(parts) * each / at_once
         seconds += planned * (_PILOT_S if part.spp else _PICTURE_PILOT_S)
+    seconds += picture_s * min(cells, SHOWN) + row_s * max(cells - SHOWN, 0.0)
     return lights + pace() * seconds
 
 

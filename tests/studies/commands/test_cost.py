@@ -18,6 +18,7 @@ from rodcone.memory import memory
 from rodcone.progress import duration
 from studies.commands import cli, expect
 from studies.commands import render as render_command
+from studies.pages.report_sweep import MOST_CELLS
 from studies.photograph import shot
 from studies.study import cost
 from studies.study.cost import START_S, PictureCost, pace, render_seconds
@@ -140,6 +141,19 @@ def test_a_sweeps_time_counts_first_calls_of_each_process_metrics_and_the_report
     assert seconds('["ple_bayer"]', 1) - one > 1.5, "its tables"
     assert seconds('["bayer"]', 1, planned=True) - one == pytest.approx(1.1), "a picture has nothing to render"
     assert seconds('["bayer"]', 1, frames=True) < one - 2.0, "neither developed nor reported"
+
+
+def test_cells_whose_pictures_a_report_does_not_show_cost_it_next_to_nothing(tmp_path: Path) -> None:
+    assert sweep_cost.SHOWN == MOST_CELLS
+    study = SAMPLE.small_study(tmp_path, processors=("bayer",), seeds=tuple(range(1000)))
+    first, second, third = (
+        estimated(replace(study, seeds=tuple(range(count))), tmp_path / "out", 1) for count in (1000, 2000, 100_000)
+    )
+    pixels, _, _ = extent_of(tmp_path / "scene.exr")
+    each_s = 0.03 + 1e-4 + pixels * (5e-6 + 1e-6)
+    assert first.cells > sweep_cost.SHOWN
+    for few, more in ((first, second), (second, third)):
+        assert (more.seconds - few.seconds) / (more.cells - few.cells) == pytest.approx(each_s, rel=1e-6)
 
 
 def test_half_of_a_sweep_is_that_of_half_its_seeds_or_of_a_quarter_of_its_pixels(tmp_path: Path) -> None:
