@@ -1,11 +1,10 @@
 """Every way to make a picture from a raw file, by name: the interleaved camera and its opponents."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from importlib.util import find_spec
 from types import MappingProxyType
-from typing import Any
 
 from numpy.typing import ArrayLike
 
@@ -58,6 +57,8 @@ class Processor:
     noise_gains : NoiseGains or None
         Measured error of its planes, for a noise-aware colour matrix; None if the processor decides itself which noise
         its matrix takes into account.
+    file_version : mapping of str to str
+        Name of a user's own file and the hash of the bytes from which it was loaded; empty for the catalogue.
     """
 
     mosaic: str
@@ -68,6 +69,7 @@ class Processor:
     unit: str = "G"
     on_backend: bool = False
     noise_gains: NoiseGains | None = None
+    file_version: Mapping[str, str] = field(default_factory=dict)
 
     def develop(
         self,
@@ -76,7 +78,7 @@ class Processor:
         *,
         neutral: ArrayLike | None = None,
         balance: ArrayLike | WhiteBalance | None = None,
-        **options: Any,
+        **options: object,
     ) -> Picture:
         """Replace defective pixels, level the sites of each channel, and develop the picture.
 

@@ -91,7 +91,8 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
         return NAMED[name]
     path, attribute = user_code
     content = _read(path)
-    if expected is not None and expected.get(path.name) != digest_bytes(content):
+    file_version = {path.name: digest_bytes(content)}
+    if expected is not None and expected.get(path.name) != file_version[path.name]:
         raise InputError(
             f"processors: {str(path)!r} on {platform.node()} isn't the file that the sweep began with; allowed: the "
             "same bytes; run rodcone sweep again, or give the workers the same file"
@@ -99,7 +100,7 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
     if path.suffix == ".whl":
         fix = "allowed: the wheel of demosaicnet with :bayer_net or :bayer_net_bm3d; pip download --no-deps demosaicnet"
         with read_errors(f"processors: {str(path)!r} can't be used", fix):
-            return network.network_processor(attribute, content)
+            return replace(network.network_processor(attribute, content), file_version=file_version)
     value = getattr(_module(path, content), attribute, None)
     processor = value if isinstance(value, Processor) else Processor(OWN, value, path.name, colours=(), unit="")  # type: ignore[arg-type]
     if not callable(processor.picture) or isinstance(value, type):
@@ -108,10 +109,10 @@ def processor_of(name: str, expected: Mapping[str, str] | None = None) -> Proces
             f"a Processor of that name; name what the file defines"
         )
 
-    def picture(raw: RawImage, colours: Any, **options: Any) -> Picture:
+    def picture(raw: RawImage, colours: object, **options: object) -> Picture:
         return _checked(name, raw, _run(path, processor.picture, raw, colours, **options))
 
-    return replace(processor, picture=picture)
+    return replace(processor, picture=picture, file_version=file_version)
 
 
 def _read(path: Path) -> bytes:

@@ -116,6 +116,29 @@ def labels(condition: Condition) -> dict[str, Any]:
     return vars(condition) | {"scene": condition.scene.label, **files}
 
 
+def stated_columns(cell: Cell) -> dict[str, Any]:
+    """Return the columns of a cell's row that are known before its picture is made."""
+    facts = cell.render.facts
+    columns = {
+        "key": cell.key,
+        "render": render_text(cell.render),
+        "processor": label(cell.processor),
+        "seed": cell.seed,
+        "luminance_cd_m2": cell.luminance_cd_m2,
+        "illuminance_lux": cell.illuminance_lux,
+        "exposure_s": cell.exposure_s,
+        "gain_factor": cell.frame.sensor.gain,
+        "lens": json.dumps(vars(cell.frame.sensor.lens)),
+        "spp": facts.spp,
+        "bands": facts.bands,
+        "render_s": facts.seconds,
+        "budget_share": cell.budget_share,
+        "variant": cell.made_by.variant,
+        "versions": cell.made_by.versions,
+    }
+    return labels(cell.condition) | columns
+
+
 def cell_keys(
     condition: Condition,
     processor: str,

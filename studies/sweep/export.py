@@ -94,7 +94,7 @@ def results_json(run: LastRun) -> bytes:
     return (json.dumps(results, indent=1, allow_nan=False) + "\n").encode()
 
 
-def _harmless(value: Any) -> Any:
+def _harmless(value: object) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 

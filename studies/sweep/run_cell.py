@@ -10,10 +10,8 @@ from pathlib import Path
 import numpy as np
 
 from isp.colour.encoding import quantise
-from isp.processors.own import own_version, processor_of
+from isp.processors.own import processor_of
 from rodcone.colour_spaces import encode_srgb
-from rodcone.errors import InputError
-from rodcone.types import Image
 from sensor.burst import merged_raw, merged_sensor
 from sensor.capture import expose
 from sensor.cfa import block_sums, mask
@@ -33,11 +31,11 @@ from studies.photograph.picture_file import to_png
 from studies.study.equal_area import area_average
 from studies.study.gain import iso_speed
 from studies.study.render_noise import monte_carlo_bound
-from studies.study.study import AS_SHOT, label
-from studies.sweep.cells import Cell, device_stream, exposure_stream, flicker_stream, labels, render_text, shake_stream
+from studies.study.study import AS_SHOT
+from studies.sweep.cells import Cell, device_stream, exposure_stream, flicker_stream, shake_stream, stated_columns
 from studies.sweep.provenance import require_same, threads
 from studies.sweep.row import Row
-from studies.sweep.stored import is_whole, keep
+from studies.sweep.stored import keep, read_array
 
 
 def run_cell(cell: Cell) -> Row:
@@ -52,18 +50,19 @@ def run_cell(cell: Cell) -> Row:
         Where the picture can't be written.
     """
     processor = processor_of(cell.processor, json.loads(cell.made_by.versions))
-    require_same(cell.made_by, cell.processor, processor.on_backend, own_version(cell.processor))
+    require_same(cell.made_by, cell.processor, processor.on_backend, processor.file_version)
     frame, sensor, engine = cell.frame, cell.frame.sensor, cell.made_by.readout_engine
-    names = labels(cell.condition) | {"processor": label(cell.processor)}
+    stated = stated_columns(cell)
     # Expose: the frame's electrons are those at 1 cd/m^2 and 1 s.
     light = cell.luminance_cd_m2 * cell.exposure_s
-    unmoved_e = np.asarray(_array(frame.electrons), dtype=np.float64) * light
+    electrons, true_linear, errors = (read_array(path) for path in (frame.electrons, frame.truth, frame.errors))
+    unmoved_e = np.asarray(electrons, dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
     # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
-    bins_truth = sensor.sites > 1 and _array(frame.truth).shape[:2] == expected_e.shape
-    truth, truth_png = _truth(frame.truth, bins_truth)
+    bins_truth = sensor.sites > 1 and true_linear.shape[:2] == expected_e.shape
+    truth, truth_png = _true_picture(frame.truth, bins_truth)
     pixels_e = sensor.pixel_sums(expected_e)
-    errors_e = sensor.pixel_sums(_array(frame.errors)) * light
+    errors_e = sensor.pixel_sums(errors) * light
     shape = (expected_e.shape[0], expected_e.shape[1])
     device = draw_device(sensor, shape, device_stream(cell.condition.sensor, processor.mosaic, cell.seed))
     frames = cell.condition.frames
@@ -81,12 +80,12 @@ def run_cell(cell: Cell) -> Row:
             raws.append(expose(frame_e, sensor, cell.exposure_s, device, stream, exact=engine == "numpy"))
         return merged_raw(raws)
 
-    raw, capture_s, first_capture_s = timed(burst, *("capture", engine, names["sensor"], shape, frames))
+    raw, capture_s, first_capture_s = timed(burst, *("capture", engine, stated["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
     # The neutral of the scene's light, as a raw file would note it, sets the scale; as shot, the balance too.
     neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
-    options = {"balance": neutral} if names["white_balance"] == AS_SHOT else {}
+    options = {"balance": neutral} if stated["white_balance"] == AS_SHOT else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.fit, sensor, neutral, cell.white_cd_m2, **options),
         *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # each has other kernels
@@ -99,24 +98,14 @@ def run_cell(cell: Cell) -> Row:
         lambda: {
             **vars(picture_quality(encoded, truth)),
             **vars(appearance(linear, truth, cell.white_cd_m2)),
-            **vars(target_figures(names["scene"], linear, truth.linear)),
+            **vars(target_figures(stated["scene"], linear, truth.linear)),
         },
-        *("measure", names["scene"], raw.shape),
+        *("measure", stated["scene"], raw.shape),
     )
+    kept, kept_truth = (keep(cell.pictures, png, ".png") for png in (to_png(quantise(encoded)), truth_png))
     return Row(
-        key=cell.key,
-        **names,
-        seed=cell.seed,
-        luminance_cd_m2=cell.luminance_cd_m2,
-        illuminance_lux=cell.illuminance_lux,
-        exposure_s=cell.exposure_s,
-        gain_factor=sensor.gain,
+        **stated,
         iso=iso_speed(sensor),
-        spp=cell.render.facts.spp,
-        bands=cell.render.facts.bands,
-        render=render_text(cell.render),
-        lens=json.dumps(vars(sensor.lens)),
-        budget_share=cell.budget_share,
         **figures,
         mc_share=monte_carlo_bound(
             errors_e * frames,
@@ -131,13 +120,10 @@ def run_cell(cell: Cell) -> Row:
         mean_electrons=json.dumps(
             {name: float(pixels_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
         ),
-        variant=cell.made_by.variant,
         readout_engine=raw.engine,
         development_engine=picture.engine,
-        versions=cell.made_by.versions,
-        picture=keep(cell.pictures, to_png(quantise(encoded)), ".png"),
-        truth=keep(cell.pictures, truth_png, ".png"),
-        render_s=cell.render.facts.seconds,
+        picture=kept,
+        truth=kept_truth,
         capture_s=capture_s,
         develop_s=develop_s,
         measure_s=measure_s,
@@ -150,25 +136,11 @@ def run_cell(cell: Cell) -> Row:
     )
 
 
-def _truth(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
-    """The truth, of 2x2 pixels each where the camera bins, and its PNG."""
-    _array(path)  # refuses what can't be read, in the cache or not
-    return _true_picture(path, binned)
-
-
-@lru_cache(maxsize=2)  # cells of one scene under one spectrum come one after the other
+@lru_cache(maxsize=2)  # cells of one scene under one spectrum follow each other
 def _true_picture(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
-    linear = np.array(_array(path))
+    """Return the true picture, binned by 2x2 pixels if the camera bins, and its PNG."""
+    linear = np.array(read_array(path))
     if binned:
         linear = np.moveaxis(block_sums(np.moveaxis(linear, -1, 0)) / 4, 0, -1)
     truth = true_picture(linear)
     return truth, to_png(quantise(truth.encoded))
-
-
-def _array(path: Path) -> Image:
-    if not is_whole(path):
-        raise InputError(
-            f"{path}: can't be read on {platform.node()}, or isn't what was written; allowed: a folder that all "
-            "workers see under the same path; give one with --out, or run the sweep again where the file is damaged"
-        )
-    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))

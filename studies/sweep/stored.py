@@ -4,6 +4,7 @@ Against accidents, not intent: bit rot, files cut short, runs that were killed.
 """
 
 import json
+import platform
 from collections.abc import Mapping
 from functools import lru_cache
 from io import BytesIO
@@ -32,6 +33,22 @@ def keep_array(folder: Path, array: NDArray[Any]) -> str:
     file = BytesIO()
     np.save(file, array)
     return keep(folder, file.getbuffer(), ".npy")
+
+
+def read_array(path: Path) -> NDArray[np.floating]:
+    """Map a kept array into memory.
+
+    Raises
+    ------
+    InputError
+        If this machine can't read the file, or its content isn't what was written.
+    """
+    if not is_whole(path):
+        raise InputError(
+            f"{path}: can't be read on {platform.node()}, or isn't what was written; allowed: a folder that all "
+            "workers see under the same path; give one with --out, or run the sweep again where the file is damaged"
+        )
+    return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 
 def keep_facts(folder: Path, key: str, facts: Mapping[str, Any]) -> None:
