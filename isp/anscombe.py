@@ -16,7 +16,7 @@ LEAST_PRNU = 1e-4
 _LEAST = 2.0 * np.sqrt(0.375)  # the Anscombe transform of 0 electrons, smaller values are raised to it
 
 
-def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDArray[Any]:
+def stabilise(electrons: NDArray[np.floating], dark_noise_e: float, prnu: float) -> NDArray[Any]:
     """Transform a mosaic to units of its own noise: generalised Anscombe transform at unit gain, with PRNU.
 
     It is the integral of 1 / sqrt(s^2 + e + 3/8 + (p e)^2), for e electrons, dark noise s and PRNU p:
@@ -47,7 +47,7 @@ def stabilise(electrons: NDArray[Any], dark_noise_e: float, prnu: float) -> NDAr
     return np.asarray(np.log(1.0 + 2.0 * prnu * np.sqrt(variance) + 2.0 * prnu**2 * seen) / prnu)
 
 
-def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
+def stabilise_raw(electrons: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:
     """Apply `stabilise` with the noise of a raw image, which has steps if pixels were read several times.
 
     From a step on, the variance is k e + s^2 + (p e)^2 with other k, s and p. Its integral is the transform at k e with
@@ -68,14 +68,14 @@ def stabilise_raw(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
     return stable
 
 
-def stabilise_channel(electrons: NDArray[Any], raw: RawImage, channel: str) -> NDArray[Any]:
+def stabilise_channel(electrons: NDArray[np.floating], raw: RawImage, channel: str) -> NDArray[Any]:
     """Transform a plane of `channel` [e-] to units of its samples' noise, as `stabilise_raw` transforms the samples."""
     if channel in _read_apart(raw):
         return _counted(electrons, raw.noise_of(channel))
     return _stabilise_in_steps(electrons, raw)
 
 
-def _stabilise_in_steps(electrons: NDArray[Any], raw: RawImage) -> NDArray[Any]:
+def _stabilise_in_steps(electrons: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:
     stable = _counted(electrons, raw.plain_noise)
     for step, offset in _joined(raw):
         stable = np.where(electrons >= step.from_e, _piece(electrons, step) + offset, stable).astype(electrons.dtype)
@@ -86,7 +86,7 @@ def _read_apart(raw: RawImage) -> list[str]:
     return [noise.channel for noise in raw.channel_noise]
 
 
-def _counted(electrons: NDArray[Any], noise: ChannelNoise) -> NDArray[Any]:
+def _counted(electrons: NDArray[np.floating], noise: ChannelNoise) -> NDArray[Any]:
     return stabilise(electrons / noise.shot, noise.dark_noise_e / noise.shot, noise.prnu)
 
 
@@ -108,7 +108,7 @@ def _joined(raw: RawImage) -> list[tuple[NoiseStep, float]]:
     return joined
 
 
-def _piece(electrons: NDArray[Any], step: NoiseStep) -> NDArray[Any]:
+def _piece(electrons: NDArray[np.floating], step: NoiseStep) -> NDArray[Any]:
     dark_e = float(np.hypot(step.read_noise_e, step.dsnu_e))
     return stabilise(electrons * step.shot, dark_e, step.prnu / step.shot) / step.shot
 

@@ -37,7 +37,7 @@ def tent_radius(tile: Tile, channel: str) -> int:
     return int(max(sampled.shape))
 
 
-def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
+def fill(values: NDArray[np.floating], tile: Tile, channel: str) -> NDArray[Any]:
     """Interpolate the samples of `channel` to a full plane; a sampled site keeps its sample.
 
     Parameters
@@ -69,7 +69,7 @@ def fill(values: NDArray[Any], tile: Tile, channel: str) -> NDArray[Any]:
 
 
 def _tent_sums(
-    values: NDArray[Any], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
+    values: NDArray[np.floating], tile: Tile, channel: str, phase: tuple[int, ...], radius: int
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """Sum tent times sample, and the tent, over the samples in the frame, for the pixels at one phase of the tile."""
     size = (len(tile), len(tile[0]))

@@ -8,7 +8,6 @@ import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -146,7 +145,7 @@ def _with_referred(node: Node, parts: Mapping[str, Node]) -> Iterator[Node]:
             pending += [child for child in part.values() if isinstance(child, dict)]
 
 
-def _matrix(transform: Any) -> Floats:
+def _matrix(transform: object) -> Floats:
     """Return the upper 3x4 of a `to_world` in any of its forms; of the identity if there is none."""
     if transform is None:
         return np.eye(4)[:3]

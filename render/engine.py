@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -319,7 +318,7 @@ def _interrupt_noted() -> Iterator[Callable[[], bool]]:
         yield noted.is_set
         return
 
-    def note(number: int, frame: Any) -> None:
+    def note(number: int, frame: object) -> None:
         if noted.is_set():
             raise KeyboardInterrupt
         noted.set()

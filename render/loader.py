@@ -196,7 +196,7 @@ def _with_common_shapes(scene: Scene) -> Scene:
     return replace(scene, geometry=rest | dict(zip(unlit, shapes, strict=False)))  # merged meshes are fewer
 
 
-def _is(part: Any, kind: Any) -> bool:
+def _is(part: object, kind: object) -> bool:
     """Return whether a part of a scene's dict has a Mitsuba type and holds no reference."""
     if not isinstance(part, dict) or part["type"] == "shapegroup":
         return False

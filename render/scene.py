@@ -216,7 +216,7 @@ def table_of(node: Node) -> Spectrum | None:
     return None
 
 
-def _numbers(text: Any) -> Floats:
+def _numbers(text: object) -> Floats:
     return np.array(str(text).replace(",", " ").split(), dtype=np.float64)
 
 
@@ -235,7 +235,7 @@ def _with_black_lamps(geometry: Node, emitters: Mapping[str, str]) -> Node:
     return result
 
 
-def _is_surface(part: Any) -> bool:
+def _is_surface(part: object) -> bool:
     """Return whether a part of a shape is its surface: a description, a reference, or a BSDF of Mitsuba's."""
     if isinstance(part, dict):
         return part.get("type") not in _NO_SURFACES
@@ -288,7 +288,7 @@ def emitter_paths(node: Node) -> dict[str, str]:
     return {"/".join(path): part["type"] for path, part in walk(node) if part.get("type") in kinds}
 
 
-def _copy(value: Any) -> Any:
+def _copy(value: object) -> Any:
     """Copy nested dicts and lists, so that a description shares none of them with its scene."""
     if isinstance(value, dict):
         return {key: _copy(item) for key, item in value.items()}

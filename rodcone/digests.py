@@ -16,12 +16,12 @@ _BITS = 30  # of a float: what processors differ by is a millionth of the last, 
 _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide with a chance of 1e-27
 
 
-def digest(value: Any) -> str:
+def digest(value: object) -> str:
     """Hash of plain data: numbers, texts, arrays, dataclasses, mappings and sequences of them."""
     return digest_bytes(json.dumps(value, sort_keys=True, default=_plain).encode())
 
 
-def digest_inputs(value: Any) -> str:
+def digest_inputs(value: object) -> str:
     """Hash of what a result is made from, as `digest`, with floats rounded to 2^-30 of the largest of their array.
 
     NumPy and BLAS pick their loops by the processor, so that a spectrum read from a table and resampled has other last
@@ -45,7 +45,7 @@ def digest_file(path: str | Path) -> str:
         return hashlib.file_digest(file, "sha256").hexdigest()[:_LENGTH]
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> Any:
     """What JSON holds in place of a value that it doesn't know."""
     if is_dataclass(value):
         return {x.name: getattr(value, x.name) for x in fields(value)}
@@ -54,7 +54,7 @@ def _plain(value: Any) -> Any:
     return np.asarray(value).tolist()  # arrays, NumPy's scalars and Dr.Jit's matrices
 
 
-def rounded(value: Any) -> Any:
+def rounded(value: object) -> Any:
     """Plain data with its floats rounded, as `digest_inputs` hashes it."""
     if isinstance(value, str) and "," in value:  # a spectrum as Mitsuba takes it is text: 0.25,0.5,...
         with suppress(ValueError):

@@ -36,7 +36,7 @@ def _is_default(field: Field[Any], value: object) -> bool:
     return plain and field.default is not MISSING and bool(value == field.default)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     """Text of a field; what is long is named by its kind."""
     if isinstance(value, np.ndarray):
         return _array(value)

@@ -70,7 +70,7 @@ def imported(module: str) -> ModuleType:
 def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
     """Check for an object of a class, or of that at ``module:name``; the function at `by_name` makes one of a name."""
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> Any:
         if by_name and isinstance(value, str | Path):
             return at(by_name)(str(value))
         require_kind(name, value, at(kind) if isinstance(kind, str) else kind, fix)
@@ -82,7 +82,7 @@ def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
 def _range(low: float, high: float, fix: str) -> Check:
     """Check for a number within limits."""
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> Any:
         require_range(name, value, low, high, fix)
         return value
 
@@ -101,26 +101,26 @@ def _plain(kind: Any, words: str) -> Check:
     return check
 
 
-def _seconds(name: str, value: Any) -> Any:
+def _seconds(name: str, value: object) -> Any:
     time_s = parse_time(value, name) if isinstance(value, str) else value
     require_range(name, time_s, 0.0, 1e7, "give seconds, or a time such as '20ms'")
     return time_s
 
 
-def _some_seconds(name: str, value: Any) -> Any:
+def _some_seconds(name: str, value: object) -> Any:
     time_s = _seconds(name, value)
     require_range(name, time_s, 1e-9, 1e7, "give a time above 0, such as '33ms'")
     return time_s
 
 
-def _exposure(name: str, value: Any) -> Any:
+def _exposure(name: str, value: object) -> Any:
     return value if isinstance(value, str) and value in at("sensor.exposure:RULES") else _seconds(name, value)
 
 
 def _array(*shape: int, or_kinds: tuple[str, ...] = (), least: float = -inf) -> Check:
     """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for `or_kinds`."""
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> Any:
         import numpy as np
 
         if any(isinstance(value, at(kind)) for kind in or_kinds):
@@ -138,7 +138,7 @@ def _array(*shape: int, or_kinds: tuple[str, ...] = (), least: float = -inf) -> 
     return check
 
 
-def _spectra(name: str, value: Any) -> Any:
+def _spectra(name: str, value: object) -> Any:
     """Lamps by light group, or one in place of all lights."""
     if isinstance(value, Mapping):
         return value
@@ -157,14 +157,14 @@ def _size_or_side(name: str, value: Any) -> Any:
     return int(value) if _passes(_WHOLE, value) and value > 0 else _size(name, value)
 
 
-def _paths(name: str, value: Any) -> Any:
+def _paths(name: str, value: object) -> Any:
     return [_PATH(name, one) for one in (value if isinstance(value, list | tuple) else [value])]
 
 
 def _each(kind: Check, least: int = 0) -> Check:
     """Check for a sequence, at least so long, of which `kind` takes each."""
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> Any:
         if not isinstance(value, list | tuple) or len(value) < least:
             raise InputError(f"{name}: {_shown(value)} is not allowed; give a list{' of one or more' * least}")
         return [kind(f"{name}[{place}]", one) for place, one in enumerate(value)]
@@ -175,7 +175,7 @@ def _each(kind: Check, least: int = 0) -> Check:
 def _each_in_turn(kind: Check) -> Check:
     """Check for a list or a generator, of which `kind` takes each when its turn comes."""
 
-    def check(name: str, value: Any) -> Any:
+    def check(name: str, value: object) -> Any:
         if not isinstance(value, list | tuple | Iterator):
             raise InputError(f"{name}: {_shown(value)} is not allowed; give a list or a generator")
         return (kind(f"{name}[{place}]", one) for place, one in enumerate(value))
@@ -183,7 +183,7 @@ def _each_in_turn(kind: Check) -> Check:
     return check
 
 
-def _as_it_is(_: str, value: Any) -> Any:
+def _as_it_is(_: str, value: object) -> Any:
     """Take any argument."""
     return value
 
@@ -303,7 +303,15 @@ def _by_type(hint: Any) -> Check:  # noqa: PLR0911  one for each kind of type
     return _value(hint, fix, by_name)
 
 
-_OF_TYPE = {bool: _FLAG, int: _WHOLE, float: _NUMBER, str: _TEXT, tuple[int, int]: _size, Any: _as_it_is}
+_OF_TYPE = {
+    bool: _FLAG,
+    int: _WHOLE,
+    float: _NUMBER,
+    str: _TEXT,
+    tuple[int, int]: _size,
+    Any: _as_it_is,
+    object: _as_it_is,
+}
 _OF_ORIGIN = {"Callable": _CALL, "Mapping": _plain(Mapping, "a dict by light group"), "ndarray": _array()}
 
 
@@ -326,7 +334,7 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
         return {parameter: check_of(name, parameter, hints.get(parameter, Any)) for parameter in call.parameters}
 
     @wraps(function)
-    def checked(*arguments: Any, **named: Any) -> Any:
+    def checked(*arguments: object, **named: object) -> Any:
         try:
             bound = call.bind(*arguments, **named)
         except TypeError as error:
@@ -355,11 +363,11 @@ def method(function: F) -> F:
     return cast(F, door(function.__qualname__, function))
 
 
-def _left_out(parameter: Parameter, value: Any) -> bool:
+def _left_out(parameter: Parameter, value: object) -> bool:
     return value is None and parameter.default is None
 
 
-def _passes(check: Check, value: Any) -> bool:
+def _passes(check: Check, value: object) -> bool:
     try:
         check("", value)
     except InputError:

@@ -83,7 +83,7 @@ def unknown(what: str, value: object, allowed: Iterable[str]) -> InputError:
     return InputError(f"{what}: {value!r} is unknown; allowed: {', '.join(names)}{hint}")
 
 
-def require_range(name: str, value: Any, low: float, high: float, fix: str) -> None:
+def require_range(name: str, value: object, low: float, high: float, fix: str) -> None:
     """Raise `InputError` unless `value` is a finite number and ``low <= value <= high``."""
     try:
         number = float(value) if not isinstance(value, bool) and isinstance(value, Real) else nan
@@ -134,7 +134,7 @@ def require_fields(value: object, place: str = "") -> None:
     ``Annotated[float, (low, high, fix)]`` is a number from low to high, of `int` a whole one; `place` stands before the
     field's name.
     """
-    owner: Any = type(value)
+    owner: object = type(value)
     for name, kind in _kinds(owner).items():
         given = getattr(value, name)
         if get_origin(kind) is Annotated:
@@ -147,11 +147,11 @@ def require_fields(value: object, place: str = "") -> None:
 
 
 @cache
-def _kinds(owner: Any) -> dict[str, Any]:
+def _kinds(owner: object) -> dict[str, Any]:
     return get_type_hints(owner, include_extras=True)
 
 
-def _fits(value: Any, kind: Any) -> bool:
+def _fits(value: object, kind: object) -> bool:
     """Whether a value is of the kind that an annotation states; arrays, and kinds that aren't classes, always are."""
     parts = get_args(kind)
     if isinstance(kind, UnionType):

@@ -53,7 +53,7 @@ def _almost(name: str, known: tuple[str, ...]) -> str:
     return next((fields[near] for near in get_close_matches(field, fields, n=1, cutoff=_LIKE)), "")
 
 
-def _changes_nothing(value: Any, nothing: str) -> bool:
+def _changes_nothing(value: object, nothing: str) -> bool:
     """Whether a value, or each of a list of them, is the one without effect, or empty."""
     if isinstance(value, bool):
         return str(value).lower() == nothing

@@ -117,7 +117,7 @@ def _place_beside(path: Path) -> Path:
     return place
 
 
-def finite(value: Any) -> Any:
+def finite(value: object) -> Any:
     """A value as a JSON file holds it: None in place of every NaN and infinity, lists in place of tuples."""
     if isinstance(value, float):
         return value if isfinite(value) else None

@@ -58,7 +58,7 @@ def parse_toml(text: str) -> dict[str, Any]:
     return content
 
 
-def _check_numbers(value: Any) -> None:
+def _check_numbers(value: object) -> None:
     if isinstance(value, dict | list):
         for item in value.values() if isinstance(value, dict) else value:
             _check_numbers(item)
@@ -79,7 +79,7 @@ def strict_converter() -> Converter:
     return converter
 
 
-def structured(content: Any, kind: type[Kind], converter: Converter, fix: str) -> Kind:
+def structured(content: object, kind: type[Kind], converter: Converter, fix: str) -> Kind:
     """Dataclass of a table's keys.
 
     Parameters
@@ -100,13 +100,13 @@ def structured(content: Any, kind: type[Kind], converter: Converter, fix: str) -
         raise InputError(_first_fault(error, fix)) from error
 
 
-def is_tuple(kind: Any) -> bool:
+def is_tuple(kind: object) -> bool:
     """Whether a type is a tuple of others."""
-    origin: Any = get_origin(kind)
+    origin: object = get_origin(kind)
     return origin is tuple
 
 
-def _is_plain_union(kind: Any) -> bool:
+def _is_plain_union(kind: object) -> bool:
     return get_origin(kind) is UnionType and set(get_args(kind)) <= {*_WORDS, type(None)}
 
 
@@ -114,7 +114,7 @@ def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
     """Return a hook that accepts a value of one of these kinds, and gives it the first kind that fits."""
     plain = [kind for kind in kinds if kind in _WORDS]
 
-    def take(value: Any, _: Any) -> Any:
+    def take(value: object, _: object) -> Any:
         if value is None and len(plain) < len(kinds):
             return None
         for kind in plain:
@@ -125,11 +125,11 @@ def _one_of(*kinds: type) -> Callable[[Any, Any], Any]:
     return take
 
 
-def _tuple_of(converter: Converter, kind: Any) -> Callable[[Any, Any], Any]:
+def _tuple_of(converter: Converter, kind: object) -> Callable[[Any, Any], Any]:
     """Return a hook that turns a list into a tuple: each value by its own type, as many values as the type states."""
     items = get_args(kind)
 
-    def take(value: Any, _: Any) -> Any:
+    def take(value: object, _: object) -> Any:
         if not isinstance(value, list):
             raise InputError(f"{value!r} is not a list; write it in brackets")
         kinds = items[:1] * len(value) if items[-1] is Ellipsis else items

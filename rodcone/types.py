@@ -17,7 +17,7 @@ Mosaic: TypeAlias = NDArray[np.float64]  # (h, w): at every pixel the one channe
 Progress: TypeAlias = Callable[[float, float], None]  # share of the work done, 0 to 1, and relative error so far
 
 
-def require_unmasked(name: str, value: Any) -> None:
+def require_unmasked(name: str, value: object) -> None:
     """Raise `InputError` for masked values, and for a table with names, which an array would lose without a word."""
     if np.ma.is_masked(value):
         raise InputError(f"{name}: values that are masked are not allowed; fill them, as by values.filled(0)")
@@ -26,7 +26,7 @@ def require_unmasked(name: str, value: Any) -> None:
         raise InputError(f"{name}: a {kind} is not allowed; give an array, as by values.to_numpy()")
 
 
-def real_array(name: str, value: Any) -> NDArray[Any]:
+def real_array(name: str, value: object) -> NDArray[Any]:
     """Array of whole or floating numbers; raises `InputError` for complex ones, masked values, text and the like."""
     require_unmasked(name, value)
     try:

@@ -4,7 +4,6 @@ import inspect
 import re
 from collections.abc import Callable
 from importlib import import_module
-from typing import Any
 
 from render.scene import Scene
 from rodcone.errors import require_keys, unknown
@@ -45,7 +44,7 @@ def scene_names() -> tuple[str, ...]:
     return _NAMES
 
 
-def load(name: str, **options: Any) -> Scene:
+def load(name: str, **options: object) -> Scene:
     """Build a scene by name.
 
     Parameters

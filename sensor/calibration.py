@@ -73,7 +73,7 @@ class ColourCalibration:
         )
 
 
-def _numbers(name: str, values: Any, shape: tuple[int, ...]) -> Floats:
+def _numbers(name: str, values: object, shape: tuple[int, ...]) -> Floats:
     """Array of finite numbers of `shape`, or `InputError`."""
     try:
         array = np.array(values, dtype=np.float64)

@@ -3,7 +3,6 @@
 from collections.abc import Callable
 from itertools import product
 from math import inf, nan
-from typing import Any
 
 import numpy as np
 import scipy
@@ -41,7 +40,7 @@ def _fit() -> list[float]:
 _FIT = _fit()
 
 
-def fast_otf(s: NDArray[Any], under: NDArray[Any], value: NDArray[Any]) -> None:
+def fast_otf(s: NDArray[np.floating], under: NDArray[np.floating], value: NDArray[np.floating]) -> None:
     """Approximate `diffraction_otf` within 4e-8, at frequencies s in shares of the cut-off: the result is in `value`.
 
     The three arrays have one shape and one precision; that of `under` is lost. Nothing is allocated.
@@ -80,7 +79,7 @@ def half_frequency(frequency: Floats, transfer: Floats) -> float:
 
 def sampled_otf(
     shape: tuple[int, int], step_um: float, lens: LensConfig, folded: bool, real: type[np.floating] = np.float64
-) -> Callable[..., NDArray[Any]]:
+) -> Callable[..., NDArray[np.floating]]:
     """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, as a function of the wavelength.
 
     The function takes the wavelength [nm] and, optionally, a slice of rows. It gives an array of shape `shape`, or of
@@ -102,12 +101,12 @@ def sampled_otf(
     # Along an axis sinc^2 of f and of f - 1, over their sum.
     energies = [((1 - f) ** 2 / ((1 - f) ** 2 + f**2), f**2 / ((1 - f) ** 2 + f**2)) for f in (rows, columns)]
     copies = list(product((0, 1), (0, 1))) if lens.diffraction or not folded else [(0, 0)]
-    blurred: dict[tuple[int, int], NDArray[Any]] = {}  # the same for all wavelengths, and slow
+    blurred: dict[tuple[int, int], NDArray[np.floating]] = {}  # the same for all wavelengths, and slow
     for down, across in copies if lens.defocus_um else []:
         frequency_per_um = np.hypot(rows[:, None] - down, columns - across) / step_um
         blurred[down, across] = defocus_otf(frequency_per_um, lens.defocus_um).astype(real)
 
-    def sum_of_copies(limit_per_sample: float, at: slice, beside: slice) -> NDArray[Any]:
+    def sum_of_copies(limit_per_sample: float, at: slice, beside: slice) -> NDArray[np.floating]:
         total = np.zeros((rows[at].size, columns[beside].size), real)
         s, under, part = np.empty((3, *total.shape), real)
         for down, across in copies:
@@ -127,7 +126,7 @@ def sampled_otf(
             total += part
         return total
 
-    def of_band(wavelength_nm: float, at: slice = slice(None)) -> NDArray[Any]:
+    def of_band(wavelength_nm: float, at: slice = slice(None)) -> NDArray[np.floating]:
         limit = step_um * limit_per_um(wavelength_nm, lens)
         first = slice(0, 1)
         total = sum_of_copies(limit, at, slice(None))

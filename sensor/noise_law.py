@@ -35,7 +35,7 @@ class NoiseLaw:
     fixed_e: Number = 0.0
     prnu: Number = 0.0
 
-    def variance(self, electrons: NDArray[Any]) -> NDArray[Any]:
+    def variance(self, electrons: NDArray[np.floating]) -> NDArray[Any]:
         """Variance of samples with these means [e-^2], shape and type of `electrons`."""
         variance = self.prnu * electrons
         variance *= variance
@@ -43,7 +43,7 @@ class NoiseLaw:
         variance += self.dark_e**2 + self.fixed_e**2
         return np.asarray(variance)
 
-    def slope(self, electrons: NDArray[Any]) -> NDArray[Any]:
+    def slope(self, electrons: NDArray[np.floating]) -> NDArray[Any]:
         """Slope of `variance` by the mean [e-]."""
         return np.asarray(self.shot + 2 * self.prnu**2 * electrons)
 

@@ -244,7 +244,7 @@ def gains_shot(raw: RawImage, dark_current_e: float) -> float:
     return 2.0 * raw.column_gain_spread**2 * dark_current_e
 
 
-def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
+def noise_at_sites(raw: RawImage, electrons: NDArray[np.floating]) -> NDArray[np.floating]:
     """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
 
     Parameters
@@ -254,7 +254,9 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[Any]) -> NDArray[Any]:
     """
     light = np.maximum(electrons, 0.0)
 
-    def variance_of(noise: NoiseStep | ChannelNoise, dark_current_e: float, mean_e: NDArray[Any]) -> NDArray[Any]:
+    def variance_of(
+        noise: NoiseStep | ChannelNoise, dark_current_e: float, mean_e: NDArray[np.floating]
+    ) -> NDArray[np.floating]:
         return replace(noise.law, shot=noise.shot + gains_shot(raw, dark_current_e)).variance(mean_e)
 
     variance = variance_of(raw._plain(""), raw.dark_current_e, light)

@@ -21,7 +21,7 @@ MOST_SIGMAS = 1e3  # from this number on there is no limit
 FEWEST_E = 2.25  # without dark noise, samples of 1 and 2 electrons count even where all samples around hold none
 
 
-def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings) -> NDArray[Any]:
+def brightest_allowed(electrons: NDArray[np.floating], raw: RawImage, settings: Settings) -> NDArray[Any]:
     """Compute the electrons up to which samples count at each pixel, for each position of a sample in the tile.
 
     With m the brightest sample of the channel that is less than 2 tiles away along either axis, s the dark noise and p
@@ -70,7 +70,7 @@ def brightest_allowed(electrons: NDArray[Any], raw: RawImage, settings: Settings
     return result
 
 
-def _most(parts: list[NDArray[Any]], out: NDArray[Any]) -> NDArray[Any]:
+def _most(parts: list[NDArray[np.floating]], out: NDArray[np.floating]) -> NDArray[Any]:
     """Return the largest of two or more arrays, element by element; `np.maximum.reduce` would copy all of them."""
     np.maximum(parts[0], parts[1], out=out)
     for part in parts[2:]:

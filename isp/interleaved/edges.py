@@ -39,7 +39,9 @@ from sensor.raw import RawImage
 STRIP_ROWS = 32  # rows that are computed together, with 2 kB per pixel
 
 
-def sharpen(white: WhiteReading, planes: NDArray[Any], gains: Floats, noise_gain: NDArray[Any]) -> NDArray[np.float32]:
+def sharpen(
+    white: WhiteReading, planes: NDArray[np.floating], gains: Floats, noise_gain: NDArray[np.floating]
+) -> NDArray[np.float32]:
     """Estimate every channel at each pixel from the nine samples around it.
 
     With m and C the mean and the covariance of the channels' planes P over 5 x 5 pixels and N = m + s^2 a sample's
@@ -125,7 +127,7 @@ def _sharpen(
     gains: Floats,
     nu: Floats,
     shares: Floats,
-    noise_gain: NDArray[Any],
+    noise_gain: NDArray[np.floating],
     planes: Floats,
     *samples: NDArray[Any],
 ) -> Floats:

@@ -184,7 +184,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     return surroundings, around + trusted / (trusted + own_variance) * difference
 
 
-def at_pixels(shares: NDArray[Any], raw: RawImage) -> NDArray[Any]:
+def at_pixels(shares: NDArray[np.floating], raw: RawImage) -> NDArray[Any]:
     """Repeat shares by tile for every pixel, (h, w, channel)."""
     repeated = shares.repeat(len(raw.cfa), axis=0).repeat(len(raw.cfa[0]), axis=1)
     return repeated[: raw.shape[0], : raw.shape[1]]

@@ -29,7 +29,7 @@ class StoredPlanes:
         """Return a copy of what an index selects."""
         return np.array(self._mapped()[index])
 
-    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[Any]:
+    def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[np.floating]:
         return np.array(self._mapped(), dtype=dtype)
 
     def _mapped(self) -> Planes:

@@ -143,7 +143,7 @@ def _check_left_out(mi: ModuleType, name: str, description: Node) -> None:
                 require_known(f"Mitsuba {kind} property", own)
 
 
-def _kind(mi: ModuleType, part: Any) -> str:
+def _kind(mi: ModuleType, part: object) -> str:
     return kind_of(mi, type_of(part)) if type_of(part) not in ("", "ref") else ""
 
 

@@ -19,7 +19,7 @@ _LONGEST_KEY = 400  # characters of an unknown key in a message: a damaged file 
 MOST_BYTES = 1 << 20  # of the text: sixteen channels' calibration takes some 5 kB
 
 
-def raw_to_json(raw: RawImage, **more: Any) -> str:
+def raw_to_json(raw: RawImage, **more: object) -> str:
     """Write as JSON all that a raw image holds beside its pixels, and the keys of `more`.
 
     Numbers are the shortest decimals that read back as the same float64. A key of `_OPTIONAL` is left out where it has

@@ -14,7 +14,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from math import sqrt
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,7 +25,7 @@ from sensor.config import METERED_PERCENTILE, METERED_SHARE, SensorConfig
 from sensor.noise_law import NoiseLaw, total
 from sensor.pixel import ChannelReading, Chip, PixelConfig
 
-Values: TypeAlias = NDArray[Any]
+Values: TypeAlias = NDArray[np.floating]
 _COUNTED = ("shot noise", "dark current", "hot pixels", "PRNU")  # sources of noise in the electrons that a well holds
 _STEPS = 16.0  # steps per octave of a metered time, so that frames of one scene take the same time
 

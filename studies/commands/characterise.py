@@ -168,7 +168,7 @@ def _measure_files(frames: Frames, out: Path | None, json: bool) -> None:
         say(f"{out}: add pitch_um and fill_factor, which frames don't show")
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> Any:
     """Give a value with lists in place of arrays, as JSON holds it."""
     if isinstance(value, np.ndarray):
         return value.tolist()

@@ -23,7 +23,7 @@ _FRACTION = re.compile(r"^[-+]?\d*\.\d+$")
 _UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
-def _converted(kind: Any, tokens: Sequence[Token]) -> Any:
+def _converted(kind: object, tokens: Sequence[Token]) -> Any:
     """Cyclopts' value of the type, but no whole number of a fraction, which it would round."""
     if kind is int or int in get_args(kind):
         for token in tokens:

@@ -16,7 +16,7 @@ from rodcone.files import check_place, finite, require_ending
 from rodcone.time_text import parse_time
 
 
-def _seconds(_: Any, tokens: Sequence[Any]) -> float:
+def _seconds(_: object, tokens: Sequence[Any]) -> float:
     """Seconds as a number, or a time with its unit."""
     text = tokens[0].value
     try:
@@ -25,7 +25,7 @@ def _seconds(_: Any, tokens: Sequence[Any]) -> float:
         return parse_time(text)
 
 
-def _time(_: Any, tokens: Sequence[Any]) -> float:
+def _time(_: object, tokens: Sequence[Any]) -> float:
     """Seconds of a time with its unit."""
     return parse_time(tokens[0].value)
 

@@ -68,7 +68,7 @@ def sensor_schema() -> dict[str, Any]:
     return table
 
 
-def _setting(kind: Any) -> dict[str, Any]:
+def _setting(kind: object) -> dict[str, Any]:
     """Return the schema of a plain type, as one field of a table."""
     if kind == tuple[float, float]:
         numbers: dict[str, Any] = {"type": "number"}

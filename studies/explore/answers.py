@@ -4,7 +4,7 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -101,7 +101,7 @@ def python_text(rendered: RenderState, controls: Controls, view: str, drops: Pat
     return text.replace(str(path), path.name) if drops in path.parents else text
 
 
-def take_sensor(files: Any, drops: Path) -> Header:
+def take_sensor(files: object, drops: Path) -> Header:
     """Keep a sensor file that was dropped on the page; return where the page's sliders begin."""
     path, sensor = write_dropped(files, drops)
     return {"sensor": str(path), "terms": sensor_terms(sensor)}

@@ -30,7 +30,7 @@ class Memo:
     check: Callable[[], None] = never_cancel
     stages: dict[str, OrderedDict[Hashable, Any]] = field(default_factory=dict)
 
-    def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: Any) -> T:
+    def of(self, stage: str, key: Hashable, make: Callable[..., T], *arguments: object) -> T:
         """Return the result kept under a key, or make it of the arguments."""
         kept = self.stages.setdefault(stage, OrderedDict())
         if key not in kept:
@@ -40,7 +40,7 @@ class Memo:
         result: T = kept[key]
         return result
 
-    def keep(self, stage: str, key: Hashable, result: Any) -> None:
+    def keep(self, stage: str, key: Hashable, result: object) -> None:
         """Keep a result under a key, in place of the oldest one."""
         kept = self.stages.setdefault(stage, OrderedDict())
         kept[key] = result

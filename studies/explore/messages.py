@@ -157,7 +157,7 @@ def _refuse(constant: str) -> None:
     raise ValueError(constant)
 
 
-def read_views(value: Any, cameras: int) -> list[tuple[int, str]]:
+def read_views(value: object, cameras: int) -> list[tuple[int, str]]:
     """Read the camera and name of each view."""
     pairs = value if isinstance(value, list) and 1 <= len(value) <= 4 else [value]
     views = []
@@ -173,7 +173,7 @@ MOST_FILES, MOST_DROPS = 8, 100
 _NAME = re.compile(rf"\w[\w .+-]{{0,99}}\.(toml|{'|'.join(x[1:] for x in ENDINGS)})", re.IGNORECASE)
 
 
-def write_dropped(files: Any, drops: Path) -> tuple[Path, SensorConfig]:
+def write_dropped(files: object, drops: Path) -> tuple[Path, SensorConfig]:
     """Write a sensor's ``.toml`` and its tables of curves, by name, below `drops`; give the sensor's path and content.
 
     Raises

@@ -96,7 +96,7 @@ VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
 )
 
 
-def explorer_view(transport: Transport, view: str = "picture", **controls: Any) -> Any:
+def explorer_view(transport: Transport, view: str = "picture", **controls: object) -> Any:
     """A picture or figure of the explorer's page, as *Copy Python* writes it.
 
     Parameters

@@ -2,7 +2,6 @@
 
 from base64 import b64encode
 from pathlib import Path
-from typing import Any
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup
@@ -25,7 +24,7 @@ def own_file(name: str) -> Markup:
     return Markup((TEMPLATES / name).read_text(encoding="utf-8"))
 
 
-def write_out(name: str, **values: Any) -> str:
+def write_out(name: str, **values: object) -> str:
     """Return a template with its values put in, and the style of all pages; a name that has none is an error."""
     environment = Environment(
         loader=FileSystemLoader(TEMPLATES),

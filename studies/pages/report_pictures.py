@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -106,7 +105,7 @@ def opened(content: bytes) -> NDArray[np.uint8]:
         return np.asarray(picture if picture.mode == "L" else picture.convert("RGB"))
 
 
-def as_webp(values: NDArray[np.uint8], **options: Any) -> bytes:
+def as_webp(values: NDArray[np.uint8], **options: object) -> bytes:
     """Return a picture (h, w) or (h, w, 3) as WebP, with Pillow's options for it."""
     file = BytesIO()
     Image.fromarray(values).convert("RGB").save(file, "WEBP", **options)

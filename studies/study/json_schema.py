@@ -41,7 +41,7 @@ def schema_of(kind: type, known: Mapping[Any, Mapping[str, Any]], *, single: boo
     return table | ({"required": required} if required else {})
 
 
-def _of(kind: Any, known: Mapping[Any, Mapping[str, Any]], single: bool) -> dict[str, Any]:
+def _of(kind: object, known: Mapping[Any, Mapping[str, Any]], single: bool) -> dict[str, Any]:
     """Return the schema of a value of a type."""
     if kind in known:
         return dict(known[kind])

@@ -102,7 +102,7 @@ def _beside(value: Any, folder: Path) -> Any:
     return str(folder / value) if named else value
 
 
-def _scene(value: Any, _: Any) -> SceneChoice:
+def _scene(value: object, _: object) -> SceneChoice:
     """Scene by its name alone, or as a table."""
     if isinstance(value, str):
         return SceneChoice(value)
@@ -111,7 +111,7 @@ def _scene(value: Any, _: Any) -> SceneChoice:
     return _scene_of_table(value, SceneChoice)
 
 
-def _axis(kind: Any) -> Callable[[Any, Any], Any]:
+def _axis(kind: object) -> Callable[[Any, Any], Any]:
     """Hook for a tuple, in which one value stands for a list of one."""
     item = get_args(kind)[0]
     return lambda value, _: tuple(

@@ -40,7 +40,9 @@ class StartedStrip:
     launches: list[Launch]
 
 
-def reconstruct_strips(raw: RawImage, settings: Settings, guide: NDArray[Any] | None) -> list[NDArray[np.float32]]:
+def reconstruct_strips(
+    raw: RawImage, settings: Settings, guide: NDArray[np.floating] | None
+) -> list[NDArray[np.float32]]:
     """Return f_i(x) of eq. (1) [e-] and its noise gain, sum w^2 / (sum w)^2; each has the shape (h, w, channel).
 
     A `guide` (h, w) is the plane whose similarity weighs the samples of all channels. Without one, W's plane does that,
