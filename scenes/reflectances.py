@@ -43,7 +43,7 @@ def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
 
 
 def held(curve: Spectrum) -> Spectrum:
-    """Curve continued to 1100 nm at its last value, in its own steps: an assumption where nothing was measured."""
+    """Continue a curve to 1100 nm at its last value, in its own steps; this is an assumption, not a measurement."""
     step = curve.wavelength_nm[-1] - curve.wavelength_nm[-2]
     beyond = np.arange(curve.wavelength_nm[-1] + step, LONGEST_NM + step / 2, step)
     values = np.concatenate([curve.values, np.full(beyond.shape, curve.values[-1])])

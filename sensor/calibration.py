@@ -74,7 +74,7 @@ class ColourCalibration:
 
 
 def _numbers(name: str, values: object, shape: tuple[int, ...]) -> Floats:
-    """Array of finite numbers of `shape`, or `InputError`."""
+    """Convert values to an array of finite numbers of `shape`; raise `InputError` if that isn't possible."""
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError, OverflowError):  # lists of unequal length, texts, whole numbers beyond a float

@@ -94,11 +94,11 @@ def measured_curves(camera: MeasuredCamera) -> Curves:
 
 
 def borrowed_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> Curves:
-    """Curves of another camera, scaled to a source's quantum efficiency at one wavelength; every `_STEP_NM` a value.
+    """Scale another camera's curves to a source's quantum efficiency at one wavelength; one value per `_STEP_NM`.
 
-    Those of the channels that the source's mosaic has, or of all. The channel that responds most at the wavelength is
-    taken for the one of which the source speaks: W for a monochrome chip. Where one electron a photon would be passed,
-    the scale ends there: the shape isn't the camera's.
+    Only curves of channels in the source's mosaic are returned, or all if it states none. The stated efficiency is
+    taken for that of the channel that responds most at the wavelength, such as W for a monochrome chip. If a scaled
+    curve would exceed one electron per photon, all are scaled less, because their shape isn't this camera's.
 
     Raises
     ------

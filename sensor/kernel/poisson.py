@@ -103,7 +103,10 @@ def _by_inversion(mean: Double, uniform: Double, active: Mask) -> Float:
 
 
 def _by_quantile(mean_e: Float, normal: Float) -> Float:
-    """Q_N2 of Giles (2016); the mean's whole part stays out of the sum, whose rounding would move large draws."""
+    """Draw from Poisson's law by its approximate quantile function Q_N2 of Giles (2016), for a normal number.
+
+    The mean's whole part is added last, because rounding in a large sum would change the result.
+    """
     whole = dr.floor(mean_e)
     square = dr.square(normal)
     root = dr.sqrt(mean_e)

@@ -130,7 +130,7 @@ def read_dng(path: Path) -> RawImage:
 
 
 def _agree(one: tuple[str, Values] | None, other: tuple[str, Values] | None, relative: float = 1e-6) -> bool:
-    """Whether two tags say the same, rationals within a relative difference."""
+    """Return whether two tags are equal, rationals within a relative difference."""
     if one is None or other is None or "2I" not in (one[0], other[0]):
         return (one and one[1]) == (other and other[1])
     (a, b), (c, d) = (tuple(x[1]) if len(x[1]) == 2 else (0, 0) for x in (one, other))
@@ -138,12 +138,12 @@ def _agree(one: tuple[str, Values] | None, other: tuple[str, Values] | None, rel
 
 
 def _sample_scale(raw: RawImage) -> float:
-    """Power of two that floats are multiplied by in the file."""
+    """Return the power of two by which floats are multiplied in the file."""
     return 2.0 ** -ceil(log2(max(raw.white_dn, 1.0) / 65_535)) if raw.dn.dtype.kind == "f" else 1.0
 
 
 def is_in_dng(tile: Tile) -> bool:
-    """Whether a mosaic is written as DNG: Bayer, 2x2 RGBW, or one of these with 2x2 pixels for each."""
+    """Return whether a mosaic can be written as DNG: Bayer, 2x2 RGBW, or one of these with 2x2 pixels for each."""
     return is_bayer(plain(tile)) or is_rgbw(plain(tile))
 
 
@@ -235,7 +235,7 @@ def _noise_profile(raw: RawImage) -> tuple[float, ...]:
 
 
 def exif_tags(raw: RawImage) -> Tags:
-    """Tags of the exposure (Exif 2.3, CIPA DC-008)."""
+    """Return the tags of the exposure (Exif 2.3, CIPA DC-008)."""
     tags: dict[int, tuple[str, Values]] = {
         EXPOSURE_TIME: ("2I", rational(raw.exposure_s)),
         36864: ("U", b"0230"),  # ExifVersion
@@ -248,7 +248,7 @@ def exif_tags(raw: RawImage) -> Tags:
 
 
 def _moment_tags(written: datetime, frame: int | None) -> Tags:
-    """Return the tags of date and time, for which those of writing stand, and of the exposure's number in a burst."""
+    """Return the tags of the exposure's number in a burst, and of its date, taken as the time of writing."""
     date = written.strftime("%Y:%m:%d %H:%M:%S")
     tags: dict[int, tuple[str, Values]] = {
         36867: text(date),  # DateTimeOriginal
@@ -261,7 +261,7 @@ def _moment_tags(written: datetime, frame: int | None) -> Tags:
 
 
 def rational(values: ArrayLike) -> Values:
-    """Numerators and denominators of the nearest fractions that fit 32 bits, row by row."""
+    """Return numerators and denominators of the nearest fractions that fit 32 bits, row by row."""
     pairs: list[int] = []
     for value in np.ravel(np.asarray(values, dtype=np.float64)):
         nearest = Fraction(float(value)).limit_denominator(max(int(_LARGEST / max(abs(value), 1.0)), 1))

@@ -176,7 +176,7 @@ def _weighted(estimates_e: Floats, weights: Floats, levels_e: Floats) -> Floats:
 
 
 def merged_noise_steps(readings: Sequence[PlainReading]) -> list[NoiseStep]:
-    """List the noise of merged electrons from the dark on, and from each seam on.
+    """List the noise steps of merged electrons: one that begins at 0 electrons, and one at each seam.
 
     Each step states dark noise at its lower end and shot noise and PRNU at its upper end, where each dominates.
     """

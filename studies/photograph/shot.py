@@ -462,7 +462,7 @@ def _frames(
     radiance: SpectralRadiance | None,
     parts: Sequence[tuple[Waveform, SpectralRadiance | None]],
 ) -> list[RawImage]:
-    """Exposures of the order; `parts` are of `lamp_parts`, and `radiance` is all light where there are any."""
+    """Take the order's exposures. `parts` are those of `lamp_parts`; `radiance`, all lamps together, is then given."""
     seed, frames = checked.order.seed, checked.order.frames
     sensor, exposure_s = lit.sensor, lit.exposure_s
     device = draw_device(sensor, lit.per_second_e.shape[:2], np.random.default_rng([seed, _DEVICE]))

@@ -74,13 +74,13 @@ def _patch(luminance: Plane, pair: PatchPair, column: float) -> Plane:
 def pair_accuracy(bright: Floats, dark: Floats, contrast: float = CONTRAST, tolerance: float = TOLERANCE) -> float:
     """Return the share of all pairs of a pixel of one patch and a pixel of the other that measure the contrast right.
 
-    Michelson's contrast c of x is that of the values from (1 - c) / (1 + c) of it on, so that sorted values are counted
-    and pairs aren't formed.
+    A value has at most the contrast c to a brighter value x if it is at least x (1 - c) / (1 + c). Therefore sorted
+    values are counted, and no pairs are formed.
     """
     lowest, highest = (contrast * (1 + sign * tolerance) + sign * EQUAL for sign in (-1, 1))
     values = np.sort(np.ravel(dark))
     known = np.ravel(bright)
-    known = known[known > 0]  # beside a value that isn't, none that makes a sum above 0 is darker
+    known = known[known > 0]  # a value of 0 or less can't be the brighter one of a pair with a positive sum
     darkest, brightest = (known * (1 - c) / (1 + c) for c in (highest, lowest))
     right = np.searchsorted(values, brightest, side="right") - np.searchsorted(values, darkest, side="left")
     return float(right.sum() / (np.size(bright) * values.size))

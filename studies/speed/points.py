@@ -62,9 +62,9 @@ class Timing:
 
 
 def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
-    """Which of some (time, error) are on the Pareto front: no other is as fast and as accurate, and better in one.
+    """Mark those of some (time, error) on the Pareto front: no other one is better in one and as good in the other.
 
-    Of equal ones the first is.
+    Of several equal ones only the first is marked.
     """
     flags = [False] * len(pairs)
     least = np.inf

@@ -246,7 +246,7 @@ def make_transport(
 
 
 def film_of(opened: OpenedScene, model: RenderModel, samples: int = 1) -> Film:
-    """Film on which a scene is rendered, with so many samples of its light along each side of a pixel."""
+    """Describe the film on which a scene is rendered, with `samples` samples along each side of a pixel."""
     if opened.scene is None:
         raise InputError(f"scene: {opened.choice.source!r} is a picture; allowed: a scene; it needs no render")
     return Film(

@@ -101,7 +101,7 @@ def defined(texts: Sequence[str]) -> dict[str, str]:
 
 
 def asked_size(size: tuple[int, int], height: int | None, width: int | None) -> tuple[int, int]:
-    """Height and width that were asked for; the one that wasn't keeps the proportions of `own`."""
+    """Return the height and width asked for; a side that wasn't asked for follows from the proportions of `size`."""
     for name, pixels in (("height", height), ("width", width)):
         if pixels is not None:
             require_whole(name, pixels, 1, 1 << 15, "give pixels")

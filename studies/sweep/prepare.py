@@ -124,7 +124,7 @@ def _portable(processor: str) -> str:
 
 
 def scene_cells(job: Job, opened: OpenedScene, progress: Progress) -> list[Cell]:
-    """Cells of one scene in the study's order; it is rendered only where a file that they share is missing.
+    """Return the cells of one scene in the study's order; render the scene only if a file that they share is missing.
 
     Raises
     ------
@@ -189,7 +189,7 @@ def note_scene(job: Job, opened: OpenedScene, record: RenderRecord) -> None:
 
 
 def scene_transport(job: Job, opened: OpenedScene, progress: Progress) -> tuple[Transport, tuple[str, ...]]:
-    """Transport of a scene, rendered or out of the folder of renders; with what had to be assumed of a file."""
+    """Return a scene's transport, rendered or from the folder of renders, and what was assumed about a file."""
     model = job.plan.renders.get(opened.choice)
     share = partial(_brightest_share, job, opened)
     samples = job.plan.samples_a_side(opened.choice)
