@@ -14,30 +14,36 @@ channels. *Light* is a patch's mean brightness, in electrons that a G sample col
 *table* holds the prior's components at one light. A *full* sample is a saturated W, which is only a lower bound.
 """
 
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from collections import deque
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 from os import cpu_count
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
-from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from isp.blas import one_thread
-from isp.ple.curve import TOGETHER, on_the_curve
-from isp.ple.overlap import STRIDE, Patches, overlapped
+from isp.ple.curve import TOGETHER as CURVED_TOGETHER
+from isp.ple.curve import on_the_curve
+from isp.ple.overlap import STRIDE, add_patches, gather, weights
 from isp.ple.pick import BLOCK, blocks, pick
 from isp.ple.prior import PATCH, Prior
 from isp.ple.tables import PILOT_VARIANCE, STEP, Sampling, Table, table, window
 from rodcone.types import Singles
 
-STRIP = 100_000  # patches that are estimated together
+TOGETHER = 8000  # patches that are estimated together
 LEAST_LIGHT = 1e-3  # electrons
 COARSE_STEPS = 2  # of light from table to table at coarse scales, which need no finer ones
 DOUBT = 2.0  # power by which a patch that its component explains badly counts less
 INFLATE = 2.0  # of the pilot's variance: it has seen the same samples
 LEAST_VARIANCE = 0.02  # of an estimate, beside its posterior one [units of noise^2]
+# Values of some patches, (patch, value) float32, every channel at every pixel times window and weight; and the tables
+# that they were made by.
+Solved: TypeAlias = tuple[Singles, list[Table]]
 
 
 @dataclass(frozen=True)
@@ -63,6 +69,11 @@ class Scale:
     samplings: tuple[tuple[Sampling, ...], ...]
     columns: NDArray[np.intp] | None = None
 
+    @cached_property
+    def any_full(self) -> bool:
+        """Whether any sample is full."""
+        return bool(self.full.any())
+
 
 @dataclass(frozen=True)
 class PatchPilot:
@@ -78,6 +89,50 @@ class PatchPilot:
 
     means: Singles
     variance: Singles
+
+
+@dataclass(frozen=True)
+class LitPatches:
+    """Patches of one sampling at one step of light.
+
+    Attributes
+    ----------
+    sampling : Sampling
+    step : int
+        Of light, in powers of `STEP`.
+    index : (patch,) intp
+        Which of the scale's patches they are, counted row by row.
+    last : bool
+        Whether no other patches of this sampling and light follow.
+    """
+
+    sampling: Sampling
+    step: int
+    index: NDArray[np.intp]
+    last: bool = True
+
+    def parts(self) -> Iterator["LitPatches"]:
+        """Groups of at most `TOGETHER` of the patches."""
+        end = len(self.index)
+        for first in range(0, end, TOGETHER):
+            yield replace(self, index=self.index[first : first + TOGETHER], last=first + TOGETHER >= end)
+
+
+@dataclass(frozen=True)
+class Patches:
+    """What is known of some patches beside their values.
+
+    Attributes
+    ----------
+    weight : (patch,) float32
+        w of the formula above.
+    inner, noise : (patch, 4) float32
+        By channel: posterior variance of the mean of the patch's middle, and of a pixel over a sample's noise.
+    """
+
+    weight: Singles
+    inner: Singles
+    noise: Singles
 
 
 @dataclass(frozen=True)
@@ -114,138 +169,103 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
     shape, (ny, nx) = scale.shape, light.shape
     coarse = 1 if size == PATCH else COARSE_STEPS
     steps = np.round(np.log(np.maximum(light, LEAST_LIGHT)) / np.log(STEP) / coarse).astype(np.int16) * coarse
-    rows = max(1, STRIP // nx)
-
-    def strip(first: int) -> tuple[Singles, ...]:
-        last = min(first + rows, ny)
-        part = slice(first * STRIDE, (last - 1) * STRIDE + size)
-        y = _windows(scale.samples[part], size)
-        full = scale.full[part]
-        hit = _windows(full, size) if full.any() else np.zeros((len(y), 1), bool)
-        if scale.columns is not None:
-            y = y[:, scale.columns]
-            hit = hit[:, scale.columns] if full.any() else hit
-        part_pilot = None
-        if pilot is not None:
-            part_pilot = PatchPilot(pilot.means[first:last].reshape(-1, 4), pilot.variance[first:last].ravel())
-        groups = _by_sampling(scale.samplings, range(first, last), nx)
-        patches = _solve(prior, groups, y, hit, steps[first:last].ravel(), part_pilot)
-        return *overlapped(patches, (last - first, nx), size), patches.noise
-
-    # Sums run in the order of the strips: the result doesn't depend on threads.
+    groups = _groups(scale.samplings, steps)
     total = np.zeros(((ny - 1) * STRIDE + size, (nx - 1) * STRIDE + size, 4), np.float32)
-    weight = np.zeros(total.shape[:2], np.float32)
-    variance = np.zeros((total.shape[0] // STRIDE, total.shape[1] // STRIDE, 4), np.float32)
-    cells = np.zeros(variance.shape[:2], np.float32)
-    noise = []
+    patches = Patches(*(np.empty((ny * nx, *width), np.float32) for width in ((), (4,), (4,))))
     with one_thread(), ThreadPoolExecutor(cpu_count()) as threads:
-        # Tables first, each once: strips would make the same ones at the same time.
-        list(threads.map(lambda key: table(prior, *key), _table_keys(scale.samplings, steps)))
-        for first, (values, weights, inner, count, patch_noise) in zip(
-            range(0, ny, rows), threads.map(strip, range(0, ny, rows)), strict=True
+        # Tables first, each once: parts of a group would make the same one at the same time.
+        list(threads.map(lambda group: table(prior, group.sampling, group.step), groups))
+        parts = [part for group in groups for part in group.parts()]
+        using = set[Table]()
+        # Sums run in the order of the parts: the result doesn't depend on threads.
+        for part, (values, tables) in zip(
+            parts, _in_turn(threads, lambda part: _solve(prior, part, scale, pilot, patches), parts), strict=True
         ):
-            for sums, part, start in (
-                (total, values, first * STRIDE),
-                (weight, weights, first * STRIDE),
-                (variance, inner, first),
-                (cells, count, first),
-            ):
-                sums[start : start + len(part)] += part
-            noise.append(patch_noise)
+            add_patches(total, values, part.index, size)
+            using.update(tables)
+            if part.last:
+                for components in using:
+                    components.end_frame()
+                using.clear()
+    weight, variance, cells = weights(patches.weight, patches.inner, (ny, nx), size)
     total /= weight[..., None]
     total += scale.samplings[0][0].black
     variance /= cells[..., None]
     edge = size - STRIDE
     inside = total[edge : edge + shape[0], edge : edge + shape[1]]
     frame = tuple(slice(edge // STRIDE, edge // STRIDE + -(-length // STRIDE)) for length in shape)
-    return ScaleEstimate(inside, variance[frame], np.median(np.concatenate(noise), axis=0))
+    return ScaleEstimate(inside, variance[frame], np.median(patches.noise, axis=0))
 
 
-def _windows(values: NDArray[Any], size: int) -> NDArray[Any]:
-    """Patches `STRIDE` apart, shape (patch, sample)."""
-    view = sliding_window_view(values, (size, size), axis=(0, 1))[::STRIDE, ::STRIDE]
-    if values.ndim == 3:
-        view = np.moveaxis(view, 2, -1)
-    return view.reshape(view.shape[0] * view.shape[1], -1)
+def _in_turn(
+    threads: ThreadPoolExecutor, solve: Callable[[LitPatches], Solved], parts: Sequence[LitPatches]
+) -> Iterator[Solved]:
+    """Results of parts in their order; few of them at once, because each takes `TOGETHER` patches of memory."""
+    waiting = deque[Future[Solved]]()
+    for part in parts:
+        if len(waiting) > (cpu_count() or 1):
+            yield waiting.popleft().result()
+        waiting.append(threads.submit(solve, part))
+    while waiting:
+        yield waiting.popleft().result()
 
 
-def _by_sampling(
-    samplings: tuple[tuple[Sampling, ...], ...], rows: range, nx: int
-) -> list[tuple[Sampling, NDArray[np.intp]]]:
-    """Each sampling, and which patches of these rows have it."""
+def _groups(samplings: tuple[tuple[Sampling, ...], ...], steps: NDArray[np.int16]) -> list[LitPatches]:
+    """Patches of each sampling and step of light."""
+    ny, nx = steps.shape
     distinct = list(dict.fromkeys(sampling for line in samplings for sampling in line))
-    numbers = np.array([[distinct.index(sampling) for sampling in line] for line in samplings])
-    order = numbers[np.array(rows)[:, None] % len(samplings), np.arange(nx) % len(samplings[0])].ravel()
-    return [(sampling, np.flatnonzero(order == number)) for number, sampling in enumerate(distinct)]
+    numbers = np.array([[distinct.index(sampling) for sampling in line] for line in samplings], np.int8)
+    order = numbers[np.arange(ny)[:, None] % len(samplings), np.arange(nx) % len(samplings[0])].ravel()
+    groups = []
+    for number, sampling in enumerate(distinct):
+        among = np.flatnonzero(order == number)
+        own_steps = steps.ravel()[among]
+        among = among[np.argsort(own_steps, kind="stable")]  # of int16: a radix sort
+        own_steps = np.sort(own_steps, kind="stable")
+        bounds = np.flatnonzero(np.diff(own_steps, prepend=-(1 << 15), append=-(1 << 15))).tolist()
+        groups += [LitPatches(sampling, int(own_steps[a]), among[a:b]) for a, b in pairwise(bounds)]
+    return groups
 
 
-def _table_keys(samplings: tuple[tuple[Sampling, ...], ...], steps: NDArray[np.int16]) -> list[tuple[Sampling, int]]:
-    """Every sampling with each step of light that its patches have."""
-    down, across = len(samplings), len(samplings[0])
-    keys = (
-        (samplings[i][j], step)
-        for i, j in np.ndindex(down, across)
-        for step in np.unique(steps[i::down, j::across]).tolist()
-    )
-    return list(dict.fromkeys(keys))
-
-
-def _solve(
-    prior: Prior,
-    groups: list[tuple[Sampling, NDArray[np.intp]]],
-    y: Singles,
-    full: NDArray[np.bool_],
-    steps: NDArray[np.int16],
-    pilot: PatchPilot | None,
-) -> Patches:
-    """Estimate the patches of each sampling, by light.
+def _solve(prior: Prior, part: LitPatches, scale: Scale, pilot: PatchPilot | None, patches: Patches) -> Solved:
+    """Estimate patches of one sampling and light.
 
     A patch with saturated Ws is estimated twice: from R, G and B alone, and then with each of these Ws at the larger of
     that estimate and its reading.
     """
-    count = len(y)
-    values = 4 * groups[0][0].size ** 2
-    patches = Patches(*(np.empty((count, *shape), np.float32) for shape in ((values,), (), (4,), (4,))))
-    hit = np.asarray(full.any(axis=1))
-    if hit.any():
-        y = y.copy()
-    for sampling, among in groups:
-        clipped = among[hit[among]]
-        if clipped.size:
-            rows = np.array(sampling.rows)
-            colours = rows % 4 != 3
-            blind = Sampling(
-                sampling.size, tuple(rows[colours].tolist()), sampling.gains, sampling.dark_e, sampling.prnu
-            )
-            _solve_by_light(prior, blind, y[:, colours], steps, pilot, clipped, patches)
-            weight = window(sampling.size).ravel()[rows // 4] * patches.weight[clipped, None]
-            guess = patches.values[np.ix_(clipped, rows)] / weight + sampling.black[rows % 4]
-            y[clipped] = np.where(full[clipped], np.maximum(y[clipped], guess), y[clipped])
-        _solve_by_light(prior, sampling, y, steps, pilot, among, patches)
-    return patches
+    sampling, index = part.sampling, part.index
+    y = _samples(scale.samples, scale, index)
+    own_pilot = None
+    if pilot is not None:
+        own_pilot = PatchPilot(pilot.means.reshape(-1, 4)[index], pilot.variance.ravel()[index])
+    full = _samples(scale.full, scale, index) if scale.any_full else np.zeros((len(index), 1), bool)
+    clipped = np.flatnonzero(full.any(axis=1))
+    components = table(prior, sampling, part.step)
+    tables = [components]
+    if clipped.size:
+        rows = np.array(sampling.rows)
+        colours = rows % 4 != 3
+        blind = table(prior, replace(sampling, rows=tuple(rows[colours].tolist())), part.step)
+        tables.append(blind)
+        blind_pilot = own_pilot and PatchPilot(own_pilot.means[clipped], own_pilot.variance[clipped])
+        values, known = _solve_one_light(blind, y[np.ix_(clipped, colours)], blind_pilot)
+        weight = window(sampling.size).ravel()[rows // 4] * known.weight[:, None]
+        guess = values[:, rows] / weight + sampling.black[rows % 4]
+        y[clipped] = np.where(full[clipped], np.maximum(y[clipped], guess), y[clipped])
+    values, known = _solve_one_light(components, y, own_pilot)
+    for name, of_patches in vars(known).items():
+        getattr(patches, name)[index] = of_patches
+    return values, tables
 
 
-def _solve_by_light(
-    prior: Prior,
-    sampling: Sampling,
-    y: Singles,
-    steps: NDArray[np.int16],
-    pilot: PatchPilot | None,
-    among: NDArray[np.intp],
-    patches: Patches,
-) -> None:
-    order = among[np.argsort(steps[among], kind="stable")]  # of int16: a radix sort
-    bounds = np.flatnonzero(np.diff(steps[order], prepend=-(1 << 15), append=-(1 << 15)))
-    for first, last in pairwise(bounds.tolist()):
-        index = order[first:last]
-        part_pilot = None if pilot is None else PatchPilot(pilot.means[index], pilot.variance[index])
-        _solve_one_light(table(prior, sampling, int(steps[index[0]])), y, part_pilot, index, patches)
+def _samples(values: NDArray[Any], scale: Scale, index: NDArray[np.intp]) -> NDArray[Any]:
+    """Samples of patches, shape (patch, sample)."""
+    samples = gather(values, index, scale.samplings[0][0].size)
+    return samples if scale.columns is None else samples[:, scale.columns]
 
 
-def _solve_one_light(
-    components: Table, y: Singles, pilot: PatchPilot | None, index: NDArray[np.intp], patches: Patches
-) -> None:
-    """Estimate the patches `index` of all, whose samples are y, from the prior's components at one light.
+def _solve_one_light(components: Table, y: Singles, pilot: PatchPilot | None) -> tuple[Singles, Patches]:
+    """Estimate patches whose samples are y from the prior's components at one light.
 
     With i_d the pilot's innovation in direction d (`Whitening.reads`), s_d its variance without the pilot's own noise
     n, and c_d its covariance with the patch's values,
@@ -254,18 +274,20 @@ def _solve_one_light(
 
     where v_y is the posterior variance given the samples alone.
     """
-    noise = None
+    noise, count = None, len(y)
+    values = np.empty((count, len(components.taper)), np.float32)
+    patches = Patches(*(np.empty((count, *width), np.float32) for width in ((), (4,), (4,))))
     # Patches whose linear estimate falls under black: `on_the_curve` estimates them again.
     below = [np.empty(0, np.intp)]
     # What the table's matrices take: samples, 1, the pilot's means.
     own = y.shape[1]
-    evidence = np.empty((len(index), own + 1 if pilot is None else own + 5), np.float32)
-    evidence[:, :own], evidence[:, own] = y[index], 1.0
+    evidence = np.empty((count, own + 1 if pilot is None else own + 5), np.float32)
+    evidence[:, :own], evidence[:, own] = y, 1.0
     if pilot is not None:
         noise = (INFLATE * pilot.variance + components.pilot_floor) / (PILOT_VARIANCE + components.pilot_floor)
         evidence[:, own + 1 :] = pilot.means
     component, misfit = pick(components, evidence, noise)
-    block, values = (np.empty((BLOCK, width), np.float32) for width in (evidence.shape[1], patches.values.shape[1]))
+    block, made = (np.empty((BLOCK, array.shape[1]), np.float32) for array in (evidence, values))
     order = np.argsort(component, kind="stable")
     bounds = np.flatnonzero(np.diff(component[order], prepend=-1, append=-1))
     for first, last in pairwise(bounds.tolist()):
@@ -286,20 +308,19 @@ def _solve_one_light(
                 rows[:, -4:] = rows @ whitening.reads[:, -4:] * precision
             # A patch that no component explains has a larger posterior variance, by `doubt`.
             doubt = np.maximum(misfit[group], 1.0) ** DOUBT
-            place = index[group]
             weight = (1.0 / (doubt * (variance.mean(axis=-1) + LEAST_VARIANCE))).astype(np.float32)
             rows *= weight[:, None]
-            weighted = np.matmul(rows, linear, out=values[: group.size])
+            weighted = np.matmul(rows, linear, out=made[: group.size])
             if noise is not None and components.mix.size == PATCH:
                 below.append(group[(weighted < 0.0).any(axis=1)])  # the finest scale: its output is seen
-            patches.weight[place] = weight
-            patches.inner[place] = doubt[:, None] * np.maximum(inner, 0.0)
-            patches.noise[place] = variance * (estimator.noise / estimator.variance)
-            patches.values[place] = weighted  # times the window, which `linear` holds
+            patches.weight[group] = weight
+            patches.inner[group] = doubt[:, None] * np.maximum(inner, 0.0)
+            patches.noise[group] = variance * (estimator.noise / estimator.variance)
+            values[group] = weighted  # times the window, which `linear` holds
     if noise is not None:
-        for group in blocks(np.concatenate(below), TOGETHER):
-            place = index[group]
-            weight = patches.weight[place, None]
-            straight = patches.values[place] / weight
+        for group in blocks(np.concatenate(below), CURVED_TOGETHER):
+            weight = patches.weight[group, None]
+            straight = values[group] / weight
             curved = on_the_curve(components, component[group], evidence[group], noise[group], straight)
-            patches.values[place] = weight * curved
+            values[group] = weight * curved
+    return values, patches

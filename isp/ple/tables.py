@@ -6,11 +6,15 @@ straight in u, so each component is a Gaussian over t as well. Its estimate from
 one with the least squared error, t + C_xy (C_yy + N)^-1 (y - t_y).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass
-from functools import cached_property, lru_cache
+from functools import cache, cached_property, lru_cache
+from threading import RLock
 
 import numpy as np
+from numpy.typing import NDArray
 
 from isp.ple.fine_lines import LEAST_ALIASED, aliased, with_fine_lines
 from isp.ple.prior import PATCH, Mixture, Prior, mixture
@@ -25,9 +29,20 @@ BRIGHTNESS = 0.98  # share of that variance that is of brightness: a coarser sca
 TAPER = 1.0  # power of half a sine: the weight of a patch's pixels
 DIRECTIONS = 20  # directions in which components are told apart first
 MARGINS = (5.0, 15.0)  # of that log likelihood: where the other directions are noise, and where they are all signal
-# Tables that are kept, all of a 4x4 tile over six decades of light: 1.3 MB each, and 70 kB for each of its estimators
+# Tables that are kept, all of a 4x4 tile over six decades of light: 0.6 MB each, and 90 kB for each of its components
 # of 8x8 pixels that was asked for.
 _TABLES = 512
+_ONE_FRAME = ContextVar("one_frame", default=False)
+
+
+@contextmanager
+def one_frame() -> Iterator[None]:
+    """Within a ``with`` block, keep less for frames that would follow: 100 MB of 0.3 Mpx, a second of a processor."""
+    token = _ONE_FRAME.set(True)
+    try:
+        yield
+    finally:
+        _ONE_FRAME.reset(token)
 
 
 @dataclass(frozen=True)
@@ -153,20 +168,20 @@ class Table:
         self.unit_e = gains * light  # electrons of a signal of 1
         # The components in units of noise: values t, their slope in u, and their slope in the light.
         electrons = self.unit_e * among.squares
-        self.values, steep, noise = np.empty((3, *electrons.shape))
+        self.values, steep, noise = (np.empty_like(electrons) for _ in range(3))
         for channel, dark_e in enumerate(sampling.dark_e):
             places = (slice(None), slice(channel, None, 4))
             self.values[places], steep[places], noise[places] = readings(dark_e).moments(electrons[places])
-        self.over_black, self.taper = self.values - np.tile(sampling.black, pixels), np.repeat(window(mix.size), 4)
-        self.unit = 1.0 / (steep**2 * (electrons + dark**2))
+        self.black, self.taper = np.tile(sampling.black, pixels), np.repeat(window(mix.size), 4)
+        # The pilot: the patch's means by channel.
+        self.average = np.tile(np.eye(4), pixels) / pixels
+        self.unit = (1.0 / (steep**2 * (electrons + dark**2))) @ self.average.T
         signal = electrons * steep
         noise += (sampling.prnu * signal) ** 2
         self.noise = noise[:, at]
         self.slopes = 2.0 * self.unit_e * mix.means * steep
         information = gains[at] ** 2 / (self.unit_e[at] + dark[at] ** 2)
         self.drift = signal * np.hypot(LIGHT_ERROR, 1 / (light * np.sqrt(information.sum())))
-        # The pilot: the patch's means by channel.
-        self.average = np.tile(np.eye(4), pixels) / pixels
         brightness = (self.average @ signal[: self.trained].T).mean(axis=1)
         self.pilot_floor = float(((PILOT_ERROR * brightness) ** 2).mean())
         along = brightness / np.linalg.norm(brightness)
@@ -182,7 +197,9 @@ class Table:
         # Coarser scales take fine lines for a colour: an error as large as the light makes them count for nothing.
         self.pilot_pilot[self.trained :] += np.diag(brightness**2)
         # What fine lines of contrast 1 would add to the pilot's means, and how much of it makes a patch one of them.
-        sampled = np.isin(np.arange(4), at % 4) / (self.average @ self.over_black[: self.trained].T).mean(axis=1)
+        sampled = np.isin(np.arange(4), at % 4) / (self.average @ (self.values[: self.trained] - self.black).T).mean(
+            axis=1
+        )
         self.aliased = (aliased(at, mix.size) * sampled).astype(np.float32)
         self.least_aliased = (LEAST_ALIASED * sampled).astype(np.float32)
         self.centre, self.directions, self.quick, outside = self._quick_likelihood()
@@ -191,6 +208,7 @@ class Table:
         self.margin = float(np.interp(share, (0.0, 1.0), MARGINS))
         self._whitenings: dict[int, Whitening] = {}
         self._estimators: dict[int, Estimator] = {}
+        self._making = RLock()
 
     def _quick_likelihood(self) -> tuple[Singles, Singles, Singles, Floats]:
         """Return the log likelihood of samples and pilot by their coordinates in `DIRECTIONS` directions.
@@ -241,17 +259,29 @@ class Table:
         quick = np.concatenate([square, straight, -0.5 / outside[:, None], constant[:, None]], axis=1)
         return centre.astype(np.float32), directions.astype(np.float32), quick.astype(np.float32), outside
 
+    def end_frame(self) -> None:
+        """Let whitenings and estimators go within `one_frame`."""
+        if _ONE_FRAME.get():
+            with self._making:
+                self._whitenings, self._estimators = {}, {}
+
     def whitening(self, k: int) -> Whitening:
         """Whitening of component k."""
-        if k not in self._whitenings:
-            self.make_whitenings([k])
-        return self._whitenings[k]
+        found = self._whitenings.get(k)
+        if found is None:
+            with self._making:
+                self.make_whitenings([k])
+                found = self._whitenings[k]
+        return found
 
     def make_whitenings(self, components: Sequence[int]) -> None:
         """Make the whitenings that don't exist yet; made together they take a third of the time."""
-        ks = [k for k in components if k not in self._whitenings]
-        if not ks:
-            return
+        with self._making:
+            ks = [k for k in components if k not in self._whitenings]
+            if ks:
+                self._whitenings |= self._made_whitenings(ks)
+
+    def _made_whitenings(self, ks: list[int]) -> dict[int, Whitening]:
         # C_yy = S A S + d d^T + N: A of the roots, S their slopes, d what an error of the light brings, N noise.
         at = self.rows
         own = len(self.rows)
@@ -262,7 +292,7 @@ class Table:
         scatter += drift[:, :, None] * drift[:, None]
         scatter[:, np.arange(own), np.arange(own)] += self.noise[ks]
         # F of F C_yy F^T = 1, so that F (y - t_y) are independent numbers of variance 1.
-        factors = _triangular_inverses(np.linalg.cholesky(scatter))
+        factors = _triangular_inverses(np.asarray(np.linalg.cholesky(scatter), np.float64))
         # H = C_py F^T. The pilot's innovation p - t_p - H F (y - t_y), in units of its errors, is turned so that its
         # four directions are independent given the samples: by the eigenvectors of its covariance C_pp - H H^T.
         half = self.pilot_samples[ks] @ factors.swapaxes(1, 2)
@@ -276,53 +306,73 @@ class Table:
         reads[:, own, own:] -= (turn @ (values @ self.average.T)[:, :, None])[:, :, 0]
         log_scale = self.mix.log_weights[ks] + np.log(np.diagonal(factors, axis1=1, axis2=2)).sum(axis=1)
         parts = zip(ks, reads.astype(np.float32), log_scale.tolist(), np.maximum(spread, 0.0), turn, strict=True)
-        self._whitenings |= {k: Whitening(*made) for k, *made in parts}
-
-    @cached_property
-    def inner(self) -> Floats:
-        """Averages over the patch's middle by channel, shape (4, value)."""
-        size = self.mix.size
-        middle = np.zeros((size, size))
-        middle[size // 4 : -(size // 4), size // 4 : -(size // 4)] = 1.0
-        return np.asarray((middle.ravel()[:, None, None] * np.eye(4)).reshape(-1, 4).T / middle.sum())
+        return {k: Whitening(*made) for k, *made in parts}
 
     @cached_property
     def roots(self) -> tuple[Singles, Singles]:
         """Twice the roots of electrons over what `Estimator.linear` gives: slope and start, (component, value)."""
         root = 2.0 * np.sqrt(self.unit_e)
-        start = root * (self.mix.means - self.over_black / self.slopes)
+        start = root * (self.mix.means - (self.values - self.black) / self.slopes)
         return (root / (self.slopes * self.taper)).astype(np.float32), start.astype(np.float32)
 
     def estimator(self, k: int) -> Estimator:
         """Estimator of component k."""
-        if k not in self._estimators:
-            self._estimators[k] = self._make_estimator(k)
-        return self._estimators[k]
+        found = self._estimators.get(k)
+        if found is None:
+            with self._making:
+                found = self._estimators.get(k) or self._make_estimator(k)
+                self._estimators[k] = found
+        return found
 
     def _make_estimator(self, k: int) -> Estimator:
-        # With F of `make_whitenings`: the estimate's matrix C_xy C_yy^-1 = H F, where H = C_xy F^T.
-        at = self.rows
+        # With F of `make_whitenings`: C_yy^-1 = F^T F, and the estimate's matrix is C_xy C_yy^-1. Both have samples in
+        # rows here, as `Estimator.linear` has.
+        at, size = self.rows, self.mix.size
+        own = len(at)
         whitening = self.whitening(k)
-        factor = whitening.reads[: len(at), : len(at)].T.astype(np.float64)
+        factor = whitening.reads[:own, :own].T.astype(np.float64)
         covariance, slopes, drift = self.mix.covariances[k], self.slopes[k], self.drift[k]
-        half = (covariance[:, at] * slopes[at] * slopes[:, None] + drift[at] * drift[:, None]) @ factor.T
-        linear = half @ factor
-        # C_xx - H H^T, the posterior covariance given the samples: its diagonal for every pixel, its rows for the
-        # pilot's means and the middle's.
-        variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - (half**2).sum(axis=1))
-        means = np.concatenate([self.average, self.inner])
-        left = ((means * slopes) @ covariance) * slopes + (means @ drift)[:, None] * drift - (means @ half) @ half.T
-        pilot = whitening.turn @ left[:4]  # covariance of the pilot's four innovations with every value
-        inner = (left[4:] * self.inner).sum(axis=1)
-        offset = self.over_black[k] - linear @ self.values[k, at]
+        crossed = covariance[at] * slopes[at, None]
+        crossed *= slopes
+        crossed += np.outer(drift[at], drift)
+        estimate = (factor.T @ factor) @ crossed
+        # C_xx - C_xy C_yy^-1 C_yx, the posterior covariance given the samples: its diagonal for every pixel, its rows
+        # for the pilot's means, and for each channel's mean over the patch's middle.
+        explained = np.einsum("ij,ij->j", estimate, crossed)
+        variance = self.average @ (np.diagonal(covariance) * slopes**2 + drift**2 - explained)
+        weights = slopes.reshape(-1, 1, 4).T / size**2  # (channel, 1, pixel)
+        means = (weights @ covariance.reshape(size**2, 4, -1).swapaxes(0, 1))[:, 0] * slopes
+        means += np.outer(self.average @ drift, drift) - (self.average @ crossed.T) @ estimate
+        pilot = whitening.turn @ means  # covariance of the pilot's four innovations with every value
+        middle, of_middle = _middle(size)
+        among = covariance[middle[:, :, None], middle[:, None]]  # the covariances of its pixels, by channel
+        inner = np.einsum("ci,cij,cj->c", slopes[middle], among, slopes[middle]) / middle.shape[1] ** 2
+        inner += (of_middle @ drift) ** 2 - ((of_middle @ crossed.T) * (of_middle @ estimate.T)).sum(axis=1)
+        linear = np.empty((own + 5, len(slopes)), np.float32)
+        offset = self.values[k] - self.black - self.values[k, at] @ estimate
+        for rows, part in ((slice(own), estimate), (own, offset), (slice(own + 1, None), pilot)):
+            np.multiply(part, self.taper, out=linear[rows], casting="same_kind")
         return Estimator(
-            linear=(np.concatenate([linear.T, offset[None], pilot]) * self.taper).astype(np.float32),
+            linear=linear,
             variance=variance,
-            noise=variance * (self.average @ self.unit[k]),
+            noise=variance * self.unit[k],
             inner=inner,
             pilot_variance=pilot**2 @ self.average.T,
-            pilot_inner=(pilot @ self.inner.T) ** 2,
+            pilot_inner=(pilot @ of_middle.T) ** 2,
         )
+
+
+@cache
+def _middle(size: int) -> tuple[NDArray[np.intp], Floats]:
+    """Return where the pixels of a patch's middle half lie in its vector, (channel, pixel), and what averages them.
+
+    The averages are by channel, (channel, value).
+    """
+    inside = np.arange(size)[size // 4 : -(size // 4)]
+    places = 4 * (size * inside[:, None] + inside).ravel() + np.arange(4)[:, None]
+    averages = np.zeros((4, 4 * size**2))
+    np.put_along_axis(averages, places, 1.0 / places.shape[1], axis=1)
+    return places, averages
 
 
 def _triangular_inverses(lower: Floats) -> Floats:

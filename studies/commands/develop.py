@@ -6,6 +6,7 @@ from typing import Annotated
 
 from cyclopts import Parameter
 
+from isp.ple.tables import one_frame
 from rodcone.errors import InputError
 from rodcone.files import check_place
 from studies.commands.console import print_result
@@ -84,6 +85,7 @@ def develop(
     picture = default_path(raw) if out is None else out
     check_picture_file(picture, bits, order.encoding)
     check_place(picture)
-    developed = develop_file((raw, *more), **choices)
+    with one_frame():
+        developed = develop_file((raw, *more), **choices)
     write_picture(developed.encoded, picture, bits, order.encoding)
     print_result(picture, {"path": str(picture), **developed.facts}, json=json)

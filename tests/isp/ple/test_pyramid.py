@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from builders import raw_image
 
-from isp.ple import estimate, mosaic, overlap, pyramid
+from isp.ple import estimate, mosaic, overlap, pyramid, tables
 from isp.ple.prior import LETTERS, PATCH, own_prior
 from rodcone.colour_spaces import encode_srgb, luminance_of_srgb
 from sensor.cfa import BAYER, MOSAICS, RGBW, channel_map, channels
@@ -131,12 +131,23 @@ def test_a_full_sample_is_a_lower_bound(tile):
 @pytest.mark.thorough
 def test_threads_change_nothing(monkeypatch):
     raw = exposure(grey(np.linspace(1, 200, 128), RGBW, (96, 128)), RGBW, np.random.default_rng(7))
-    monkeypatch.setattr(estimate, "STRIP", 500)
+    monkeypatch.setattr(estimate, "TOGETHER", 500)
     found = []
     for count in (1, 3):
         monkeypatch.setattr(estimate, "cpu_count", lambda count=count: count)
         found.append(reconstruct(raw)[0])
     assert np.array_equal(*found)
+
+
+def test_within_one_frame_the_result_is_the_same():
+    raw = exposure(grey(np.linspace(1, 200, 32), RGBW, (16, 32)), RGBW, np.random.default_rng(7))
+    planes, _ = reconstruct(raw)
+    made = tables.table.cache_info().currsize
+    with tables.one_frame():
+        again, _ = reconstruct(raw)
+        assert np.array_equal(again, planes)
+    assert tables.table.cache_info().currsize == made
+    assert np.array_equal(reconstruct(raw)[0], planes)
 
 
 @pytest.mark.sample(5)

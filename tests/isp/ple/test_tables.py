@@ -6,7 +6,7 @@ from scipy.linalg import block_diag
 
 from isp.ple.pick import pick
 from isp.ple.prior import LETTERS, PATCH, Mixture, mixture, own_prior
-from isp.ple.tables import PILOT_VARIANCE, Sampling, Table, window
+from isp.ple.tables import PILOT_VARIANCE, Sampling, Table, one_frame, window
 from isp.ple.units import readings
 from sensor.cfa import BAYER, MOSAICS, RGBW
 
@@ -146,3 +146,14 @@ def test_of_cells_with_one_channel_each_the_likeliest_component_is_picked():
         missed = likelihood.max(axis=1) - likelihood[np.arange(len(known)), chosen]
         assert (missed > 0.01).mean() < 0.01, pilot_noise
         assert misfit.mean() == pytest.approx(1.0, abs=0.1), pilot_noise
+
+
+def test_within_one_frame_a_table_lets_its_components_go():
+    table = Table(mixture(own_prior()), sampling(), 20.0)
+    first = table.estimator(3)
+    table.end_frame()
+    assert table.estimator(3) is first
+    with one_frame():
+        table.end_frame()
+    assert table.estimator(3) is not first
+    assert np.array_equal(table.estimator(3).linear, first.linear)
