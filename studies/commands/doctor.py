@@ -155,12 +155,13 @@ def engine_findings() -> list[Finding]:
     try:
         from render.loader import variant
         from rodcone import jit, llvm
+
+        backend = jit.backend()
     except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
         cause = str(error.__context__ or error)
         fix = "; Debian: apt install libatomic1" if "libatomic" in cause else ""
         return [Finding("engine", f"can't be imported: {cause}{fix}", False)]
     version = llvm.llvm_version(llvm.LIBLLVM) if llvm.LIBLLVM else None
-    backend = jit.backend()
     return [
         llvm_finding(llvm.LIBLLVM, version, llvm.OLDEST_LLVM),
         Finding("backend", FALLBACK if backend == "numpy" else backend),
