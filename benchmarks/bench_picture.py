@@ -2,7 +2,7 @@
 
     python benchmarks/bench_picture.py                     (the table of docs/how_to/what_a_picture_costs.md: minutes)
     python benchmarks/bench_picture.py --sides 256 512
-    python benchmarks/bench_picture.py --stored 1 2    (captures of stored pictures, by megapixels, and a development)
+    python benchmarks/bench_picture.py --stored 1 2    (captures by megapixels, and a development)
 
 Each command runs in a process of its own, whose processor time and peak memory the system tells. A render is made with
 two numbers of samples: their difference is the cost of a sample, and the table's render of 64 samples is computed from
@@ -32,6 +32,7 @@ LARGE = 3464  # 12 Mpx
 SAMPLES = 64  # of the table's render
 FEW = 2, 10  # samples of the two renders
 BANDS = 20
+BOX = Path(__file__).with_name("box.xml")
 COMMAND = "from studies.commands.cli import main; raise SystemExit(main())"
 
 
@@ -57,19 +58,23 @@ def main() -> None:
 
 
 def stored(megapixels: list[float]) -> None:
-    """Print the table of captures of a photograph and of a file of radiance, and of the photograph's development."""
-    print("\n| size | photograph: capture | develop | 20 bands: capture |\n|---|---|---|---|")
+    """Print the table of captures of a scene file, a photograph and a file of radiance, and of a development.
+
+    The scene is a box that is rendered in 20 bands by 4 samples per pixel, `BOX`.
+    """
+    print("\n| size | scene: capture | photograph: capture | 20 bands: capture | develop |\n|---|---|---|---|---|")
     for size in megapixels:
         height = round((size * 1e6 * 3 / 4) ** 0.5) // 4 * 4
         shape = height, height * 4 // 3 // 4 * 4
         with tempfile.TemporaryDirectory() as folder:
-            photograph, light, raw = (str(Path(folder) / name) for name in ("a.png", "a.exr", "a.dng"))
+            photograph, light, raw = (str(Path(folder) / name) for name in ("photograph.png", "light.exr", "shot.dng"))
             # In a process of its own: Linux counts this one's peak as that of those that it starts.
             writer = get_context("spawn").Process(target=write_pictures, args=(shape, photograph, light))
             writer.start()
             writer.join()
-            cells = [run(*words) for words in (("capture", photograph, "-o", raw), ("develop", raw))]
-            cells.append(run("capture", light, "-o", raw))
+            box = "capture", str(BOX), "--width", str(shape[1]), "--height", str(shape[0]), "--spp", "4", "-o", raw
+            cells = [run(*box), run("capture", photograph, "-o", raw), run("capture", light, "-o", raw)]
+            cells.append(run("develop", raw))
         words = " | ".join(f"{seconds:.3g} s, {most / 1e9:.2g} GB" for seconds, most in cells)
         print(f"| {shape[1]} x {shape[0]}, {shape[0] * shape[1] / 1e6:.2g} Mpx | {words} |", flush=True)
 
