@@ -15,7 +15,7 @@ LEAST_SATURATION_E = 200.0  # a smaller one looks like thousands of electrons; s
 
 
 def doubts(figures: Mapping[str, float], bits: int | None, black_dn: int | None) -> list[str]:
-    """Sentences about figures in doubt, each with the value, what the others make of it, and the likely unit.
+    """Return a sentence per doubtful figure: its value, the value that the other figures imply, and the likely unit.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def doubts(figures: Mapping[str, float], bits: int | None, black_dn: int | None)
 
 
 def _of_saturation(figures: Mapping[str, float], saturation_e: float) -> list[str]:
-    """Doubts about SNR and dynamic range beside saturation, dark noise and K."""
+    """Return the doubts about SNR and dynamic range, which follow from saturation, dark noise and K."""
     expected = {"SNR_max_dB": (10 * log10(saturation_e), f"sqrt(mu_e_sat) of {saturation_e:g} e-")}
     if "sigma_d" in figures and "K" in figures:
         least_e = sqrt(figures["sigma_d"] ** 2 + 1 / 12 / figures["K"] ** 2) + 0.5
@@ -58,7 +58,7 @@ def _of_saturation(figures: Mapping[str, float], saturation_e: float) -> list[st
 
 
 def _of_gain(gain: float, saturation_e: float, range_dn: int) -> list[str]:
-    """Doubts about K beside saturation and the converter's range above black."""
+    """Return the doubt about K if it puts saturation far above the converter's range over black."""
     if gain * saturation_e <= MOST_OVER * range_dn:
         return []
     other = f"; K looks like e-/DN: give {1 / gain:.4g} DN/e- if it is" if saturation_e / gain < range_dn else ""

@@ -52,7 +52,7 @@ class EmvaReport:
 
     @property
     def source_note(self) -> str:
-        """The source with its date, on one line."""
+        """Return the source with its date on one line."""
         return " ".join(f"{self.source}, {self.date}".split())
 
 
@@ -85,10 +85,10 @@ def read_report(path: Path) -> EmvaReport:
 
 
 def numbers_of(report: EmvaReport) -> PixelNumbers:
-    """Pixel of a report; what the report doesn't tell is left out.
+    """Return the numbers of the pixel that a report describes; those that the report doesn't state are left out.
 
-    The well clips where the converter does: at (2^bits - 1 - black) / K. Where a report lacks one of the three, the
-    clip follows from its saturation capacity (`clip_over_saturation`).
+    The pixel clips where the converter does: at (2^bits - 1 - black) / K. Where the report lacks one of these three,
+    the clip follows from the saturation capacity (`clip_over_saturation`).
     """
     source_note, figures = report.source_note, report.figures
     pixel: dict[str, SourcedValue] = {}
@@ -140,10 +140,11 @@ def numbers_of(report: EmvaReport) -> PixelNumbers:
 
 
 def numbers_at_gains(low: EmvaReport, high: EmvaReport) -> PixelNumbers:
-    """Pixel of a camera whose reports state two gains: noise before and after the amplifier, and the gain between.
+    """Return the pixel of a camera reported at two gains: noise before and after the amplifier, and the gains' ratio.
 
-    In electrons what comes after the amplifier falls as the gain rises: sigma^2 = read^2 + (converter / K)^2 at both
-    gains. DSNU is the higher gain's, for the amplifier's own offsets fall as well; all else is the lower gain's.
+    In electrons the noise from behind the amplifier falls as the gain rises: at either gain sigma^2 = read^2 +
+    (converter / K)^2. DSNU is taken from the higher gain's report, because the amplifier's own offsets fall as well;
+    all else is taken from the lower gain's.
 
     Raises
     ------
@@ -182,7 +183,7 @@ def numbers_at_gains(low: EmvaReport, high: EmvaReport) -> PixelNumbers:
 
 
 def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> float:
-    """Electrons at which pixels clip, from the light at which their temporal variance is greatest, mu_e.sat.
+    """Return the electrons at which pixels clip, from mu_e.sat, the light at which their temporal variance is greatest.
 
     The variance of min(n, clip) for a normal n of variance mean + sigma_d^2, averaged over pixels whose means spread by
     PRNU, falls as soon as some pixels clip: mu_e.sat lies two to three standard deviations under the clip.

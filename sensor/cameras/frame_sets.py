@@ -85,7 +85,7 @@ class Pixels:
 
 
 def is_set(path: Path) -> bool:
-    """Whether a path names a set of frames, and no single raw file."""
+    """Return whether a path names a set of frames (folder, zip, descriptor or list) and not a single raw file."""
     return path.is_dir() or path.suffix.lower() in (".zip", ".txt", ".csv")
 
 
@@ -146,7 +146,7 @@ def _checked(dn: NDArray[Any], name: str, white_dn: float) -> Pixels:
 
 
 def _headless(path: Path, frames: FrameSet) -> NDArray[Any]:
-    """Pixels of a file without a head: bytes up to 8 bits, little-endian words above."""
+    """Read the pixels of a file without a header: bytes up to 8 bits, little-endian 16-bit words above."""
     height, width = frames.shape
     if not height or isnan(frames.white_dn):
         raise InputError(f"{path}: it has no head; allowed: beside a descriptor whose line n gives bits and size")
@@ -170,7 +170,7 @@ def _unpack(path: Path, folder: Path) -> None:
 
 
 def _index_in(folder: Path, name: str) -> Path:
-    """Path of the one list or descriptor at a folder's top, or in the one folder below that has one."""
+    """Return the path of the only list or descriptor at a folder's top or, if there is none, in its subfolders."""
     for pattern in (LIST_NAME, f"*/{LIST_NAME}", "*.txt", "*/*.txt"):
         found = [path for path in sorted(folder.glob(pattern)) if path.suffix == ".csv" or _is_descriptor(path)]
         if len(found) > 1:
@@ -261,7 +261,10 @@ def _read_list(path: Path) -> FrameSet:
 
 
 def white_level(pixels: Sequence[Pixels]) -> tuple[float, str]:
-    """White level of frames that don't say it: the top of the fewest bits that hold their greatest reading."""
+    """Return the white level of frames that don't state it, and a note.
+
+    It is the greatest number of the fewest bits that hold all readings.
+    """
     most = max(float(np.max(one.dn)) for one in pixels)
     bits = max(int(most).bit_length(), 1)
     return 2.0**bits - 1, f"the converter has {bits} bits, the fewest that hold the greatest reading, {most:g} DN"

@@ -121,7 +121,7 @@ def measure_set(frames: FrameSet, window: int | None = None) -> FrameFigures:
 
 
 def frame_numbers(figures: FrameFigures, files: Sequence[Path]) -> PixelNumbers:
-    """Pixel that frames tell, every number with its 95 % interval."""
+    """Return the numbers of the pixel that were measured on the frames, each with its 95 % interval."""
     *flats, darks = figures.frames
     source_note = f"measured on {sum(flats)} flat and {darks} dark frames, {files[0].name} and others"
     gain = figures.gain_dn_per_e

@@ -56,15 +56,16 @@ class MeasuredCamera:
 
     @property
     def balanced(self) -> bool:
-        """Whether the channels share a unit: False where each was divided by its own maximum."""
+        """Return whether the channels share a unit: False where each was divided by its own maximum."""
         return not all(abs(float(curve.max()) - 1.0) < 1e-4 for curve in self.per_power.values())
 
     @property
     def responses(self) -> Responses:
-        """Electrons per photon, relative: the greatest is 1.
+        """Return the responses in electrons per photon, relative: the greatest is 1.
 
-        A photon carries the energy h c / wavelength, so a response to equal power, divided by the wavelength, is one to
-        equal photons. What LibRaw holds for daylight says that the published curves are the former (decision 0045).
+        A photon carries the energy h c / wavelength, so a response to equal power divided by the wavelength is a
+        response to equal photons. LibRaw's white balance for daylight indicates that the published curves are per power
+        (decision 0045).
         """
         per_photon = {name: curve / self.wavelength_nm for name, curve in self.per_power.items()}
         greatest = max(float(curve.max()) for curve in per_photon.values())
@@ -74,14 +75,14 @@ class MeasuredCamera:
 
     @property
     def text(self) -> str:
-        """Who measured it, when and how, on one line."""
+        """Return on one line who measured the camera, when and how."""
         return ", ".join(
             part for part in dict.fromkeys((self.creator, self.laboratory, self.date, self.equipment)) if part
         )
 
 
 def measured_cameras() -> dict[str, MeasuredCamera]:
-    """Cameras by name, such as ``Nikon D850``: those of the copy, and one that every installation has.
+    """Return the measured cameras by name, such as ``Nikon D850``: those of the copy, and one that is always installed.
 
     Raises
     ------
@@ -94,7 +95,7 @@ def measured_cameras() -> dict[str, MeasuredCamera]:
 
 
 def measured_camera(name: str) -> MeasuredCamera:
-    """Camera by name, whatever the case of its letters.
+    """Return the measured camera of this name, in upper or lower case.
 
     Raises
     ------
@@ -116,9 +117,9 @@ def measured_camera(name: str) -> MeasuredCamera:
 
 @cache
 def _npl_camera() -> MeasuredCamera:
-    """Camera that every installation has.
+    """Return the camera that every installation has, a Nikon D5100.
 
-    The same measurement as rawtoaces-data's, equal to the last digit there. colour-science's other camera, a Sigma SD1
+    It is the same measurement as rawtoaces-data's, equal to the last digit. colour-science's other camera, a Sigma SD1
     Merrill, has three layers in each pixel and no mosaic (decision 0052).
     """
     curves = published_spectra("nikon_d5100")
@@ -138,7 +139,7 @@ def _npl_camera() -> MeasuredCamera:
 
 @cache
 def read_library(copy: Path) -> dict[str, MeasuredCamera]:
-    """Cameras of a copy of rawtoaces-data, by maker and model.
+    """Read the cameras of a copy of rawtoaces-data, by maker and model.
 
     Raises
     ------
@@ -155,7 +156,7 @@ def read_library(copy: Path) -> dict[str, MeasuredCamera]:
 
 
 def read_camera(path: Path) -> MeasuredCamera:
-    """One camera of rawtoaces-data; `InputError` for a file that is damaged or under another licence."""
+    """Read one camera of rawtoaces-data; raise `InputError` for a file that is damaged or under another licence."""
     try:
         content = json.loads(read_bounded(path, _MOST_BYTES).decode("utf-8"))
         header, data = content["header"], content["spectral_data"]

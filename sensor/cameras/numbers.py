@@ -82,7 +82,7 @@ class Curves:
 
 
 def measured_curves(camera: MeasuredCamera) -> Curves:
-    """Curves of a measured camera."""
+    """Return the response curves of a measured camera, with their source and a note on their unit."""
     note = "per photon, greatest 1: published per radiant power, divided by the wavelength"
     if not camera.balanced:
         note += (
@@ -133,10 +133,10 @@ def borrowed_curves(sensor: SensorConfig, name: str, numbers: PixelNumbers) -> C
 
 
 def bits_of(white_dn: float, black_dn: float, source: str) -> SourcedValue:
-    """Bits of the converter whose top is a white level, or next above it.
+    """Return the fewest bits of a converter that reaches a white level, and a note of where this comes from.
 
-    White stays the same number of electrons, so K [DN/e-] rises as the range above black does: (top - black) / (white -
-    black).
+    The white level stays the same number of electrons. If the simulated converter ends above it, K [DN/e-] therefore
+    rises as the range above black does: by (top - black) / (white - black).
     """
     bits = int(white_dn).bit_length()
     top = 2**bits - 1
@@ -146,18 +146,18 @@ def bits_of(white_dn: float, black_dn: float, source: str) -> SourcedValue:
 
 
 def missing(numbers: PixelNumbers) -> list[str]:
-    """Keys that a camera needs and the source doesn't tell."""
+    """Return the keys that a camera needs and that the source doesn't state."""
     return [key for key in NEEDED if key not in numbers.pixel]
 
 
 def completed(numbers: PixelNumbers, sensor: SensorConfig, name: str) -> PixelNumbers:
-    """Numbers with what is missing taken from another camera, and said so."""
+    """Fill in the missing numbers from another camera, each with a note that names it."""
     lent = {key: SourcedValue(getattr(sensor.pixel, key), f"of {name}, not of this camera") for key in missing(numbers)}
     return replace(numbers, pixel={**numbers.pixel, **lent})
 
 
 def preset_text(title: str, numbers: PixelNumbers, shape: Curves | None, curves: str) -> str:
-    """Preset file as `sensor.config_file.read_sensor` reads it, a source on every number.
+    """Return a preset file that `sensor.config_file.read_sensor` reads, with the source of every number.
 
     Parameters
     ----------
@@ -210,9 +210,10 @@ def responses_csv(curves: Mapping[str, Spectrum]) -> str:
 
 
 def greatest_response(numbers: PixelNumbers, shape: Curves) -> float | None:
-    """Electrons per photon of relative curves' greatest response, by a source's at one wavelength.
+    """Return the electrons per photon at the peak of relative curves, from a source's value at one wavelength.
 
-    The channel that responds most there is taken for the one of which the source speaks. None without a source.
+    The source's value is taken to be that of the channel that responds most at this wavelength. The result is None if
+    the source states no value.
 
     Raises
     ------
@@ -276,5 +277,5 @@ def _line(key: str, number: SourcedValue) -> str:
 
 
 def _plain(text: str) -> str:
-    """Words of a text on one line, without what TOML forbids in a comment."""
+    """Return a text on one line, without the characters that TOML forbids in a comment."""
     return " ".join("".join(x if x.isprintable() else " " for x in text).split())
