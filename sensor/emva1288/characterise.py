@@ -74,7 +74,7 @@ class Characterisation:
 
     @property
     def snr(self) -> Floats:
-        """Mean above the dark over the temporal noise, at each level; NaN where nothing varies."""
+        """Return the mean above the dark over the temporal noise at each level; NaN where nothing varies."""
         noise = np.sqrt(np.where(self.transfer.variance_dn2 > 0, self.transfer.variance_dn2, np.nan))
         return np.asarray((self.transfer.mean_dn - self.dark_mean_dn) / noise)
 
@@ -94,7 +94,7 @@ class Characterisation:
         return axes
 
     def figure(self, name: str) -> FigureOfMerit:
-        """Result by name."""
+        """Return the figure of merit of this name."""
         return next(figure for figure in self.figures if figure.name == name)
 
 
@@ -129,7 +129,10 @@ def characterise(
 
 
 def plan_for(sensor: SensorConfig, exposure_s: float = 0.01) -> ExposurePlan:
-    """Even levels up to 1.1 times the well and a few dim ones; dark times that fill the quickest pixels to a third."""
+    """Plan the exposures: even levels up to 1.1 times the well, a few dim ones, and dark times.
+
+    In the longest dark time the pixels with the most dark current fill to about a third.
+    """
     pixel = sensor.pixel
     current = pixel.dark_current_e_per_s + pixel.hot_pixel_dark_current_e_per_s
     longest_s = min(0.3 * sensor.top_e / current, 1e6) if current else 1.0
@@ -202,7 +205,10 @@ def measure_camera(expose: Expose, plan: ExposurePlan, sensor: SensorConfig) -> 
 
 
 def configured(sensor: SensorConfig, exposure_s: float) -> dict[str, float]:
-    """Each figure without measurement error; saturation is the converter's top, as if all pixels clipped at once."""
+    """Return each figure as configured, without measurement error.
+
+    Saturation is the converter's top, as if all pixels clipped at once.
+    """
     pixel = sensor.pixel
     share = sensor.pixel.hot_pixel_share
     hot_e = pixel.hot_pixel_dark_current_e_per_s * exposure_s

@@ -21,9 +21,10 @@ Estimate = tuple[float, float]
 
 
 def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
-    """Overall system gain K [DN/e-]: slope of temporal variance over mean, above the dark's, up to 70 % of saturation.
+    """Estimate the overall system gain K [DN/e-]: the slope of temporal variance over mean up to 70 % of saturation.
 
-    The line goes through the dark point, whose variance all others share, so its error counts once for all.
+    Both are taken above the dark's. The line goes through the dark point, whose variance is subtracted from all others,
+    so its error counts once for all.
 
     Raises
     ------
@@ -48,7 +49,7 @@ def gain(transfer: Transfer, dark: Stack, saturation_e: float) -> Estimate:
 
 
 def linearity(transfer: Transfer, dark_mean_dn: float, saturation_e: float) -> tuple[Floats, float]:
-    """Relative deviation of each mean from the fitted line (NaN beyond 5-95 % of saturation), and its mean size.
+    """Return each mean's relative deviation from the fitted line (NaN beyond 5-95 % of saturation), and its mean size.
 
     The line is fitted with weights 1/light^2, so that relative deviations count alike at all levels.
     """
@@ -66,7 +67,7 @@ def linearity(transfer: Transfer, dark_mean_dn: float, saturation_e: float) -> t
 
 
 def dark_noise(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
-    """Temporal dark noise [e-], less quantisation."""
+    """Estimate the temporal dark noise [e-], with the noise of quantisation subtracted."""
     error = dark.variance_dn2 * sqrt(2 / (dark.mean_dn.size * (dark.frames - 1)))
     return _electrons(dark.variance_dn2 - QUANTISATION_DN2, error, gain_dn_per_e)
 
@@ -150,5 +151,5 @@ def _squares(image: NDArray[np.float64]) -> Floats:
 
 
 def _spread_error(of_columns: Floats) -> float:
-    """Standard error of the mean over columns: they are independent even where a column's pixels are not."""
+    """Return the standard error of the mean over columns: they are independent where their pixels are not."""
     return float(of_columns.std(ddof=1) / sqrt(of_columns.size))

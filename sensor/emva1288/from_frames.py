@@ -71,12 +71,12 @@ class LightPoint:
 
     @property
     def signal_dn(self) -> Floats:
-        """Mean above the dark."""
+        """Return the mean above the dark [DN]."""
         return self.mean_dn - self.dark_dn
 
     @property
     def gain(self) -> Floats:
-        """Variance that light adds, over the signal [DN/e-]: K at this light."""
+        """Return the variance that the light adds over the signal [DN/e-]: K at this light."""
         return (self.variance_dn2 - self.dark_variance_dn2) / self.signal_dn
 
 
@@ -144,7 +144,7 @@ class Site:
 
     @property
     def temporal_dn2(self) -> float:
-        """Temporal variance that is left in the mean over frames."""
+        """Return the temporal variance that is left in the mean over frames [DN^2]."""
         return self.variance_dn2 / self.frames
 
 
@@ -164,7 +164,7 @@ class SystemGain:
 
     @property
     def estimate(self) -> Estimate:
-        """Value and whole standard error."""
+        """Return the value and its whole standard error."""
         return self.value, hypot(self.scatter, self.model)
 
 
@@ -279,7 +279,10 @@ def _point(stack: LightStack, dark: LightStack) -> LightPoint:
 
 
 def _saturation_dn(points: Sequence[LightPoint], white_dn: float) -> float:
-    """Signal of the light behind the one whose variance is greatest; white above black where no brighter one is."""
+    """Return the signal at saturation [DN]: that of the light next brighter than the one whose variance is greatest.
+
+    If no brighter light was taken, it is white above black.
+    """
     peak = max(range(len(points)), key=lambda index: float(points[index].variance_dn2.mean()))
     return min(float(points[peak + 1].signal_dn.max()), white_dn) if peak + 1 < len(points) else white_dn
 
@@ -347,11 +350,12 @@ def _sites(frames: Sequence[NDArray[np.uint16]], tile: Tile) -> list[Site]:
 
 
 def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
-    """Slope of the variance that light adds over the signal (eq. 50), in DN per electron, through the dark point.
+    """Fit the slope of the variance that light adds over the signal (eq. 50) [DN/e-], through the dark point.
 
-    Its errors are those of the frames, widened by the scatter of K by light where that is more than frames explain
-    (Birge's ratio), and the spread of K over the range by a second term of the line, together with the error of that
-    term: lights that don't tell a small change from 0 don't tell either that there is none.
+    The standard error has two parts. One is that of the frames, widened by the scatter of K over the lights where that
+    is more than the frames explain (Birge's ratio). The other is the change of K over the range, fitted as a second
+    term of the line, together with the error of that term: lights that can't tell a small change from 0 can't exclude
+    one either.
     """
     used = [point for point in points if point.clipped <= MOST_CLIPPED]
     signal = np.array([point.signal_dn for point in used]).reshape(-1)
@@ -392,7 +396,10 @@ def _gain(points: Sequence[LightPoint], most_dn: float) -> SystemGain:
 
 
 def _relative(stack: Sequence[Site], dark: Sequence[Site], level: Floats) -> list[tuple[NDArray[np.float64], float]]:
-    """Response of each pixel over the mean, less a smooth surface of second order, with its temporal variance."""
+    """Return each pixel's response over the mean, less a smooth surface of second order, and its temporal variance.
+
+    There is one such pair for each position in the tile.
+    """
     responses = []
     for site, shade, signal in zip(stack, dark, level, strict=True):
         added = (site.mean_dn - shade.mean_dn) / signal
@@ -403,7 +410,7 @@ def _relative(stack: Sequence[Site], dark: Sequence[Site], level: Floats) -> lis
 
 
 def without_surface(image: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Image less a smooth surface of second order: a lens's shading, and a lamp at one side."""
+    """Subtract a fitted smooth surface of second order: a lens's shading, or a lamp that stands at one side."""
     y, x = (np.linspace(-1, 1, size) for size in image.shape)
     terms = [np.ones_like(image), *np.meshgrid(x, y), *np.meshgrid(x**2, y**2), np.outer(y, x)]
     surface = np.stack([term.ravel() for term in terms], axis=1)
@@ -413,7 +420,10 @@ def without_surface(image: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _spread(images: list[tuple[NDArray[np.float64], float]]) -> Estimate:
-    """Variance over pixels less the temporal one (eqs. 66, 67), and its error by columns: they are independent."""
+    """Return the variance over pixels less the temporal one (eqs. 66, 67), and its error.
+
+    The error comes from the scatter over columns, because these are independent.
+    """
     squares = np.concatenate(
         [
             np.mean((image - image.mean()) ** 2, axis=0) * image.size / (image.size - 1) - noise
@@ -429,7 +439,7 @@ def _interval(estimate: Estimate) -> Interval:
 
 
 def _root(variance: float, error: float) -> Interval:
-    """Root of a variance, the ends of the interval being roots too: it stays right where the variance is near 0."""
+    """Return the root of a variance, and the roots of its interval's ends: so it stays right near 0."""
     low, high = variance - NORMAL_95 * error, variance + NORMAL_95 * error
     return Interval(sqrt(max(variance, 0.0)), sqrt(max(low, 0.0)), sqrt(max(high, 0.0)))
 
@@ -493,7 +503,7 @@ def _evenness(stack: LightStack, level: Floats) -> list[str]:
 
 
 def _unevenness(image: NDArray[np.float64], signal: float) -> float:
-    """Difference of the darkest part of an image and the brightest, beyond noise, over the signal."""
+    """Return by how much an image's darkest and brightest parts differ beyond noise, over the signal."""
     rows = np.array_split(image, _BLOCKS)
     blocks = [block for row in rows for block in np.array_split(row, _BLOCKS, axis=1)]
     means = np.array([block.mean() for block in blocks])

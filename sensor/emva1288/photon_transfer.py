@@ -73,7 +73,7 @@ class Stack:
 
     @property
     def spatial_dn2(self) -> float:
-        """Variance over pixels [DN^2], less what the mean over frames left of the temporal one."""
+        """Return the variance over pixels [DN^2], less the temporal variance that is left in the mean over frames."""
         return float(self.mean_dn.var() - self.variance_dn2 / self.frames)
 
 
