@@ -35,11 +35,11 @@ class FlickerFigures:
 
 
 def flicker_figures(waveform: Waveform, exposure_s: float, tolerance: float = TOLERANCE) -> FlickerFigures:
-    """Flicker modulation index and modulation mitigation probability of IEEE 2020, in closed form.
+    """Return the flicker modulation index and the modulation mitigation probability of IEEE 2020, in closed form.
 
-    Of a cosine of depth d the light swings by a = d |sinc(f T)|: the index is a, the probability 1 where a is within
-    the tolerance t, else (2 / pi) arcsin(t / a). Of straight pieces the light is a parabola between any two starts at
-    which a corner of the waveform enters or leaves the exposure, so that extremes and crossings are exact.
+    For a cosine of depth d the light swings by a = d |sinc(f T)|: the index is a; the probability is 1 where a is
+    within the tolerance t, else (2 / pi) arcsin(t / a). For straight pieces the light is a parabola between any two
+    starts at which a corner of the waveform enters or leaves the exposure, so that extremes and crossings are exact.
 
     Parameters
     ----------
@@ -69,7 +69,10 @@ def flicker_figures(waveform: Waveform, exposure_s: float, tolerance: float = TO
 
 
 def _of_pieces(waveform: Waveform, exposure_s: float, tolerance: float) -> tuple[float, float, float]:
-    """Least and most light that an exposure collects, and the share of starts within the tolerance of 1."""
+    """Return the least and most light that an exposure collects, and the share of its starts with light near the mean.
+
+    Light is relative to the mean, and near it means within `tolerance`.
+    """
     places = np.array(waveform.places)
     corners = np.concatenate([places, (places - exposure_s * waveform.frequency_hz) % 1.0])
     corners = np.unique(corners)

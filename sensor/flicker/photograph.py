@@ -72,10 +72,10 @@ def held_under_lamps(
     start_s: float,
     rng: np.random.Generator,
 ) -> NDArray[np.float64]:
-    """Electrons behind every filter, (h, w, channel), of a camera in the hand under lamps that flicker.
+    """Return the electrons behind every filter, (h, w, channel), of a hand-held camera under lamps that flicker.
 
-    Where the hand is while a lamp is bright counts for more of that lamp's light: a lamp that flashes freezes it. Each
-    row keeps the light that the lamp gives it within its exposure, so that bands are those of a still camera.
+    The camera's position while a lamp is bright has more weight for that lamp's light, so a lamp that flashes freezes
+    the movement. Each row keeps the light that the lamp gives within its exposure: bands are those of a still camera.
 
     Parameters
     ----------
@@ -121,7 +121,9 @@ def held_under_lamps(
 def frame_starts_s(
     sensor: SensorConfig, shape: tuple[int, int], exposure_s: float, rng: np.random.Generator, frames: int = 1
 ) -> list[float]:
-    """When each frame of a burst starts, by the lamps' clock [s]: at any time, then as soon as the readout lets it.
+    """Draw when a burst's first frame starts, by the lamps' clock [s], and add the starts of the frames after it.
+
+    The first frame starts at a random time, each later one as soon as the readout allows.
 
     Parameters
     ----------
@@ -130,7 +132,7 @@ def frame_starts_s(
         Of its photodiodes.
     exposure_s : float
     rng : numpy.random.Generator
-        Gives the first start: a camera and the mains know nothing of each other.
+        Gives the first start: the camera isn't synchronised to the mains.
     frames : int
     """
     first_s = LONGEST_START_S * float(rng.random())

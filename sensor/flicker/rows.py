@@ -59,7 +59,7 @@ def flickering(
     exposure_s: float,
     start_s: float = 0.0,
 ) -> NDArray[np.float64]:
-    """Expected electrons of one exposure under lamps that flicker, shape (h, w).
+    """Return the expected electrons of one exposure under lamps that flicker, shape (h, w).
 
     Parameters
     ----------
@@ -78,10 +78,10 @@ def flickering(
 
 
 def steady_exposure_s(waveforms: Iterable[Waveform], exposure_s: float) -> float:
-    """Exposure time of a rule that knows the lamps [s]: cut to whole periods of the slowest, where it holds one.
+    """Cut an exposure [s] to whole periods of the slowest lamp; leave one that is shorter than a period.
 
-    Every row then collects the same. Cameras call it anti-banding. Lamps whose frequencies are no multiples of one
-    another keep bands, of the faster ones only.
+    Every row then collects the same light; cameras call this anti-banding. Lamps whose periods don't divide that of the
+    slowest keep bands, though only these faster lamps do.
     """
     slowest_s = max((x.period_s for x in waveforms), default=0.0)
     periods = floor(exposure_s / slowest_s + 1e-9) if slowest_s else 0

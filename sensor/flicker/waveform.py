@@ -101,13 +101,13 @@ class Waveform:
 
     @property
     def period_s(self) -> float:
-        """Time after which the light is the same again [s]."""
+        """Return the time after which the light repeats [s]."""
         return 1 / self.frequency_hz
 
     def mean(self, start_s: float | Floats, exposure_s: float) -> Floats:
-        """Mean light within an exposure, over that of all time: exactly, by the integral.
+        """Return the mean light within an exposure, relative to that of all time, from the exact integral.
 
-        Of a cosine that is 1 + depth sinc(f T) cos(2 pi f (t + T / 2)), with sinc(x) = sin(pi x) / (pi x).
+        For a cosine that is 1 + depth sinc(f T) cos(2 pi f (t + T / 2)), with sinc(x) = sin(pi x) / (pi x).
 
         Parameters
         ----------
@@ -127,7 +127,7 @@ class Waveform:
         return np.asarray((whole + self._integral(last) - self._integral(first)) / periods)
 
     def _integral(self, place: Floats) -> Floats:
-        """Integral of the straight pieces from 0 to a place in two periods."""
+        """Integrate the straight pieces from 0 to a place in two periods."""
         places, levels = np.array(self.places), np.array(self.levels)
         widths = np.diff(places)
         before = np.concatenate([[0.0], np.cumsum(widths * (levels[1:] + levels[:-1]) / 2)])
@@ -140,7 +140,7 @@ class Waveform:
 
 
 def pwm(frequency_hz: float, duty: float) -> Waveform:
-    """Lamp that is switched: fully on for a share `duty` of each period, from time 0, and off for the rest.
+    """Return a switched lamp: fully on for a share `duty` of each period, from time 0, and off for the rest.
 
     Raises
     ------
@@ -194,7 +194,7 @@ def read_waveform(path: str | Path) -> Waveform:
 
 
 def waveform(text: str) -> Waveform:
-    """Waveform of a lamp by name and frequency, of pulse width modulation, or of a table.
+    """Return the waveform of a lamp: by name and frequency, by pulse width modulation, or from a table.
 
     Parameters
     ----------
