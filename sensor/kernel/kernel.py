@@ -33,7 +33,7 @@ _FINITE_E = 1e30  # over any well; times any response in single precision's rang
 def expected_electrons_single(
     values: NDArray[np.floating], weights: NDArray[np.float64], sensor: SensorConfig
 ) -> NDArray[np.float32]:
-    """Expected photo-electrons behind each pixel's own filter, in single precision.
+    """Return the expected photo-electrons behind each pixel's own filter, in single precision.
 
     Parameters
     ----------
@@ -103,11 +103,11 @@ def weighted_sum(planes: list[Float], weights: list[list[Float]], channel: UInt)
 
 
 def _pieces(planes: NDArray[np.float32]) -> list[tuple[int, NDArray[np.float32]]]:
-    """First pixel and aligned band planes of the parts that `planes` is read in.
+    """Split `planes` into parts to read, each with its first pixel and its band planes, aligned.
 
-    NumPy's memory starts 16 bytes after a multiple of 64. Read from there, the cache lines that 40 planes share with
-    their neighbours evict each other where planes lie a power of two apart: half the speed. So the first few pixels are
-    copied, and the rest is read in place from the first aligned one on.
+    NumPy's memory starts 16 bytes after a multiple of 64. If it were read from there, the cache lines that 40 planes
+    share with their neighbours would evict each other where planes lie a power of two apart, at half the speed. So the
+    first few pixels are copied, and the rest is read in place from the first aligned pixel on.
     """
     skip = (-planes.ctypes.data % ALIGNMENT) // planes.itemsize
     in_place = planes.strides[0] % ALIGNMENT == 0 and planes.ctypes.data % planes.itemsize == 0
@@ -128,9 +128,9 @@ def read_frame(
     key: int,
     reading: int = 0,
 ) -> NDArray[np.uint16]:
-    """Digital numbers of one exposure: what `sensor.readout.draw_frame` does, with other draws.
+    """Draw the digital numbers of one exposure: what `sensor.readout.draw_frame` does, with other random draws.
 
-    Binned in charge, the wells are filled here and a quarter as many pixels converted in NumPy.
+    If the camera bins in charge, the wells are filled here, and NumPy converts the quarter as many pixels.
     """
     expected_e = np.asarray(expected_e, dtype=np.float32)
     jit = arrays()
@@ -179,7 +179,7 @@ def read_frame(
 
 
 def philox_single(counter: tuple[UInt, ...], key: tuple[UInt, UInt]) -> tuple[UInt, ...]:
-    """Philox4x32-10, as `sensor.random.philox`: four random words for each counter."""
+    """Return four random words for each counter by Philox4x32-10, as `sensor.random.philox` does."""
     (c0, c1, c2, c3), (k0, k1) = counter, key
     first, second = (arrays().UInt(int(multiplier)) for multiplier in MULTIPLIERS)
     for _ in range(ROUNDS):
@@ -189,7 +189,7 @@ def philox_single(counter: tuple[UInt, ...], key: tuple[UInt, UInt]) -> tuple[UI
 
 
 def normal_pair(first: UInt, second: UInt) -> tuple[Float, Float]:
-    """Two independent standard normal draws of two words (Box-Muller); they end at 6.7 standard deviations."""
+    """Return two independent standard normal draws from two words (Box-Muller); they end at 6.7 standard deviations."""
     jit = arrays()
     radius = dr.sqrt(-2.0 * dr.log(dr.fma(jit.Float(jit.Int(first >> 1)), 2.0**-31, 2.0**-32)))
     sine, cosine = dr.sincos(jit.Float(jit.Int(second >> 1)) * (2.0 * pi * 2.0**-31))
@@ -197,7 +197,7 @@ def normal_pair(first: UInt, second: UInt) -> tuple[Float, Float]:
 
 
 def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
-    """Values in single precision, bounded by its largest number."""
+    """Convert values to single precision, bounded by its largest number."""
     if values.dtype == np.float32:
         return values
     return np.asarray(np.minimum(values, np.float64(LARGEST)), dtype=np.float32)

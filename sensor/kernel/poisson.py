@@ -27,7 +27,10 @@ _MOST_TERMS = 40  # the chance of more at a mean under 1 is 1e-48; rounding coul
 
 @cache
 def alias_table() -> NDArray[np.uint32]:
-    """Alias tables of the whole means 0..29, shape (30, 128): share of the bin's own number << 7 | the other number."""
+    """Return the alias tables of the whole means 0..29, shape (30, 128).
+
+    Each entry holds the share of the bin's own number << 7 | the other number.
+    """
     table = np.empty((int(EXACT_BELOW_E), _BINS), dtype=np.uint32)
     counts = np.arange(_BINS)
     log_factorial = np.concatenate([[0.0], np.cumsum(np.log(counts[1:]))])
@@ -55,7 +58,7 @@ def _alias(heights: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[n
 
 
 def poisson_single(mean_e: Float, normal: Float, words: tuple[UInt, UInt], table: UInt) -> Float:
-    """Poisson draw of each thread, whole numbers in Float.
+    """Draw a Poisson number in each thread, a whole number in Float.
 
     Parameters
     ----------
@@ -86,7 +89,7 @@ def _by_table(mean_e: Float, words: tuple[UInt, UInt], table: UInt) -> Float:
 
 
 def _by_inversion(mean: Double, uniform: Double, active: Mask) -> Float:
-    """Poisson draw of a mean under 1: the first number whose chance to be exceeded is not above `uniform`."""
+    """Draw from a Poisson law of mean under 1: the first number exceeded with a chance of at most `uniform`."""
     jit = arrays()
 
     def next_number(number: Double, chance: Double, exceeded: Double) -> tuple[Double, Double, Double]:
