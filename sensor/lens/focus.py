@@ -14,7 +14,7 @@ from rodcone.errors import InputError
 
 
 def focal_length_of_view_mm(width_mm: float, view_deg: float, focus_m: float) -> float:
-    """Focal length [mm] of a lens that gives a sensor of this width an angle of view while it is focused at a distance.
+    """Return the focal length [mm] of a lens that, focused at a distance, gives a sensor this angle of view.
 
     Parameters
     ----------
@@ -29,7 +29,7 @@ def focal_length_of_view_mm(width_mm: float, view_deg: float, focus_m: float) ->
 
 
 def pupil_mm(f_number: float, focal_length_mm: float, focus_m: float) -> float:
-    """Diameter of a lens's pupil [mm].
+    """Return the diameter of a lens's pupil [mm].
 
     Raises
     ------
@@ -45,7 +45,7 @@ def pupil_mm(f_number: float, focal_length_mm: float, focus_m: float) -> float:
 
 
 def circle_of_confusion_um(f_number: float, focal_length_mm: float, focus_m: float, distance_m: float) -> float:
-    """Diameter of the disc on the sensor that a point at a distance becomes [um]: a lens's `defocus_um` for it.
+    """Return the diameter [um] of the disc that a point becomes on the sensor, which is `defocus_um` for its distance.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ NATURAL_POWER = 4.0  # of a lens that states its angle of view alone
 
 
 def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
-    """Angle of view across the picture: the lens's own, or that of the scene's camera.
+    """Return the angle of view across the picture [degrees]: the lens's own, or else that of the scene's camera.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def view_deg(lens: LensConfig, of_scene: float | None, term: str) -> float:
 
 
 def darkens(lens: LensConfig) -> bool:
-    """Whether the lens gives the corners less light than the middle."""
+    """Return whether the lens gives the corners less light than the middle."""
     if lens.table and lens_table(lens).darkens():
         return True
     return lens.horizontal_view_deg > 0 or lens.falloff_power > 0 or lens.vignetting > 0
@@ -71,7 +71,7 @@ def framed(lens: LensConfig, of_scene: float | None) -> LensConfig:
 
 
 def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = None) -> NDArray[np.float64]:
-    """Irradiance of each pixel over that on the axis, shape `shape`.
+    """Return the irradiance of each pixel relative to that on the axis, shape `shape`.
 
     Parameters
     ----------
@@ -106,7 +106,10 @@ def pupil_share(height: Floats, lens: LensConfig) -> NDArray[np.float64]:
 
 @lru_cache(maxsize=64)
 def _shift(lens: LensConfig) -> float:
-    """Distance k of the rim's centre from the pupil's in the corners, at which they lose what the lens states."""
+    """Return the distance k of the rim's centre from the pupil's, seen from the corners.
+
+    It is the one at which the corners lose the share of light that the lens states.
+    """
 
     def too_bright(shift: float) -> float:
         return float(_common_area(np.array([1.0]), shift, lens.vignetting_from)[0]) / np.pi - (1 - lens.vignetting)
@@ -116,7 +119,7 @@ def _shift(lens: LensConfig) -> float:
 
 
 def _common_area(height: Floats, shift: float, start: float) -> NDArray[np.float64]:
-    """Area that a circle of radius 1 shares with one of radius 1 + shift x start, shift x height beside it."""
+    """Return the area that a unit circle shares with one of radius 1 + shift x start, shift x height beside it."""
     radius = 1 + shift * start
     apart = np.clip(shift * height, radius - 1, radius + 1)
     within = apart > radius - 1

@@ -59,7 +59,7 @@ def patches(shape: tuple[int, int], rings: int, beyond: int = 0) -> tuple[Patch,
 
 
 def _windows(side: int, step: float, beyond: int) -> list[tuple[float, slice, Floats]]:
-    """Places along an axis, its middle and ends among them, what each covers, and its window."""
+    """Return the places along an axis (its middle and ends included), the samples that each covers, and its window."""
     places = max(ceil((side - 1) / 2 / step), 1)
     nodes = np.linspace(0, side - 1, 2 * places + 1) if side > 2 else np.arange(float(side))
     samples = np.clip(np.arange(-beyond, side + beyond), 0, side - 1)
@@ -76,10 +76,10 @@ def _windows(side: int, step: float, beyond: int) -> list[tuple[float, slice, Fl
 def spreader(
     table: LensTable, shape: tuple[int, int], step_um: float, folded: bool, threads: int
 ) -> Callable[[Plane, float], Plane]:
-    """Function of light and wavelength: what the lens's own point images give beyond those of an ideal lens.
+    """Return a function of light and wavelength: the difference between the lens's point images and an ideal lens's.
 
-    Added to what an ideal lens gives of the same light (with diffraction, of a table of wavefronts), it is the light on
-    the sensor. It doesn't depend on the number of threads.
+    Its result is to be added to what an ideal lens makes of the same light (with diffraction if the table holds
+    wavefronts); the sum is the light on the sensor. It doesn't depend on the number of threads.
 
     Parameters
     ----------
@@ -133,16 +133,16 @@ def spreader(
 
 
 def _turned(kernel: Floats, down: bool, over: bool) -> Floats:
-    """Kernel, whose middle is its first sample, mirrored along its rows, columns or both."""
+    """Mirror a kernel, whose middle is its first sample, along its rows, its columns or both."""
     axes = tuple(axis for axis, mirrored in enumerate((down, over)) if mirrored)
     return np.roll(np.flip(kernel, axes), 1, axes) if axes else kernel
 
 
 def mover(table: LensTable, shape: tuple[int, int], step_um: float) -> Callable[[Plane, float], Plane]:
-    """Function of light and wavelength that gives the light where the lens's distortion and lateral colour land it.
+    """Return a function of light and wavelength that moves light to where distortion and lateral colour let it land.
 
-    Light between samples is a cubic spline's, below 0 nowhere where none of the light is. Beyond the border the picture
-    goes on as its mirror image.
+    Between samples the light is a cubic spline, cut off at 0 unless some of the light is negative. Beyond the border
+    the picture continues as its mirror image.
 
     Parameters
     ----------

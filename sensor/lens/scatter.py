@@ -34,12 +34,12 @@ _OWN, _NEAR, _NEAR_PX = 256, 16, 6
 
 
 def scatters(lens: LensConfig) -> bool:
-    """Whether a lens, or an eye in its place, scatters light by angle."""
+    """Return whether a lens, or an eye in its place, scatters light by angle."""
     return lens.scatter > 0 or lens.eye_age_years > 0
 
 
 def veil_per_sr(angle_deg: Floats, lens: LensConfig) -> Floats:
-    """Luminance of the veil at angles from a lamp, over the lamp's illuminance at the aperture [1/sr]."""
+    """Return the veil's luminance at angles from a lamp, over the lamp's illuminance at the aperture [1/sr]."""
     angle = np.asarray(angle_deg, dtype=np.float64)
     if not lens.eye_age_years:
         shoulder = sin(radians(lens.scatter_shoulder_deg))
@@ -53,7 +53,10 @@ def veil_per_sr(angle_deg: Floats, lens: LensConfig) -> Floats:
 
 
 def _peak_per_sr(lens: LensConfig) -> float:
-    """P of a lens at the lamp itself: the share over the integral 2 pi b (1 + (b / l)^2)^(-s / 2) db from 0 to 1."""
+    """Return P of a lens at the lamp itself [1/sr], with l the sine of the shoulder angle and s the slope.
+
+    It is the scattered share over the integral of 2 pi b (1 + (b / l)^2)^(-s / 2) db from 0 to 1.
+    """
     shoulder2 = sin(radians(lens.scatter_shoulder_deg)) ** 2
     left = 1 - lens.scatter_slope / 2
     rise = log(1 + 1 / shoulder2)
@@ -106,7 +109,10 @@ def scatterer(lens: LensConfig, shape: tuple[int, int], horizontal_view_deg: flo
 
 
 def _veil_by_pixel(down: Floats, across: Floats, step: float, lens: LensConfig) -> Floats:
-    """Veil of a lamp in one pixel at whole offsets from it, over the lamp's light; `step` is a pixel's tangent."""
+    """Return the veil of a lamp in one pixel, at whole offsets from it, relative to the lamp's light.
+
+    `step` is the tangent of the angle that a pixel covers.
+    """
 
     def mean_over(rows: Floats, columns: Floats, squares: int) -> Floats:
         inner = (np.arange(squares) + 0.5) / squares - 0.5

@@ -109,15 +109,15 @@ class LensTable:
     digest: str = ""
 
     def illumination(self, height: Floats) -> Floats:
-        """Irradiance at image heights over that on the axis."""
+        """Return the irradiance at image heights relative to that on the axis."""
         return np.asarray(self._curves[0](np.minimum(height, 1.0)))
 
     def darkens(self) -> bool:
-        """Whether the lens gives some heights less light than the middle."""
+        """Return whether the lens gives some image heights another illumination than the middle."""
         return bool((self.relative_illumination != 1).any())
 
     def landing(self, height: Floats, wavelength_nm: float, half_diagonal_um: float) -> Floats:
-        """Image height at which light of an ideal image height lands."""
+        """Return the image height at which light lands that an ideal lens would image at `height`."""
         lateral = self._lateral(wavelength_nm)
         beside = np.interp(height, self.field, lateral / half_diagonal_um)
         if lateral.any() and self.field.size > 1:
@@ -133,7 +133,7 @@ class LensTable:
         return pchip(self.field, self.relative_illumination), pchip(self.field, self.distortion)
 
     def wavefront_nm(self, height: float, wavelength_nm: float) -> tuple[Floats, Floats]:
-        """Coefficients [nm] and the pupil's half axes at an image height, of a lens with wavefronts."""
+        """Return the Zernike coefficients [nm] and the pupil's half axes at an image height (wavefronts only)."""
         assert isinstance(self.point_spread, Wavefronts)
         both = np.concatenate([self.point_spread.path_nm, self.point_spread.pupil], axis=2)
         of_field = scipy.interpolate.PchipInterpolator(self.field, both)(min(height, 1.0))
@@ -144,7 +144,7 @@ class LensTable:
         return values[:-2], values[-2:]
 
     def kernel(self, height: float, wavelength_nm: float) -> Floats:
-        """Point image at an image height, of a lens with kernels."""
+        """Return the point image at an image height, for a lens with kernels."""
         assert isinstance(self.point_spread, Kernels)
         total = np.zeros(self.point_spread.energy.shape[2:])
         for at, of_field in _between(self.field, height):
@@ -154,7 +154,7 @@ class LensTable:
 
 
 def _between(nodes: Floats, value: float) -> list[tuple[int, float]]:
-    """Nodes on either side of a value, with their shares."""
+    """Return the nodes on either side of a value, each with its share in linear interpolation."""
     share = float(np.interp(value, nodes, np.arange(nodes.size)))
     low = min(int(share), nodes.size - 1)
     return [(low, 1 - share + low), (min(low + 1, nodes.size - 1), share - low)]
@@ -179,12 +179,12 @@ _CONVERTER = strict_converter()
 
 
 def shipped() -> tuple[str, ...]:
-    """Names of the lenses that come with rodcone."""
+    """Return the names of the lenses that come with rodcone."""
     return tuple(sorted(path.stem for path in SHIPPED.glob("*.toml")))
 
 
 def lens_file(lens: str) -> Path:
-    """Path of a lens's file: of a shipped one by its name, of any other by the path that ends in ``.toml``.
+    """Return the path of a lens's file: of a shipped one by its name, of any other by the path that ends in ``.toml``.
 
     Raises
     ------
@@ -198,7 +198,7 @@ def lens_file(lens: str) -> Path:
 
 
 def with_lens(sensor: SensorConfig, table: str) -> SensorConfig:
-    """Camera behind a lens by data (`LensConfig.table`), at the f-number that its table states.
+    """Return the camera with a lens from measured or designed data (`LensConfig.table`), at the f-number of its table.
 
     Raises
     ------
@@ -209,7 +209,7 @@ def with_lens(sensor: SensorConfig, table: str) -> SensorConfig:
 
 
 def terms_of(table: str) -> dict[str, Any]:
-    """Fields of `LensConfig` that a lens by data gives: itself, its f-number, and the hash of a file's content.
+    """Return the fields of `LensConfig` that a tabulated lens sets: its name, its f-number, and the hash of its files.
 
     A shipped lens has no hash: its content belongs to the version of rodcone.
 
@@ -274,7 +274,7 @@ def read_lens(lens: str) -> LensTable:
 
 
 def _stamp(path: Path, what: str = "lens file", fix: str = _FIX) -> tuple[int, int]:
-    """When a file was changed, and its size."""
+    """Return when a file was changed, and its size."""
     with read_errors(f"{what}: {str(path)!r} can't be read", fix):
         status = path.stat()
     return status.st_mtime_ns, status.st_size
@@ -332,7 +332,7 @@ def _table(given: _File, folder: Path) -> LensTable:
 
 
 def _rising(name: str, values: Sequence[float]) -> Floats:
-    """Array of numbers that rise."""
+    """Check that numbers rise, and return them as an array."""
     found = np.array(values, dtype=np.float64)
     if not found.size or not np.isfinite(found).all() or np.any(np.diff(found) <= 0):
         raise InputError(f"{name}: {list(values)} doesn't rise; allowed: numbers, each above the last; sort them")
@@ -340,7 +340,7 @@ def _rising(name: str, values: Sequence[float]) -> Floats:
 
 
 def _of_fields(name: str, values: Sequence[float], field: Floats, default: float, low: float, high: float) -> Floats:
-    """Array of one number for each field, each from low to high; the default where none is given."""
+    """Check that there is one number from low to high for each field; fill in the default where none is given."""
     if not values:
         return np.full(field.size, default)
     if len(values) != field.size:
@@ -367,7 +367,7 @@ def _point_spread(path: Path, field: Floats, nm: Floats) -> Wavefronts | Kernels
 
 
 def _numbers(rows: list[list[str]]) -> tuple[list[str], Floats]:
-    """Header and numbers of a CSV's rows."""
+    """Return the header and the numbers of a CSV's rows."""
     if len(rows) < 2:
         raise InputError("rows: none; allowed: a header and one row or more; fill it")
     head = [name.strip() for name in rows[0]]
@@ -384,7 +384,7 @@ def _numbers(rows: list[list[str]]) -> tuple[list[str], Floats]:
 
 
 def _places(numbers: Floats, field: Floats, nm: Floats) -> tuple[Any, Any]:
-    """Indices of the field and the wavelength of each row, all of which are there."""
+    """Return the indices of each row's field and wavelength; raise `InputError` if a combination is missing."""
     indices = []
     for name, nodes, values in zip(PLACE, (field, nm), numbers.T, strict=False):
         index = np.abs(values[:, None] - nodes).argmin(axis=1)

@@ -45,7 +45,7 @@ def zernike(noll: int, along: Floats, across: Floats) -> Floats:
 
 @lru_cache(maxsize=512)
 def _radial(noll: int) -> tuple[float, ...]:
-    """Factors of the powers of the radius, from 0 on, in a polynomial."""
+    """Return the factors of the powers of the radius, from 0 on, in a Zernike polynomial."""
     n, m = orders(noll)
     factors = [0.0] * (n + 1)
     for s in range((n - abs(m)) // 2 + 1):
@@ -72,7 +72,7 @@ def _path_nm(coefficients: Floats, noll: tuple[int, ...], along: Floats, across:
 def _pupil(
     table: LensTable, height: float, wavelength_nm: float, along: Floats, across: Floats, edge: float
 ) -> NDArray[np.complex128]:
-    """Pupil function at places in units of the f-number's radius, its rim softened over `edge` of them."""
+    """Return the pupil function at places in units of the f-number's radius; `edge` is the width of its soft rim."""
     assert isinstance(table.point_spread, Wavefronts)
     coefficients, (radial, sideways) = table.wavefront_nm(height, wavelength_nm)
     along, across = along / radial, across / sideways
@@ -86,7 +86,7 @@ def _pupil(
 
 
 def transfer(table: LensTable, height: float, wavelength_nm: float, radial: Floats, across: Floats) -> Floats:
-    """Transfer of the lens at one place of the picture: what the table says, without a picture.
+    """Return the lens's transfer function at one place of the picture, straight from the table.
 
     Parameters
     ----------
@@ -130,7 +130,10 @@ def transfer(table: LensTable, height: float, wavelength_nm: float, radial: Floa
 
 
 def reach_of(table: LensTable, nm: Floats, step_um: float) -> int:
-    """Samples on each side of a point over which its image differs from an ideal one's, for the widest of a table."""
+    """Return the samples on each side of a point within which its image differs from an ideal one's.
+
+    The widest image of the table counts.
+    """
     spread = table.point_spread
     if isinstance(spread, Kernels):
         farthest_um = sqrt(2) * float(spread.energy.shape[2] // 2) * spread.step_um
@@ -155,10 +158,11 @@ def reach_of(table: LensTable, nm: Floats, step_um: float) -> int:
 def sampled_kernel(
     table: LensTable, height: float, azimuth: float, wavelength_nm: float, step_um: float, reach: int, folded: bool
 ) -> Floats:
-    """Image of a point at the samples around it, less that of a lens without aberrations, shape (2 reach,) * 2.
+    """Return a point's image at the samples around it, less that of an ideal lens, shape (2 reach,) * 2.
 
-    The point is at [0, 0], what lies before it at the ends; the sum is 0. Of a table of kernels the lens without
-    aberrations has no diffraction either. `folded` is as `sensor.diffraction.sampled_otf` takes it.
+    The point is at [0, 0], and what lies before it wraps around to the ends; the sum is 0. The ideal lens has no
+    aberrations and, for a table of kernels, no diffraction either. `folded` is as `sensor.diffraction.sampled_otf`
+    takes it.
 
     Parameters
     ----------
@@ -195,7 +199,7 @@ def sampled_kernel(
 
 
 def _correlated(pupil: NDArray[Any]) -> NDArray[np.complex128]:
-    """Correlation of a pupil function with itself; of its soft rim the part that is covered counts at 0."""
+    """Correlate a pupil function with itself; at 0, a place on the soft rim counts by its covered part."""
     amplitude = scipy.fft.ifft2(pupil.astype(np.complex64), overwrite_x=True)
     found = scipy.fft.fft2(amplitude.real**2 + amplitude.imag**2)
     found[0, 0] = np.abs(pupil).sum() / pupil.size
@@ -204,7 +208,7 @@ def _correlated(pupil: NDArray[Any]) -> NDArray[np.complex128]:
 
 @lru_cache(maxsize=4)
 def _ideal(spot_um: float, step_um: float, reach: int, times: int, folded: bool) -> Floats:
-    """Image of a point by a round pupil without aberrations, by the same sums as one with them."""
+    """Return the image of a point by a round pupil without aberrations, computed by the same sums as one with them."""
     places = np.fft.fftfreq(2 * reach * times, step_um / times) * 2 * spot_um
     amplitude = np.clip((1 - np.hypot(places[:, None], places)) / (spot_um / (reach * step_um)) + 0.5, 0.0, 1.0)
     return _inverse(_correlated(amplitude), times, reach, folded)
@@ -223,7 +227,10 @@ def _of_kernel(kernel: Floats, step_um: float, radial: Floats, across: Floats) -
 
 
 def _inverse(found: NDArray[np.complex128], times: int, reach: int, folded: bool) -> Floats:
-    """Kernel of sum 1 at samples, of a transfer known `times` as far: frequencies beyond theirs come back."""
+    """Return the kernel of sum 1 at the samples, from a transfer known up to `times` their frequencies.
+
+    Frequencies beyond those of the samples are aliased into them.
+    """
     if folded:
         kernel = scipy.fft.ifft2(found).real[::times, ::times].astype(np.float64)
         return np.asarray(kernel / kernel.sum())
