@@ -13,10 +13,11 @@ LEAST_CELLS = 256  # that a percentile is taken of
 
 
 def stops_to_white(raw: RawImage) -> float:
-    """Stops by which a raw image is brightened, so that the 99th percentile of its luminance is shown at 90 % of white.
+    """Return the stops of gain that show the 99th percentile of a raw image's luminance at 90 % of white.
 
-    The luminance is that of means over cells: one tile of the mosaic, and more where noise would raise the percentile.
-    So it depends on the exposure alone, and is the same for every way to develop it. 0 for a frame without light.
+    The luminance is that of means over cells, which are a tile of the mosaic, or more where noise would raise the
+    percentile. It therefore depends on the exposure only, and is the same for every way to develop the image. The
+    result is 0 for a frame without light.
 
     Raises
     ------
@@ -43,7 +44,7 @@ def stops_to_white(raw: RawImage) -> float:
 
 
 def _cell_means(electrons: NDArray[np.float64], at: NDArray[np.bool_], cell: NDArray[np.intp]) -> NDArray[np.float64]:
-    """Mean of a channel's samples in each whole cell of the mosaic; of a frame smaller than a cell, the whole mean."""
+    """Average a channel's samples over each whole cell of the mosaic, or over a frame smaller than a cell."""
     height, width = (min(n, size) for n, size in zip(cell, electrons.shape, strict=True))
     rows, columns = electrons.shape[0] // height, electrons.shape[1] // width
     inside = slice(rows * height), slice(columns * width)

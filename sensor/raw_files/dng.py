@@ -148,9 +148,9 @@ def is_in_dng(tile: Tile) -> bool:
 
 
 def is_own(path: Path) -> bool:
-    """Whether a file is a mosaic of rodcone's as `write_dng` lays it out: uncompressed, in strips.
+    """Return whether a file is a mosaic that rodcone wrote with `write_dng`: uncompressed, in strips.
 
-    What another program compressed is LibRaw's to read.
+    One that another program has compressed since then is read by LibRaw instead.
     """
     try:
         with path.open("rb") as file:
@@ -162,14 +162,15 @@ def is_own(path: Path) -> bool:
 
 
 def dng_tags(raw: RawImage) -> Tags:
-    """Tags of the first directory, without those that describe the TIFF itself.
+    """Return the tags of the first directory, without those that describe the TIFF itself.
 
     NoiseProfile is N(x)^2 = S x + O for x from black (0) to white (1), the same for all channels unless some are read
-    apart: S is the shot noise, 1 / full scale in electrons, with what columns' gains make of light beside dark current;
-    O the dark noise; PRNU grows with x^2 and doesn't fit the form. LinearResponseLimit is where the well begins to clip
-    (`RawImage.saturation_e`). WhiteLevel is one for all channels: converters clip what one that is read apart holds
-    beyond it. BaselineExposure is `stops_to_white`, less what converters brighten already: they scale the channel that
-    answers most to a neutral to 1, development green.
+    with a time, density or gain of their own. S is the shot noise, 1 / full scale in electrons, with what the columns'
+    gains make of light beside dark current; O is the dark noise; PRNU grows with x^2 and doesn't fit the form.
+    LinearResponseLimit is where the well begins to clip (`RawImage.saturation_e`). WhiteLevel is one for all channels:
+    converters clip what a channel of its own time, density or gain holds beyond it. BaselineExposure is
+    `stops_to_white`, less what converters brighten already, because they scale the channel that responds most to a
+    neutral to 1, whereas rodcone scales green to 1.
 
     Raises
     ------

@@ -78,9 +78,10 @@ class DngLevels:
 
 
 def directories(path: Path, codes: Collection[int]) -> Iterator[Tags]:
-    """Tags of these codes in each of a TIFF's chain of pictures and those below them; none for another format.
+    """Yield the tags of these codes from each directory of a TIFF and those below it; nothing for another format.
 
-    tifffile follows damaged chains for minutes; here a few directories are looked into, and no tag is read but these.
+    tifffile follows damaged chains of directories for minutes. Here only a few directories are visited, and no other
+    tag is read.
     """
     with path.open("rb") as file:
         head = file.read(8)
@@ -106,7 +107,7 @@ def directories(path: Path, codes: Collection[int]) -> Iterator[Tags]:
 
 
 def dng_levels(path: Path, shape: tuple[int, int]) -> DngLevels | None:
-    """Levels and colours of a digital negative's mosaic; None for another format, which LibRaw alone knows.
+    """Return the levels and colours of a digital negative's mosaic; None for another format, which only LibRaw knows.
 
     Parameters
     ----------
@@ -151,7 +152,7 @@ def dng_levels(path: Path, shape: tuple[int, int]) -> DngLevels | None:
 
 
 def _area(path: Path, tags: Tags, shape: tuple[int, int]) -> tuple[int, int, int, int]:
-    """First and last row and column of the active area, as slices have them."""
+    """Return the first row and column of the active area, and those after its last, as slices take them."""
     area = _numbers(tags, ACTIVE_AREA) or (0, 0, *shape)
     fits = len(area) == 4 and area[0] < area[2] <= shape[0] and area[1] < area[3] <= shape[1]
     if not fits:
@@ -160,7 +161,7 @@ def _area(path: Path, tags: Tags, shape: tuple[int, int]) -> tuple[int, int, int
 
 
 def _tile(path: Path, tags: Tags) -> Tile:
-    """Colours of the mosaic, row by row."""
+    """Return the colours of the mosaic, row by row."""
     repeat, pattern = _numbers(tags, CFA_REPEAT), _numbers(tags, CFA_PATTERN)
     fits = len(repeat) == 2 and 0 < repeat[0] * repeat[1] == len(pattern) <= 256
     if not fits or max(pattern) >= len(_COLOURS):
@@ -170,7 +171,7 @@ def _tile(path: Path, tags: Tags) -> Tile:
 
 
 def _black(path: Path, tags: Tags, shape: tuple[int, int]) -> Floats:
-    """Black level of each sample of the active area [DN]: a repeating pattern, and what rows and columns add."""
+    """Return the black level of each sample in the active area [DN]: a pattern plus offsets of rows and columns."""
     repeat = _numbers(tags, BLACK_REPEAT) or (1, 1)
     levels = _fractions(tags, BLACK) or (0.0,)
     if len(repeat) != 2 or not 0 < repeat[0] * repeat[1] == len(levels):
@@ -203,13 +204,13 @@ def _tell_opcodes(path: Path, tags: Tags) -> None:
 
 
 def _numbers(tags: Tags, code: int) -> tuple[int, ...]:
-    """Whole numbers of a tag; empty where it is missing or of another type."""
+    """Return the whole numbers of a tag; empty where it is missing or of another type."""
     form, values = tags.get(code, ("", ()))
     return tuple(int(value) for value in values) if form in ("B", "U", "H", "I") else ()
 
 
 def _fractions(tags: Tags, code: int) -> tuple[float, ...]:
-    """Numbers of a tag; empty where it is missing, infinite where a denominator is 0."""
+    """Return the numbers of a tag; empty where it is missing, infinite where a denominator is 0."""
     form, values = tags.get(code, ("", ()))
     if form not in ("2I", "2i"):
         return tuple(float(value) for value in values)

@@ -57,9 +57,10 @@ def estimate_noise(above_black_dn: NDArray[np.float64], full_dn: float) -> Noise
 def _blocks(
     above_black_dn: NDArray[np.float64], full_dn: float
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Mean, diagonal difference (with a sample's variance) and structure around every 2x2 block of one site's samples.
+    """Return the mean, the diagonal difference and the structure around every 2x2 block of one site's samples.
 
-    Structure: squares of the differences across and down over 3x3 blocks, and of the diagonal ones of the eight others.
+    The diagonal difference has the variance of a sample. The structure is the sum of squared differences: across and
+    down over 3x3 blocks, and along the diagonal in the eight outer ones of these.
     """
     height, width = (size // 4 * 4 for size in above_black_dn.shape)
     sites = above_black_dn[:height, :width].reshape(height // 4, 2, 2, width // 4, 2, 2)
@@ -75,7 +76,7 @@ def _blocks(
 
 
 def _fit(level: NDArray[np.float64], variance: NDArray[np.float64]) -> NoiseEstimate | None:
-    """Line through variances, relative errors weighing alike, neither slope nor dark variance under 0."""
+    """Fit a line to variances by their relative errors, with neither its slope nor its dark variance below 0."""
 
     def residuals(parameters: NDArray[np.float64]) -> NDArray[np.float64]:
         return np.asarray(np.log((parameters[0] * level + parameters[1]) / variance))

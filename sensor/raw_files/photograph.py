@@ -177,14 +177,17 @@ def _raw_image(opened: Any, path: Path, reader: str) -> tuple[RawImage, dict[str
 
 
 def _turned(frame: NDArray[Any], flip: int) -> NDArray[Any]:
-    """Frame upright. LibRaw's `flip`: 1 mirrors the columns, 2 the rows, 4 then swaps the two."""
+    """Turn a frame upright. LibRaw's `flip`: 1 mirrors the columns, 2 the rows, 4 then swaps the two."""
     rows, columns = (slice(None, None, -1 if flip & bit else 1) for bit in (2, 1))
     turned = frame[rows, columns]
     return np.ascontiguousarray(turned.T if flip & 4 else turned)
 
 
 def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
-    """Calibration from LibRaw's matrix, camera to sRGB for daylight, and the as-shot balance."""
+    """Return the colour calibration from LibRaw's matrix and white balance, and where these stem from.
+
+    The matrix leads from the camera's channels to sRGB, for daylight; the balance is the as-shot one if it is known.
+    """
     matrix = np.array(opened.color_matrix, dtype=np.float64)[:, :3]
     sums = matrix.sum(axis=1, keepdims=True)
     regular = bool(np.all(np.isfinite(matrix)) and np.all(sums > 0) and np.linalg.cond(matrix) < 1e6)
@@ -210,7 +213,7 @@ def _colour(opened: Any) -> tuple[ColourCalibration, dict[str, str]]:
 
 
 def _neutral(gains: Any) -> Floats | None:
-    """Response of R, G and B to a neutral, green 1, from white balance factors; None where they aren't known."""
+    """Return R, G and B of a neutral, green 1, from white balance factors; None where these aren't known."""
     factors = np.array(gains[:3], dtype=np.float64)
     if factors.shape != (3,) or not np.all(np.isfinite(factors) & (factors > 0)):
         return None

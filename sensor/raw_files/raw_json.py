@@ -48,7 +48,7 @@ def raw_to_json(raw: RawImage, **more: object) -> str:
 
 
 def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, Any]:
-    """Calibration as `raw_to_json` wrote it, its keys checked: `KEYS` and `more`.
+    """Parse a calibration that `raw_to_json` wrote, and check its keys: `KEYS` and `more`.
 
     Raises
     ------
@@ -77,7 +77,7 @@ def parse_json(text: bytes, name: str, more: tuple[str, ...] = ()) -> dict[str, 
 
 
 def raw_image(calibration: dict[str, Any], dn: NDArray[np.uint16], name: str) -> RawImage:
-    """Raw image from its pixels and its calibration as `parse_json` gives it.
+    """Make a raw image from its pixels and its calibration, as `parse_json` returns it.
 
     Raises
     ------

@@ -74,7 +74,7 @@ def write_mosaic(
 
 
 def _directory(tags: Tags, start: int) -> bytes:
-    """Directory of tags that stands at byte `start` (an even one), the values that don't fit into it behind it."""
+    """Return a directory of tags for the even byte `start`; the values that don't fit into it follow it."""
     entries = struct.pack("<H", len(tags))
     behind = b""
     for code, (form, values) in sorted(tags.items()):
@@ -93,12 +93,12 @@ def _count(form: str, values: Values) -> int:
 
 
 def text(value: str) -> tuple[str, bytes]:
-    """ASCII tag with its closing zero."""
+    """Return an ASCII tag with its closing zero."""
     return "s", value.encode("ascii") + b"\0"
 
 
 def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tuple[NDArray[Any], Tags]:
-    """Pixels (h, w), and the tags of these codes, Exif's among them; one of more than a mebibyte is left out.
+    """Read the pixels (h, w), and the tags of these codes (also Exif's) unless they hold more than a mebibyte.
 
     Raises
     ------
@@ -113,9 +113,10 @@ def read_mosaic(path: Path, photometric: int, codes: Collection[int] = ()) -> tu
 
 
 def read_tags(file: BinaryIO, codes: Collection[int], name: str) -> Tags:
-    """Tags of these codes from the first directory, the Exif directory that it names, and that of the mosaic.
+    """Read the tags of these codes from the first directory, the Exif directory that it names, and that of the mosaic.
 
-    Other programs write a preview into the first directory, and the mosaic into one below it, whose tags count.
+    Other programs write a preview into the first directory and the mosaic into one below it, whose tags take
+    precedence.
     """
     head = file.read(8)
     if head[:4] != b"II*\0" or len(head) < 8:
@@ -136,9 +137,10 @@ def read_tags(file: BinaryIO, codes: Collection[int], name: str) -> Tags:
 def read_directory(
     file: BinaryIO, start: int, codes: Collection[int], name: str, order: str = "<"
 ) -> tuple[dict[int, tuple[str, Values]], int]:
-    """Tags of these codes from the directory at byte `start`, and the start of the next (0 for none).
+    """Read the tags of these codes from the directory at byte `start`, and the start of the next one (0 for none).
 
-    No other tag is read: 65 535 of them could each claim the whole file. Types that TIFF 6.0 doesn't know are skipped.
+    No other tag is read, because each of up to 65 535 tags could claim the whole file. Types that TIFF 6.0 doesn't know
+    are skipped.
 
     Raises
     ------
@@ -179,7 +181,7 @@ def read_directory(
 
 
 def whole(tags: Tags, code: int, name: str) -> tuple[int, ...]:
-    """Values of a tag of whole numbers, or `InputError` where it is missing or of another type."""
+    """Return the values of a tag of whole numbers; raise `InputError` where it is missing or of another type."""
     form, values = tags.get(code, ("", ()))
     if form not in ("B", "U", "H", "I") or not values:
         raise InputError(f"{name}: tag {code} is missing or holds no whole numbers; allowed: files that rodcone wrote")
@@ -187,7 +189,7 @@ def whole(tags: Tags, code: int, name: str) -> tuple[int, ...]:
 
 
 def _read_strips(file: BinaryIO, tags: Tags, photometric: int, name: str) -> NDArray[Any]:
-    """Pixels (h, w); memory is taken for no more of them than the file has bytes."""
+    """Read the pixels (h, w); refuse a file with fewer bytes than its pixels need before any memory is taken."""
     kind = whole(tags, BITS_PER_SAMPLE, name), whole(tags, SAMPLE_FORMAT, name) if SAMPLE_FORMAT in tags else (1,)
     if (samples := _SAMPLES.get(kind)) is None:
         raise InputError(
