@@ -56,7 +56,7 @@ def collected_share(readings: Sequence[PlainReading]) -> float:
 
 
 def dark_electrons(readings: Sequence[PlainReading]) -> float:
-    """Mean electrons of dark current and hot pixels in the whole pixel."""
+    """Return the mean electrons of dark current and hot pixels in the whole pixel."""
     pixel = readings[0].pixel
     dark_e_per_s = pixel.dark_current_e_per_s + pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
     return dark_e_per_s * readings[0].exposure_s

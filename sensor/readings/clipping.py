@@ -103,9 +103,9 @@ def clipped(light_e: Floats, reading: PlainReading) -> Moments:
 
 
 def _bent(collected_e: Floats, dark_e: float, reading: PlainReading) -> tuple[Floats, Floats, float]:
-    """Mean above black and slope of what is read of the electrons collected, and what those of the dark current read.
+    """Return the bent response to the electrons collected, above black, its slope, and the response to dark current.
 
-    Beyond the well, where samples clip, the response goes on straight.
+    Beyond the well, where samples clip, the response continues straight.
     """
     pixel = reading.sensor.pixel
     share = reading.share
@@ -118,7 +118,10 @@ def _bent(collected_e: Floats, dark_e: float, reading: PlainReading) -> tuple[Fl
 def _over_reading(
     mean: Floats, counted: Floats, after_e: Floats, well_e: float, top_e: float
 ) -> tuple[Floats, Floats, Floats]:
-    """Moments of min(min(n, well) + e, top), less `mean`, over e of standard deviation `after_e`; the open share."""
+    """Return the first two moments of min(min(n, well) + e, top) - `mean`, and the share of samples that don't clip.
+
+    e is the noise of reading, with the standard deviation `after_e`.
+    """
     first, second, open_ = (np.zeros_like(mean) for _ in range(3))
     reach = np.maximum(FAR * after_e, 1e-9)
     change = np.clip(top_e - well_e, -reach, reach)  # under it the well clips first, over it the converter

@@ -78,35 +78,38 @@ class PlainReading:
 
     @property
     def dark_e(self) -> float:
-        """Mean electrons of dark current and hot pixels, in the raw image's electrons."""
+        """Return the mean electrons of dark current and hot pixels, in the raw image's electrons."""
         pixel = self.sensor.pixel
         hot_e_per_s = pixel.hot_pixel_share * pixel.hot_pixel_dark_current_e_per_s
         return (pixel.dark_current_e_per_s + hot_e_per_s) * self.exposure_s / self.share
 
     @property
     def full_well_e(self) -> float:
-        """Electrons, dark current's among them, that reach the converter's top, in the raw image's electrons."""
+        """Return the electrons, dark current included, that reach the converter's top, in the raw image's electrons."""
         return self.sensor.top_e / self.share
 
     @property
     def headroom_e(self) -> float:
-        """Photo-electrons that it can read beside the mean of its dark current, in the raw image's electrons."""
+        """Return the photo-electrons that fit below the converter's top, beside the mean of the dark current.
+
+        They are in the raw image's electrons.
+        """
         return (self.sensor.top_e - self.sensor.pixel.dark_current_e_per_s * self.exposure_s) / self.share
 
     @cached_property
     def sources(self) -> dict[str, NoiseLaw]:
-        """Law of each source of a sample's noise over chips and exposures, in the raw image's electrons."""
+        """Return the law of each source of a sample's noise over chips and exposures, in the raw image's electrons."""
         sources = pixel_sources(self.sensor, self.exposure_s, self.poisson)
         return {name: law.over(self.share) for name, law in sources.items()}
 
     @cached_property
     def law(self) -> NoiseLaw:
-        """Law of a sample's noise over chips and exposures, in the raw image's electrons; without clipping."""
+        """Return the law of a sample's noise over chips and exposures, in the raw image's electrons; unclipped."""
         return total(self.sources.values())
 
     @cached_property
     def counted_law(self) -> NoiseLaw:
-        """Part of `law` that is in the electrons counted, which the well clips."""
+        """Return the part of `law` that lies in the collected electrons, which the well clips."""
         return total(self.sources[name] for name in _COUNTED)
 
 
@@ -270,7 +273,7 @@ def _no_channel(sensor: SensorConfig, apart: Sequence[str]) -> InputError:
 
 
 def several(readings: Sequence[PlainReading]) -> bool:
-    """Whether every pixel is read several times, so that the readings are merged."""
+    """Return whether every pixel is read several times, so that the readings are merged."""
     return len(readings) > 1 and readings[0].sites is None
 
 
