@@ -173,10 +173,10 @@ def merged_raw(frames: Sequence[RawImage]) -> RawImage:
 
 
 def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
-    """Sensor whose one exposure of `count` times the time holds the noise that a merged burst of `count` does.
+    """Return the sensor whose one exposure of `count` times the time has the noise of a merged burst of `count`.
 
-    Its pixels are undivided: four photodiodes of a burst are no binning of four bursts. Its quantisation is `count`
-    times as large a variance as that of the burst's roundings.
+    Its pixels aren't divided into photodiodes, because a burst of binned pixels isn't a binning of bursts. The variance
+    of its quantisation is `count` times as large as that of the burst, which adds up `count` independent roundings.
     """
 
     def burst_of(dark: _Dark) -> _Dark:
@@ -201,7 +201,7 @@ def merged_sensor(sensor: SensorConfig, count: int) -> SensorConfig:
 
 
 def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
-    """Frames by exposure time, longest first; `InputError` unless they are of one camera."""
+    """Group the frames by exposure time, longest first; raise `InputError` unless all are of one camera."""
     if len(frames) == 0:
         raise InputError("frames: none were given; allowed: one or more raw images; take some")
     first_of_time = {frame.exposure_s: frame for frame in reversed(frames)}
@@ -247,9 +247,10 @@ def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, floa
 
 
 def _at_sites(raw: RawImage, electrons: _Sites) -> tuple[_Sites, ...]:
-    """Temporal dark variance, DSNU, shot noise's factor, PRNU, dark current and full well of samples with these means.
+    """Return the noise terms, dark current and full well that apply to each sample of a frame, by its mean electrons.
 
-    Numbers, or (h, w).
+    The terms are the temporal variance in the dark [e-^2], DSNU [e-], the factor of shot noise, PRNU, the dark current
+    and the full well [e-]. They are numbers where all samples share them, otherwise arrays (h, w).
     """
     last = raw.dark_current_e, raw.full_well_e
     plain = raw.read_noise_e**2 + raw.rounding_e2, raw.dsnu_e, 1.0, raw.prnu, *last
@@ -266,11 +267,13 @@ def _at_sites(raw: RawImage, electrons: _Sites) -> tuple[_Sites, ...]:
 
 
 def _weighted(groups: Sequence[_Group]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Best rate, its temporal variance, and that of the fixed patterns, each (h, w).
+    """Return the best estimate of the rate [e-/s], its temporal variance, and that of the fixed patterns, each (h, w).
 
-    A group's rate has the variance (shot x rate x time + temporal noise) / (frames x time^2). The rate in it is the
-    merged one: a start from shot noise alone, where the weights are the times, and a few rounds. Frames of several
-    readings weigh as while all of these count: by its light, which is left out near a seam can't be told without bias.
+    A group's rate has the variance (shot x rate x time + temporal noise) / (frames x time^2), where the rate is the
+    merged one. It starts from shot noise alone, for which the weights are the times, and is refined in a few rounds. A
+    frame of a camera that reads each pixel several times is weighted with the noise of a dark sample, to which all
+    readings contribute: a weight chosen by the sample's own light would bias the mean near the level at which a reading
+    drops out.
     """
     whole_s = sum(group.count * group.exposure_s for group in groups)
     rate = np.asarray(sum(group.rate * (group.count * group.exposure_s / whole_s) for group in groups))

@@ -61,7 +61,7 @@ class ColourCalibration:
 
     @method
     def part(self, index: Sequence[int]) -> "ColourCalibration":
-        """Calibration of some of the channels; ``R, G, B`` have to stay in front."""
+        """Return the calibration of the channels with these indices; ``R, G, B`` have to stay in front."""
         kept = list(index)
         return replace(
             self,
@@ -111,7 +111,7 @@ class NoiseStep:
 
     @property
     def law(self) -> NoiseLaw:
-        """Law of a sample's variance by its mean from `from_e` on, without the noise of the columns' gains."""
+        """Return the law of a sample's variance by its mean from `from_e` on, without the columns' gain noise."""
         return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
 
@@ -148,10 +148,10 @@ class ChannelNoise:
 
     @property
     def law(self) -> NoiseLaw:
-        """Law of a sample's variance by its mean, without the noise of the columns' gains."""
+        """Return the law of a sample's variance by its mean, without the noise of the columns' gains."""
         return NoiseLaw(self.shot, self.read_noise_e, self.dsnu_e, self.prnu)
 
     @property
     def dark_noise_e(self) -> float:
-        """Standard deviation of a dark sample [e-]."""
+        """Return the standard deviation of a dark sample [e-]."""
         return hypot(self.read_noise_e, self.dsnu_e)

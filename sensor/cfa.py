@@ -36,7 +36,7 @@ MOSAICS: Mapping[str, Tile] = MappingProxyType({name: tuple(rows) for name, rows
 
 
 def mosaics() -> tuple[str, ...]:
-    """Names of the mosaics that `tile_of` knows.
+    """Return the names of the mosaics that `tile_of` knows.
 
     Examples
     --------
@@ -76,15 +76,16 @@ def check_tile(tile: Sequence[str]) -> Tile:
 
 
 def channels(tile: Tile) -> tuple[str, ...]:
-    """Channels of a tile, each once: R, G, B, W first in this order, any others as they appear row by row."""
+    """Return each channel of a tile once: R, G, B, W first in this order, then any others as they appear row by row."""
     present = dict.fromkeys("".join(tile))
     return tuple(name for name in "RGBW" if name in present) + tuple(name for name in present if name not in "RGBW")
 
 
 def unit_channel(tile: Tile) -> str:
-    """Channel that exposure, white balance and a picture's scale go by: G, else W, else the commonest one.
+    """Return the channel that sets exposure, white balance and a picture's scale.
 
-    That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours; of equally common ones the first.
+    It is G, else W, else the most frequent one. That is C in RCCB and RCCC, Y in RYYB, W in a camera without colours;
+    of equally frequent ones it is the first.
     """
     names = channels(tile)
     sites = "".join(tile)
@@ -92,7 +93,7 @@ def unit_channel(tile: Tile) -> str:
 
 
 def is_bayer(tile: Tile) -> bool:
-    """Whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
+    """Return whether a tile is one of Bayer's four phases: 2x2, green on a diagonal, red and blue once."""
     return tile in (("RG", "GB"), ("BG", "GR"), ("GR", "BG"), ("GB", "RG"))
 
 
@@ -103,17 +104,17 @@ def plain(tile: Tile) -> Tile:
 
 
 def is_rgbw(tile: Tile) -> bool:
-    """Whether a tile is 2x2 with R, G, B and W once each."""
+    """Return whether a tile is 2x2 with R, G, B and W once each."""
     return len(tile) == 2 and len(tile[0]) == 2 and sorted("".join(tile)) == list("BGRW")
 
 
 def channel_map(tile: Tile, shape: tuple[int, int]) -> NDArray[np.str_]:
-    """Channel of each pixel, shape `shape`."""
+    """Return the channel of each pixel of a mosaic of this shape."""
     return _repeated(np.array([list(row) for row in tile]), shape)
 
 
 def mask(tile: Tile, channel: str, shape: tuple[int, int]) -> NDArray[np.bool_]:
-    """Where the mosaic samples `channel`, or one of several channels: S_i of eq. (1), shape `shape`.
+    """Return where a mosaic of this shape samples `channel`, or any channel of several letters: S_i of eq. (1).
 
     Examples
     --------
@@ -131,7 +132,7 @@ def _repeated(cells: NDArray[Any], shape: tuple[int, int]) -> NDArray[Any]:
 
 
 def block_sums(values: NDArray[Any]) -> NDArray[Any]:
-    """Sums over 2x2 pixels, shape (..., h, w) to (..., h / 2, w / 2)."""
+    """Sum 2x2 pixels: shape (..., h, w) becomes (..., h / 2, w / 2)."""
     rows = values[..., ::2, :] + values[..., 1::2, :]
     return np.asarray(rows[..., ::2] + rows[..., 1::2])
 
@@ -147,7 +148,7 @@ def check_covers(tile: Tile, shape: tuple[int, ...]) -> None:
 
 
 def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
-    """Electrons that each site of a tile reads, over those behind each channel's filter, in an even field.
+    """Return the electrons that a tile's sites read of an even field, over those behind each channel's filter.
 
     Parameters
     ----------
@@ -171,7 +172,7 @@ def site_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] 
 
 
 def channel_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, float] | None = None) -> Floats:
-    """Mean of `site_mixing` over the sites of each channel: K, shape (channel that reads, channel of the light)."""
+    """Return `site_mixing` averaged over each channel's sites: K, shape (channel that reads, channel of the light)."""
     at_sites = site_mixing(tile, crosstalk, light_shares)
     names = channels(tile)
     sites = np.array([list(row) for row in tile])
@@ -179,10 +180,10 @@ def channel_mixing(tile: Tile, crosstalk: float, light_shares: Mapping[str, floa
 
 
 def unmixed(mixing: Floats, electrons: Sequence[float] | Floats) -> Floats:
-    """Electrons behind each filter alone, of an even field that the channels read; not under a ten-thousandth of those.
+    """Return the electrons behind each filter alone, from those that the channels read of an even field.
 
-    Where all of the charge goes to the neighbours two channels may read the same, and K has no inverse: of all fields
-    that fit, this is the one with the least squares.
+    Results are at least a ten-thousandth of the reading. If all charge goes to the neighbours, two channels may read
+    the same, and K has no inverse; of all fields that fit, the result is then the one with the least squares.
     """
     read_e = np.asarray(electrons, dtype=np.float64)
     return np.asarray(np.maximum(np.linalg.lstsq(mixing, read_e, rcond=1e-9)[0], 1e-4 * read_e))

@@ -195,10 +195,11 @@ class SensorConfig:
 
     @method
     def metered_well_e(self, channel: str) -> float:
-        """Photo-electrons of the whole pixel that its most sensitive photodiode can read: what an exposure aims at.
+        """Return the photo-electrons of the whole pixel at which its most sensitive reading is full.
 
-        What shorter times and smaller photodiodes hold beyond it is room for lamps. Of a channel that is read apart,
-        what its longest time holds.
+        This is what an automatic exposure aims at. What shorter times and smaller photodiodes hold beyond it is
+        headroom for lamps. For a channel that is read with a time, density or gain of its own, it is what that reading
+        holds.
         """
         for apart in self.chip.channels:
             if apart.channel == channel:
@@ -209,37 +210,37 @@ class SensorConfig:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of `cfa`, as `sensor.cfa.channels` orders them."""
+        """Return the channels of `cfa` in the order of `sensor.cfa.channels`."""
         return channels(self.cfa)
 
     @property
     def unit_channel(self) -> str:
-        """Channel that exposure, white balance and a picture's scale go by (`sensor.cfa.unit_channel`)."""
+        """Return the channel that sets exposure, white balance and a picture's scale (`sensor.cfa.unit_channel`)."""
         return unit_channel(self.cfa)
 
     @property
     def sites(self) -> int:
-        """Photodiodes along either side of a pixel of the raw image: 2 of a camera that bins."""
+        """Return the photodiodes along either side of a raw image's pixel: 2 for a camera that bins, otherwise 1."""
         return self.chip.sites
 
     @property
     def in_charge(self) -> bool:
-        """Whether photodiodes are summed before they are read."""
+        """Return whether the charges of a pixel's photodiodes are summed before they are read."""
         return self.chip.in_charge
 
     @property
     def site_pitch_um(self) -> float:
-        """Pitch of the photodiodes [um], onto each of which light is imaged."""
+        """Return the pitch of the photodiodes [um], the grid on which light is imaged."""
         return self.pixel.pitch_um / self.sites
 
     @property
     def undivided(self) -> "SensorConfig":
-        """The camera with one photodiode a pixel, for light that is known no finer than pixels."""
+        """Return the camera with one photodiode per pixel, for light that is known no finer than pixels."""
         return self if self.chip.binning is None else replace(self, chip=replace(self.chip, binning=None))
 
     @property
     def photosites(self) -> "SensorConfig":
-        """Camera of the photodiodes by themselves: `sensor.photodiodes.binned` undone."""
+        """Return the camera that reads each photodiode by itself: the inverse of `sensor.photodiodes.binned`."""
         binning = self.chip.binning
         if binning is None:
             return self
@@ -256,7 +257,7 @@ class SensorConfig:
 
     @method
     def pixel_sums(self, values: NDArray[Any]) -> NDArray[Any]:
-        """What the raw image's pixels hold of values of photodiodes, shape (..., h, w).
+        """Sum the values of the photodiodes, shape (..., h, w), over each pixel of the raw image.
 
         Raises
         ------
@@ -268,12 +269,12 @@ class SensorConfig:
 
     @property
     def white_dn(self) -> int:
-        """Reading of a full well."""
+        """Return the reading of a full well [DN]."""
         return int(2**self.bits - 1 if self.white_level_dn is None else self.white_level_dn)
 
     @property
     def black_dn(self) -> int:
-        """Black level [DN], a whole number: raw converters truncate fractions, which tints shadows."""
+        """Return the black level [DN], a whole number: raw converters truncate fractions, which tints shadows."""
         if self.black_level_dn is not None:
             return int(self.black_level_dn)
         dark_e = BLACK_SIGMAS * hypot(self.pixel.read_noise_e, self.pixel.fixed_dark_e)
@@ -285,22 +286,22 @@ class SensorConfig:
 
     @property
     def top_e(self) -> float:
-        """Electrons that read the converter's top: the well over the gain."""
+        """Return the electrons at which the converter reads its greatest value: the full well over the gain."""
         return self.pixel.full_well_e / self.gain
 
     @property
     def gain_e_per_dn(self) -> float:
-        """Electrons per DN."""
+        """Return the electrons per DN."""
         return self.top_e / (self.white_dn - self.black_dn)
 
     @property
     def converter_noise_e(self) -> float:
-        """Standard deviation of the noise after the amplifier, in electrons before it [e-]."""
+        """Return the standard deviation of the noise that arises after the amplifier, referred to its input [e-]."""
         return self.converter_noise_dn * self.gain_e_per_dn
 
     @property
     def read_noise_e(self) -> float:
-        """Standard deviation of the temporal noise of reading, before and after the amplifier [e-]."""
+        """Return the standard deviation of the temporal noise of reading, from before and after the amplifier [e-]."""
         return hypot(self.pixel.read_noise_e, self.converter_noise_e)
 
 
@@ -326,18 +327,18 @@ def _check_even(sensor: SensorConfig, shape: tuple[int, ...]) -> None:
 
 
 def row_starts_s(sensor: SensorConfig, rows: int) -> Floats:
-    """When the exposure of each row of the raw image starts [s], after that of the first one; shape (rows,)."""
+    """Return when each row of the raw image starts its exposure, after the first one [s], shape (rows,)."""
     order = np.arange(rows) if sensor.row_time_us >= 0 else np.arange(rows)[::-1]
     return np.asarray(order * (abs(sensor.row_time_us) * 1e-6))
 
 
 def frame_interval_s(sensor: SensorConfig, rows: int, exposure_s: float) -> float:
-    """Time from one frame of a burst to the next [s]: the exposure, or the readout of all rows if it takes longer."""
+    """Return the time from one frame of a burst to the next [s]: the exposure, or the readout if that is longer."""
     return max(exposure_s, rows * abs(sensor.row_time_us) * 1e-6)
 
 
 def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: str = MERGED) -> SensorConfig:
-    """Camera whose pixel is read several times in an exposure; its well and dark noise are those of the readings.
+    """Return the camera whose pixel is read several times in an exposure; the readings set its well and dark noise.
 
     Raises
     ------
@@ -357,9 +358,10 @@ def with_readings(sensor: SensorConfig, readings: Sequence[Reading], readout: st
 
 
 def with_channel_readings(sensor: SensorConfig, readings: Sequence[ChannelReading]) -> SensorConfig:
-    """Camera some of whose channels are read apart: after a time of their own, behind a density, or at another gain.
+    """Return the camera with some channels that have an exposure time, a neutral density or a gain of their own.
 
-    Its raw image holds all channels in one unit: what each would collect in the whole time without the density.
+    Its raw image holds all channels in one unit: the electrons that each would collect in the whole time without
+    density.
 
     Raises
     ------
@@ -377,6 +379,6 @@ def with_channel_readings(sensor: SensorConfig, readings: Sequence[ChannelReadin
 
 
 def with_tile(sensor: SensorConfig, tile: Tile, responses: Responses) -> SensorConfig:
-    """Camera with another mosaic: of its channels that are read apart those that the mosaic has."""
+    """Return the camera with another mosaic, without the settings of channels that this mosaic lacks."""
     readings = tuple(x for x in sensor.chip.channels if x.channel in channels(tile))
     return replace(sensor, cfa=tile, responses=responses, chip=replace(sensor.chip, channels=readings))

@@ -160,7 +160,7 @@ def _sensor(content: dict[str, Any], folder: Path, cfa: Tile | None) -> SensorCo
 
 
 def _with_its_lens(content: dict[str, Any], folder: Path) -> dict[str, Any]:
-    """Content whose lens by data is found from the file's own folder, and gives the f-number where none is stated."""
+    """Find a tabulated lens from the file's own folder, and take its f-number where the file states none."""
     lens = content.get("lens")
     if not isinstance(lens, dict) or not isinstance(lens.get("table"), str) or not lens["table"]:
         return content
@@ -170,7 +170,7 @@ def _with_its_lens(content: dict[str, Any], folder: Path) -> dict[str, Any]:
 
 
 def _with_a_whole_pixel(content: dict[str, Any]) -> dict[str, Any]:
-    """Content whose pixel has what each of several readings has for itself: the first one's."""
+    """Fill in the pixel's terms that each of several readings states for itself, from the first reading."""
     pixel, readings = content.get("pixel"), content.get("readings")
     if "readings" not in content or not isinstance(pixel, dict):
         return content

@@ -57,7 +57,7 @@ class Responses:
         object.__setattr__(self, "curves", MappingProxyType(dict(self.curves)))
 
     def __reduce__(self) -> tuple[type["Responses"], tuple[dict[str, Spectrum], bool]]:
-        """Pickle the mapping as a dict: a mapping proxy can't be pickled."""
+        """Return what pickle needs, with the curves as a dict: a mapping proxy can't be pickled."""
         return Responses, (dict(self.curves), self.relative)
 
     @method
@@ -67,7 +67,7 @@ class Responses:
         return draw_curves(curves, axes, x="wavelength, nm", y="electrons a photon")
 
     def band_average(self, channels: tuple[str, ...], wavelength_nm: ArrayLike, width_nm: ArrayLike) -> Floats:
-        """Mean response in each band, shape (channel, band).
+        """Return the mean response in each band, shape (channel, band).
 
         Raises
         ------
@@ -80,7 +80,7 @@ class Responses:
 
 @cache
 def rgbw() -> Responses:
-    """Response of R, G, B and W over 380-1068 nm, the project's own curves (Parmar & Wandell 2009, Figure 2)."""
+    """Return the project's own responses of R, G, B and W, 380-1068 nm (Parmar & Wandell 2009, Figure 2)."""
     nm = np.arange(380.0, 1069.0)
     curves = {}
     for channel, (peak, centre, left, left_power, right, right_power) in _RGBW_PARAMETERS.items():
@@ -97,7 +97,7 @@ def built_in() -> Responses:
 
 
 def with_channels(responses: Responses, names: Sequence[str]) -> Responses:
-    """Responses with C (the clear pixel of RCCC and RCCB) as W, and Y as R and G together, where asked and missing."""
+    """Add C (the clear pixel of RCCC and RCCB) as W, and Y as R plus G, where they are named and missing."""
     curves = dict(responses.curves)
     if "C" in names and "W" in curves:
         curves.setdefault("C", curves["W"])
@@ -113,7 +113,7 @@ def _sum(one: Spectrum, other: Spectrum) -> Spectrum:
 
 
 def complementary(responses: Responses) -> Responses:
-    """Responses of C, M and Y, and of G and W where `responses` has them.
+    """Return the responses of C, M and Y, and of G and W where `responses` has them.
 
     Each filter is assumed to pass what two of the primary filters pass together: C = G + B, M = R + B, Y = R + G. A
     matrix then takes C, M and Y exactly back to R, G and B.
@@ -131,7 +131,7 @@ def complementary(responses: Responses) -> Responses:
 
 
 def matched_transmittance(responses: Responses) -> float:
-    """Transmittance of the neutral density with which W collects what G does from a neutral surface under D65.
+    """Return the transmittance of a neutral density with which W collects as much as G from grey under D65.
 
     The density is assumed to pass the same share of every wavelength.
 
@@ -150,7 +150,7 @@ def matched_transmittance(responses: Responses) -> float:
 
 
 def electrons_from_neutral(responses: Responses, names: Sequence[str], light: Spectrum) -> Floats:
-    """Electrons of each channel, in any unit, from a surface that reflects the light evenly, 380-780 nm: exact.
+    """Return each channel's electrons, in any unit, from a surface that reflects `light` evenly over 380-780 nm.
 
     Raises
     ------
@@ -165,7 +165,7 @@ def electrons_from_neutral(responses: Responses, names: Sequence[str], light: Sp
 
 
 def neutral_density(responses: Responses) -> Responses:
-    """Responses with W behind the neutral density of `matched_transmittance`."""
+    """Return the responses with W behind the neutral density of `matched_transmittance`."""
     transmittance = matched_transmittance(responses)
     return Responses({**responses.curves, "W": responses.curves["W"] * transmittance}, responses.relative)
 
@@ -247,14 +247,17 @@ def read_curve(path: str | Path) -> Spectrum:
 
 
 def _table(path: str | Path) -> dict[str, Spectrum]:
-    """Columns of a CSV by their names."""
+    """Read the columns of a CSV of responses by their names."""
     columns = read_columns(path, "responses")
     nm = columns.pop("wavelength_nm")
     return {name: Spectrum(nm, column) for name, column in columns.items()}
 
 
 def _per_photon(curves: dict[str, Spectrum], *, amperes: bool) -> dict[str, Spectrum]:
-    """Responses per radiant power as responses per photon: h c / (e wavelength) electrons per photon for 1 A/W."""
+    """Convert responses per radiant power to responses per photon: 1 A/W is h c / (e wavelength) electrons per photon.
+
+    Unless the responses are in amperes per watt, the greatest becomes 1.
+    """
     per_photon = {
         name: Spectrum(x.wavelength_nm, x.values / (photons_per_joule(x.wavelength_nm) * ELECTRON_C))
         for name, x in curves.items()
@@ -277,7 +280,7 @@ def _within(curve: Spectrum, range_nm: tuple[float, float], path: str) -> Spectr
 
 
 def _times(curve: Spectrum, factor: float | Spectrum) -> Spectrum:
-    """Product at the points of both curves; zero where either ends."""
+    """Multiply a curve by a number or by another curve, at the points of both, over the range that they share."""
     if not isinstance(factor, Spectrum):
         require_range("quantum_efficiency", factor, 0.0, 1.0, "give electrons per photon")
         return curve * float(factor)

@@ -47,7 +47,7 @@ class Device:
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width in pixels."""
+        """Return the height and width in pixels."""
         return self.photo_response.shape[0], self.photo_response.shape[1]
 
 
@@ -99,7 +99,10 @@ def draw_device(sensor: SensorConfig, shape: tuple[int, int], rng: np.random.Gen
 
 @lru_cache(maxsize=8)
 def _normals_kept(key: int, term: NoiseTerm, shape: tuple[int, int], number: int) -> NDArray[np.float64]:
-    """`normals` of a chip whose PRNU or DSNU alone may change next: they are most of a small chip's time."""
+    """Draw `normals` and cache them.
+
+    A chip of which only PRNU or DSNU changes needs the same draws again, and they take most of a small chip's time.
+    """
     draws = normals(key, term, shape, number)
     draws.flags.writeable = False
     return draws

@@ -14,22 +14,22 @@ from sensor.config import LensConfig
 
 
 def limit_per_um(wavelength_nm: float, lens: LensConfig) -> float:
-    """Cut-off frequency of diffraction: 1 / (wavelength x working f-number); inf where the lens has none."""
+    """Return the cut-off frequency of diffraction, 1 / (wavelength x working f-number) [1/um]; inf without it."""
     spot_um = wavelength_nm * 1e-3 * lens.f_number * (1 + lens.magnification) * lens.diffraction
     return 1 / spot_um if spot_um else inf
 
 
 def diffraction_otf(frequency_per_um: Floats, wavelength_nm: float, lens: LensConfig) -> Floats:
-    """Transfer of an incoherent image by a circular aperture: 2/pi (arccos s - s sqrt(1 - s^2)), 0 from s = 1 on.
+    """Return a circular aperture's incoherent transfer: 2/pi (arccos s - s sqrt(1 - s^2)), 0 from s = 1 on.
 
-    s is the frequency over its limit; Goodman, "Introduction to Fourier Optics", section 6.3.
+    Here s is the frequency over the cut-off (Goodman, "Introduction to Fourier Optics", section 6.3).
     """
     s = np.minimum(frequency_per_um / limit_per_um(wavelength_nm, lens), 1.0)
     return np.asarray(2 / np.pi * (np.arccos(s) - s * np.sqrt(1 - s**2)))
 
 
 def _fit() -> list[float]:
-    """Polynomial in s that `diffraction_otf` is (1 - s)^1.5 times, within 4e-8."""
+    """Fit the polynomial in s by which (1 - s)^1.5 has to be multiplied to give `diffraction_otf`, within 4e-8."""
     s = (1 - np.cos(np.pi * (np.arange(400) + 0.5) / 400)) / 2
     exact = diffraction_otf(s, 1e3, LensConfig(1.0, diffraction=1.0))
     falling = (1 - s) ** 1.5
@@ -41,9 +41,9 @@ _FIT = _fit()
 
 
 def fast_otf(s: NDArray[np.floating], under: NDArray[np.floating], value: NDArray[np.floating]) -> None:
-    """Approximate `diffraction_otf` within 4e-8, at frequencies s in shares of the cut-off: the result is in `value`.
+    """Write `diffraction_otf`, within 4e-8, at the frequencies s (in units of the cut-off) into `value`.
 
-    The three arrays have one shape and one precision; that of `under` is lost. Nothing is allocated.
+    The three arrays have one shape and one precision; the content of `under` is overwritten. Nothing is allocated.
     """
     np.subtract(1, s, out=under)
     if s[-1, -1] > 1 or s[0, 0] > 1 or s[0, -1] > 1 or s[-1, 0] > 1:  # frequencies of a rectangle: a corner is the last
@@ -59,10 +59,11 @@ def fast_otf(s: NDArray[np.floating], under: NDArray[np.floating], value: NDArra
 
 
 def defocus_otf(frequency_per_um: Floats, diameter_um: float) -> Floats:
-    """Transfer of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; negative in places.
+    """Return the transfer function of an even disc, 2 J1(x) / x with x = pi x diameter x frequency; negative in places.
 
-    The geometric limit of Hopkins, "The frequency response of a defocused optical system" (Proc. R. Soc. A 231, 1955):
-    good where the disc is wider than the Airy disc, from two wavelengths of path or more at the aperture's rim.
+    This is the geometric limit of Hopkins, "The frequency response of a defocused optical system" (Proc. R. Soc. A 231,
+    1955). It is good where the disc is wider than the Airy disc, from two wavelengths of path or more at the aperture's
+    rim.
     """
     x = np.pi * diameter_um * frequency_per_um
     return np.asarray(np.divide(2 * scipy.special.j1(x), x, out=np.ones_like(x), where=x > 1e-9))
@@ -80,20 +81,22 @@ def half_frequency(frequency: Floats, transfer: Floats) -> float:
 def sampled_otf(
     shape: tuple[int, int], step_um: float, lens: LensConfig, folded: bool, real: type[np.floating] = np.float64
 ) -> Callable[..., NDArray[np.floating]]:
-    """Transfer at the cosines' frequencies of a picture with samples `step_um` apart, as a function of the wavelength.
+    """Return the lens's transfer function on the frequency grid of a cosine transform, as a function of the wavelength.
 
-    The function takes the wavelength [nm] and, optionally, a slice of rows. It gives an array of shape `shape`, or of
-    these rows, which is 1 at the first frequency. Samples know a frequency and its copies, one sampling frequency away,
-    by their sum alone. In focus no point image gets negative.
+    The function takes the wavelength [nm] and, optionally, a slice of rows. It returns an array of shape `shape`, or of
+    these rows, which is 1 at the first frequency. Samples `step_um` apart can't distinguish a frequency from its
+    aliases, which lie one sampling frequency away: each value combines the transfer of both. In focus no point image
+    gets negative.
 
     Parameters
     ----------
     folded : bool
-        False, for a picture's pixels: the mean of the copies' transfers by the energy that a square pixel passes of
-        each, sinc^2. A pixel's light is somewhere in its square, and this is the best linear estimate of what the next
-        pixels get of it, of the four nearest copies. True, for samples finer than the pixels: the sum of the copies,
-        which is the transform of the point image taken at the samples (Poisson's sum), and below the pixels' Nyquist
-        frequency the lens's own wherever its limit lies under the sampling frequency less that.
+        False, for a picture's pixels: the mean of the aliases' transfers, weighted by the energy that a square pixel
+        passes of each, sinc^2. A pixel's light is somewhere in its square, and of the four nearest aliases this gives
+        the best linear estimate of what the next pixels get of it. True, for samples finer than the pixels: the sum of
+        the aliases, which is the transform of the point image taken at the samples (Poisson's sum). Below the pixels'
+        Nyquist frequency that is the lens's own transfer, provided that its limit lies under the sampling frequency
+        less that.
     real : type
         Of the transfer's numbers.
     """

@@ -53,9 +53,9 @@ def auto_exposure_s(
     percentile: float = METERED_PERCENTILE,
     well_share: float = METERED_SHARE,
 ) -> float:
-    """Exposure in which a percentile of one channel's light and the dark current fill a share of the well [s].
+    """Return the exposure [s] in which a percentile of a channel's light, with dark current, fills a share of the well.
 
-    Neighbours, whose charge crosstalk brings, count as if they showed what a pixel shows itself; hot pixels are left
+    Crosstalk is counted as if each pixel's neighbours showed the same light as the pixel itself; hot pixels are left
     out. The well is `SensorConfig.metered_well_e`.
 
     Parameters
@@ -107,15 +107,16 @@ def _share_of_well_s(
 
 
 def _dark_per_second_e(sensor: SensorConfig, channel: str) -> float:
-    """Dark current that a channel's sites would have in the whole time without a density, as their light is given."""
+    """Return the dark current [e-/s] at a channel's sites in the unit of its light: full time, no density."""
     reading = at_channel(chip_readings(sensor, exposure_s=1.0), channel)[0]
     return reading.sensor.pixel.dark_current_e_per_s / reading.share
 
 
 def at_level_s(unit_s: float, level: float, rule: str, sensor: SensorConfig) -> float:
-    """Exposure by ``auto`` or ``auto:W`` of `level` times the light whose exposure without a longest one is `unit_s`.
+    """Return the exposure [s] by ``auto`` or ``auto:W`` in `level` times the light that takes `unit_s` without a limit.
 
-    Dark current, a share f of what fills the well there, doesn't grow with the light: unit_s / (level + (1 - level) f).
+    Dark current doesn't grow with the light. If it makes up the share f of what fills the well in `unit_s`, the
+    exposure is unit_s / (level + (1 - level) f).
     """
     channel = "W" if rule == AUTO_W and "W" in sensor.channels else sensor.unit_channel
     fill_e = METERED_SHARE * sensor.metered_well_e(channel)
@@ -125,7 +126,7 @@ def at_level_s(unit_s: float, level: float, rule: str, sensor: SensorConfig) -> 
 def exposure_by_rule_s(
     rule: str, irradiance: SpectralIrradiance, sensor: SensorConfig, longest_s: float = LONGEST_S
 ) -> float:
-    """Exposure by one of `RULES` [s].
+    """Return the exposure [s] that one of `RULES` gives.
 
     Raises
     ------
@@ -138,7 +139,7 @@ def exposure_by_rule_s(
 def exposure_of_electrons_s(
     rule: str, per_second_e: NDArray[np.float64], sensor: SensorConfig, longest_s: float = LONGEST_S
 ) -> float:
-    """Exposure by one of `RULES` [s], from the electrons of each channel in a second, shape (h, w, channel).
+    """Return the exposure [s] that one of `RULES` gives, from the electrons per second (h, w, channel).
 
     Raises
     ------
@@ -151,7 +152,9 @@ def exposure_of_electrons_s(
 def exposed_by_rule(
     rule: str, per_second_e: NDArray[np.float64], sensor: SensorConfig, longest_s: float = LONGEST_S
 ) -> tuple[float, SensorConfig]:
-    """Exposure by one of `RULES` [s], and the camera at the gain that it takes once that time is the longest.
+    """Return the exposure [s] that one of `RULES` gives, and the camera at its gain.
+
+    The gain rises where the rule asks for more than the longest time (`amplified`).
 
     Parameters
     ----------
@@ -177,10 +180,10 @@ def exposed_by_rule(
 
 
 def amplified(sensor: SensorConfig, wish_s: float, longest_s: float) -> tuple[float, SensorConfig]:
-    """Time of an automatic exposure [s], and the camera at its gain.
+    """Limit the time of an automatic exposure [s], and raise the camera's gain instead.
 
-    Beyond the longest time the gain rises, in thirds of a stop and up to `SensorConfig.gain_limit`, so that what a
-    longer time would have put at the converter's top stands there, or less than a third of a stop under it.
+    Beyond the longest time the gain rises in thirds of a stop, up to `SensorConfig.gain_limit`: light that would have
+    reached the converter's top in the longer time reaches it, or ends less than a third of a stop below it.
 
     Parameters
     ----------
@@ -196,10 +199,11 @@ def amplified(sensor: SensorConfig, wish_s: float, longest_s: float) -> tuple[fl
 def best_exposure(
     per_second_e: NDArray[np.float64], sensor: SensorConfig, green_s: float, longest_s: float = LONGEST_S
 ) -> tuple[float, SensorConfig]:
-    """Time [s] and gain of a ladder that leave the least expected error in the picture; of equal ones the longest.
+    """Choose the exposure [s] and gain, from a ladder, with the least expected error in the picture.
 
-    The ladder rises in thirds of a stop from a 64th of `green_s` to four times as long; at `longest_s` it goes on in
-    gains (`amplified`). It goes by the light, so that twice the light takes half the time.
+    Of equal ones it is the longest. The ladder rises in thirds of a stop from a 64th of `green_s` to four times as
+    long; beyond `longest_s` it goes on in gains (`amplified`). It is scaled by the light, so that twice the light takes
+    half the time.
 
     Parameters
     ----------
@@ -225,7 +229,7 @@ def best_exposure(
 
 
 def _few_tiles(mosaic: Mosaic, height: int, width: int) -> NDArray[np.float64]:
-    """A mosaic of at most `_METERED_TILES` of a mosaic's tiles, evenly spread over it."""
+    """Return a mosaic of at most `_METERED_TILES` tiles, picked evenly from a larger one."""
     rows, columns = mosaic.shape[0] // height, mosaic.shape[1] // width
     if rows * columns <= _METERED_TILES:
         return mosaic
@@ -235,17 +239,18 @@ def _few_tiles(mosaic: Mosaic, height: int, width: int) -> NDArray[np.float64]:
 
 
 def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float) -> float:
-    """Expected squared error of the developed, encoded picture, as far as noise and full wells decide it.
+    """Return the expected squared error of the developed, encoded picture that comes from noise and full wells.
 
-    A picture is made of two things: a colour for each neighbourhood, which all samples of a channel there tell
-    together, and fine detail, which a pixel's own sample alone tells. Before they are measured, both are known to a
-    relative standard deviation, k and d. A sample whose relative variance is q leaves of them
+    A picture consists of two parts: a colour for each neighbourhood, which all samples of a channel there determine
+    together, and fine detail, which only a pixel's own sample determines. Before they are measured, both are known to a
+    relative standard deviation, k and d. A sample whose relative variance is q leaves them with the posterior variances
+    of Gaussians,
 
-        k^2 q_4 / (k^2 + q_4)    and    d^2 q / (d^2 + q),        q_4 = q / samples in four tiles
+        k^2 q_4 / (k^2 + q_4)    and    d^2 q / (d^2 + q),        q_4 = q / samples in four tiles.
 
-    the posterior variances of Gaussians. A sample counts by the share of readings that stay clear of the well by three
-    standard deviations: a full one leaves k^2 and d^2 whole. The picture is encoded by about the 2.4th root, so errors
-    count by the light's power 2 / 2.4.
+    A sample counts by the share of its readings that stay three standard deviations below the full well; a full one
+    leaves k^2 and d^2 as they were. The picture is encoded by about the 2.4th root, so errors are weighted by the
+    light's power 2 / 2.4.
 
     k, d and the number of tiles were chosen so that the error follows `studies.design.expect` over exposure times for
     RGBW and Bayer (0.2 dB root mean square over seven octaves, the same best time); they are no free settings.
@@ -287,7 +292,7 @@ def picture_error(expected_e: NDArray[np.float64], sensor: SensorConfig, exposur
 
 
 def _dark_full(raw: RawImage) -> bool:
-    """Whether dark current leaves light less than a tenth of what it takes itself."""
+    """Return whether dark current leaves light less than a tenth of the electrons that it takes itself."""
     return raw.full_well_e < 0.1 * raw.dark_current_e
 
 

@@ -36,7 +36,7 @@ class NoiseLaw:
     prnu: Number = 0.0
 
     def variance(self, electrons: NDArray[np.floating]) -> NDArray[Any]:
-        """Variance of samples with these means [e-^2], shape and type of `electrons`."""
+        """Return the variance of samples with these means [e-^2], in the shape and type of `electrons`."""
         variance = self.prnu * electrons
         variance *= variance
         variance += self.shot * electrons
@@ -44,16 +44,16 @@ class NoiseLaw:
         return np.asarray(variance)
 
     def slope(self, electrons: NDArray[np.floating]) -> NDArray[Any]:
-        """Slope of `variance` by the mean [e-]."""
+        """Return the derivative of `variance` by the mean [e-]."""
         return np.asarray(self.shot + 2 * self.prnu**2 * electrons)
 
     def over(self, share: float) -> "NoiseLaw":
-        """Law of samples divided by `share`, by the mean of the quotient."""
+        """Return the law of samples that are divided by `share`, as a function of the quotient's mean."""
         return NoiseLaw(self.shot / share, self.dark_e / share, self.fixed_e / share, self.prnu)
 
 
 def total(laws: Iterable[NoiseLaw]) -> NoiseLaw:
-    """Law of the sum of independent noises, whose laws hold numbers."""
+    """Return the law of the sum of independent noises, whose laws hold numbers."""
     laws = tuple(laws)
     dark_e, fixed_e, prnu = (hypot(*(getattr(law, name) for law in laws)) for name in ("dark_e", "fixed_e", "prnu"))
     return NoiseLaw(sum(law.shot for law in laws), dark_e, fixed_e, prnu)

@@ -77,26 +77,26 @@ class SpectralIrradiance:
 
     @property
     def widths_nm(self) -> Floats:
-        """Width of each band, shape (band,)."""
+        """Return the width of each band [nm], shape (band,)."""
         return band_widths(self.wavelength_nm, self.width_nm)
 
     def illuminance(self) -> NDArray[np.float64]:
-        """Illuminance of each pixel [lux], shape (h, w)."""
+        """Return the illuminance of each pixel [lux], shape (h, w)."""
         return luminance(self.values, self.wavelength_nm, self.widths_nm, self.light)
 
     def photons(self) -> NDArray[np.float64]:
-        """Photons of all bands together [um^-2 s^-1], shape (h, w)."""
+        """Return the photons of all bands together [um^-2 s^-1], shape (h, w)."""
         weights = photons_per_joule(self.wavelength_nm) * self.widths_nm * 1e-12
         return np.asarray(self.values @ weights, dtype=np.float64)
 
 
 def camera_equation(lens: LensConfig) -> float:
-    """Irradiance over radiance on the axis [sr]: pi T / (1 + 4 N^2 (1 + |m|)^2)."""
+    """Return the ratio of irradiance to radiance on the axis [sr]: pi T / (1 + 4 N^2 (1 + |m|)^2)."""
     return pi * lens.transmittance / (1 + 4 * lens.f_number**2 * (1 + lens.magnification) ** 2)
 
 
 def spreads(lens: LensConfig) -> bool:
-    """Whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
+    """Return whether the lens spreads a point's light over other pixels: a picture then can't be imaged in parts."""
     blurs = lens.diffraction > 0 or lens.defocus_um > 0 or bool(lens.table)
     return blurs or lens.veiling_glare > 0 or scatters(lens)
 
@@ -107,8 +107,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Parameters
     ----------
     radiance : SpectralRadiance
-        Box-filtered samples. One sample a pixel contains the pixel's aperture already; where in the pixel its light
-        lies it doesn't tell (`sensor.diffraction.sampled_otf`).
+        Box-filtered samples. One sample per pixel already includes the pixel's aperture, but doesn't say where in the
+        pixel its light lies (`sensor.diffraction.sampled_otf`).
     sensor : SensorConfig
         A term of its lens that is 0 costs nothing; `left_out` says what that leaves out.
     samples_per_pixel : int
@@ -118,8 +118,8 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
     Returns
     -------
     SpectralIrradiance
-        One value a sensor pixel and band, in the radiance's precision. Light is neither gained nor lost at the border,
-        where the picture goes on as its mirror image; what a lens scatters beyond the border is lost.
+        One value per sensor pixel and band, in the radiance's precision. Light is neither gained nor lost at the
+        border, where the picture goes on as its mirror image; what a lens scatters beyond the border is lost.
 
     Raises
     ------
@@ -163,11 +163,12 @@ def form_image(radiance: SpectralRadiance, sensor: SensorConfig, samples_per_pix
 def image_sums(
     radiance: SpectralRadiance | BandRadiance, weights: Floats, sensor: SensorConfig, samples_per_pixel: int = 1
 ) -> NDArray[np.float64]:
-    """Weighted sums over bands of what `form_image` gives, shape (h, w, sum): as many inverse transforms as sums.
+    """Return weighted sums over bands of what `form_image` gives, shape (h, w, sum), at one inverse transform per sum.
 
-    Where the brightest light is at most `MOST_OVER_MEAN` times the mean in each band they are of single precision, off
-    by up to 1e-6 of the pixel's own light and the mean together. Beside a lamp in view that would be much for the dark,
-    and they are of double precision. Undershoot becomes 0 in each sum; `form_image` does so in each band.
+    Where the brightest light is at most `MOST_OVER_MEAN` times the mean in each band, they are computed in single
+    precision. Their error is then up to 1e-6 of the pixel's own light and the mean together, which would be much for
+    the dark parts beside a lamp in view: there they are computed in double precision. Undershoot becomes 0 in each sum;
+    `form_image` sets it to 0 in each band.
 
     Parameters
     ----------
@@ -190,7 +191,7 @@ def image_sums(
 
 
 def pixel_shape(radiance: SpectralRadiance | BandRadiance, samples_per_pixel: int) -> tuple[int, int]:
-    """Rows and columns of the pixels that the samples make.
+    """Return the rows and columns of pixels that the samples make.
 
     Raises
     ------
@@ -205,7 +206,7 @@ def pixel_shape(radiance: SpectralRadiance | BandRadiance, samples_per_pixel: in
 
 
 def _enough(radiance: SpectralRadiance | BandRadiance) -> type[np.floating]:
-    """Precision that a picture's light asks for."""
+    """Return the floating-point type that a picture's range of light needs."""
     if isinstance(radiance, SpectralRadiance) and radiance.values.dtype != np.float32:
         return np.float64
     most, mean = band_extents(radiance)
@@ -216,9 +217,9 @@ def _enough(radiance: SpectralRadiance | BandRadiance) -> type[np.floating]:
 def _imager(
     radiance: SpectralRadiance | BandRadiance, sensor: SensorConfig, samples: int, real: type[np.floating]
 ) -> Callable[[Floats], NDArray[np.float64]]:
-    """Function of weights (sum, band) that gives these sums behind a lens, (sum, h, w); bands without weight are free.
+    """Return a function that takes weights (sum, band) and gives these sums behind the lens, (sum, h, w).
 
-    A sum's value doesn't depend on the number of threads.
+    Bands without weight cost nothing. A sum's value doesn't depend on the number of threads.
     """
     # What the lens does.
     pixels, lens, (height, width) = pixel_shape(radiance, samples), sensor.lens, radiance.shape
@@ -291,7 +292,7 @@ def _imager(
 
 
 def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...]:
-    """One line for each effect of a lens that `form_image` leaves out, or approximates at one sample a pixel: its cost.
+    """Return a line per effect of a lens that `form_image` leaves out or approximates, with its estimated cost.
 
     MTFs are those of lens and pixel aperture together, at 550 nm, for the camera's own pixel and f-number.
     """
@@ -329,23 +330,23 @@ def left_out(sensor: SensorConfig, samples_per_pixel: int = 1) -> tuple[str, ...
 
 
 def loss_within_pixels(sensor: SensorConfig) -> float:
-    """Largest loss of the MTF along an axis up to Nyquist, 550 nm, as one sample a pixel is imaged."""
+    """Return the largest loss of MTF along an axis up to Nyquist, at 550 nm, due to one sample per pixel."""
     _, ideal, imaged = _axis_mtfs(sensor)
     return float(np.max(ideal - imaged))
 
 
 def least_samples(sensor: SensorConfig) -> int:
-    """Samples along each side of a pixel from which on the lens's own transfer is imaged below the pixels' Nyquist.
+    """Return the least samples along a pixel's side that image the lens's own transfer below the pixels' Nyquist.
 
-    Samples fold the frequencies beyond them back, so that the limit of diffraction, at 550 nm, has to lie under the
-    sampling frequency less the pixels' Nyquist frequency. Without diffraction one does.
+    Samples alias the frequencies beyond their own limit. So the cut-off of diffraction at 550 nm has to lie under the
+    sampling frequency less the pixels' Nyquist frequency. Without diffraction one sample is enough.
     """
     limit_per_px = limit_per_um(WAVELENGTH_NM, sensor.lens) * sensor.site_pitch_um
     return 1 if limit_per_px == inf else max(2, ceil(limit_per_px + 0.5))
 
 
 def mtf50_error(sensor: SensorConfig) -> float:
-    """Relative error of an edge's MTF50 that one sample a pixel makes, at 550 nm; nan where MTF50 is beyond Nyquist."""
+    """Return the relative error of MTF50 due to one sample per pixel, at 550 nm; nan if it is beyond Nyquist."""
     frequency, ideal, imaged = _axis_mtfs(sensor)
     true, found = (half_frequency(frequency, mtf) for mtf in (ideal, imaged))
     return found / true - 1
@@ -357,7 +358,7 @@ def _edge_words(sensor: SensorConfig) -> str:
 
 
 def _axis_mtfs(sensor: SensorConfig) -> tuple[Floats, Floats, Floats]:
-    """Frequencies along an axis up to Nyquist [1/px], and the MTF of lens and pixel there: the true and the imaged."""
+    """Return frequencies along an axis up to Nyquist [1/px], and the true and imaged MTF of lens and pixel."""
     lens = sensor.lens
     steps = np.arange(64) / 128
     ideal = diffraction_otf(steps / sensor.site_pitch_um, WAVELENGTH_NM, lens) if lens.diffraction else 1.0

@@ -23,13 +23,14 @@ MOST_BITS_SUMMED = 14  # of a converter whose readings are summed by four: a raw
 
 
 def binned(sensor: SensorConfig, way: str) -> SensorConfig:
-    """Camera of which 2x2 photodiodes make a pixel: `sensor` is what they would be alone.
+    """Return the camera of which 2x2 photodiodes make a pixel; `sensor` describes the photodiodes read one by one.
 
-    Its numbers are those of four photodiodes: mean and variance of an evenly lit pixel are exact below the well, but
-    that column gains in digital numbers miss half of their spread's square of the shot noise. Its read noise there
-    holds three of the four roundings, for the noise of a raw image counts one. Its share s of hot pixels and their dark
-    current give the sum's mean and variance (a sum that holds a hot pixel is 1.5 s less hot than that). Its crosstalk
-    is what leaves the four.
+    The numbers of the binned pixel follow from those of four photodiodes. Mean and variance of an evenly lit pixel are
+    exact below the full well, with one exception: in digital binning the noise of the column gains misses half the
+    square of their spread times the shot noise. There the read noise includes three of the four roundings, because a
+    raw image's noise counts one itself. The share s of hot pixels and their dark current give the sum's mean and
+    variance (a sum that includes a hot pixel is 1.5 s less hot than that). Crosstalk is the charge that leaves the four
+    together.
 
     Raises
     ------
@@ -91,7 +92,7 @@ def binned(sensor: SensorConfig, way: str) -> SensorConfig:
 
 
 def with_gain(sensor: SensorConfig, gain: Gain) -> SensorConfig:
-    """Camera at a fixed gain, which no automatic exposure raises; converter, black level and noise follow it.
+    """Return the camera at a fixed gain; converter, black level and noise follow it, and auto exposure keeps it.
 
     Parameters
     ----------

@@ -90,17 +90,17 @@ class PixelConfig:
 
     @property
     def fixed_dark_e(self) -> float:
-        """Standard deviation over pixels of all fixed dark offsets [e-]: DSNU and column offsets."""
+        """Return the standard deviation over pixels of all fixed dark offsets [e-]: DSNU and column offsets."""
         return hypot(self.dsnu_e, self.column_offset_e)
 
     @property
     def fixed_gain(self) -> float:
-        """Standard deviation over pixels of all relative gains: PRNU and column gains."""
+        """Return the standard deviation over pixels of all relative gains: PRNU and column gains."""
         return hypot(self.prnu, self.column_gain_spread)
 
     @property
     def swing_e(self) -> float:
-        """Electrons that fill the voltage swing: reported, not applied (Table 1's disagrees with its own well)."""
+        """Return the electrons that fill the voltage swing: only reported (Table 1's disagrees with its own well)."""
         return self.voltage_swing_v * 1e6 / self.conversion_gain_uv_per_e
 
 
@@ -147,7 +147,7 @@ class Reading:
 
     @property
     def charge(self) -> tuple[str, float]:
-        """What readings of the same charge have in common: photodiode and time."""
+        """Return the photodiode and the share of time, which readings of the same charge have in common."""
         return self.photodiode, self.time_share
 
 
@@ -196,7 +196,10 @@ class ChannelReading:
         return self.time_share * self.light_share
 
     def pixel_of(self, pixel: PixelConfig) -> PixelConfig:
-        """Pixel of the channel's sites, in electrons of their own; the whole time's dark current by its share."""
+        """Return the pixel as this channel's sites have it, in their own electrons.
+
+        Its dark current is the share that collects in the channel's time, spread over the whole time.
+        """
         changed = {"full_well_e": self.full_well_e, "read_noise_e": self.read_noise_e, "dsnu_e": self.dsnu_e}
         return replace(
             pixel,
@@ -290,22 +293,22 @@ class Chip:
 
     @property
     def sites(self) -> int:
-        """Photodiodes along either side of a pixel."""
+        """Return the number of photodiodes along either side of a pixel."""
         return 1 if self.binning is None else 2
 
     @property
     def in_charge(self) -> bool:
-        """Whether photodiodes are summed before they are read."""
+        """Return whether the charges of a pixel's photodiodes are summed before they are read."""
         return self.binning is not None and self.binning.way == CHARGE
 
     @property
     def switched(self) -> bool:
-        """Whether each frame is read with one gain of several."""
+        """Return whether each frame is read with one of several gains."""
         return self.readout == SWITCHED
 
 
 def pixel_of_readings(pixel: PixelConfig, readings: Sequence[Reading]) -> PixelConfig:
-    """Pixel with the deepest well and the least dark noise that one of its readings has, over that one's share."""
+    """Return the pixel with the deepest well and the least dark noise of its readings, divided by their shares."""
     return replace(
         pixel,
         full_well_e=max(x.full_well_e / x.share for x in readings),

@@ -22,7 +22,7 @@ _NAMES = (
 
 
 def preset_names() -> tuple[str, ...]:
-    """Names that `preset` knows.
+    """Return the names that `preset` knows.
 
     Examples
     --------
@@ -34,7 +34,7 @@ def preset_names() -> tuple[str, ...]:
 
 
 def preset_file(name: str) -> Path:
-    """File of a preset.
+    """Return the file of a preset.
 
     Raises
     ------
@@ -52,7 +52,7 @@ def preset_file(name: str) -> Path:
 
 
 def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorConfig:
-    """Camera by name, or from a TOML file of the user's own.
+    """Return a camera by name, or from a TOML file of the user's own.
 
     Parameters
     ----------
@@ -77,17 +77,19 @@ def preset(name: str | Path, cfa: str | Sequence[str] | None = None) -> SensorCo
 
 
 def table1_pixel(cfa: str = "rgbw") -> SensorConfig:
-    """Table 1, its noise voltages taken at the photodiode, as ISET computes: read 152.7 e-, DSNU 200 e-."""
+    """Return Table 1's camera with noise voltages taken at the photodiode, as ISET does: read 152.7 e-, DSNU 200 e-."""
     return preset("table1_pixel", cfa)
 
 
 def table1_output(cfa: str = "rgbw") -> SensorConfig:
-    """Table 1, its noise voltages taken behind the analog gain of 7.98: read 19.1 e-, DSNU 25.1 e-."""
+    """Return Table 1's camera with noise voltages taken behind the analog gain of 7.98: read 19.1 e-, DSNU 25.1 e-."""
     return preset("table1_output", cfa)
 
 
 def low_noise(cfa: str = "rgbw") -> SensorConfig:
-    """Present-day pixel, Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 % (typical of backside-lit CMOS).
+    """Return a camera with a present-day pixel of Table 1's geometry: read 1.5 e-, DSNU 1 e-, PRNU 1 %.
+
+    These are typical of backside-lit CMOS.
 
     Examples
     --------

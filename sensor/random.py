@@ -31,12 +31,12 @@ class NoiseTerm(IntEnum):
 
 
 def draw_key(rng: np.random.Generator) -> int:
-    """One 64-bit key from a generator; all draws of a device or an exposure derive from it."""
+    """Draw a 64-bit key from a generator; all random numbers of a device or an exposure derive from it."""
     return int(rng.integers(0, 2**64, dtype=np.uint64))
 
 
 def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[np.uint64], ...]:
-    """Four 32-bit words (in uint64) for each counter of four 32-bit words, under a 64-bit key."""
+    """Return four 32-bit words (in uint64) for each counter of four 32-bit words, under a 64-bit key."""
     c0, c1, c2, c3 = counter
     k0 = key & 0xFFFFFFFF
     k1 = key >> 32
@@ -51,9 +51,9 @@ def philox(counter: tuple[NDArray[np.uint64], ...], key: int) -> tuple[NDArray[n
 
 
 def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) -> NDArray[np.float64]:
-    """Standard normal draw for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms).
+    """Draw a standard normal number for each pixel, shape `shape` (Box-Muller on two 53-bit uniforms).
 
-    Draws of another `number` are independent: each reading of one charge, each pattern of one chip.
+    Draws of another `number` are independent: each reading of one charge, and each pattern of one chip, has its own.
     """
     draws = np.empty(shape)
     columns = np.arange(shape[1], dtype=np.uint64)[None, :]
@@ -72,7 +72,7 @@ def normals(key: int, term: NoiseTerm, shape: tuple[int, int], number: int = 0) 
 
 
 def poisson(key: int, term: NoiseTerm, mean: NDArray[np.float64]) -> NDArray[np.int64]:
-    """Exact Poisson draw for each pixel of `mean` (h, w); one stream a row."""
+    """Draw an exact Poisson number for each pixel of `mean` (h, w), with one random stream per row."""
     draws = np.empty(mean.shape, dtype=np.int64)
     words = np.array([key, 0], dtype=np.uint64)  # a plain list with a large integer would go through float64
     for row, row_mean in enumerate(mean):

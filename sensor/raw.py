@@ -134,56 +134,57 @@ class RawImage:
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """Channels of `cfa`, as `sensor.cfa.channels` orders them."""
+        """Return the channels of `cfa` in the order of `sensor.cfa.channels`."""
         return channels(self.cfa)
 
     @property
     def unit_channel(self) -> str:
-        """Channel that exposure, white balance and a picture's scale go by (`sensor.cfa.unit_channel`)."""
+        """Return the channel that sets exposure, white balance and a picture's scale (`sensor.cfa.unit_channel`)."""
         return unit_channel(self.cfa)
 
     @property
     def colour_channels(self) -> tuple[str, ...]:
-        """Channels that saturate together with the picture: all but W beside G, which is full long before."""
+        """Return the channels that saturate together with the picture: all but a W beside G, which is full earlier."""
         return tuple(x for x in self.channels if x != "W") if "G" in self.channels else self.channels
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width in pixels."""
+        """Return the height and width in pixels."""
         return self.dn.shape[0], self.dn.shape[1]
 
     @property
     def dark_noise_e(self) -> float:
-        """Standard deviation of a dark pixel [e-]: read noise, DSNU and quantisation (1/sqrt(12) DN)."""
+        """Return the standard deviation of a dark pixel [e-]: read noise, DSNU and quantisation (1/sqrt(12) DN)."""
         return float(np.sqrt(self.read_noise_e**2 + self.dsnu_e**2 + self.rounding_e2))
 
     @property
     def rounding_e2(self) -> float:
-        """Variance of quantisation [e-^2]: of whole numbers alone, for merged samples aren't rounded."""
+        """Return the variance of quantisation [e-^2]; 0 for floating-point samples, which aren't rounded."""
         return self.gain_e_per_dn**2 / 12 if self.dn.dtype.kind in "iu" else 0.0
 
     @property
     def electrons(self) -> NDArray[np.float64]:
-        """Mosaic in electrons above black, shape (h, w), float64; negative where noise took it under black."""
+        """Return the mosaic in electrons above black, shape (h, w), float64; noise can make it negative."""
         return (np.asarray(self.dn, dtype=np.float64) - self.black_dn) * self.gain_e_per_dn
 
     @property
     def full_well_e(self) -> float:
-        """Electrons of a pixel that reads the white level."""
+        """Return the electrons of a pixel that reads the white level."""
         return float((self.white_dn - self.black_dn) * self.gain_e_per_dn)
 
     @method
     def noise_of(self, channel: str) -> ChannelNoise:
-        """Noise and well of a channel's samples; of pixels read several times up to the first of `noise_steps`.
+        """Return the noise and full well of a channel's samples.
 
-        Its ``shot`` holds what columns' gains make of dark current and light together (`gains_shot`) too.
+        For pixels that are read several times they hold below the first of `noise_steps`. Its ``shot`` includes what
+        the columns' gains make of dark current and light together (`gains_shot`).
         """
         noise = next((noise for noise in self.channel_noise if noise.channel == channel), self._plain(channel))
         return replace(noise, shot=noise.shot + gains_shot(self, noise.dark_current_e))
 
     @property
     def plain_noise(self) -> ChannelNoise:
-        """`noise_of` the channels that aren't read apart."""
+        """Return `noise_of` a channel that has no entry in `channel_noise`."""
         noise = self._plain("")
         return replace(noise, shot=noise.shot + gains_shot(self, noise.dark_current_e))
 
@@ -192,12 +193,12 @@ class RawImage:
 
     @property
     def site_mixing(self) -> Floats:
-        """What the tile's sites read of each channel's light in an even field (`sensor.cfa.site_mixing`)."""
+        """Return what the tile's sites read of each channel's light in an even field (`sensor.cfa.site_mixing`)."""
         return site_mixing(self.cfa, self.crosstalk, self._light_shares)
 
     @property
     def channel_mixing(self) -> Floats:
-        """What the channels read of each channel's light in an even field (`sensor.cfa.channel_mixing`)."""
+        """Return what the channels read of each channel's light in an even field (`sensor.cfa.channel_mixing`)."""
         return channel_mixing(self.cfa, self.crosstalk, self._light_shares)
 
     @property
@@ -222,12 +223,12 @@ class RawImage:
 
     @property
     def saturated(self) -> NDArray[np.bool_]:
-        """Where the pixel counts as saturated, shape (h, w)."""
+        """Return where pixels count as saturated, shape (h, w)."""
         return full_at_sites(self, self.dn)
 
 
 def full_at_sites(raw: RawImage, dn: NDArray[Any]) -> NDArray[np.bool_]:
-    """Where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
+    """Return where digital numbers of the mosaic, or of a part that begins with a whole tile, count as saturated."""
     full = np.asarray(dn >= raw.saturation_e / raw.gain_e_per_dn + raw.black_dn)
     for noise in raw.channel_noise:
         at = mask(raw.cfa, noise.channel, full.shape)
@@ -236,16 +237,16 @@ def full_at_sites(raw: RawImage, dn: NDArray[Any]) -> NDArray[np.bool_]:
 
 
 def gains_shot(raw: RawImage, dark_current_e: float) -> float:
-    """Variance per electron of light that columns' gains add where there is dark current.
+    """Return the variance per electron of light that the columns' gains add in the presence of dark current.
 
-    A column's gain is one factor of light e and dark current D: of its variance c^2 (e + D)^2 the term 2 c^2 D e grows
-    as shot noise does.
+    A column's gain multiplies both the light e and the dark current D. Its variance c^2 (e + D)^2 has the term 2 c^2 D
+    e, which grows with the light as shot noise does.
     """
     return 2.0 * raw.column_gain_spread**2 * dark_current_e
 
 
 def noise_at_sites(raw: RawImage, electrons: NDArray[np.floating]) -> NDArray[np.floating]:
-    """Variance of samples with these means [e-^2], shape and type of `electrons`; under 0 as at 0.
+    """Return the variance of samples with these means [e-^2], in their shape and type; a negative mean counts as 0.
 
     Parameters
     ----------
@@ -269,14 +270,14 @@ def noise_at_sites(raw: RawImage, electrons: NDArray[np.floating]) -> NDArray[np
 
 
 def channel_variance(raw: RawImage, mean_e: ArrayLike) -> NDArray[np.float64]:
-    """Variance of a sample of each channel at these means, PRNU left out [e-^2], shape (channel,)."""
+    """Return the variance of a sample of each channel at these means, without PRNU [e-^2], shape (channel,)."""
     noise = [raw.noise_of(name) for name in raw.channels]
     shot, dark_e = np.array([(x.shot, x.dark_noise_e) for x in noise]).T
     return np.asarray(shot * mean_e + dark_e**2)
 
 
 def renamed(raw: RawImage, names: Mapping[str, str]) -> RawImage:
-    """Raw image whose channels go by other names; without its colours."""
+    """Return the raw image with other names for its channels, and without its colour calibration."""
     return replace(
         raw,
         cfa=tuple("".join(names.get(name, name) for name in row) for row in raw.cfa),
@@ -286,7 +287,7 @@ def renamed(raw: RawImage, names: Mapping[str, str]) -> RawImage:
 
 
 def _as_array(values: ArrayLike) -> NDArray[Any]:
-    """Array of any type; an empty one of objects for lists of unequal length or numbers beyond 64 bits."""
+    """Return values as an array; an empty one of objects for lists of unequal length or numbers beyond 64 bits."""
     try:
         return np.asarray(values)
     except (ValueError, OverflowError):
@@ -294,7 +295,7 @@ def _as_array(values: ArrayLike) -> NDArray[Any]:
 
 
 def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
-    """Samples as an array, or `InputError` where one is no finite real number."""
+    """Return samples as an array; raise `InputError` unless all are finite real numbers."""
     require_unmasked("dn", dn)
     samples = _as_array(dn)
     if samples.dtype.kind not in "uif":
@@ -308,7 +309,7 @@ def _checked_dn(dn: ArrayLike) -> NDArray[np.uint16]:
 
 
 def _checked_defects(defects: ArrayLike, shape: tuple[int, int]) -> NDArray[np.intp] | None:
-    """Rows and columns in the frame's order, each pixel once; None where there is none."""
+    """Return the rows and columns of defects in the frame's order, each pixel once; None where there is none."""
     pixels = _as_array(defects)
     if pixels.size == 0 and pixels.dtype != np.object_:
         return None

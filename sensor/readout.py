@@ -39,11 +39,11 @@ def draw_frame(
     reading: int = 0,
     counts: Callable[[int, NoiseTerm, NDArray[np.float64]], NDArray[Any]] = poisson,
 ) -> NDArray[np.uint16]:
-    """Digital numbers of one exposure, shape (h, w), with NumPy's exact Poisson sampler; binned, (h / 2, w / 2).
+    """Draw the digital numbers of one exposure, shape (h, w); (h / 2, w / 2) for a camera that bins.
 
-    In physical order: crosstalk and PRNU move the photo-electrons' means, dark current and hot pixels add to them, then
-    one Poisson draw; the well clips; pixels that bin in charge are summed; the rest is `convert`. Of one key, each
-    `reading` draws read noise of its own, and the same shot noise.
+    In physical order: crosstalk and PRNU change the photo-electrons' means, dark current and hot pixels add to them,
+    then follows one Poisson draw, by NumPy's exact sampler; the well clips; pixels that bin in charge are summed; the
+    rest is `convert`. For one key, each `reading` draws read noise of its own and the same shot noise.
     """
     pixel = sensor.photosites.pixel
     expected = np.asarray(expected_e, dtype=np.float64)
@@ -62,7 +62,7 @@ def draw_frame(
 def convert(
     collected_e: NDArray[np.float64], sensor: SensorConfig, device: Device, key: int, reading: int = 0
 ) -> NDArray[np.uint16]:
-    """Digital numbers of what the wells hold, shape (h, w); binned, (h / 2, w / 2).
+    """Convert what the wells hold to digital numbers, shape (h, w); (h / 2, w / 2) for a camera that bins.
 
     Pixels that bin in charge are summed, and their floating diffusion clips; the response bends; the column's amplifier
     multiplies; fixed offsets and read noise, before the gain and after it, are added; the converter, whose top is the
@@ -86,7 +86,7 @@ def convert(
 
 
 def pixel_read_noise_e(converter: SensorConfig) -> float:
-    """Part of the read noise that each pixel has by itself [e-]."""
+    """Return the part of the read noise that is independent between pixels [e-]: all but the rows' noise."""
     row_e = converter.pixel.row_noise_e
     return sqrt(converter.read_noise_e**2 - row_e**2) if row_e else converter.read_noise_e
 
@@ -104,9 +104,9 @@ def draw_mean_frame(
     key: int,
     reading: int = 0,
 ) -> NDArray[np.uint16]:
-    """`draw_frame` without shot noise: a pixel collects the mean of its Poisson draw, fractions of electrons too.
+    """Draw a frame as `draw_frame` does, but without shot noise: pixels collect the mean electrons, fractions included.
 
-    No camera does; it shows what the other terms do alone. Both draw the same read noise for a key.
+    No camera does this; it shows the effect of the other terms alone. Both draw the same read noise for a key.
     """
     return draw_frame(expected_e, sensor, device, exposure_s, key, reading, counts=lambda key, term, mean_e: mean_e)
 
@@ -177,11 +177,11 @@ def read(
 
 
 def spread_charge(expected_e: NDArray[np.float64], crosstalk: float) -> NDArray[np.float64]:
-    """Expected photo-electrons after each pixel gave `crosstalk` of its own to each of its four neighbours.
+    """Return the expected photo-electrons after each pixel gave `crosstalk` of its own to each of its four neighbours.
 
-    It belongs before the Poisson draw: electrons that go separate ways are thinned, and thinned Poisson counts are
-    Poisson and independent again. At the frame's edge the charge stays, so the total is kept. Charge beyond a full
-    well is lost, not handed on: blooming isn't modelled.
+    This has to happen before the Poisson draw: electrons that go separate ways are thinned, and thinned Poisson counts
+    are again Poisson and independent. At the frame's edge the charge stays, so the total is kept. Charge beyond a full
+    well is lost and not handed on, because blooming isn't modelled.
 
     Parameters
     ----------
@@ -276,15 +276,15 @@ def collected_e(expected_e: NDArray[np.float64], readings: Sequence[PlainReading
 def noise_sources(
     expected_e: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None
 ) -> dict[str, float]:
-    """Standard deviation of each source of a pixel's noise in an even field [e-], by name.
+    """Return the standard deviation of each source of a pixel's noise in an even field [e-], by name.
 
-    Their squares sum to `noise_variance` where nothing clips or bends, which says what each of them is.
+    Their squares sum to `noise_variance` where nothing clips or bends; its docstring explains each of them.
     """
     return sources_of(expected_e, at_channel(resolve(sensor, np.array([expected_e]), exposure_s, channel), channel))
 
 
 def sources_of(expected_e: float, readings: Sequence[PlainReading]) -> dict[str, float]:
-    """`noise_sources` of readings of every pixel."""
+    """Return `noise_sources` for readings of every pixel."""
     light = np.array([expected_e])
     if several(readings):
         variances_e2 = merged_variances(light, readings)
@@ -296,10 +296,10 @@ def sources_of(expected_e: float, readings: Sequence[PlainReading]) -> dict[str,
 def as_raw(
     dn: NDArray[np.uint16], sensor: SensorConfig, exposure_s: float, engine: str, hot: NDArray[np.bool_] | None = None
 ) -> RawImage:
-    """Raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
+    """Make a raw image of a frame that `engine` drew, with the camera's calibration and the chip's list of hot pixels.
 
-    Black is the mean that covered pixels read. Dark current raises it and adds to both kinds of dark noise: its own
-    shot noise, and what the columns' gains make of it.
+    Black is the mean that covered pixels read. Dark current raises it, and adds to both kinds of dark noise: its own
+    shot noise to the temporal one, and what the columns' gains make of it to the fixed one.
     """
     hot = None if hot is None else sensor.pixel_sums(hot)
     pixel = sensor.pixel

@@ -26,10 +26,10 @@ _STEP_NM = 1.0  # of the wavelength grid on which shares are summed
 def electrons_per_irradiance(
     sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats, exposure_s: float, light: Spectrum | None = None
 ) -> Floats:
-    """Electrons of each channel's photodiode per unit irradiance in each band, shape (channel, band).
+    """Return the electrons of each channel's photodiode per unit irradiance in each band, shape (channel, band).
 
-    Response x photons per joule, integrated over the light inside the camera's window, x collecting area x time. Within
-    a band the light follows the lamp and surfaces that are smooth (`render.band_weights`).
+    They are response x photons per joule, integrated over the light inside the camera's window, x collecting area x
+    time. Within a band the light follows the lamp and surfaces that are smooth (`render.band_weights`).
 
     Parameters
     ----------
@@ -74,7 +74,10 @@ def _response_weights(
     bands: ByBits[tuple[Floats, Floats]],
     lamp: ByBits[Spectrum] | None,
 ) -> Floats:
-    """`band_weights` of the channels: a cell of a sweep asks four times, and its neighbours ask for the same."""
+    """Return the `band_weights` of the channels, cached.
+
+    A cell of a sweep needs them four times, and its neighbours need the same ones.
+    """
     spectra = [curve.value for curve in curves]
     corners = np.concatenate([np.array(window_nm), *(curve.wavelength_nm for curve in spectra)])
     seen = partial(_electrons_per_joule, spectra, window_nm)
@@ -82,13 +85,13 @@ def _response_weights(
 
 
 def _electrons_per_joule(curves: Sequence[Spectrum], window_nm: tuple[float, float], wavelength_nm: Floats) -> Floats:
-    """Electrons of each curve per joule of light at wavelengths, shape (curve, n)."""
+    """Return each curve's electrons per joule of light at these wavelengths, shape (curve, n); 0 outside the window."""
     inside = (wavelength_nm > window_nm[0]) & (wavelength_nm < window_nm[1])
     return np.asarray(per_joule(curves, wavelength_nm) * inside)
 
 
 def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
-    """Expected photo-electrons that each photodiode would collect behind every filter, shape (h, w, channel).
+    """Return each photodiode's expected photo-electrons behind every filter, shape (h, w, channel).
 
     Examples
     --------
@@ -111,11 +114,11 @@ def channel_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, expo
 def imaged_electrons(
     radiance: SpectralRadiance | BandRadiance, sensor: SensorConfig, exposure_s: float, samples_per_pixel: int = 1
 ) -> NDArray[np.float64]:
-    """`channel_electrons` of `form_image`, shape (h, w, channel), in a quarter of the time behind a lens that spreads.
+    """Return `channel_electrons` of `form_image`, shape (h, w, channel), computed faster for a lens that spreads light.
 
-    Where no undershoot is cut off it is within 1e-6 of the pixel's own light and the picture's mean together
-    (`sensor.optics.image_sums`). Parameters as of these two. Radiance that comes band by band is held as a whole
-    only where a pixel is one sample and the lens doesn't spread.
+    There it takes a quarter of the time, and where no undershoot is cut off it is within 1e-6 of the pixel's own light
+    and the picture's mean together (`sensor.optics.image_sums`). Parameters are as of these two. Radiance that comes
+    band by band is held as a whole only where a pixel is one sample and the lens doesn't spread.
     """
     if samples_per_pixel == 1 and not spreads(sensor.lens):
         whole = radiance.whole() if isinstance(radiance, BandRadiance) else radiance
@@ -125,7 +128,9 @@ def imaged_electrons(
 
 
 def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exposure_s: float) -> NDArray[np.float64]:
-    """Expected photo-electrons behind each photodiode's own filter, shape (h, w); dark current comes with `read_out`.
+    """Return the expected photo-electrons behind each photodiode's own filter, shape (h, w), without dark current.
+
+    Dark current is added by `read_out`.
 
     Parameters
     ----------
@@ -153,16 +158,16 @@ def expected_electrons(irradiance: SpectralIrradiance, sensor: SensorConfig, exp
 
 
 def mixing_of(sensor: SensorConfig) -> Floats:
-    """Electrons that each channel of a camera's raw image reads of an even field, over those behind each filter alone.
+    """Return what each channel of a raw image reads of an even field, over the electrons behind each filter.
 
-    As `sensor.cfa.channel_mixing`: a maker's calibration sees the channels as crosstalk mixes them.
+    This is `sensor.cfa.channel_mixing`: a maker's calibration sees the channels as crosstalk mixes them.
     """
     shares = {reading.channel: reading.light_share for reading in sensor.chip.channels}
     return channel_mixing(sensor.cfa, sensor.pixel.crosstalk, shares)
 
 
 def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
-    """Electrons behind each photodiode's own filter, shape (h, w), of those of every channel, shape (h, w, channel).
+    """Pick each photodiode's channel from the electrons of every channel: (h, w, channel) becomes (h, w).
 
     Raises
     ------
@@ -242,7 +247,7 @@ def _check_covered(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats
 
 
 def _inside_nm(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> Floats:
-    """Width of each band's part inside the window, shape (band,)."""
+    """Return the width of each band's part inside the window [nm], shape (band,)."""
     low, high = window_nm
     first, last = wavelength_nm - width_nm / 2, wavelength_nm + width_nm / 2
     return np.asarray(np.clip(np.minimum(last, high) - np.maximum(first, low), 0.0, None))

@@ -43,7 +43,7 @@ STEPS = (32, 4096)
 
 
 def held_lens(lens: LensConfig, shake: str | None) -> LensConfig:
-    """Lens of a camera that is held as one of `SHAKES` names; None leaves the lens as it is.
+    """Return the lens of a camera that is held as one of `SHAKES` names; None leaves the lens as it is.
 
     Raises
     ------
@@ -57,10 +57,10 @@ def held_lens(lens: LensConfig, shake: str | None) -> LensConfig:
 
 
 def blur_variance(exposure_s: float) -> float:
-    """Expected variance of the image's place within an exposure, over its variance in all time.
+    """Return the expected variance of the image's position within an exposure, relative to its variance over all time.
 
-    That is the integral of S(f) (1 - sinc^2(f T)) / s^2, in closed form by the autocorrelation
-    Re((1 - i a) exp(p t)), p the oscillator's pole and a = -Re p / Im p.
+    That is the integral of S(f) (1 - sinc^2(f T)) / s^2, in closed form by the autocorrelation Re((1 - i a) exp(p t)),
+    where p is the oscillator's pole and a = -Re p / Im p.
     """
     if exposure_s == 0:
         return 0.0
@@ -84,7 +84,7 @@ def _step_count(time_s: float, longest_s: float = STEP_S) -> int:
 
 
 def _walk(step_s: float, count: int, key: int) -> NDArray[np.float64]:
-    """`count` places of the image, `step_s` apart, about their mean, shape (axis, time); s is 1."""
+    """Draw `count` positions of the image, `step_s` apart, around their mean, in units of s; shape (axis, time)."""
     # Place and speed / (2 pi f0), both of variance 1, taken on exactly: z' = A z + B n with B B^T = 1 - A A^T.
     turn = np.exp(POLE_PER_S * step_s)
     advance = turn.real * np.eye(2) + turn.imag / sqrt(1 - DAMPING**2) * np.array([[DAMPING, 1.0], [-1.0, -DAMPING]])
@@ -180,18 +180,19 @@ def moved_by_rows(electrons: NDArray[np.float64], places_px: Floats, shares: Flo
 def shaken(
     electrons: NDArray[np.float64], sensor: SensorConfig, exposure_s: float, rng: np.random.Generator
 ) -> NDArray[np.float64]:
-    """Electrons behind every filter, shape (h, w, channel), as the moving image leaves them.
+    """Return the electrons behind every filter, shape (h, w, channel), blurred by the image's movement.
 
-    The transfer function of the path multiplies the picture's, which goes on as its mirror image. Undershoot becomes 0,
-    and each channel keeps its sum. Rows that roll see a part of the path each (`moved_by_rows`).
+    The transfer function of the path multiplies the picture's spectrum; the picture continues as its mirror image.
+    Undershoot becomes 0, and each channel keeps its sum. With a rolling shutter each row sees its own part of the path
+    (`moved_by_rows`).
 
     Parameters
     ----------
     electrons : (h, w, channel) float64
         Of a still camera, as `sensor.response.channel_electrons`.
     sensor : SensorConfig
-        Its lens's `shake_um` is the standard deviation of the image's place; 0 draws nothing. Its `row_time_us` parts
-        the starts of the rows.
+        Its lens's `shake_um` is the standard deviation of the image's position; 0 draws nothing. Its `row_time_us` is
+        the delay between the starts of two rows.
     exposure_s : float
     rng : numpy.random.Generator
         Gives one key for the path.
