@@ -27,7 +27,7 @@ BAYER: Tile = ("RG", "GB")
 
 
 def quad(tile: Tile) -> Tile:
-    """Tile of twice the height and width, in which 2x2 pixels stand for each of `tile`."""
+    """Return the tile of twice the height and width in which 2x2 pixels replace each of `tile`."""
     return tuple("".join(2 * channel for channel in row) for row in tile for _ in range(2))
 
 
@@ -48,7 +48,7 @@ def mosaics() -> tuple[str, ...]:
 
 
 def tile_of(mosaic: str | Sequence[str]) -> Tile:
-    """Tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels, also as ``RG/BW``.
+    """Return the tile of a mosaic given by a name of `MOSAICS`, or by its rows of channels, also as ``RG/BW``.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def is_bayer(tile: Tile) -> bool:
 
 
 def plain(tile: Tile) -> Tile:
-    """Tile that `tile` is the `quad` of, or the tile itself."""
+    """Return the tile whose `quad` is `tile`, or `tile` itself if there is none."""
     half = tuple(row[::2] for row in tile[::2])
     return half if quad(half) == tile else tile
 

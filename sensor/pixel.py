@@ -142,7 +142,7 @@ class Reading:
 
     @property
     def share(self) -> float:
-        """Share of the whole pixel's electrons in the whole exposure that this charge holds."""
+        """Return the share of the whole pixel's electrons in the whole exposure that this charge contains."""
         return self.light_share * self.time_share
 
     @property
@@ -192,7 +192,7 @@ class ChannelReading:
 
     @property
     def share(self) -> float:
-        """Share of what the sites would collect in the whole time without the density."""
+        """Return the share that the sites collect of what they would in the whole time without the density."""
         return self.time_share * self.light_share
 
     def pixel_of(self, pixel: PixelConfig) -> PixelConfig:

@@ -207,12 +207,14 @@ class RawImage:
 
     @property
     def saturation_e(self) -> float:
-        """Level from which a sample of channels that aren't read apart counts as saturated [e-]."""
+        """Return the level [e-] from which a sample of a channel without `channel_noise` counts as saturated."""
         return self._saturation_e(self._plain(""))
 
     def _saturation_e(self, noise: ChannelNoise) -> float:
-        """Level from which a channel's sample counts as saturated [e-]: but for dark current's, noise comes after the
-        well clips; columns' gains act on the whole well. Rounding takes half a DN off at most, whatever its variance.
+        """Return the level [e-] from which a channel's sample counts as saturated.
+
+        It lies below the full well by the noise that arises after the well clips: all but that of the dark current; the
+        columns' gains act on the whole well. Rounding takes off half a DN at most, whatever its variance.
         """
         last = self.noise_steps[-1] if self.noise_steps else noise
         dark_e = noise.dark_current_e

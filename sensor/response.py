@@ -201,7 +201,9 @@ def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm
 
 
 def lost_shares(sensor: SensorConfig, wavelength_nm: Floats, width_nm: Floats) -> dict[str, float]:
-    """Share of each channel's electrons that absent bands leave out, of light of equal energy in the camera's window.
+    """Return the share of each channel's electrons that absent bands leave out.
+
+    It holds for light of equal energy within the camera's window.
 
     Parameters
     ----------

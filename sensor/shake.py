@@ -71,9 +71,10 @@ def blur_variance(exposure_s: float) -> float:
 
 
 def path(exposure_s: float, key: int) -> NDArray[np.float64]:
-    """Place of the image at even times within an exposure, about its mean, shape (axis, time); s is 1.
+    """Draw the positions of the image at even times within an exposure, around their mean, shape (axis, time); s is 1.
 
-    A draw depends on key, axis and time step alone. The exposure's own mean is the framing, and no blur.
+    A draw depends on key, axis and time step alone. The mean position within the exposure only shifts the framing and
+    isn't blur.
     """
     count = _step_count(exposure_s)
     return _walk(exposure_s / count, count, key)
@@ -128,9 +129,9 @@ def rolling_path(
 
 
 def row_shares(starts_s: Floats, exposure_s: float, step_s: float, count: int) -> NDArray[np.float64]:
-    """Weight of each place of a path in the mean over a row's exposure, shape (row, time); a row's sum is 1.
+    """Return the weight of each position of a path in the mean over a row's exposure, shape (row, time).
 
-    Between two of the `count` places, `step_s` apart, the image goes over from the one to the other in a straight line.
+    A row's weights sum to 1. Between two of the `count` positions, `step_s` apart, the image moves in a straight line.
     """
 
     def until(time_s: Floats) -> Floats:

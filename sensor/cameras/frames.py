@@ -150,7 +150,7 @@ def _interval_text(interval: Interval) -> str:
 
 
 def _middle(dn: NDArray[Any], tile: Tile, window: int | None) -> NDArray[Any]:
-    """Square in the middle of a frame, beginning with the tile's first position."""
+    """Cut a square out of the middle of a frame, beginning with the tile's first position; None keeps the frame."""
     if window is None:
         return dn
     height, width = dn.shape

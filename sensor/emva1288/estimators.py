@@ -73,7 +73,7 @@ def dark_noise(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
 
 
 def dsnu(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
-    """Spread of the pixels' dark values [e-], columns and hot pixels included."""
+    """Estimate the spread of the pixels' dark values [e-], columns and hot pixels included."""
     return _electrons(dark.spatial_dn2, _spread_error(_squares(dark.mean_dn)), gain_dn_per_e)
 
 
@@ -85,7 +85,7 @@ def prnu(dark: Stack, bright: Stack) -> Estimate:
 
 
 def column_offset(dark: Stack, gain_dn_per_e: Estimate) -> Estimate:
-    """Spread of the columns' dark offsets [e-]."""
+    """Estimate the spread of the columns' dark offsets [e-]."""
     return _electrons(*column_variance(dark.mean_dn), gain_dn_per_e)
 
 

@@ -33,13 +33,13 @@ def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
 
 
 def row_weights(waveform: Waveform, sensor: SensorConfig, rows: int, exposure_s: float, start_s: float = 0.0) -> Floats:
-    """Light that a lamp gives each row of photodiodes within its exposure, over the lamp's mean; shape (rows,).
+    """Return the light that a lamp gives each row of photodiodes in its exposure, over the lamp's mean; shape (rows,).
 
     Parameters
     ----------
     waveform : Waveform
     sensor : SensorConfig
-        Its `row_time_us` parts the rows' starts; photodiodes that bin are exposed together.
+        Its `row_time_us` is the delay between the starts of two rows; photodiodes that bin are exposed together.
     rows : int
         Of photodiodes.
     exposure_s : float

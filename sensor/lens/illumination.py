@@ -100,7 +100,7 @@ def falloff(lens: LensConfig, shape: tuple[int, int], of_scene: float | None = N
 
 
 def pupil_share(height: Floats, lens: LensConfig) -> NDArray[np.float64]:
-    """Share of the pupil's area that the rim leaves at image heights, which are 1 in the corners."""
+    """Return the share of the pupil's area that the rim leaves free at image heights, which are 1 in the corners."""
     return _common_area(np.asarray(height, dtype=np.float64), _shift(lens), lens.vignetting_from) / np.pi
 
 

@@ -66,7 +66,7 @@ def _peak_per_sr(lens: LensConfig) -> float:
 
 @lru_cache(maxsize=64)
 def scattered_share(lens: LensConfig) -> float:
-    """Share of the light that leaves its place, over all directions."""
+    """Return the share of the light that is scattered, over all directions."""
     if not lens.eye_age_years:
         return lens.scatter
 

@@ -55,7 +55,7 @@ def _radial(noll: int) -> tuple[float, ...]:
 
 
 def _path_nm(coefficients: Floats, noll: tuple[int, ...], along: Floats, across: Floats) -> Floats:
-    """Sum of polynomials; those of one angular order are summed before they are evaluated."""
+    """Sum the Zernike polynomials to the wave's path [nm]; those of one angular order are added up first."""
     by_order: dict[int, Floats] = {}
     for value, j in zip(coefficients, noll, strict=True):
         if value:
@@ -215,7 +215,7 @@ def _ideal(spot_um: float, step_um: float, reach: int, times: int, folded: bool)
 
 
 def _of_kernel(kernel: Floats, step_um: float, radial: Floats, across: Floats) -> NDArray[np.complex128]:
-    """Transform of a kernel at frequencies, 0 beyond the half of its points' frequency."""
+    """Return the Fourier transform of a kernel at frequencies; 0 beyond half the sampling frequency of its points."""
     side = scipy.fft.next_fast_len(_PAD * len(kernel))
     padded = np.zeros((side, side))
     padded[: len(kernel), : len(kernel)] = kernel

@@ -68,12 +68,12 @@ class PlainReading:
 
     @property
     def share(self) -> float:
-        """Share of a pixel's electrons in the whole time that this reading counts."""
+        """Return the share of a pixel's electrons in the whole time that this reading counts."""
         return self.light_share * self.time_share
 
     @property
     def charge(self) -> tuple[str, float, str | None]:
-        """Name of the charge: readings of one charge share its shot noise."""
+        """Return a key of the charge; readings of one charge share its shot noise."""
         return self.photodiode, self.time_share, self.sites
 
     @property
