@@ -33,7 +33,7 @@ _DRAWN = re.compile(f"({'|'.join(DRAWN)})-([0-9a-f]{{1,40}})")
 
 
 def scene_names() -> tuple[str, ...]:
-    """Names that `load` knows, in alphabetical order.
+    """Return the names that `load` knows, in alphabetical order.
 
     Examples
     --------
@@ -68,7 +68,7 @@ def load(name: str, **options: object) -> Scene:
 
 
 def scene_options(name: str) -> tuple[str, ...]:
-    """Names of what `load` takes beside the name.
+    """Return the names of the options that `load` takes for a scene.
 
     Raises
     ------

@@ -23,10 +23,10 @@ FACING = look_at((0, 0, 0), (0, 0, 1))  # towards the camera
 
 
 def color_checker(light: str = "D65", surround: float = 0.2, chart: str | None = None) -> Scene:
-    """ColorChecker, facing the camera; each patch's radiance is its reflectance times the sky's.
+    """Build a ColorChecker that faces the camera; each patch's radiance is its reflectance times the sky's.
 
-    Beyond 780 nm, where its tables end, every surface keeps its reflectance there, up to 1100 nm: an assumption, for
-    studies of the near infrared.
+    The tables end at 780 nm. Up to 1100 nm every surface is assumed to keep its reflectance at 780 nm, for studies of
+    the near infrared.
 
     Parameters
     ----------
@@ -58,12 +58,12 @@ def chart_scene(name: str, curves: Sequence[Spectrum], surround: Spectrum, light
 
 
 def color_checker_nodes(pose: Floats) -> dict[str, Node]:
-    """Nodes of a ColorChecker centred on `pose` and facing its +z, 380-780 nm."""
+    """Return the nodes of a ColorChecker centred on `pose` and facing its +z, 380-780 nm."""
     return chart_nodes(pose, [curve for _, curve in patches()], grey(BOARD))
 
 
 def chart_nodes(pose: Floats, curves: Sequence[Spectrum], board: Spectrum) -> dict[str, Node]:
-    """Nodes of a chart's board and up to 24 patches, row by row, centred on `pose` and facing its +z."""
+    """Return the nodes of a chart's board and up to 24 patches, row by row, centred on `pose` and facing its +z."""
     step = PATCH_M + GAP_M
     nodes = {"chart_board": panel(pose, COLUMNS * step + GAP_M, ROWS * step + GAP_M, matte(board))}
     for index, reflectance in enumerate(curves):

@@ -55,7 +55,7 @@ def patch_pairs() -> list[PatchPair]:
 
 
 def contrast_patches(light: str = "D65") -> Scene:
-    """Twelve pairs of patches on grey card in a constant environment.
+    """Build twelve pairs of patches on grey card in a constant environment.
 
     Parameters
     ----------

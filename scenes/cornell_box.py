@@ -33,7 +33,7 @@ _PAINTS = {
 
 
 def cornell_box(light: str | None = None) -> Scene:
-    """Box of 0.55 m with one lamp in its ceiling (group ``lamp``): light goes from wall to wall many times.
+    """Build a box of 0.55 m with one lamp in its ceiling (group ``lamp``); light goes from wall to wall many times.
 
     Parameters
     ----------
@@ -70,6 +70,6 @@ def cornell_box(light: str | None = None) -> Scene:
 
 
 def paint(colour: str) -> Spectrum:
-    """Measured reflectance of the box's ``white``, ``green`` or ``red``, its ends held outside 400-700 nm."""
+    """Return the measured reflectance of ``white``, ``green`` or ``red``, with its end values outside 400-700 nm."""
     values = np.array(_PAINTS[colour].split(), dtype=np.float64) / 1000
     return resampled(np.arange(400.0, 701.0, 4.0), values)

@@ -27,10 +27,10 @@ SIDE_M = 0.5  # of the scene's chart, which fills a square picture
 
 
 def dead_leaves(seed: int = 0, light: str = "D65") -> Scene:
-    """Chart of dead leaves that fills a square picture, in a constant environment.
+    """Build a chart of dead leaves that fills a square picture, in a constant environment.
 
-    The greys are those of `chart`, row by row from the upper left corner. Radii are from 1 to 24 units, of which 256
-    make the chart's side.
+    The greys are those of `chart`, row by row from the upper left corner. Radii are from 1 to 24 units; the chart's
+    side has 256 units.
 
     Parameters
     ----------

@@ -50,7 +50,9 @@ class _Stage:
 
 
 def diorama(seed: int = 0) -> Scene:
-    """Street, room or table by day, at dusk or by night; groups ``sun``, ``sky``, ``window``, ``lamps0`` and so on.
+    """Build a random street, room or table by day, at dusk or by night.
+
+    Its light groups are ``sun``, ``sky``, ``window``, ``lamps0`` and so on.
 
     Parameters
     ----------
@@ -76,7 +78,7 @@ def diorama(seed: int = 0) -> Scene:
 
 
 def _street(rng: Rng) -> _Stage:
-    """Street between house fronts with windows, poles and trees."""
+    """Build a street between house fronts with windows, poles and trees."""
     half_m = float(rng.uniform(3.5, 6.0))
     nodes = {
         "ground": panel(floor(0, 0, -40), 120.0, 120.0, _tile(rng, 25)),
@@ -113,7 +115,7 @@ def _street(rng: Rng) -> _Stage:
 
 
 def _room(rng: Rng) -> _Stage:
-    """Closed room with pictures on its walls and a window at its left."""
+    """Build a closed room with pictures on its walls and a window on its left."""
     width, height, depth = rng.uniform(4, 6), rng.uniform(2.4, 3.2), rng.uniform(5, 9)
     nodes = {
         "floor": panel(floor(0, 0, 0), width, depth, _surface(rng, 4)),
@@ -141,7 +143,7 @@ def _room(rng: Rng) -> _Stage:
 
 
 def _table(rng: Rng) -> _Stage:
-    """Table, far or near before a wall with leaves; indoors or outdoors."""
+    """Build a table in front of a near or far wall with leaves, indoors or outdoors."""
     far_m = float(rng.choice((0.7, 3.0, 8.0)))
     wall = translate(0, 0.5, -far_m)
     nodes = {
@@ -160,7 +162,7 @@ def _table(rng: Rng) -> _Stage:
 
 
 def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightGroup]]:
-    """Sun and sky or a window, and lamps of one or two spectra."""
+    """Build the lights: sun and sky or a window, and lamps of one or two spectra."""
     nodes: Nodes = {}
     groups: dict[str, LightGroup] = {}
     area: Node = {"emitter": {"type": "area"}}
@@ -201,7 +203,7 @@ def _lights(rng: Rng, hour: str, stage: _Stage) -> tuple[Nodes, dict[str, LightG
 
 
 def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
-    """A measured patch's reflectance, mixed with grey and darkened."""
+    """Draw a reflectance: that of a measured patch, mixed with grey and darkened."""
     _, patch = color_checker_reflectances()[rng.integers(24)]
     share = purest * rng.uniform(0.6, 1)
     level = rng.uniform(0.03, 0.8)
@@ -209,12 +211,12 @@ def _paint(rng: Rng, purest: float = 1.0) -> Spectrum:
 
 
 def _tile(rng: Rng, repeats: float) -> Node:
-    """Brick, grass or gravel, dark gaps between muted stones."""
+    """Draw a material of brick, grass or gravel: muted stones with dark gaps between them."""
     return printed(TILES[rng.integers(3)], grey(0.02), _paint(rng, 0.9), repeats * rng.uniform(0.5, 1.5), 90.0)
 
 
 def _surface(rng: Rng, repeats: float = 1.0) -> Node:
-    """Any surface but glass."""
+    """Draw any surface but glass."""
     kind = rng.random()
     turn_deg = float(rng.uniform(0, 180))
     if kind < 0.15:
@@ -232,7 +234,7 @@ def _surface(rng: Rng, repeats: float = 1.0) -> Node:
 
 
 def _leaves(rng: Rng, wall: str, pose: Floats, half_m: Pair, sizes_m: Pair, count: int) -> Nodes:
-    """Pictures and sheets on a wall, sizes by a power law, each before the one drawn earlier."""
+    """Put pictures and sheets on a wall, with sizes by a power law, each in front of the ones drawn earlier."""
     nodes = {}
     low, high = sizes_m
     half, up = half_m
@@ -244,7 +246,7 @@ def _leaves(rng: Rng, wall: str, pose: Floats, half_m: Pair, sizes_m: Pair, coun
 
 
 def _tree(rng: Rng, x: float, z: float) -> Nodes:
-    """Trunk and a crown of leafy balls."""
+    """Build a tree: a trunk and a crown of leafy balls."""
     height_m, radius_m = rng.uniform(1.5, 3), rng.uniform(0.6, 1.4)
     leaf = _tile(rng, 2)
     nodes = {"trunk": rod((x, 0.0, z), (x, height_m + radius_m, z), 0.1, matte(_paint(rng, 0.5)))}
@@ -257,7 +259,7 @@ def _tree(rng: Rng, x: float, z: float) -> Nodes:
 
 
 def _thing(rng: Rng, x: float, z: float, unit_m: float) -> Nodes:
-    """Ball, block, pillar, pole, stack or a heap of many small things, on the ground."""
+    """Put a thing on the ground: a ball, block, pillar, pole, stack or heap of many small balls."""
     kind = rng.random()
     surface = _surface(rng)
     size_m = float(unit_m * rng.uniform(0.4, 1.0))

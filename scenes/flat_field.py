@@ -8,7 +8,7 @@ from scenes.reflectances import grey
 
 
 def flat_field(reflectance: float = 0.5, light: str = "D65") -> Scene:
-    """Lambertian wall of one reflectance; its radiance is `reflectance` times the sky's, exactly.
+    """Build a Lambertian wall of one reflectance; its radiance is exactly `reflectance` times the sky's.
 
     Parameters
     ----------

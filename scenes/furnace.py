@@ -8,10 +8,10 @@ from scenes.reflectances import grey
 
 
 def furnace() -> Scene:
-    """Ball and block of reflectance 1 under a sky of 1 W m^-2 sr^-1 nm^-1: every pixel and band is 1.
+    """Build a ball and a block of reflectance 1 under a sky of 1 W m^-2 sr^-1 nm^-1: every pixel and band is 1.
 
-    Light that goes to and fro between the two is cut off at the render's `max_depth`: at 8 less than 1e-6 is lost,
-    since no point of one sees more than a quarter of the hemisphere filled by the other. Both are convex.
+    Light that is reflected to and fro between the two is cut off at the render's `max_depth`. At 8 less than 1e-6 is
+    lost, because no point of one sees more than a quarter of the hemisphere filled by the other. Both are convex.
     """
     camera = {"type": "perspective", "fov": 30.0, "to_world": to_world(look_at((0, 1.2, 4.0), (0, 0, 0)))}
     white = matte(grey(1.0))

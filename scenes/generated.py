@@ -19,7 +19,7 @@ LARGEST_SEED = 2**160 - 1  # that of a SHA-1
 
 
 def generated(seed: int = 0, light: str | None = None) -> Scene:
-    """Table before a wall of overlapping leaves, all drawn from `seed`, lit by one softbox (group ``softbox``).
+    """Build a table before a wall of overlapping leaves, all drawn from `seed`, lit by one softbox (group ``softbox``).
 
     Parameters
     ----------
@@ -77,7 +77,7 @@ def generated(seed: int = 0, light: str | None = None) -> Scene:
 
 
 def _colour(rng: np.random.Generator) -> Spectrum:
-    """Grey, a rise or a bump, each as saturated as it comes."""
+    """Draw a reflectance: grey, an edge or a bump, more or less saturated."""
     kind = rng.random()
     low, high = rng.uniform(0.03, 0.3), rng.uniform(0.3, 0.85)
     if kind < 0.3:
@@ -92,7 +92,7 @@ def _cloth(rng: np.random.Generator) -> Node:
 
 
 def _thing(rng: np.random.Generator, x: float, z: float) -> Node:
-    """Ball, block or rod of any of the materials, on the table."""
+    """Put a ball, block or rod of any of the materials on the table."""
     kind = rng.random()
     if kind < 0.1:
         surface = glass()

@@ -51,7 +51,7 @@ def _lamps(side: str) -> tuple[str, ...]:
 
 
 def _half(middle: Floats) -> dict[str, Node]:
-    """One half of the cabinet and what stands in it; `middle` is the middle of its bottom's front edge."""
+    """Build one half of the cabinet and what stands in it; `middle` is the middle of its bottom's front edge."""
     # carcass and shelf, and below the top and below the shelf a lamp behind a black lip
     oak = matte(OAK)
     side = (WIDTH_M + BOARD_M) / 2

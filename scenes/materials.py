@@ -20,7 +20,7 @@ SKY_LUMINANCE_CD_M2 = 100.0
 
 
 def matte(reflectance: Spectrum) -> Node:
-    """Lambertian surface, lit from either side.
+    """Return a Lambertian surface, which can be lit from either side.
 
     Examples
     --------
@@ -32,7 +32,7 @@ def matte(reflectance: Spectrum) -> Node:
 
 
 def glossy(reflectance: Spectrum, roughness: float) -> Node:
-    """Coloured body under a rough clear coat of refractive index 1.5 (Beckmann roughness)."""
+    """Return a coloured body under a rough clear coat of refractive index 1.5 (Beckmann roughness)."""
     return {
         "type": "roughplastic",
         "diffuse_reflectance": spectrum_node(reflectance),
@@ -43,9 +43,10 @@ def glossy(reflectance: Spectrum, roughness: float) -> Node:
 
 
 def metal(material: str, roughness: float) -> Node:
-    """Rough metal with the measured complex refractive index that Mitsuba brings (``Au``, ``Cu``, ``Al``, ...).
+    """Return a rough metal with the measured complex refractive index that Mitsuba has for it.
 
-    On the common grid: named as Mitsuba's `material`, each metal has a grid of its own and takes 7 s more to compile.
+    Materials are ``Au``, ``Cu``, ``Al`` and others. The index is resampled to the common grid. If it were named as
+    Mitsuba's `material`, each metal would have a grid of its own and take 7 s more to compile.
     """
     index: dict[str, Node] = {}
     for part in ("eta", "k"):
@@ -57,7 +58,10 @@ def metal(material: str, roughness: float) -> Node:
 
 
 def checks(first: Spectrum, second: Spectrum, columns: float, rows: float, turn_deg: float = 0.0) -> Node:
-    """Matte cloth of small checks; `columns` and `rows` count pairs over the shape, under half a row makes stripes."""
+    """Return a matte cloth of small checks.
+
+    `columns` and `rows` count pairs of checks over the shape; less than half a row makes stripes.
+    """
     texture = {
         "type": "checkerboard",
         "color0": spectrum_node(first),
@@ -68,10 +72,10 @@ def checks(first: Spectrum, second: Spectrum, columns: float, rows: float, turn_
 
 
 def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn_deg: float = 0.0) -> Node:
-    """Matte surface that carries a grey picture of scikit-image's wheel, a mixture of two reflectances at each point.
+    """Return a matte surface that carries a grey picture, which mixes two reflectances at each point.
 
-    The share of `bright` is the picture's stored value, 0 to 1. `repeats` count over the shape, every other one
-    mirrored.
+    The picture comes from scikit-image's wheel. Its stored value, 0 to 1, is the share of `bright`. The picture is
+    repeated `repeats` times over the shape; every other repeat is mirrored.
     """
     share = {
         "type": "bitmap",
@@ -85,7 +89,7 @@ def printed(picture: str, dark: Spectrum, bright: Spectrum, repeats: float, turn
 
 
 def mixed(share: Greys, dark: Spectrum, bright: Spectrum) -> Node:
-    """Matte surface of squares, each a mixture of two reflectances: `share` / 255 of `bright`.
+    """Return a matte surface of squares, each a mixture of two reflectances: `share` / 255 of `bright`.
 
     The first row is the upper one, as a camera sees the front of a panel that `look_at` turns to it.
     """
@@ -96,13 +100,13 @@ def mixed(share: Greys, dark: Spectrum, bright: Spectrum) -> Node:
 
 
 def panel(pose: Floats, width_m: Metres, height_m: Metres, bsdf: Node, **more: Node) -> Node:
-    """Rectangle centred on the origin of `pose`, facing its +z."""
+    """Return a rectangle centred on the origin of `pose` and facing its +z."""
     size = scale(width_m / 2, height_m / 2, 1.0)
     return {"type": "rectangle", "to_world": to_world(pose, size), "bsdf": bsdf, **more}
 
 
 def floor(x: float, y: float, z: float) -> Floats:
-    """Pose at a point that faces up (+y)."""
+    """Return the pose at a point that faces up (+y)."""
     return translate(x, y, z) @ rotate((1, 0, 0), -90)
 
 
@@ -112,24 +116,24 @@ def disk(pose: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
 
 
 def far_disk(towards: tuple[float, float, float], distance_m: float, radius_deg: float) -> Node:
-    """Emitting disk of an angular radius as seen from the origin, such as the sun; `towards` has length 1."""
+    """Return an emitting disk, such as the sun, of an angular radius seen from the origin; `towards` has length 1."""
     pose = look_at(tuple(distance_m * x for x in towards), (0.0, 0.0, 0.0))
     radius_m = distance_m * tan(radians(radius_deg))
     return disk(pose, radius_m, matte(grey(0.02)), emitter={"type": "area"})
 
 
 def star(pose: Floats, radius_m: float, first: Spectrum, second: Spectrum, spokes: int) -> Node:
-    """Disk of `spokes` sectors of each of two colours: its second texture coordinate is the angle."""
+    """Return a disk with `spokes` sectors of each of two colours; its second texture coordinate is the angle."""
     return disk(pose, radius_m, checks(first, second, 0.4, spokes))  # 0.4: under half a check from middle to rim
 
 
 def ball(x: float, y: float, z: float, radius_m: float, bsdf: Node) -> Node:
-    """Sphere about a point."""
+    """Return a sphere around a point."""
     return {"type": "sphere", "center": [x, y, z], "radius": radius_m, "bsdf": bsdf}
 
 
 def block(pose: Floats, width_m: float, height_m: float, depth_m: float, bsdf: Node, **more: Node) -> Node:
-    """Cuboid that stands on the origin of `pose`: x across, y up, z to the front."""
+    """Return a cuboid that stands on the origin of `pose`: x across, y up, z to the front."""
     half = scale(width_m / 2, height_m / 2, depth_m / 2)
     return {"type": "cube", "to_world": to_world(pose, translate(0, height_m / 2, 0), half), "bsdf": bsdf, **more}
 
@@ -141,15 +145,15 @@ def rod(start: tuple[float, float, float], end: tuple[float, float, float], radi
 
 
 def glass() -> Node:
-    """Clear crown glass with a smooth surface; one index for all wavelengths, so that one path serves all bands.
+    """Return clear, smooth crown glass with one index for all wavelengths, so that one path serves all bands.
 
-    1.5187 is Schott N-BK7's at 546 nm; leaving out its dispersion shifts the refracted picture by 1 % at most.
+    1.5187 is Schott N-BK7's index at 546 nm; leaving out its dispersion shifts the refracted picture by 1 % at most.
     """
     return {"type": "dielectric", "int_ior": 1.5187, "ext_ior": 1.000277}
 
 
 def under_sky(name: str, view: Node, shapes: Mapping[str, Node], light: str, reference_plane: str) -> Scene:
-    """Scene of some shapes in a constant environment of 100 cd/m^2, the light group ``sky``."""
+    """Build a scene of some shapes in a constant environment of 100 cd/m^2, the light group ``sky``."""
     geometry = {"type": "scene", "sensor": view, **shapes, "sky": {"type": "constant"}}
     groups = {"sky": LightGroup(("sky",), illuminant(light), SKY_LUMINANCE_CD_M2)}
     return Scene(name, geometry, groups, reference_plane=reference_plane)

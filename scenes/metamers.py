@@ -22,7 +22,7 @@ _BASES = (0, 1, 2, 4, 5, 9, 19, 20, 21, 7, 3, 10)
 
 
 def metamers(light: str = TWINS_UNDER) -> Scene:
-    """Chart of 12 pairs, side by side: patches 0 and 1, 2 and 3, ...; each pair is one colour under D65.
+    """Build a chart of 12 pairs of patches, 0 and 1, 2 and 3, ..., side by side; each pair is one colour under D65.
 
     Parameters
     ----------
@@ -35,9 +35,9 @@ def metamers(light: str = TWINS_UNDER) -> Scene:
 
 @cache
 def pairs() -> tuple[tuple[Spectrum, Spectrum], ...]:
-    """Two reflectances of each pair: a base plus and minus a metameric black (Wyszecki & Stiles 1982, 3.8.4).
+    """Return both reflectances of each pair: a base plus and minus a metameric black (Wyszecki & Stiles 1982, 3.8.4).
 
-    The black is a sum of smooth bumps with XYZ of zero under D65, for the CIE 1931 observer; of all such sums it is the
+    The black is a sum of smooth bumps whose XYZ is zero under D65 for the CIE 1931 observer. Of all such sums it is the
     one of unit size whose XYZ under `OTHER_LIGHT` is the largest.
     """
     nm = grey(0.0).wavelength_nm
@@ -53,7 +53,7 @@ def _pair(nm: Floats, base: Floats, black: Floats) -> tuple[Spectrum, Spectrum]:
 
 
 def _black(nm: Floats) -> Floats:
-    """Metameric black on a grid of reflectances, its largest value 1."""
+    """Return a metameric black on a grid of reflectances, its largest value 1."""
     bumps = np.exp(-0.5 * ((nm[:, None] - np.arange(400.0, 721.0, 20.0)) / BUMP_NM) ** 2)
     # Colours of every bump at fine resolution, and by products of averages over 10 nm: a black of both, so that a
     # program that multiplies averages sees the pairs alike too.
@@ -69,7 +69,7 @@ def _black(nm: Floats) -> Floats:
 
 
 def _colours(nm: Floats, curves: Floats, light: str, at_nm: Floats, width_nm: Floats) -> Floats:
-    """XYZ of curves (nm, curve) under a light, summed over bands: shape (3, curve)."""
+    """Return XYZ of curves (nm, curve) under a light, summed over bands: shape (3, curve)."""
     # A signed curve is no `Spectrum`: take the matrix that averages a grid over the bands instead.
     averages = np.array([Spectrum(nm, row).band_average(at_nm, width_nm) for row in np.eye(nm.size)]).T
     observer = np.array([x.band_average(at_nm, width_nm) for x in colour_matching_functions()]) * width_nm

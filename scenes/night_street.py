@@ -26,7 +26,10 @@ DARK = grey(0.03)
 
 
 def night_street() -> Scene:
-    """Street 5 m wide between house fronts; light groups ``moon``, ``sodium``, ``led`` and ``window``, all in view."""
+    """Build a street 5 m wide between house fronts, with four light groups, all of them in view.
+
+    The groups are ``moon``, ``sodium``, ``led`` and ``window``.
+    """
     left, right = rotate((0, 1, 0), 90), rotate((0, 1, 0), -90)
     line = matte(grey(0.50))
     kerb = matte(KERB)
@@ -64,7 +67,7 @@ def night_street() -> Scene:
 
 
 def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str, Node]:
-    """Front 12 m wide that faces the +z of `pose`: windows with frames and sills in rows, a door, an eaves board."""
+    """Build a house front 12 m wide that faces the +z of `pose`: rows of windows, a door, an eaves board."""
     frame = matte(FRAME)
     pane = glossy(DARK, 0.08)
     nodes = {
@@ -87,7 +90,7 @@ def _house(name: str, pose: Floats, height: float, front: Spectrum) -> dict[str,
 
 
 def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
-    """Street lamp 6 m high on the pavement, its arm over the street (`towards` = 1: to the right)."""
+    """Build a street lamp 6 m high on the pavement, with its arm over the street (`towards` = 1: to the right)."""
     steel = matte(grey(0.12))
     head = x + 1.1 * towards
     down = translate(head, 6.025, z) @ rotate((1, 0, 0), 90)
@@ -100,7 +103,7 @@ def _lamp(name: str, x: float, z: float, towards: int) -> dict[str, Node]:
 
 
 def _car(pose: Floats) -> dict[str, Node]:
-    """Parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
+    """Build a parked car 4.1 m long, seen from behind: boxes, glazing, wheels, rear lamps, number plate."""
     paint = glossy(band(460, 40, 0.03, 0.30), 0.1)
     glazing = glossy(DARK, 0.08)
     tyre = matte(DARK)

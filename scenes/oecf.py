@@ -19,7 +19,7 @@ FILL = 0.6  # of the distance between neighbours, that a patch's side takes
 
 
 def oecf(patches: int = 12, contrast: float = 100.0, light: str = "D65") -> Scene:
-    """Grey patches clockwise from the top, from bright to dark, on grey card in a constant environment.
+    """Build a ring of grey patches on grey card in a constant environment, clockwise from bright to dark.
 
     Parameters
     ----------

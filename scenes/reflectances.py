@@ -17,13 +17,13 @@ _NM = np.arange(380.0, 781.0, 5.0)  # the chart's own grid: one grid for all mat
 
 @cache
 def color_checker_reflectances() -> tuple[tuple[str, Spectrum], ...]:
-    """Name and reflectance of the 24 patches, row by row, 380-780 nm (Ohta 1997)."""
+    """Return the name and reflectance of each of the 24 patches, row by row, 380-780 nm (Ohta 1997)."""
     tables = published_spectra("color_checker")
     return tuple((name, Spectrum(nm, np.clip(values, 0, 1))) for name, (nm, values) in tables.items())
 
 
 def read_reflectances(path: str | Path) -> tuple[tuple[str, Spectrum], ...]:
-    """Name and reflectance of each column of a CSV beside its first, ``wavelength_nm``.
+    """Read the name and reflectance of each column of a CSV but its first, ``wavelength_nm``.
 
     Raises
     ------
@@ -51,7 +51,7 @@ def held(curve: Spectrum) -> Spectrum:
 
 
 def grey(reflectance: Annotated[float, (0.0, 1.0, "give a share of the light")]) -> Spectrum:
-    """Same reflectance, 0 to 1, at every wavelength.
+    """Return the same reflectance, 0 to 1, at every wavelength.
 
     Examples
     --------
@@ -63,15 +63,15 @@ def grey(reflectance: Annotated[float, (0.0, 1.0, "give a share of the light")])
 
 
 def edge(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
-    """Reflectance that rises smoothly from `low` to `high` around `centre_nm`: yellows, oranges, reds."""
+    """Return a reflectance that rises smoothly from `low` to `high` around `centre_nm`: yellows, oranges, reds."""
     return Spectrum(_NM, low + (high - low) / (1 + np.exp(-(_NM - centre_nm) / width_nm)))
 
 
 def band(centre_nm: float, width_nm: float, low: float, high: float) -> Spectrum:
-    """Reflectance with one Gaussian bump of standard deviation `width_nm`: greens, blues."""
+    """Return a reflectance with one Gaussian bump of standard deviation `width_nm`: greens, blues."""
     return Spectrum(_NM, low + (high - low) * np.exp(-0.5 * ((_NM - centre_nm) / width_nm) ** 2))
 
 
 def resampled(wavelength_nm: Floats, values: Floats) -> Spectrum:
-    """Measured curve on the common grid; its ends are held outside its range."""
+    """Resample a measured curve to the common grid; outside its range its end values are kept."""
     return Spectrum(_NM, np.interp(_NM, wavelength_nm, values))

@@ -11,7 +11,7 @@ BLACK, WHITE = grey(0.04), grey(0.85)
 
 
 def siemens_star(spokes: int = 72, light: str = "D65") -> Scene:
-    """Star of black spokes on a white card, in a constant environment.
+    """Build a star of black spokes on a white card, in a constant environment.
 
     On a circle of radius r it has `spokes` / (2 pi r) line pairs per metre.
 

@@ -11,7 +11,7 @@ SIDE_M = 2.0  # each half reaches far out of the picture, 0.5 m high
 
 
 def slanted_edge(contrast: float = 4.0, angle_deg: float = 5.0, light: str = "D65") -> Scene:
-    """Dark half and bright half that meet in an edge through the middle of the picture, in a constant environment.
+    """Build a dark and a bright half that meet in an edge through the picture's middle, in a constant environment.
 
     Parameters
     ----------

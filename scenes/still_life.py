@@ -16,7 +16,7 @@ SPOKES, BARS = 36, 33
 
 
 def still_life(light: str = "D65") -> Scene:
-    """Still life about 0.9 m wide, lit by a large softbox from the left.
+    """Build a still life about 0.9 m wide, lit by a large softbox from the left.
 
     Parameters
     ----------
@@ -59,7 +59,7 @@ def _box(x: float, y: float, z: float, width: float, height: float, turn: float,
 
 
 def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
-    """Thin black spokes: every spatial frequency at once (a Siemens star)."""
+    """Return thin black spokes, which hold every spatial frequency at once (a Siemens star)."""
     nodes: dict[str, Node] = {}
     width = 2 * radius * sin(pi / (2 * SPOKES)) * 0.9
     middle = 0.58 * radius
@@ -71,7 +71,7 @@ def _star(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
 
 
 def _combs() -> dict[str, Node]:
-    """Coloured bars, ever finer, on a white strip in front: where colour resolution shows."""
+    """Return coloured bars, ever finer, on a white strip in front, to show colour resolution."""
     colours: tuple[Spectrum, ...] = (edge(600, 12, 0.05, 0.75), band(530, 35, 0.05, 0.6), band(455, 30, 0.05, 0.6))
     nodes = {"comb_back": panel(floor(0.02, 0.001, 0.40), 0.34, 0.10, matte(WHITE))}
     x = -0.14

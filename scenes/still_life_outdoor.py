@@ -26,9 +26,9 @@ WOOD = (0.33, 0.27, 0.36, 0.30, 0.25, 0.34)
 
 
 def still_life_outdoor() -> Scene:
-    """Garden table about 1 m wide in late-morning sun; light groups ``sun`` and ``sky``, in their true proportion.
+    """Build a garden table about 1 m wide in late-morning sun; ``sun`` and ``sky`` are light groups in true proportion.
 
-    The glass stands in the shade of the crate: sunlight focused by glass on its way to a surface can't be sampled.
+    The glass stands in the shade of the crate, because sunlight that glass focuses on a surface can't be sampled.
     """
     height, bearing = radians(SUN_HEIGHT_DEG), radians(SUN_BEARING_DEG)
     to_sun = (-sin(bearing) * cos(height), sin(height), cos(bearing) * cos(height))
@@ -68,7 +68,7 @@ def still_life_outdoor() -> Scene:
 
 
 def _fruit() -> dict[str, Node]:
-    """Apples in the crate, oranges and a lime on the cloth, grapes beside them."""
+    """Place the fruit: apples in the crate, oranges and a lime on the cloth, grapes beside them."""
     orange = glossy(edge(575, 14, 0.04, 0.72), 0.2)
     grape = glossy(band(430, 40, 0.03, 0.12), 0.15)
     places = {
@@ -86,7 +86,7 @@ def _fruit() -> dict[str, Node]:
 
 
 def _vessels() -> dict[str, Node]:
-    """Wooden crate, glass ball in its shade, copper mug, steel ball, terracotta pot with a small tree."""
+    """Build a crate, a glass ball in its shade, a copper mug, a steel ball and a terracotta pot with a tree."""
     crate, terracotta = matte(edge(580, 40, 0.12, 0.48)), matte(edge(590, 22, 0.08, 0.38))
     copper = metal("Cu", 0.18)
     boards = {
@@ -111,7 +111,7 @@ def _vessels() -> dict[str, Node]:
 
 
 def _tree(x: float, y: float, z: float, radius: float) -> dict[str, Node]:
-    """Clipped box tree: a ball of leafy tufts, evenly spread (golden angle)."""
+    """Build a clipped box tree: a ball of leafy tufts, evenly spread (golden angle)."""
     tufts = {}
     count = 90
     for i in range(count):

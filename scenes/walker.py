@@ -17,7 +17,7 @@ _HIP_M, _SHOULDER_M, _HEAD_M = 0.90, 1.42, 1.64
 
 
 def walker(time_s: float = 0.0) -> Scene:
-    """Street by night with its four light groups, and somebody in a red coat who walks across it to the right.
+    """Build the street of `night_street` with somebody in a red coat who walks across it to the right.
 
     Parameters
     ----------
@@ -35,7 +35,7 @@ def walker(time_s: float = 0.0) -> Scene:
 
 
 def _figure(time_s: float) -> dict[str, Node]:
-    """Legs and arms that swing once a stride, a coat, a pale scarf, a head with a cap."""
+    """Build the walker: legs and arms that swing once per stride, a coat, a pale scarf, a head with a cap."""
     x = _START_M + SPEED_M_S * time_s
     phase = 2 * pi * SPEED_M_S * time_s / STRIDE_M
     swing = radians(_SWING_DEG) * sin(phase)
