@@ -15,7 +15,7 @@ SAFE_PATH = {"PYTHONSAFEPATH": "1"}  # as python -P, for its own children too
 
 
 def safe_environment(**more: str) -> dict[str, str]:
-    """Variables of this process, its import path and `more`."""
+    """Return the environment for a child process: this process's variables and import path, and `more`."""
     return {**os.environ, **SAFE_PATH, "PYTHONPATH": os.pathsep.join(filter(None, sys.path)), **more}
 
 

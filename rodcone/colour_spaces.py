@@ -20,12 +20,12 @@ _BRADFORD = np.array([[0.8951, 0.2664, -0.1614], [-0.7502, 1.7135, 0.0367], [0.0
 
 
 def xyz_from_xy(xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """XYZ of a chromaticity (x, y) at Y = 1."""
+    """Return XYZ of a chromaticity (x, y) at Y = 1."""
     return np.array([xy[0] / xy[1], 1.0, (1 - xy[0] - xy[1]) / xy[1]])
 
 
 def rgb_to_xyz(primaries_xy: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Matrix from linear R, G, B with these primaries, (3, 2) x and y, to XYZ; (1, 1, 1) gives D65 at Y = 1."""
+    """Return the matrix from linear R, G, B of these primaries, (3, 2) x and y, to XYZ; (1, 1, 1) is D65 at Y = 1."""
     columns = np.stack([xyz_from_xy(xy) for xy in primaries_xy], axis=1)
     return np.asarray(columns * np.linalg.solve(columns, xyz_from_xy(D65_XY)))
 
@@ -36,23 +36,23 @@ XYZ_TO_SRGB_ROUNDED = np.array([[3.2406, -1.5372, -0.4986], [-0.9689, 1.8758, 0.
 
 
 def xyz_to_srgb(xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Linear sRGB of XYZ over the last axis; D65 at Y = 1 gives (1, 1, 1)."""
+    """Convert XYZ, along the last axis, to linear sRGB; D65 at Y = 1 gives (1, 1, 1)."""
     return np.asarray(xyz @ np.linalg.inv(SRGB_TO_XYZ).T)
 
 
 def luminance_of_srgb(rgb: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Y of linear sRGB over the last axis."""
+    """Return the luminance Y of linear sRGB, which lies along the last axis."""
     return np.asarray(rgb @ SRGB_TO_XYZ[1])
 
 
 def white_of(linear: NDArray[np.floating]) -> float:
-    """Level of linear sRGB (h, w, 3), or of grey (h, w), that is shown as white; 0 or less where there is no light."""
+    """Return the level of linear sRGB (h, w, 3), or grey (h, w), that is shown as white; 0 or less without light."""
     luminance = linear if linear.ndim == 2 else luminance_of_srgb(linear)
     return float(np.percentile(luminance, WHITE_PERCENTILE)) / WHITE_AT
 
 
 def adapt_to_d65(xyz: NDArray[np.float64], white_xyz: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Bradford chromatic adaptation of XYZ (last axis) from a light's white to D65; Y of the white is kept."""
+    """Adapt XYZ (last axis) from a light's white to D65 by Bradford's transform, which keeps Y of the white."""
     source = _BRADFORD @ (white_xyz / white_xyz[1])
     matrix = np.linalg.inv(_BRADFORD) @ np.diag(_BRADFORD @ xyz_from_xy(D65_XY) / source) @ _BRADFORD
     return np.asarray(xyz @ matrix.T)
@@ -73,6 +73,6 @@ def encode_srgb(linear: NDArray[np.floating]) -> NDArray[np.float64]:
 
 
 def decode_srgb(encoded: NDArray[np.floating]) -> NDArray[np.float64]:
-    """Linear sRGB of encoded values in 0..1 (IEC 61966-2-1)."""
+    """Convert encoded sRGB values in 0..1 to linear ones (IEC 61966-2-1)."""
     low = encoded / 12.92
     return np.asarray(np.where(encoded <= 0.04045, low, ((encoded + 0.055) / 1.055) ** 2.4), dtype=np.float64)

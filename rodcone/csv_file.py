@@ -7,7 +7,7 @@ from typing import TextIO
 
 
 def csv_text(head: Sequence[str], rows: Iterable[Sequence[object]], line_end: str = "\r\n") -> str:
-    """Table as CSV (RFC 4180)."""
+    """Return a table as CSV (RFC 4180)."""
     text = StringIO()
     write_table(text, head, rows, line_end)
     return text.getvalue()

@@ -51,7 +51,7 @@ _WITHOUT_EFFECT = ("BandwidthFWHM", "BandwidthCorrected", "ReflectionGeometry", 
 
 
 def is_curve_file(name: str | Path) -> bool:
-    """Whether a name ends as a table of curves does."""
+    """Return whether a name has an ending of a table of curves."""
     return str(name).lower().endswith(ENDINGS)
 
 
@@ -128,7 +128,7 @@ def _decoded(content: bytes) -> str:
 
 
 def _of_text(text: str, place: str) -> tuple[list[str], Floats]:
-    """Names and numbers of the one table in a text."""
+    """Return the names and numbers of the one table in a text."""
     written = [(number, line.strip()) for number, line in enumerate(text.splitlines(), 1) if line.strip()]
     plain = [(number, line) for number, line in written if not line.startswith(_COMMENTS)]
     parsed = [[_parsed(number, line, separator) for number, line in plain] for separator in _SEPARATORS]
@@ -228,7 +228,7 @@ def _check_decimals(block: Sequence[_Line], place: str) -> None:
 
 
 def _header(above: str, separator: str | None, columns: int, place: str) -> tuple[list[str], Floats]:
-    """Names and factors of a table's columns from the line before it; plain ones where that is no header."""
+    """Return names and factors of a table's columns from the line above, or numbers and 1 if it is no header."""
     comment = above.startswith(_COMMENTS)
     line = above.lstrip("".join(_COMMENTS)).strip() if comment else above
     splits = [_cells(line, by) for by in (separator, "\t", ";", ",", None)] if line else []
@@ -256,7 +256,7 @@ def _header(above: str, separator: str | None, columns: int, place: str) -> tupl
 
 
 def _wavelength_factor(name: str) -> float | None:
-    """Nanometres that a column of wavelengths holds in 1, by its name; None for a name of anything else."""
+    """Return the nanometres per unit of a column of wavelengths, by its name; None for any other column."""
     letters = _NOT_LETTERS.sub("", name.lower())
     if letters in ("nm", "um", "µm", "μm"):
         return LENGTHS_NM[letters]
@@ -271,7 +271,7 @@ def _wavelength_factor(name: str) -> float | None:
 
 
 def _of_tm27(text: str, what: str, place: str) -> Floats:
-    """Numbers of a ``.spdx`` file, which states what it holds."""
+    """Return the wavelengths and values of a ``.spdx`` file (IES TM-27), which names its quantity."""
     found: list[tuple[str, str]] = []
     path: list[str] = []
     said: list[str] = []

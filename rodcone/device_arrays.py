@@ -13,7 +13,7 @@ ALIGNMENT = 64  # bytes; for memory that isn't aligned Dr.Jit compiles another, 
 
 
 def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
-    """Empty array whose memory starts at a multiple of `ALIGNMENT`: Dr.Jit takes it without a copy."""
+    """Return an empty array whose memory starts at a multiple of `ALIGNMENT`: Dr.Jit takes it without a copy."""
     size = int(np.prod(shape)) * np.dtype(dtype).itemsize
     memory = np.empty(size + ALIGNMENT, dtype=np.uint8)
     start = -memory.ctypes.data % ALIGNMENT
@@ -21,10 +21,10 @@ def aligned(shape: tuple[int, ...], dtype: DTypeLike) -> NDArray[Any]:
 
 
 def upload(values: NDArray[Any], *, copy_under: float = inf) -> Any:
-    """Evaluated Dr.Jit array of the same values and type, flat.
+    """Return an evaluated, flat Dr.Jit array of the same values and type.
 
-    It lies over the values themselves where they are contiguous and aligned, or have `copy_under` bytes or more; else
-    over an aligned copy.
+    It uses the memory of the values themselves if they are contiguous and aligned, or have `copy_under` bytes or more;
+    otherwise it uses an aligned copy.
     """
     jit = arrays()
     kinds = {"f4": jit.Float, "f8": jit.Float64, "u4": jit.UInt, "i4": jit.Int}
@@ -51,16 +51,19 @@ def divisor(number: int) -> Divisor:
 
 
 def tile_cell(pixel: UInt, width: Divisor, tile: tuple[Divisor, Divisor]) -> UInt:
-    """Number of each pixel's cell in a tile of (height, width) that is repeated over a picture; row by row, both."""
+    """Return the number of each pixel's cell in a tile of (height, width) that is repeated over a picture.
+
+    Pixels and cells are both numbered row by row.
+    """
     row, column = divide(pixel, width)
     return divide(row, tile[0])[1] * tile[1].number + divide(column, tile[1])[1]
 
 
 def divide(number: UInt, by: Divisor) -> tuple[UInt, UInt]:
-    """Quotient and remainder of whole numbers (UInt) under 2^31.
+    """Return the quotient and remainder of whole numbers (UInt) below 2^31.
 
-    Exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the rounding of its
-    double-precision quotient. CPUs convert Int to Float64 in vectors, UInt they don't.
+    The result is exact: number + 1/2 is at least half a step of 1/divisor from the next multiple, far above the
+    rounding of its double-precision quotient. CPUs convert Int to Float64 in vectors, but not UInt.
     """
     jit = arrays()
     quotient = jit.UInt(jit.Int((jit.Float64(jit.Int(number)) + 0.5) * by.inverse))

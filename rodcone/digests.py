@@ -17,22 +17,22 @@ _LENGTH = 32  # hexadecimal digits, 128 bits: two of a million cells collide wit
 
 
 def digest(value: object) -> str:
-    """Hash of plain data: numbers, texts, arrays, dataclasses, mappings and sequences of them."""
+    """Hash plain data: numbers, texts, arrays, dataclasses, mappings and sequences of them."""
     return digest_bytes(json.dumps(value, sort_keys=True, default=_plain).encode())
 
 
 def digest_inputs(value: object) -> str:
-    """Hash of what a result is made from, as `digest`, with floats rounded to 2^-30 of the largest of their array.
+    """Hash the inputs of a result as `digest` does, with floats rounded to 2^-30 of the largest in their array.
 
-    NumPy and BLAS pick their loops by the processor, so that a spectrum read from a table and resampled has other last
-    bits on another one. The same inputs have the same hash on all; only a float that happens to lie on the edge
-    between two roundings (one in a million of those that differ) makes a result be made again.
+    NumPy and BLAS choose their loops by the processor, so the last bits of a resampled spectrum differ between
+    processors. With rounding the same inputs have the same hash on all of them. Only a float that happens to lie on the
+    edge between two roundings (one in a million of those that differ) causes a result to be computed again.
     """
     return digest(rounded(value))
 
 
 def digest_bytes(*parts: bytes | memoryview) -> str:
-    """Hash of bytes, one after the other."""
+    """Hash the parts' bytes, one after the other."""
     sha = hashlib.sha256()
     for part in parts:
         sha.update(part)
@@ -40,13 +40,13 @@ def digest_bytes(*parts: bytes | memoryview) -> str:
 
 
 def digest_file(path: str | Path) -> str:
-    """Hash of a file's content."""
+    """Hash a file's content."""
     with Path(path).open("rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()[:_LENGTH]
 
 
 def _plain(value: object) -> Any:
-    """What JSON holds in place of a value that it doesn't know."""
+    """Return what JSON holds in place of a value that it doesn't know."""
     if is_dataclass(value):
         return {x.name: getattr(value, x.name) for x in fields(value)}
     if isinstance(value, Mapping):
@@ -55,7 +55,7 @@ def _plain(value: object) -> Any:
 
 
 def rounded(value: object) -> Any:
-    """Plain data with its floats rounded, as `digest_inputs` hashes it."""
+    """Return plain data with its floats rounded as `digest_inputs` hashes them."""
     if isinstance(value, str) and "," in value:  # a spectrum as Mitsuba takes it is text: 0.25,0.5,...
         with suppress(ValueError):
             return rounded(np.array(value.split(","), dtype=np.float64))

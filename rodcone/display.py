@@ -19,7 +19,7 @@ MOST_RANGED = 1 << 20  # elements of an array whose range is worth the time
 
 
 def brief(value: Any) -> str:
-    """Text of a dataclass on one line: its fields but for those at their defaults, arrays by shape and range.
+    """Return the text of a dataclass on one line: fields that differ from their defaults, arrays by shape and range.
 
     A class that holds arrays or tables takes it as its ``__repr__``.
     """
@@ -37,7 +37,7 @@ def _is_default(field: Field[Any], value: object) -> bool:
 
 
 def _text(value: object) -> str:
-    """Text of a field; what is long is named by its kind."""
+    """Return the text of a field; a long value is named by its kind."""
     if isinstance(value, np.ndarray):
         return _array(value)
     if isinstance(value, float | np.floating):
@@ -56,7 +56,7 @@ def _text(value: object) -> str:
 
 
 def _array(values: np.ndarray[Any, Any]) -> str:
-    """Small ones in full, others by shape, type and range."""
+    """Return a small array in full, and of any other its shape, type and range."""
     if 0 < values.size <= MOST_ITEMS and values.ndim == 1:
         return f"[{', '.join(f'{x:.6g}' if values.dtype.kind == 'f' else str(x) for x in values)}]"
     what = f"<{' x '.join(map(str, values.shape))} {values.dtype}"
@@ -67,7 +67,7 @@ def _array(values: np.ndarray[Any, Any]) -> str:
 
 
 def _listed(items: list[str]) -> str:
-    """Items with commas, the first few of many."""
+    """Join items by commas; of many, name the first few and their number."""
     if len(items) <= MOST_ITEMS:
         return ", ".join(items)
     return f"{', '.join(items[: MOST_ITEMS - 1])}, ... {len(items)} in all"
@@ -84,14 +84,14 @@ SIZE = (6.0, 3.0)  # of a figure [inches]
 
 
 def new_axes() -> Axes:
-    """Axes of a figure of their own, which a notebook shows and a script by `matplotlib.pyplot.show`."""
+    """Return the axes of a new figure, which a notebook shows by itself and a script by `matplotlib.pyplot.show`."""
     from matplotlib import pyplot
 
     return pyplot.subplots(figsize=SIZE, layout="constrained")[1]
 
 
 def png_of(draw: Callable[[Axes], object]) -> bytes:
-    """PNG of what a function draws into axes; Matplotlib's list of open figures doesn't grow."""
+    """Return a PNG of what a function draws into axes; Matplotlib's list of open figures doesn't grow."""
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=SIZE, layout="constrained")
@@ -143,10 +143,10 @@ SIDE = 512  # most pixels of a shown picture's longer side
 
 
 def preview_png(linear: NDArray[np.floating]) -> bytes:
-    """PNG of a linear picture, (h, w, 3) sRGB or (h, w) grey, scaled by its own white.
+    """Return a PNG of a linear picture, (h, w, 3) sRGB or (h, w) grey, scaled by its own white.
 
-    Large pictures are subsampled, small ones shown by whole multiples. For display alone: pictures that are compared
-    are adapted and encoded by `rodcone.colour_spaces`.
+    Large pictures are subsampled, small ones enlarged by whole multiples. It is meant for display only: pictures that
+    are to be compared are adapted and encoded by `rodcone.colour_spaces`.
     """
     from PIL import Image  # only here: most programs never show anything
 

@@ -139,7 +139,7 @@ def _array(*shape: int, or_kinds: tuple[str, ...] = (), least: float = -inf) -> 
 
 
 def _spectra(name: str, value: object) -> Any:
-    """Lamps by light group, or one in place of all lights."""
+    """Check lamps by light group, or one illuminant in place of all lights."""
     if isinstance(value, Mapping):
         return value
     return _value("render.spectrum:Spectrum", "give a dict by light group, or an illuminant", _ILLUMINANT)(name, value)
@@ -153,7 +153,7 @@ def _size(name: str, value: Any) -> Any:
 
 
 def _size_or_side(name: str, value: Any) -> Any:
-    """Height and width, or the longer side."""
+    """Check a height and width, or the longer side alone."""
     return int(value) if _passes(_WHOLE, value) and value > 0 else _size(name, value)
 
 
@@ -189,7 +189,7 @@ def _as_it_is(_: str, value: object) -> Any:
 
 
 def _shown(value: Any) -> str:
-    """A value as an error names it: itself where that is short, its class elsewhere."""
+    """Return a value as an error names it: itself if it is short, otherwise its class."""
     text = repr(value) if isinstance(value, str | bytes | int | float | complex | tuple | list) else ""
     return text if 0 < len(text) <= 80 else f"a {type(value).__name__}"
 
@@ -359,7 +359,7 @@ def door(name: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def method(function: F) -> F:
-    """A method of a public value with the checks of its arguments before it, as `door` has them."""
+    """Check the arguments of a public value's method before it runs, as `door` does for functions."""
     return cast(F, door(function.__qualname__, function))
 
 

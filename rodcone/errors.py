@@ -48,7 +48,7 @@ def one_line(error: BaseException) -> str:
 
 
 def is_out_of_memory(error: RuntimeError) -> bool:
-    """Whether Dr.Jit says that memory ran out, of the machine or of its device: it has no error of its own for that."""
+    """Return whether Dr.Jit reports that the machine or device is out of memory: it has no error class for that."""
     return "out of memory" in str(error).lower()
 
 
@@ -152,7 +152,10 @@ def _kinds(owner: object) -> dict[str, Any]:
 
 
 def _fits(value: object, kind: object) -> bool:
-    """Whether a value is of the kind that an annotation states; arrays, and kinds that aren't classes, always are."""
+    """Return whether a value is of the kind that an annotation states.
+
+    The answer is always yes for arrays and for kinds that aren't classes.
+    """
     parts = get_args(kind)
     if isinstance(kind, UnionType):
         return any(_fits(value, part) for part in parts)

@@ -47,14 +47,14 @@ def require_known(kind: str, keys: Mapping[str, Any]) -> None:
 
 
 def _almost(name: str, known: tuple[str, ...]) -> str:
-    """Known key of the same struct that is spelt almost so; empty where none is."""
+    """Return the known key of the same struct with almost the same spelling; empty if there is none."""
     struct, _, field = name.rpartition("/")
     fields = {key.rpartition("/")[2]: key for key in known if key.rpartition("/")[0] == struct}
     return next((fields[near] for near in get_close_matches(field, fields, n=1, cutoff=_LIKE)), "")
 
 
 def _changes_nothing(value: object, nothing: str) -> bool:
-    """Whether a value, or each of a list of them, is the one without effect, or empty."""
+    """Return whether a value, or each one of a list, is empty or the value without effect."""
     if isinstance(value, bool):
         return str(value).lower() == nothing
     parts = str(value).strip("{}[]() \n").replace(" ", "").split(",")

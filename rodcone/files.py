@@ -38,7 +38,7 @@ def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
 
 
 def _named(error: OSError, paths: Mapping[str, Path]) -> OSError:
-    """Error with the path that was asked for and the cause: libraries leave both out where a disk is full."""
+    """Return an error with the path that the caller named and the cause: libraries omit both where a disk is full."""
     path = paths.get(str(error.filename)) or (next(iter(paths.values())) if error.filename is None else None)
     if path is None:
         return error
@@ -55,7 +55,7 @@ def write_files(files: Mapping[Path, str | bytes | memoryview]) -> None:
 
 
 def is_half_written(path: Path) -> bool:
-    """Whether a path is a file that `replacing` had begun to write, as a killed program leaves it behind."""
+    """Return whether a path is a file that `replacing` began to write and a killed program left behind."""
     return bool(_HALF_WRITTEN.fullmatch(path.name)) and path.is_file() and not path.is_symlink()
 
 
@@ -93,7 +93,7 @@ def check_place(path: Path) -> None:
 
 
 def inside(folder: Path, name: str) -> Path:
-    """Path of a file that another file names, which has to lie below a folder.
+    """Return the path of a file that another file names, which has to lie below a folder.
 
     Raises
     ------
@@ -107,7 +107,10 @@ def inside(folder: Path, name: str) -> Path:
 
 
 def _place_beside(path: Path) -> Path:
-    """New path beside a path, in a folder that can be written, with its ending, by which writers choose a format."""
+    """Return a new path beside a path, in a folder that can be written to.
+
+    It has the path's ending, because writers choose a format by it.
+    """
     place = path.with_name(f".rodcone-{os.urandom(8).hex()}{path.suffix}")
     try:
         place.open("xb").close()
@@ -118,7 +121,7 @@ def _place_beside(path: Path) -> Path:
 
 
 def finite(value: object) -> Any:
-    """A value as a JSON file holds it: None in place of every NaN and infinity, lists in place of tuples."""
+    """Return a value as a JSON file holds it: None in place of every NaN and infinity, lists in place of tuples."""
     if isinstance(value, float):
         return value if isfinite(value) else None
     if isinstance(value, Mapping):

@@ -80,14 +80,14 @@ def syntax(function: Callable[..., Any]) -> Callable[..., Any]:
 
 @cache
 def backend() -> Backend:
-    """Where kernels run: ``cuda`` where a device answers, else ``llvm``, else ``numpy``."""
+    """Return where kernels run: ``cuda`` if a device answers, else ``llvm``, else ``numpy``."""
     if dr.has_backend(dr.JitBackend.CUDA):
         return "cuda"
     return "llvm" if LIBLLVM and dr.has_backend(dr.JitBackend.LLVM) else "numpy"
 
 
 def compiler_version() -> str:
-    """Version of the LLVM or CUDA that kernels are compiled by, ``none`` on ``numpy``."""
+    """Return the version of LLVM or CUDA that compiles kernels; ``none`` on ``numpy``."""
     version = {"llvm": dr.detail.llvm_version, "cuda": dr.detail.cuda_version}.get(backend())
     return ".".join(map(str, version())) if version else "none"
 
@@ -108,7 +108,7 @@ def compiling() -> Iterator[Callable[[], float]]:
 
 
 def arrays() -> ModuleType:
-    """Module of Dr.Jit array types (`Float`, `UInt`, ...) of the backend; raises RuntimeError on ``numpy``."""
+    """Return the module of the backend's Dr.Jit array types (`Float`, `UInt`, ...); raise RuntimeError on ``numpy``."""
     name = backend()
     if name == "numpy":
         raise RuntimeError("Dr.Jit has neither LLVM nor CUDA here; see `rodcone doctor`")

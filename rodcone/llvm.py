@@ -19,7 +19,7 @@ _LIBRARY_NAME = re.compile(r"libLLVM(?:-(\d+)\.so(?:\.\d+)*|\.so\.(\d+)(?:\.\d+)
 
 
 def llvm_version(path: Path) -> int | None:
-    """Major version of an LLVM library by its file name, None where the name doesn't tell."""
+    """Return the major version of an LLVM library by its file name; None if the name doesn't state it."""
     match = _LIBRARY_NAME.match(path.name)
     return int(match[1] or match[2]) if match else None
 
@@ -47,13 +47,13 @@ def _system_library() -> Path | None:
 
 
 def find_llvm() -> Path | None:
-    """Library that Dr.Jit is told to use, None where there is none of version 17 or more."""
+    """Return the LLVM library that Dr.Jit should use; None if there is none of version 17 or more."""
     stated_path = os.environ.get("DRJIT_LIBLLVM_PATH")
     return Path(stated_path) if stated_path else _wheel_library() or _system_library()
 
 
 def _loaded_too_early() -> Path | None:
-    """LLVM library of less than 17 that an earlier `import drjit` has already loaded; it can't be replaced."""
+    """Return an LLVM library below 17 that an earlier `import drjit` has loaded, if any; it can't be replaced."""
     maps = Path("/proc/self/maps")
     if "drjit" not in sys.modules or not maps.is_file():
         return None

@@ -76,9 +76,9 @@ def memory(
     held: int = 0,
     light_arrays: int | None = None,
 ) -> Memory:
-    """Memory that a render of so many light groups needs, or what comes after it where that needs more.
+    """Return the memory that a render of so many light groups needs, or the steps after it if they need more.
 
-    Kernels that no earlier render has left in `~/.drjit` are compiled, which takes up to 3 MB a band more.
+    Kernels that no earlier render has left in `~/.drjit` are compiled, which takes up to 3 MB more per band.
 
     Parameters
     ----------
@@ -87,14 +87,14 @@ def memory(
     workers : int
         Processes that develop cells; 1: the process that renders does, 0: no cells are made here.
     spp : float, optional
-        Samples per pixel of the render, at most; 0 where the light is there already; left out, many.
+        Samples per pixel of the render, at most; 0 if the light exists already; left out, many.
     denoised : bool
         Whether the render is denoised.
     held : int
-        Other renders of this size whose light is held meanwhile.
+        Other renders of this size whose light is kept in memory meanwhile.
     light_arrays : int, optional
-        Of a capture, which makes the bands that it images one at a time: how many arrays of all bands each group's
-        light is. Left out, the light is a render's and all of its bands are looked at together.
+        For a capture, which computes the bands that it images one at a time: how many arrays of all bands each group's
+        light takes. Left out, the light is a render's, and all of its bands are viewed together.
     """
     plane = 4.0 * pixels * bands  # of float32, all bands
     per_pixel = _DENOISED_ARRAYS * groups * 4.0 * bands + _DENOISER_BYTES
@@ -142,7 +142,7 @@ def require_memory(need: Memory, force: bool = False) -> None:
 
 
 def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
-    """Bounds on this process's memory that the system states, if any.
+    """Yield the bounds on this process's memory that the system states, if any.
 
     Parameters
     ----------
@@ -161,7 +161,7 @@ def memory_limits(root: Path = Path("/")) -> Iterator[Limit]:
 
 
 def _groups(root: Path) -> Iterator[Limit]:
-    """Limits of the control groups that this process is in, of both versions; parents bind too."""
+    """Yield the limits of the control groups that this process is in, of both versions; those of parents apply too."""
     mount = root / "sys/fs/cgroup"
     try:
         places = [line.split(":", 2) for line in (root / "proc/self/cgroup").read_text().splitlines()]
@@ -185,7 +185,7 @@ def _groups(root: Path) -> Iterator[Limit]:
 
 
 def _group_limit(folder: Path, most_file: str, used_file: str, cache_key: str) -> Limit:
-    """Limit of one group; `ValueError` where it has none. Cached files don't count as used."""
+    """Return the limit of one group, with cached files not counted as used; raise `ValueError` if it has none."""
     most = int((folder / most_file).read_text())  # the word "max" without a limit
     used = int((folder / used_file).read_text())
     cached = dict(line.split() for line in (folder / "memory.stat").read_text().splitlines())[cache_key]
@@ -193,7 +193,7 @@ def _group_limit(folder: Path, most_file: str, used_file: str, cache_key: str) -
 
 
 def _pages(field: int) -> float:
-    """Memory of this process [bytes] by a field of ``/proc/self/statm``: 0 all addresses, 1 what is resident."""
+    """Return this process's memory [bytes] by a field of ``/proc/self/statm``: 0 all addresses, 1 the resident part."""
     with suppress(OSError, LookupError, ValueError):
         return float(Path("/proc/self/statm").read_text().split()[field]) * resource.getpagesize()
     return 0.0

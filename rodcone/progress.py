@@ -82,7 +82,7 @@ def progress_bar(step: Step | None) -> Iterator[Step]:
 
 
 def _notebook_display() -> Callable[..., Any] | None:
-    """IPython's display where a notebook's kernel runs this; IPython is asked only where it is loaded already."""
+    """Return IPython's display function if a notebook's kernel runs this; don't load IPython to find out."""
     ipython = sys.modules.get("IPython")
     shell = ipython.get_ipython() if ipython else None
     if shell is None or not hasattr(shell, "kernel"):
@@ -109,7 +109,10 @@ def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
 
 
 def render_words(error: float, share: float = 0.0) -> str:
-    """What a render is at: until its first share it may compile, and some samples later its error is known."""
+    """Return what a render is doing.
+
+    It may be compiling until its first share is done, and its error is known some samples later.
+    """
     if math.isfinite(error):
         return f"render, relative error {error:.3f}"
     return "render" if share else "render, compiling"
@@ -123,7 +126,7 @@ def compile_note(seconds: float) -> str | None:
 
 
 def duration(seconds: float) -> str:
-    """Time in words, to the precision that an estimate has: ``40 s``, ``3 min``, ``2.5 h``, ``3 days``."""
+    """Return a time in words, as precise as an estimate is: ``40 s``, ``3 min``, ``2.5 h``, ``3 days``."""
     if seconds < 100:
         return f"{seconds:.0f} s"
     if seconds < 6000:

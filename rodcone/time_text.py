@@ -12,7 +12,7 @@ _SECONDS = {"us": 1e-6, "ms": 1e-3, "s": 1.0}
 
 
 def parse_time(text: str, name: str = "time", others: Sequence[str] = ()) -> float:
-    """Time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; `others` are what an error names beside it.
+    """Return the time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; an error also lists `others` as allowed.
 
     Raises
     ------

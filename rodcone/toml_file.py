@@ -33,7 +33,7 @@ _TYPES = {bool: (bool,), str: (str,), int: (int,), float: (int, float)}  # what 
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """Content of a TOML file.
+    """Return the content of a TOML file.
 
     Raises
     ------
@@ -47,7 +47,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def parse_toml(text: str) -> dict[str, Any]:
-    """Content of a text in TOML; a `ValueError` as `read_toml`."""
+    """Return the content of a text in TOML; raise `ValueError` as `read_toml` does."""
     if _LONG_KEY.search(text):
         raise ValueError("it is nested too deep")
     try:
@@ -67,9 +67,9 @@ def _check_numbers(value: object) -> None:
 
 
 def strict_converter() -> Converter:
-    """Converter that takes a whole number for a number, and converts nothing else.
+    """Return a converter that accepts a whole number as a number, and converts nothing else.
 
-    Python would take a text that reads as a number for one, and true for 1.
+    Without it a text that reads as a number would become one, and true would become 1.
     """
     converter = Converter(forbid_extra_keys=True)
     for kind in _WORDS:
@@ -80,12 +80,12 @@ def strict_converter() -> Converter:
 
 
 def structured(content: object, kind: type[Kind], converter: Converter, fix: str) -> Kind:
-    """Dataclass of a table's keys.
+    """Return the dataclass that a table's keys describe.
 
     Parameters
     ----------
     content : dict
-        As `rodcone.toml_file.read_toml` gives it.
+        As `rodcone.toml_file.read_toml` returns it.
     fix : str
         Where to look for what is allowed, such as ``see rodcone new study``.
 
@@ -101,7 +101,7 @@ def structured(content: object, kind: type[Kind], converter: Converter, fix: str
 
 
 def is_tuple(kind: object) -> bool:
-    """Whether a type is a tuple of others."""
+    """Return whether a type is a tuple of others."""
     origin: object = get_origin(kind)
     return origin is tuple
 

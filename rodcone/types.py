@@ -27,7 +27,7 @@ def require_unmasked(name: str, value: object) -> None:
 
 
 def real_array(name: str, value: object) -> NDArray[Any]:
-    """Array of whole or floating numbers; raises `InputError` for complex ones, masked values, text and the like."""
+    """Return an array of whole or floating numbers; raise `InputError` for complex or masked ones, text and others."""
     require_unmasked(name, value)
     try:
         array = np.asarray(value)
