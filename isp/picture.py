@@ -53,17 +53,17 @@ class Picture:
 
     @property
     def shape(self) -> tuple[int, ...]:
-        """Shape of `rgb`."""
+        """Return the shape of `rgb`."""
         return self.rgb.shape
 
     @property
     def substituted(self) -> bool | None:
-        """Whether W gave most of the luminance; None if W substitutes nothing."""
+        """Return whether W gave most of the luminance; None if W substitutes nothing."""
         return None if self.substitution is None else self.substitution > 0.5
 
     @property
     def snr_db(self) -> float | None:
-        """`snr` in decibels; None without an SNR or without signal."""
+        """Return `snr` in decibels; None without an SNR or without signal."""
         return 20 * float(np.log10(self.snr)) if self.snr is not None and self.snr > 0 else None
 
     def __array__(self, dtype: DTypeLike | None = None, copy: bool | None = None) -> NDArray[np.floating]:

@@ -57,7 +57,7 @@ class Settings:
 
     @cached_property
     def reach(self) -> int:
-        """Largest offset in Omega along one axis [pixels]."""
+        """Return the largest offset in Omega along one axis [pixels]."""
         return self.neighbourhood // 2
 
     def __post_init__(self) -> None:

@@ -56,7 +56,7 @@ class Gaussians:
 
     @property
     def directions(self) -> Floats:
-        """F and b mu together, in the form of `factors`."""
+        """Return F and b mu together, in the form of `factors`."""
         return np.concatenate([self.factors, self.brightness * self.means[..., None]], axis=-1)
 
 

@@ -168,7 +168,7 @@ def _read_numpy(raw: RawImage, ratios: Floats, white: int) -> tuple[Floats, Floa
     value = electrons / own
 
     def noise(light: Floats) -> Floats:
-        """Variance of a sample read as W [e-^2], at some light."""
+        """Return the variance of a sample that is read as W [e-^2], at some light."""
         return np.asarray(np.maximum((shot[site] * np.maximum(light, 0.0) + dark[site] / own) / own, TINY))
 
     weight = 1.0 / noise(light)

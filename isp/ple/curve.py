@@ -58,7 +58,10 @@ def on_the_curve(
 
 
 def over_black(roots: Singles, dark_e: tuple[float, ...]) -> Singles:
-    """Mean readings over those of black, of twice the roots of expected electrons, channels in turn; under 0 as 0."""
+    """Return mean readings less those of black, from twice the roots of expected electrons, channels in turn.
+
+    A negative root counts as 0. The result overwrites `roots`.
+    """
     bases, steps, firsts, offsets = _side_by_side(dark_e, roots.shape[1] // len(dark_e))
     # clip is three times as fast as minimum and maximum
     over = np.clip(roots, 0.0, np.inf, out=roots)
@@ -74,7 +77,10 @@ def over_black(roots: Singles, dark_e: tuple[float, ...]) -> Singles:
 
 @lru_cache(maxsize=256)
 def _side_by_side(dark_e: tuple[float, ...], repeats: int) -> tuple[Singles, ...]:
-    """4 d^2 + 1/2, steps in twice a root, and a channel's first step, by value; then all steps of `Readings.offset`."""
+    """Return what `over_black` needs for each value, and all steps of `Readings.offset` less black.
+
+    For each value that is 4 d^2 + 1/2, the number of steps per unit of twice a root, and its channel's first step.
+    """
     curves = [readings(noise_e) for noise_e in dark_e]
     black = np.array([curve.mean(np.zeros(1))[0] for curve in curves])
     offsets = np.stack([curve.offset for curve in curves])

@@ -71,7 +71,7 @@ class Scale:
 
     @cached_property
     def any_full(self) -> bool:
-        """Whether any sample is full."""
+        """Return whether any sample is full."""
         return bool(self.full.any())
 
 
@@ -112,7 +112,7 @@ class LitPatches:
     last: bool = True
 
     def parts(self) -> Iterator["LitPatches"]:
-        """Groups of at most `TOGETHER` of the patches."""
+        """Split the patches into groups of at most `TOGETHER`."""
         end = len(self.index)
         for first in range(0, end, TOGETHER):
             yield replace(self, index=self.index[first : first + TOGETHER], last=first + TOGETHER >= end)
@@ -200,7 +200,7 @@ def estimate(prior: Prior, scale: Scale, light: Singles, pilot: PatchPilot | Non
 def _in_turn(
     threads: ThreadPoolExecutor, solve: Callable[[LitPatches], Solved], parts: Sequence[LitPatches]
 ) -> Iterator[Solved]:
-    """Results of parts in their order; few of them at once, because each takes `TOGETHER` patches of memory."""
+    """Yield the results of parts in their order; few run at once, because each needs memory for `TOGETHER` patches."""
     waiting = deque[Future[Solved]]()
     for part in parts:
         if len(waiting) > (cpu_count() or 1):
@@ -211,7 +211,7 @@ def _in_turn(
 
 
 def _groups(samplings: tuple[tuple[Sampling, ...], ...], steps: NDArray[np.int16]) -> list[LitPatches]:
-    """Patches of each sampling and step of light."""
+    """Group the patches by sampling and step of light."""
     ny, nx = steps.shape
     distinct = list(dict.fromkeys(sampling for line in samplings for sampling in line))
     numbers = np.array([[distinct.index(sampling) for sampling in line] for line in samplings], np.int8)
@@ -259,7 +259,7 @@ def _solve(prior: Prior, part: LitPatches, scale: Scale, pilot: PatchPilot | Non
 
 
 def _samples(values: NDArray[Any], scale: Scale, index: NDArray[np.intp]) -> NDArray[Any]:
-    """Samples of patches, shape (patch, sample)."""
+    """Return the samples of patches, shape (patch, sample)."""
     samples = gather(values, index, scale.samplings[0][0].size)
     return samples if scale.columns is None else samples[:, scale.columns]
 

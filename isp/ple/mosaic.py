@@ -114,7 +114,7 @@ def _cell_sampling(
 
 
 def _first_patch(presence: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """Which channels the cells of a patch hold, shape (cell, channel): patches begin at the tile's first one."""
+    """Return which channels the cells of a patch contain, shape (cell, channel), from the tile's first cell on."""
     down, across, count = presence.shape
     return np.tile(presence, (CELLS // down, CELLS // across, 1)).reshape(-1, count)
 
@@ -132,13 +132,16 @@ def _sampling(
 
 
 def counted_noise(raw: RawImage) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """Variance k of R, G, B and W per electron of light, 1 of plain counts; dark noise in counted electrons."""
+    """Return the noise of R, G, B and W: the variance k per electron of light, and the dark noise in counted electrons.
+
+    k is 1 for a sample that counts every electron for which it stands.
+    """
     noise = [raw.noise_of(name) for name in LETTERS]
     return np.array([x.shot for x in noise]), np.array([x.dark_noise_e / x.shot for x in noise])
 
 
 def site_electrons(raw: RawImage) -> Singles:
-    """Electrons that the sites of a mosaic count, (h, w) float32: over k, so that their shot noise is Poisson's."""
+    """Return the electrons that a mosaic's sites count, (h, w) float32, of Poisson's noise: the image's over k."""
     electrons = raw.electrons.astype(np.float32)
     counted = electrons / np.float32(raw.plain_noise.shot)
     for noise in (raw.noise_of(apart.channel) for apart in raw.channel_noise):
@@ -148,12 +151,12 @@ def site_electrons(raw: RawImage) -> Singles:
 
 
 def full_white(raw: RawImage) -> NDArray[np.bool_]:
-    """Saturated samples of W beside G, which is full long after."""
+    """Return where W is saturated in a mosaic with G, which saturates much later; nowhere in a mosaic without G."""
     return np.asarray(raw.saturated & (channel_map(raw.cfa, raw.shape) == "W") & ("W" not in raw.colour_channels))
 
 
 def scale_of_cells(cells: Cells) -> Scale:
-    """Sums in units of noise, as `isp.ple.estimate` takes them."""
+    """Convert sums over cells to units of noise, as `isp.ple.estimate` takes them."""
     stable = [
         transform(plane, cells.sampling.dark_e[channel])
         for plane, channel in zip(np.moveaxis(cells.electrons, -1, 0), cells.index, strict=True)
@@ -169,7 +172,7 @@ def scale_of_cells(cells: Cells) -> Scale:
 
 
 def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full: NDArray[np.bool_]) -> Scale:
-    """Samples in units of noise, and a sampling for each phase of the tile within patches; as `pyramid`."""
+    """Convert samples to units of noise, with a sampling for each phase of the tile; parameters as `pyramid`."""
     down, across = (len(raw.cfa), len(raw.cfa[0]))
     beyond = PATCH - STRIDE  # pixels of the first patch that lie before the frame
     samplings = tuple(
@@ -189,7 +192,7 @@ def scale_of_pixels(raw: RawImage, white_e: ArrayLike, electrons: Singles, full:
 
 
 def _sites(tile: Tile, top: int, left: int) -> tuple[int, ...]:
-    """Places of a patch's samples in its vector, whose first pixel lies at (top, left)."""
+    """Return the indices of a patch's samples in its vector; the patch's first pixel lies at (top, left)."""
     return tuple(
         4 * (PATCH * y + x) + LETTERS.index(tile[(top + y) % len(tile)][(left + x) % len(tile[0])])
         for y in range(PATCH)
@@ -198,9 +201,9 @@ def _sites(tile: Tile, top: int, left: int) -> tuple[int, ...]:
 
 
 def pad_mosaic(tile: Tile, *samples: NDArray[Any]) -> tuple[NDArray[Any], ...]:
-    """Samples (h, w) of a mosaic, continued beyond the frame by reflection; the tile goes on too.
+    """Continue samples (h, w) of a mosaic beyond the frame by reflection, with the tile continued too.
 
-    Where the reflected pixel is of another channel, the nearest pixel beside it of the right one stands for it.
+    Where the reflected pixel has another channel, the nearest pixel beside it with the right one takes its place.
     """
     wide = tuple(padded(plane, PATCH) for plane in samples)
     if max(len(tile), len(tile[0])) <= 2:  # reflection keeps a tile of two

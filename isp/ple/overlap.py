@@ -66,7 +66,7 @@ def _lines(values: NDArray[Any], size: int) -> NDArray[np.void]:
 
 
 def _places(values: NDArray[Any], index: NDArray[np.intp], size: int) -> NDArray[np.intp]:
-    """Places of patches' lines among `_lines`, shape (patch, line)."""
+    """Return the indices of patches' lines in `_lines`, shape (patch, line)."""
     width = values.shape[1]
     rows, columns = np.divmod(index, (width - size) // STRIDE + 1)
     return np.asarray((STRIDE * rows[:, None] + np.arange(size)) * (width // STRIDE) + columns[:, None])

@@ -58,7 +58,7 @@ def pick(components: Table, evidence: Singles, noise: Singles | None) -> tuple[N
 
 
 def blocks(index: NDArray[np.intp], length: int = BLOCK) -> Iterator[NDArray[np.intp]]:
-    """Parts of an index, `length` long."""
+    """Yield parts of an index that are `length` long."""
     return (index[first : first + length] for first in range(0, len(index), length))
 
 

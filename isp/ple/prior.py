@@ -66,7 +66,7 @@ class Prior:
 
     @property
     def neutral_e(self) -> NDArray[np.float64]:
-        """Electrons of R, G, B and W from white under D65, relative to G, shape (4,): a signal of 1 in each."""
+        """Return the electrons of R, G, B and W from white under D65, relative to G, shape (4,): signals of 1."""
         return np.asarray(self.neutrals_e[0])
 
 
@@ -94,7 +94,7 @@ class Mixture:
 
 @cache
 def mixture(prior: Prior, size: int = PATCH) -> Mixture:
-    """The prior of the middle `size` pixels of its patches."""
+    """Return the prior of the middle `size` pixels of its patches."""
     inside = np.zeros((PATCH, PATCH, 4), dtype=bool)
     edge = (PATCH - size) // 2
     inside[edge : edge + size, edge : edge + size] = True
@@ -113,9 +113,9 @@ def mixture(prior: Prior, size: int = PATCH) -> Mixture:
 def _mixed(
     means: NDArray[np.float64], covariances: NDArray[np.float32], mixing: NDArray[np.float64]
 ) -> tuple[NDArray[np.float64], NDArray[np.float32]]:
-    """Gaussians over roots of signals K x, from those over roots of signals x, to first order about the means.
+    """Convert Gaussians over roots of signals x to those over roots of signals K x, to first order about the means.
 
-    A pixel's neighbours count as if they showed what it shows itself.
+    Crosstalk is counted as if a pixel's neighbours showed the same light as the pixel itself.
     """
     components, values = means.shape
     roots = np.abs(means).reshape(components, -1, 4)
@@ -132,7 +132,7 @@ def _mixed(
 
 
 def mixed_prior(prior: Prior, mixing: NDArray[np.float64], white_e: NDArray[np.float64]) -> Prior:
-    """Prior of a camera whose pixels exchange charge.
+    """Return the prior of a camera whose pixels exchange charge.
 
     Parameters
     ----------
@@ -152,13 +152,13 @@ def mixed_prior(prior: Prior, mixing: NDArray[np.float64], white_e: NDArray[np.f
 
 @lru_cache(maxsize=8)
 def _prior_with(prior: Prior, mixing: tuple[float, ...], neutrals_e: tuple[float, ...]) -> Prior:
-    """One value for one camera and light: what is made of a prior is kept by its identity."""
+    """Return the same object for the same camera and light, because caches know a prior by its identity."""
     return replace(prior, mixing=np.reshape(mixing, (4, 4)), neutrals_e=np.reshape(neutrals_e, (-1, 4)))
 
 
 @cache
 def own_prior() -> Prior:
-    """The prior of the project's own curves."""
+    """Return the prior of the project's own curves."""
     return load_prior(OWN)
 
 

@@ -104,7 +104,7 @@ def reconstruct(raw: RawImage, prior: Prior, white_e: ArrayLike) -> tuple[Single
 
 
 def _sides(shape: tuple[int, ...], coarse: tuple[int, ...], size: int) -> list[tuple[int, int]]:
-    """Cells to add before and behind, so that 4x4 of them stand for each patch of the finer scale."""
+    """Return how many cells to add before and behind, so that each patch of the finer scale has its 4x4 cells."""
     patches = [(length - 1) // STRIDE + size // STRIDE for length in shape]
     return [
         (size // STRIDE - 1, count + CELLS - size // STRIDE - cells)
@@ -129,7 +129,7 @@ def _light_of_sums(cells: Cells, sides: list[tuple[int, int]], stride: int) -> P
 
 
 def _medians(cells: Cells) -> NDArray[np.float64]:
-    """Median of each channel's electrons over the cells that hold it, shape (channel,)."""
+    """Return the median of each channel's electrons over the cells that contain the channel, shape (channel,)."""
     down, across, _ = cells.presence.shape
     medians = np.empty(len(cells.index))
     for c in range(len(cells.index)):
@@ -177,7 +177,7 @@ def _in_finer_units(planes: Singles, variance: Singles, before: Sampling, now: S
 
 
 def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
-    """Means over the cells that each patch of a finer scale covers."""
+    """Average values over the cells that each patch of a finer scale covers."""
     side = size // STRIDE
     sides = [(side - 1, count - cells) for count, cells in zip(shape, values.shape[:2], strict=True)]
     wide = np.pad(values, [*sides, (0, 0)], mode="symmetric")
@@ -185,7 +185,7 @@ def _patch_means(values: Singles, shape: tuple[int, ...], size: int) -> Singles:
 
 
 def _sums(values: NDArray[Any], stride: int, side: int = CELLS) -> Singles:
-    """Sums over `side` x `side`, `stride` apart."""
+    """Sum values over squares of `side` x `side` that are `stride` apart."""
     ends = [(length - side) // stride * stride + 1 for length in values.shape[:2]]
     rows = values[: ends[0] : stride].astype(np.float32)
     for i in range(1, side):

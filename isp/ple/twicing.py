@@ -105,7 +105,7 @@ def twice_colours(planes: Singles, stable: Singles, raw: RawImage) -> None:
 
 
 def _to_pixels(cells: Singles) -> Singles:
-    """Values of each row's pixels from those of its cells: means over 2 `CELL` - 1 pixels, linear in between."""
+    """Return the values of each row's pixels: means of the cells' values over the 2 `CELL` - 1 pixels around them."""
     wide = np.pad(cells, ((1, 1), (0, 0)), mode="edge")
     side = 2 * CELL - 1
     place = np.arange(CELL, dtype=np.float32)[:, None] / side
@@ -115,9 +115,10 @@ def _to_pixels(cells: Singles) -> Singles:
 
 
 def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singles:
-    """Shares of cells from those of wider ones: linear between their centres, weighted by how alike they are in x.
+    """Interpolate the shares of wider cells to cells, weighted by how alike the cells are in x.
 
-    A cell that is like none of the wide ones around it, as beside an edge, gets next to nothing.
+    The interpolation is linear between the centres of the wider cells. A cell that is like none of the wide ones around
+    it, as beside an edge, gets next to nothing.
     """
     if together == 1:
         return share
@@ -144,7 +145,7 @@ def _to_cells(share: Singles, wide: Singles, x: Singles, together: int) -> Singl
 
 
 def _biases(x: Singles, sums: list[Singles], light: Singles, guide: int, colours: list[int]) -> Singles:
-    """`_bias` of all cells, strips of rows at a time; parameters as of it, without `REACH` cells around."""
+    """Return `_bias` of all cells, by strips of rows; its parameters come without the `REACH` cells around."""
     sides = ((REACH, REACH), (REACH, REACH), (0, 0))
     wide = [np.pad(values, sides) for values in (x, *sums)]  # nothing is known beyond the picture
     bias = np.empty_like(light)
@@ -199,7 +200,7 @@ def _bias(x: Singles, wide: list[Singles], light: Singles, guide: int, colours: 
 
 
 def _sums(values: NDArray[Any], side: int = CELL) -> Singles:
-    """Sums over `side` x `side` values; those at the far edges may be over fewer."""
+    """Sum `side` x `side` values each; sums at the far edges may be over fewer."""
     height, width = values.shape[:2]
     filled = np.pad(values, ((0, -height % side), (0, -width % side), *((0, 0),) * (values.ndim - 2)))
     cells = filled.reshape(len(filled) // side, side, filled.shape[1] // side, side, *values.shape[2:])

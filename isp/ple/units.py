@@ -56,26 +56,26 @@ class Readings:
     excess: Floats
 
     def mean(self, electrons: NDArray[Any]) -> Floats:
-        """Mean reading of expected electrons, 0 or more."""
+        """Return the mean reading of expected electrons, which are 0 or more."""
         return 2.0 * _limit(electrons, self.dark_e) + self.offset[self._step(electrons)]
 
     def slope(self, electrons: NDArray[Any]) -> Floats:
-        """Slope of the mean reading [1/e-]."""
+        """Return the slope of the mean reading over expected electrons [1/e-]."""
         return self.steepness[self._step(electrons)] / _limit(electrons, self.dark_e)
 
     def variance(self, electrons: NDArray[Any]) -> Floats:
-        """Variance of a reading by shot and dark noise."""
+        """Return the variance of a reading that comes from shot and dark noise."""
         return np.asarray(self.variances[self._step(electrons)] * _straight(electrons, self.dark_e))
 
     def moments(self, electrons: NDArray[Any]) -> tuple[Floats, Floats, Floats]:
-        """Mean, slope and variance together."""
+        """Return the mean, slope and variance of a reading together."""
         limit = _limit(electrons, self.dark_e)
         step = self._step(electrons)
         straight = _straight(electrons, self.dark_e)
         return 2.0 * limit + self.offset[step], self.steepness[step] / limit, self.variances[step] * straight
 
     def electrons(self, readings: NDArray[Any]) -> Floats:
-        """Electrons whose mean reading this is; under 0 where it is under the mean reading of 0."""
+        """Return the electrons whose mean reading this is; negative below the mean reading of 0 electrons."""
         values = np.maximum(readings, 0.0)
         plain = 0.25 * np.square(values, dtype=np.float64) - ((LIFT * self.dark_e) ** 2 + 0.125)
         return np.asarray(plain + self.excess[_nearest(values, self.most[1])])
@@ -85,13 +85,13 @@ class Readings:
 
 
 def transform(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
-    """Readings of samples [e-], of their type."""
+    """Transform samples [e-] to readings, in the samples' own type."""
     return stabilise(np.maximum(electrons, electrons.dtype.type(-FLOOR * dark_e)), LIFT * dark_e, 0.0)
 
 
 @lru_cache(maxsize=256)
 def readings(dark_e: float) -> Readings:
-    """Curves at one dark noise [e-]."""
+    """Return the curves of readings at one dark noise [e-]."""
     roots = np.linspace(0.0, _LARGEST_ROOT * max(dark_e, 1.0), _KNOTS)
     electrons = roots[:, None] ** 2
     density = np.exp(-0.5 * _NORMAL**2)
@@ -123,17 +123,17 @@ def readings(dark_e: float) -> Readings:
 
 
 def _limit(electrons: NDArray[Any], dark_e: float) -> Floats:
-    """Half of the mean reading in light."""
+    """Return half of the mean reading that the formula for light gives."""
     return np.asarray(np.sqrt(np.asarray(electrons, np.float64) + ((LIFT * dark_e) ** 2 + 0.125)))
 
 
 def _straight(electrons: NDArray[Any], dark_e: float) -> NDArray[Any]:
-    """Variance of a reading where the transform is straight."""
+    """Return the variance of a reading if the transform is taken for straight."""
     base = electrons + (dark_e**2 + 0.125)
     return np.asarray(base / (base + (LIFT**2 - 1) * dark_e**2))
 
 
 def _nearest(values: NDArray[Any], most: float) -> NDArray[np.intp]:
-    """Nearest of `_STEPS` steps from 0 to `most`; its last one beyond."""
+    """Return the index of the nearest of `_STEPS` steps from 0 to `most`; beyond `most`, the last one."""
     steps = values * values.dtype.type((_STEPS - 1) / most) + values.dtype.type(0.5)
     return np.asarray(np.minimum(steps, values.dtype.type(_STEPS - 1)).astype(np.intp))

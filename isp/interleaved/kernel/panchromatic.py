@@ -185,7 +185,7 @@ def _guide_band(frame: Frame, rows: tuple[int, int], inside: slice) -> tuple[NDA
     shots, darks = at_site(opaque(shot), site), at_site(opaque(dark), site)
 
     def variance(light: Float) -> Float:
-        """Variance of a sample read as W [e-^2], at some light."""
+        """Return the variance of a sample that is read as W [e-^2], at some light."""
         return larger((shots * larger(light, 0.0) + darks / own) / own, TINY)
 
     weighed = pixels.store(electrons / own, 1.0 / variance(light))
