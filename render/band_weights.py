@@ -45,11 +45,11 @@ class LampSpectrum(Protocol):
 
     @property
     def wavelength_nm(self) -> Floats:
-        """Increasing."""
+        """Return the wavelengths of the points [nm], increasing."""
 
     @property
     def values(self) -> Floats:
-        """One each."""
+        """Return the spectrum's value at each point."""
 
 
 @dataclass(frozen=True)
@@ -83,7 +83,7 @@ class BandPoints:
 
     @property
     def lit(self) -> NDArray[np.bool_]:
-        """Which bands hold light, shape (band,)."""
+        """Return which bands contain light, shape (band,)."""
         return np.asarray(self.mean > LEAST_LIGHT * self.mean.max(initial=0.0))
 
 

@@ -60,12 +60,12 @@ class Limits:
 
     @property
     def most_samples(self) -> int:
-        """Samples per pixel, of both halves together, after which the render stops in any case; not rounded up."""
+        """Return the samples per pixel, of both halves, after which the render stops in any case; not rounded up."""
         return self.spp or self.max_spp or (MOST_SPP if self.noise or self.max_seconds else DEFAULT_SPP)
 
     @property
     def most_points(self) -> int:
-        """Points of each half after which the render stops in any case: a whole number of chunks."""
+        """Return the points of each half after which the render stops in any case: a whole number of chunks."""
         half = math.ceil(self.most_samples / 2 / self.mean_rate)
         chunk = chunk_from(half)
         return -(-half // chunk) * chunk

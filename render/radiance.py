@@ -86,13 +86,13 @@ class SpectralRadiance:
 
     @property
     def widths_nm(self) -> Floats:
-        """Width of each band, shape (band,)."""
+        """Return the width of each band [nm], shape (band,)."""
         assert self.width_nm is not None  # since construction
         return self.width_nm
 
     @property
     def shape(self) -> tuple[int, int]:
-        """Height and width in pixels."""
+        """Return the height and width in pixels."""
         return self.values.shape[0], self.values.shape[1]
 
     def luminance(self) -> NDArray[np.float64]:
@@ -202,13 +202,13 @@ class BandRadiance:
 
     @cached_property
     def extents(self) -> Floats:
-        """Largest absolute value, mean absolute value and mean of each band, shape (3, band)."""
+        """Return the largest absolute value, the mean absolute value and the mean of each band, shape (3, band)."""
         planes = (self.plane(band) for band in range(self.wavelength_nm.size))
         return np.transpose([(*_extent(plane), plane.mean(dtype=np.float64)) for plane in planes])
 
     @property
     def mean_luminance(self) -> float:
-        """Mean luminance of the picture [cd m^-2]."""
+        """Return the mean luminance of the picture [cd m^-2]."""
         weights = observer_weights(self.wavelength_nm, self.widths_nm, self.light)[1]
         return float(LUMINOUS_EFFICACY_LM_W * (self.extents[2] @ weights))
 

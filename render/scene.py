@@ -133,7 +133,7 @@ class Scene:
 
     @property
     def size(self) -> tuple[int, int]:
-        """Height and width of the camera's film, for whose proportions the scene is made; 256 x 256 without a film."""
+        """Return height and width of the camera's film, for which the scene is composed; 256 x 256 without a film."""
         film = self.geometry["sensor"].get("film", {})
         return int(film.get("height", OWN_SIDE)), int(film.get("width", OWN_SIDE))
 
@@ -146,7 +146,7 @@ class Scene:
 
     @property
     def description(self) -> Node:
-        """Plain dict for `mitsuba.load_dict`, with every light at its own spectrum and power.
+        """Return a plain dict for `mitsuba.load_dict`, with every light at its own spectrum and power.
 
         Coloured emitters are unchanged, because Mitsuba has no parameter for a factor on them. Bitmaps whose ``data``
         are rows of bytes, as in `dead_leaves`, become Mitsuba's tensors by `render.loader.with_textures`.

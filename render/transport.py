@@ -95,17 +95,17 @@ class Transport:
 
     @property
     def radiance(self) -> Planes:
-        """Mean of both halves, (group, band, h, w) float32, which times a spectral emission is radiance."""
+        """Return the mean of both halves, (group, band, h, w) float32; times a spectral emission it is radiance."""
         return np.asarray(self.light.mean)
 
     @property
     def spp(self) -> float:
-        """Samples per pixel of both halves together, averaged over the picture."""
+        """Return the samples per pixel of both halves together, averaged over the picture."""
         return float(self.counts.mean())
 
     @property
     def irradiance(self) -> Floats | None:
-        """Irradiance on the scene's reference plane at unit spectral emission, (group, band); None without a plane."""
+        """Return the reference plane's irradiance at unit spectral emission, (group, band); None without a plane."""
         return None if self.meter is None else self.meter().mean
 
     def relight(
