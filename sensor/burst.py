@@ -65,16 +65,16 @@ class _Group:
 
 
 def merge_frames(frames: Sequence[RawImage]) -> Merged:
-    """Weigh each pixel's exposures by the inverse of their temporal noise, and leave the saturated ones out.
+    """Average each pixel's exposures, weighted by the inverse of their temporal noise, without the saturated ones.
 
-    Weights and saturation both follow the merged rate itself, never one frame's own noisy value: among linear
-    estimates, the best one is uncorrelated with the differences between the frames, so that what is decided from it
-    biases no frame against another. The remaining bias is under 1 % of a pixel's merged noise, at any light.
+    Weights and saturation follow the merged rate and never one frame's own noisy value. The best linear estimate is
+    uncorrelated with the differences between the frames, so a decision that follows it favours none of them. The
+    remaining bias is under 1 % of a pixel's merged noise at any light.
 
-    The stated temporal variance follows the merged rate under 0 too, so that it is right in the mean of dark pixels; a
-    tenth of the dark's is its least, which makes it 3 % too large at a temporal dark noise of 1.5 e-, 10 % at 1 e-.
-    Fixed offsets are common to all frames, and no weight averages them away; where they exceed the temporal noise
-    several times they disturb the weights, and are better subtracted first.
+    The stated temporal variance follows the merged rate below 0 too, so that it is right in the mean of dark pixels. It
+    is at least a tenth of the dark's, which makes it 3 % too large at a temporal dark noise of 1.5 e-, 10 % at 1 e-.
+    Fixed offsets are common to all frames, and no weight averages them away. Where they are several times as large as
+    the temporal noise they disturb the weights, and are better subtracted first.
 
     Parameters
     ----------
@@ -234,9 +234,9 @@ def _grouped(frames: Sequence[RawImage]) -> list[_Group]:
 
 
 def _dark_noise(times_s: NDArray[np.float64], frames: Sequence[tuple[float, float]]) -> tuple[float, float]:
-    """Read noise and DSNU of a dark pixel merged from frames of such temporal variances and DSNU [e- of all the time].
+    """Return read noise and DSNU of a merged dark pixel [e- of all the time], from each frame's variance and DSNU.
 
-    In the dark a frame's weight is the square of its time over its variance.
+    In the dark a frame's weight is the square of its time over its temporal variance.
     """
     temporal_e2, dsnu_e = np.array(frames).T
     temporal_e2 = np.maximum(temporal_e2, 1e-30)  # without noise the times alone weigh

@@ -297,7 +297,7 @@ def _dark_full(raw: RawImage) -> bool:
 
 
 def warn_if_full(raw: RawImage) -> None:
-    """Warn of a frame most of whose pixels are saturated, as one of 10 s is that was meant as 10 ms."""
+    """Warn of a frame with mostly saturated pixels, such as one of 10 s that was meant to be 10 ms."""
     if _dark_full(raw):
         warnings.warn(
             f"exposure_s: dark current fills the well in {raw.exposure_s:g} s; give less, or a smaller "
@@ -313,7 +313,7 @@ def warn_if_full(raw: RawImage) -> None:
 
 
 def warn_if_dark(raw: RawImage) -> None:
-    """Warn of a frame that shows nothing but its dark noise; one of no time at all is meant so."""
+    """Warn of a frame that shows nothing but its dark noise, unless its exposure is 0 s, which is deliberate."""
     lit = float(np.mean(raw.electrons > DARK_SIGMAS * raw.dark_noise_e))
     least_lit = max(LEAST_LIT, 1.5 / (raw.dn.size + 1))  # of few pixels one may be lit by chance
     if raw.exposure_s > 0 and not _dark_full(raw) and lit < least_lit:

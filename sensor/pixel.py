@@ -318,10 +318,10 @@ def pixel_of_readings(pixel: PixelConfig, readings: Sequence[Reading]) -> PixelC
 
 
 def bent_e(collected_e: Any, pixel: PixelConfig) -> Any:
-    """Compute the electrons that are read of those collected: `response_bend`; any array, of Dr.Jit too."""
+    """Return the electrons that are read from those collected, by `response_bend`, for arrays of NumPy or Dr.Jit."""
     return collected_e * ((1.0 + pixel.response_bend) - collected_e * (pixel.response_bend / pixel.full_well_e))
 
 
 def bent_slope(collected_e: Any, pixel: PixelConfig) -> Any:
-    """Compute the slope of `bent_e`."""
+    """Return the slope of `bent_e`."""
     return (1.0 + pixel.response_bend) - collected_e * (2.0 * pixel.response_bend / pixel.full_well_e)

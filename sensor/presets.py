@@ -123,8 +123,8 @@ def tile_named(mosaic: str) -> Tile:
 def vary(sensor: SensorConfig, mosaic: str) -> SensorConfig:
     """Give a camera another mosaic: the same pixel, well, lens and converter.
 
-    The mosaic is the one that the raw image shows: for a camera that bins it can't be a quad, of whose pixels no camera
-    has four for one.
+    The mosaic is the one that the raw image shows. For a camera that bins it can't be a quad, because the photodiodes
+    would need a quad of the quad, which no camera has.
 
     Parameters
     ----------

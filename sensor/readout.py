@@ -121,7 +121,7 @@ def read_out(
     draw: DrawFrame = draw_frame,
     engine: str = "numpy",
 ) -> RawImage:
-    """Expose and read the chip once; of a pixel with several readings all are drawn and merged, or one is chosen.
+    """Expose and read the chip once; draw all readings of a pixel and merge them, or choose one.
 
     Parameters
     ----------
@@ -206,7 +206,7 @@ def noise_variance(
     """Compute the variance of each sample over chips and exposures [e-^2], in the shape of `expected_e`.
 
     It is the sum of shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was
-    collected, DSNU and column offsets, read noise of pixels and of rows, and quantisation (a DN^2 / 12). Of a bent
+    collected, DSNU and column offsets, read noise of pixels and of rows, and quantisation (a DN^2 / 12). For a bent
     response it is the variance of its samples, which development takes for straight. Near the full well, the
     converter's top and 0 DN, it is the variance that clipping leaves (`sensor.readings.clipping`).
 
@@ -256,7 +256,7 @@ def light_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainRead
 def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
     """Return the variance that a frame's samples would have without clipping [e-^2].
 
-    In units of its root, callers state how far a pixel's mean is from the full well.
+    Callers use its root as the unit in which they state how far a pixel's mean is from the full well.
     """
     light_e = collected_e(expected_e, readings)
     if several(readings):
@@ -265,9 +265,10 @@ def unclipped_variance(expected_e: NDArray[np.float64], readings: Sequence[Plain
 
 
 def collected_e(expected_e: NDArray[np.float64], readings: Sequence[PlainReading]) -> NDArray[np.float64]:
-    """Return the photo-electrons that each pixel is expected to collect, those from its neighbours' crosstalk included.
+    """Return the photo-electrons that each pixel is expected to collect, with its neighbours' crosstalk.
 
-    Both are in the raw image's electrons, which count the light before the pixel's share of it (`density`) is taken.
+    `expected_e` and the result are in the raw image's electrons, which count the light before a density takes its
+    share.
     """
     density = by_site([1.0 if several(readings) else x.light_share for x in readings], readings, expected_e.shape)
     return np.asarray(spread_charge(expected_e * density, readings[0].pixel.crosstalk) / density)

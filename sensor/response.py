@@ -184,10 +184,10 @@ def behind_filters(electrons: NDArray[np.float64], sensor: SensorConfig) -> NDAr
 
 
 def check_window(window_nm: tuple[float, float], wavelength_nm: Floats, width_nm: Floats) -> None:
-    """Raise `InputError` where a camera's window opens beyond 380-780 nm and the bands don't reach there.
+    """Raise `InputError` if a camera's window opens beyond 380-780 nm and the bands don't reach that far.
 
-    Bands that are absent count as dark. Within 380-780 nm that is a choice of the scene; beyond, it would hide that a
-    W pixel may collect 16-35 % of its electrons there. Less than one more band may be missing.
+    Absent bands count as dark. Within 380-780 nm that is the scene's choice; beyond, it would hide that a W pixel may
+    collect 16-35 % of its electrons there. Less than one band may be missing.
     """
     low, high = window_nm
     beyond = ((low, min(VISIBLE_NM[0], high), width_nm[0]), (max(VISIBLE_NM[1], low), high, width_nm[-1]))

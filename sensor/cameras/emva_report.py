@@ -205,7 +205,7 @@ def clip_over_saturation(saturation_e: float, sigma_d: float, prnu: float) -> fl
 
 
 def _read_noise(figures: Mapping[str, float], source_note: str) -> tuple[SourcedValue, dict[str, str]]:
-    """Read noise from sigma_d, which holds the dark current's shot noise too, and a word on what isn't told."""
+    """Return the read noise, which is sigma_d less the dark current's shot noise, and a note if that isn't known."""
     sigma_d, current, exposure_s = (figures.get(key) for key in ("sigma_d", "mu_I", "exposure_s"))
     sigma_d = float(sigma_d or 0.0)
     if current is None:

@@ -206,9 +206,9 @@ def figures_of_stacks(
 ) -> FrameFigures:
     """Measure a camera from reduced frames.
 
-    Each light is held against the dark frames of its exposure time, where there are some, else against the stack with
-    the most. Flat stacks may come one by one: the image is kept of one alone, that with the most frames, and the
-    brightest of those, up to 70 % of white.
+    Each light is compared with the dark frames of its exposure time or, if there are none, with the dark stack of the
+    most frames. Flat stacks may come one by one. Only one image is kept in memory: of the stacks up to 70 % of white
+    that with the most frames, and the brightest of these.
 
     Raises
     ------
@@ -288,7 +288,7 @@ def _saturation_dn(points: Sequence[LightPoint], white_dn: float) -> float:
 
 
 def _notes(points: Sequence[LightPoint], darks: Sequence[LightStack], gain: SystemGain) -> list[str]:
-    """Say what was assumed, with the figure that these frames show of it."""
+    """Say what was assumed, and how well these frames agree with it."""
     used = [point for point in points if point.clipped <= MOST_CLIPPED]
     notes = [
         "frames are single exposures: frames that a camera averaged (stacked) or denoised would show less noise",
@@ -483,7 +483,7 @@ def _require_exposed(flats: Sequence[NDArray[np.uint16]], darks: Sequence[NDArra
 
 
 def _evenness(stack: LightStack, level: Floats) -> list[str]:
-    """Say how even the light was; refuse a surface with structure beyond a smooth one, which would pass for PRNU."""
+    """Say how even the light was; refuse structure beyond a smooth surface, because it would pass for PRNU."""
     uneven = max(_unevenness(site.mean_dn, signal) for site, signal in zip(stack.sites, level, strict=True))
     if uneven <= MOST_UNEVEN:
         return [f"the flat frames are even within {max(uneven, 0.0):.1%} from the darkest part to the brightest"]

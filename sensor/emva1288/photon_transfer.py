@@ -78,7 +78,7 @@ class Stack:
 
 
 def take_transfer(expose: Expose, light_e: Sequence[float] | Floats, exposure_s: float) -> Transfer:
-    """Take two frames a level."""
+    """Take two frames per level."""
     rows = []
     for level in light_e:
         first, second = (expose(float(level), exposure_s).astype(np.float64) for _ in range(2))

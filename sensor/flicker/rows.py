@@ -18,7 +18,7 @@ from sensor.flicker.waveform import Waveform
 
 
 def check_flicker(sensor: SensorConfig, held: bool = False) -> None:
-    """Raise `InputError` for a camera that lamps which flicker aren't modelled for; `held` allows one that shakes."""
+    """Raise `InputError` for a camera for which flicker isn't modelled; `held` allows one that shakes."""
     times = [x.time_share for x in sensor.chip.readings] + [x.time_share for x in sensor.chip.channels]
     if min(times, default=1.0) < 1 or any(x.metered for x in sensor.chip.channels):
         raise InputError(

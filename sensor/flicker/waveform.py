@@ -154,8 +154,8 @@ def pwm(frequency_hz: float, duty: float) -> Waveform:
 def read_waveform(path: str | Path) -> Waveform:
     """Read one period of a lamp's light from a CSV with a header: ``time_s``, ``time_ms`` or ``time_us``, and light.
 
-    The light is in any unit, since only its shape counts; between two rows it goes on straight. The last row's time is
-    the end of the period.
+    The light is in any unit, because only its shape counts; it is interpolated linearly between two rows. The last
+    row's time is the end of the period.
 
     Raises
     ------

@@ -204,7 +204,7 @@ def _single(values: NDArray[np.floating]) -> NDArray[np.float32]:
 
 
 def _aligned_rows(planes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Copy whose rows all start at a multiple of `ALIGNMENT`."""
+    """Copy planes so that all rows start at a multiple of `ALIGNMENT`."""
     step = ALIGNMENT // planes.itemsize
     padded = aligned((planes.shape[0], -(-planes.shape[1] // step) * step), planes.dtype)
     copy = padded[:, : planes.shape[1]]

@@ -65,9 +65,9 @@ _LARGEST = 2**31 - 1  # of a rational's numerator and denominator
 
 
 def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: datetime | None = None) -> Path:
-    """Write a digital negative; gives its path. LibRaw and what is built on it open frames from 22 pixels a side.
+    """Write a digital negative; return its path. LibRaw and what is built on it open frames from 22 pixels per side on.
 
-    BlackLevel is a whole number, since raw converters cut fractions off; `read_dng` gives back the exact one.
+    BlackLevel is a whole number, because raw converters truncate fractions; `read_dng` restores the exact one.
 
     Parameters
     ----------
@@ -94,7 +94,7 @@ def write_dng(raw: RawImage, path: Path, *, frame: int | None = None, written: d
 
 
 def read_dng(path: Path) -> RawImage:
-    """Read a digital negative that `write_dng` wrote, or Adobe's writer from one without compression.
+    """Read a digital negative that `write_dng` wrote, or that Adobe's converter made of one without compression.
 
     Raises
     ------

@@ -67,7 +67,7 @@ _SRGB_TO_D50 = np.linalg.inv(adapt_to_d65(np.eye(3), D50_XYZ).T) @ SRGB_TO_XYZ
 
 
 def read_photograph(path: Path) -> tuple[RawImage, dict[str, Any]]:
-    """Read a camera's raw file, turned upright, and what had to be estimated or assumed.
+    """Read a camera's raw file and turn it upright; also return what had to be estimated or assumed.
 
     Returns
     -------

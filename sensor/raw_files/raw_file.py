@@ -26,7 +26,7 @@ def check_ending(path: Path, tile: Tile) -> None:
 
 
 def write_raw(raw: RawImage, path: str | Path, *, frame: int | None = None) -> tuple[Path, ...]:
-    """Write a raw file; gives the paths of what was written, the picture first.
+    """Write a raw file; return the paths of what was written, the picture first.
 
     Parameters
     ----------
@@ -62,7 +62,7 @@ def read_raw(path: str | Path) -> RawImage:
 
 
 def open_raw(path: str | Path) -> tuple[RawImage, dict[str, Any]]:
-    """Read a raw file, and for a camera's, what had to be estimated or assumed; nothing for our own.
+    """Read a raw file; for another camera's, also return what had to be estimated or assumed.
 
     Raises
     ------

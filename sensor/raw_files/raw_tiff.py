@@ -17,7 +17,7 @@ DIGEST = "pixels_sha256"
 
 
 def write_tiff(raw: RawImage, path: Path) -> tuple[Path, Path]:
-    """Write the mosaic, and its sidecar beside it under the same name with ``.json``; gives both paths.
+    """Write the mosaic, and beside it its sidecar under the same name with ``.json``; return both paths.
 
     Raises
     ------

@@ -116,7 +116,10 @@ def best_weights(covariance: Floats, kept: NDArray[np.intp]) -> Floats:
 
 
 def seams(readings: Sequence[PlainReading]) -> Seams:
-    """Find the light from which each reading is left out: 6 deviations under its well, half of it at least."""
+    """Find the light from which on each reading is left out.
+
+    That is six standard deviations below the reading's full well, but at least half of the well.
+    """
     full_e = np.array([x.sensor.pixel.full_well_e for x in readings]) / shares(readings)
     total = sum(covariances(full_e, readings).values())
     spread_e = np.sqrt(np.einsum("iii->i", total))
@@ -129,8 +132,9 @@ def seams(readings: Sequence[PlainReading]) -> Seams:
 def merged_electrons(estimates_e: Floats, readings: Sequence[PlainReading]) -> Floats:
     """Combine each reading's estimate of the whole pixel's electrons.
 
-    Weights and the choice of readings follow the merged light, never one reading's own noisy value: the best linear
-    estimate is uncorrelated with what the readings differ by, so that what is decided from it favours none of them.
+    Weights and the choice of readings follow the merged light and never one reading's own noisy value. The best linear
+    estimate is uncorrelated with the differences between the readings, so a decision that follows it favours none of
+    them.
 
     Parameters
     ----------
@@ -213,8 +217,9 @@ def _variances_at(expected_e: float, readings: Sequence[PlainReading], kept: NDA
 def merged_variances(expected_e: Floats, readings: Sequence[PlainReading]) -> Mapping[str, Floats]:
     """Return the merge's variance over chips and exposures for each source [e-^2], shaped as `expected_e`.
 
-    Around a seam some pixels keep the reading that fills and some leave it out, by their merged light; that is not
-    correlated with what the readings differ by, so that the variances add by the shares of the pixels.
+    Around a seam some pixels use the reading that is about to fill and others don't, by their merged light. This choice
+    isn't correlated with the differences between the readings, so the variances of both kinds are averaged by the share
+    of the pixels.
     """
     light = np.ravel(np.asarray(expected_e, dtype=np.float64))
     by_source = covariances(light, readings)

@@ -15,9 +15,10 @@ from sensor.readings.resolve import PlainReading
 
 
 def join(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage:
-    """Join frames, each at the sites that its reading reads; the first frame is on the converter's own scale.
+    """Join frames, each at the sites that its reading covers; the first frame is on the converter's own scale.
 
-    The samples are floats on the scale of the first frame: whole numbers but for channels that are read apart.
+    The samples are floats on the scale of the first frame. They are whole numbers except for channels with a time,
+    density or gain of their own.
     """
     plain = raws[0]
     dn: NDArray[Any] = plain.dn.astype(np.float32)

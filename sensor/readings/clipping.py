@@ -140,7 +140,7 @@ def _over_reading(
 
 
 def clipped_frame(mean_e: Floats, readings: Sequence[PlainReading]) -> Moments:
-    """Return the moments of a frame, in which each reading stands at the sites that it reads."""
+    """Return the moments of a frame to which each reading contributes the sites that it covers."""
     if readings[0].sites is None:
         return clipped(mean_e, readings[0])
     parts = np.empty((3, *mean_e.shape))

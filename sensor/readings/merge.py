@@ -19,9 +19,9 @@ MERGED_WHITE_DN = 256 * 65_535
 def merge(readings: Sequence[PlainReading], raws: Sequence[RawImage]) -> RawImage:
     """Merge all readings of one exposure.
 
-    The raw image's electrons are those of all charges together, so that shot noise is Poisson's as long as none is
-    full; beyond each seam `RawImage.noise_steps` says what the rest knows. Its exposure time is the one that would
-    collect as many: the whole pixel's times `collected_share`.
+    The raw image's electrons are those of all charges together, so that its shot noise is Poisson's as long as none is
+    full. Beyond each seam `RawImage.noise_steps` states the noise of the readings that remain. The exposure time is the
+    one in which the whole pixel would collect as many electrons: the whole exposure times `collected_share`.
 
     Parameters
     ----------

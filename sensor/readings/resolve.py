@@ -116,8 +116,8 @@ class PlainReading:
 def pixel_sources(sensor: SensorConfig, exposure_s: float, poisson: float = 1.0) -> dict[str, NoiseLaw]:
     """Return the law of each noise source of a pixel that is read once, for a chip drawn at random, without clipping.
 
-    Shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was collected, DSNU
-    and column offsets, read noise, what comes after the amplifier, and quantisation (a DN^2 / 12).
+    The sources are shot noise of signal and dark current, PRNU on the signal, hot pixels, column gains on all that was
+    collected, DSNU and column offsets, read noise, noise after the amplifier, and quantisation (a DN^2 / 12).
     """
     pixel = sensor.pixel
     dark_e = pixel.dark_current_e_per_s * exposure_s
@@ -227,7 +227,7 @@ def resolve(
 
 
 def _switched(readings: Sequence[PlainReading], expected_e: Values) -> int:
-    """Choose the reading of a camera that switches its gain: the number of the quietest that holds the bright end."""
+    """Choose the gain of a camera that switches it: the number of the quietest reading that holds the bright end."""
     dark_e = readings[0].pixel.dark_current_e_per_s * readings[0].exposure_s
     bright_e = float(np.percentile(expected_e, METERED_PERCENTILE)) + dark_e
     wells_e = [x.sensor.pixel.full_well_e for x in readings]
@@ -251,7 +251,7 @@ def _timed(
 
 
 def at_channel(readings: Sequence[PlainReading], channel: str | None) -> tuple[PlainReading, ...]:
-    """Return the readings that read a channel's sites, as if each read every pixel.
+    """Return the readings that cover a channel's sites, as if each covered every pixel.
 
     Raises
     ------
@@ -280,7 +280,7 @@ def several(readings: Sequence[PlainReading]) -> bool:
 def by_site(
     values: Sequence[float], readings: Sequence[PlainReading], shape: tuple[int, ...]
 ) -> float | NDArray[np.float64]:
-    """Place one value of each reading at the sites that it reads, (h, w); a number where one reads every pixel."""
+    """Place each reading's value at the sites that it covers, (h, w); return a number if one covers every pixel."""
     if readings[0].sites is None:
         return values[0]
     result = np.empty(shape)
@@ -310,7 +310,7 @@ def light_of(expected_e: Values, readings: Sequence[PlainReading]) -> tuple[Valu
 
 
 def unsaturated(expected_e: Values, readings: Sequence[PlainReading]) -> NDArray[np.bool_]:
-    """Find the pixels of a frame that light and dark current together don't fill, (h, w)."""
+    """Return the pixels of a frame that light and dark current together don't fill, (h, w)."""
     if readings[0].sites is None:
         return np.asarray(expected_e < max(x.headroom_e for x in readings))
     return np.asarray(expected_e < by_site([x.headroom_e for x in readings], readings, expected_e.shape))
