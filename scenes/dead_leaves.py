@@ -58,7 +58,7 @@ def chart(seed: int) -> Plane:
 
 
 def draw_leaves(side_px: int, samples: int, rng: np.random.Generator) -> Plane:
-    """Draw the reflectances of a chart of side_px x side_px pixels, `samples` squares along a side of each pixel."""
+    """Draw the reflectances of a chart of side_px x side_px pixels, each from `samples` x `samples` squares."""
     side, least, most = (value * samples for value in (side_px, LEAST_PX, MOST_PX))
     around = side + 2 * most
     mean_area = 2 * np.pi * np.log(most / least) / (least**-2 - most**-2)

@@ -24,9 +24,9 @@ WHITE, BLACK = grey(0.80), grey(0.04)
 
 
 def lit_and_shadowed(dark_cd_m2: float = DARK_CD_M2, lit_cd_m2: float = LIT_CD_M2) -> Scene:
-    """Open cabinet 1.2 m wide; light groups ``night`` in the left half and ``lamp`` in the right one.
+    """Build an open cabinet 1.2 m wide; light groups ``night`` in the left half and ``lamp`` in the right one.
 
-    No light gets from one half to the other: in front there is nothing that it could fall on.
+    No light gets from one half to the other, because nothing stands in front on which it could fall.
 
     Parameters
     ----------
@@ -114,7 +114,7 @@ def _ball(pose: Floats, middle: tuple[float, float, float], radius_m: float, bsd
 
 
 def _cup(pose: Floats, name: str, radius_m: float, height_m: float, bsdf: Node) -> dict[str, Node]:
-    """Open cylinder that stands on the origin of `pose`, and its floor."""
+    """Return an open cylinder that stands on the origin of `pose`, and its floor."""
     x, y, z = pose[:3, 3].tolist()
     return {
         name: rod((x, y + 0.0005, z), (x, y + height_m, z), radius_m, bsdf),

@@ -111,7 +111,7 @@ def floor(x: float, y: float, z: float) -> Floats:
 
 
 def disk(pose: Floats, radius_m: float, bsdf: Node, **more: Node) -> Node:
-    """Round plate centred on the origin of `pose`, facing its +z."""
+    """Return a round plate centred on the origin of `pose` and facing its +z."""
     return {"type": "disk", "to_world": to_world(pose, scale(radius_m, radius_m, 1.0)), "bsdf": bsdf, **more}
 
 
@@ -139,7 +139,7 @@ def block(pose: Floats, width_m: float, height_m: float, depth_m: float, bsdf: N
 
 
 def rod(start: tuple[float, float, float], end: tuple[float, float, float], radius_m: float, bsdf: Node) -> Node:
-    """Open cylinder between two points."""
+    """Return an open cylinder between two points."""
     ends = {"p0": [float(x) for x in start], "p1": [float(x) for x in end]}
     return {"type": "cylinder", **ends, "radius": radius_m, "bsdf": bsdf}
 
