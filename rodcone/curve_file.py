@@ -67,11 +67,11 @@ class _Line:
 
 
 def read_columns(path: str | Path, what: str) -> dict[str, Floats]:
-    """Read the columns of a table by their names; the first holds rising wavelengths, and is called ``wavelength_nm``.
+    """Read the columns of a table by their names; the first, ``wavelength_nm``, contains rising wavelengths.
 
-    Cells stand apart by commas, semicolons, tabs or white space; with the last three, a decimal comma is read. A header
-    names the columns; without one they are called ``1``, ``2``, ... A header's units are applied: µm and Å, and per
-    cent, of which a `UserWarning` tells. Falling wavelengths are turned round.
+    Cells are separated by commas, semicolons, tabs or white space; with the last three, a decimal comma is read. A
+    header names the columns; without one they are called ``1``, ``2``, ... Units in a header are applied: µm, Å, and
+    per cent, which a `UserWarning` reports. Falling wavelengths are reversed.
 
     Parameters
     ----------

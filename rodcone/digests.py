@@ -88,5 +88,5 @@ class ByBits(Generic[T]):
 
 
 def by_bits(value: T, *arrays: NDArray[Any]) -> ByBits[T]:
-    """Return a value as a cache takes it, with the arrays that it is made of."""
+    """Wrap a value as the key of a cache, which compares it by the bits of these arrays."""
     return ByBits(value, tuple((array.dtype.str, array.tobytes()) for array in arrays))

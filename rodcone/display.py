@@ -123,7 +123,7 @@ def draw_curves(
 
 
 def draw_line(planes: Mapping[str, NDArray[np.floating]], row: int | None, axes: Axes | None, y: str) -> Axes:
-    """Draw a row of planes (h, w); the middle one where none is asked for, samples that are NaN left out.
+    """Draw a row of planes (h, w), by default the middle one; samples that are NaN are left out.
 
     Raises
     ------

@@ -68,7 +68,7 @@ def imported(module: str) -> ModuleType:
 
 
 def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
-    """Check for an object of a class, or of that at ``module:name``; the function at `by_name` makes one of a name."""
+    """Return a check for an object of a class or that at ``module:name``; `by_name` names what makes it of a name."""
 
     def check(name: str, value: object) -> Any:
         if by_name and isinstance(value, str | Path):
@@ -80,7 +80,7 @@ def _value(kind: str | type, fix: str, by_name: str = "") -> Check:
 
 
 def _range(low: float, high: float, fix: str) -> Check:
-    """Check for a number within limits."""
+    """Return a check for a number within limits."""
 
     def check(name: str, value: object) -> Any:
         require_range(name, value, low, high, fix)
@@ -90,7 +90,7 @@ def _range(low: float, high: float, fix: str) -> Check:
 
 
 def _plain(kind: Any, words: str) -> Check:
-    """Check for an object of one of Python's own classes; True and False are no numbers."""
+    """Return a check for an object of one of Python's own classes; True and False don't count as numbers."""
 
     def check(name: str, value: Any) -> Any:
         wrong = not isinstance(value, kind) or (kind is Integral and isinstance(value, bool))
@@ -118,7 +118,7 @@ def _exposure(name: str, value: object) -> Any:
 
 
 def _array(*shape: int, or_kinds: tuple[str, ...] = (), least: float = -inf) -> Check:
-    """Check for an array of finite real numbers from `least` on, of a shape where one is given; or for `or_kinds`."""
+    """Return a check for an array of finite real numbers that are at least `least`, or for an object of `or_kinds`."""
 
     def check(name: str, value: object) -> Any:
         import numpy as np
@@ -162,7 +162,7 @@ def _paths(name: str, value: object) -> Any:
 
 
 def _each(kind: Check, least: int = 0) -> Check:
-    """Check for a sequence, at least so long, of which `kind` takes each."""
+    """Return a check for a sequence of at least some length, whose items `kind` checks."""
 
     def check(name: str, value: object) -> Any:
         if not isinstance(value, list | tuple) or len(value) < least:
@@ -173,7 +173,7 @@ def _each(kind: Check, least: int = 0) -> Check:
 
 
 def _each_in_turn(kind: Check) -> Check:
-    """Check for a list or a generator, of which `kind` takes each when its turn comes."""
+    """Return a check for a list or a generator, whose items `kind` checks one by one as they are used."""
 
     def check(name: str, value: object) -> Any:
         if not isinstance(value, list | tuple | Iterator):

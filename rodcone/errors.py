@@ -41,7 +41,7 @@ def cut(text: str) -> str:
 
 
 def one_line(error: BaseException) -> str:
-    """Give the words of an error on one line; of a traceback within, as Mitsuba quotes Python's, the last line."""
+    """Return the words of an error on one line; if they quote a traceback, as Mitsuba does, only its last line."""
     words, quoted, traceback = str(error).partition("Traceback (most recent call last):")
     last = (traceback.strip() or " ").splitlines()[-1] if quoted else ""
     return " ".join(f"{words} {last}".split())
@@ -56,7 +56,7 @@ def is_out_of_memory(error: RuntimeError) -> bool:
 def read_errors(what: str, fix: str, kinds: Kinds = (OSError, ValueError)) -> Iterator[None]:
     """Turn errors within into an `InputError`, ``what (the error's words); fix``.
 
-    One that is an `InputError` already goes on as it is.
+    An error that is an `InputError` already is raised unchanged.
     """
     try:
         yield
@@ -128,11 +128,11 @@ def require_keys(what: str, keys: Iterable[str], allowed: Collection[str]) -> No
 
 
 def require_fields(value: object, place: str = "") -> None:
-    """Raise `InputError` where a field of a dataclass is of another kind than its annotation says, or out of range.
+    """Raise `InputError` if a field of a dataclass is of another kind than its annotation says, or out of range.
 
-    Numbers, text, flags, classes and tuples of these; arrays and mappings say more than an annotation, and are left.
-    ``Annotated[float, (low, high, fix)]`` is a number from low to high, of `int` a whole one; `place` stands before the
-    field's name.
+    It checks numbers, text, flags, classes and tuples of these. Arrays and mappings need more than an annotation, and
+    are left out. ``Annotated[float, (low, high, fix)]`` is a number from low to high, `int` a whole one; `place` is put
+    before the field's name.
     """
     owner: object = type(value)
     for name, kind in _kinds(owner).items():

@@ -14,7 +14,7 @@ _LIKE = 0.85  # from which on a key is taken for another one misspelt
 
 @cache
 def formats() -> Mapping[str, Mapping[str, Any]]:
-    """Read the table: known keys by format, with what is done about each."""
+    """Read the table: known keys by format, with the treatment of each."""
     return tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 
 

@@ -18,7 +18,7 @@ _HALF_WRITTEN = re.compile(r"\.rodcone-[0-9a-f]{16}(\.\w+)?")
 
 @contextmanager
 def replacing(*paths: Path) -> Iterator[tuple[Path, ...]]:
-    """Yield a temporary path beside each path; at the end they are renamed, in this order. On failure none is.
+    """Yield a temporary path beside each path; rename them at the end, in this order. On failure rename none.
 
     Raises
     ------

@@ -94,7 +94,7 @@ def compiler_version() -> str:
 
 @contextmanager
 def compiling() -> Iterator[Callable[[], float]]:
-    """Give a function that tells the seconds of compiling so far: 0 where all kernels were there already."""
+    """Yield a function that returns the seconds of compiling so far: 0 if all kernels existed already."""
     seconds: float = 0.0
 
     def seconds_so_far() -> float:

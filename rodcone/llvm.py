@@ -30,9 +30,9 @@ def _newest(paths: Iterable[Path]) -> Path | None:
 
 
 def _wheel_library() -> Path | None:
-    """Return the library of the wheel `karellen-llvm-core`, None where it isn't installed.
+    """Return the library of the wheel `karellen-llvm-core`; None if it isn't installed.
 
-    Its list of files is read as it stands: `importlib.metadata` alone takes as long as all else of `import rodcone`.
+    Its list of files is read directly, because `importlib.metadata` takes as long as all the rest of `import rodcone`.
     """
     for folder in map(Path, sys.path):
         for record in sorted(folder.glob("karellen_llvm_core-*.dist-info/RECORD")):

@@ -127,9 +127,9 @@ def file_extent(path: str | Path) -> tuple[int, int, int]:
 
 
 def require_memory(need: Memory, force: bool = False) -> None:
-    """Raise `InputError` where a run needs more memory than is free, unless `force`.
+    """Raise `InputError` if a run needs more memory than is free, unless `force`.
 
-    What this process holds already is part of what the run needs. The message names the need and the least limit.
+    What this process holds already is part of what the run needs. The message states the need and the tightest limit.
     """
     resident = _pages(1)
     for limit in sorted([] if force else memory_limits(), key=lambda limit: limit.free):

@@ -21,12 +21,12 @@ START = "start"  # what a task says before its first step
 
 @contextmanager
 def progress(file: TextIO) -> Iterator[Step]:
-    """Give a function to call with what is being done and the share of the whole that is done (0..1).
+    """Yield a function to call with what is being done and the share of the whole that is done (0..1).
 
-    On a terminal it moves a bar, which vanishes at the end; elsewhere, as in the log of a batch system, a line is
-    printed every five seconds where there is something new. The share only grows. Both show the time left, by the pace
-    since the first share above 0: what comes before, such as compilation, isn't repeated. Until then the bar swings to
-    and fro.
+    On a terminal it moves a bar, which vanishes at the end. Elsewhere, as in the log of a batch system, a line is
+    printed every five seconds if there is something new. The share only grows. Both show the time left, by the pace
+    since the first share above 0, because what comes before, such as compilation, isn't repeated. Until then the bar
+    swings to and fro.
     """
     console = Console(file=file)
     *columns, time_left = Progress.get_default_columns()
@@ -57,7 +57,7 @@ def progress(file: TextIO) -> Iterator[Step]:
 
 @contextmanager
 def progress_bar(step: Step | None) -> Iterator[Step]:
-    """Give the caller's own step, or where there is none a bar under a notebook's cell; elsewhere nothing is shown.
+    """Yield the caller's own step or, if there is none, a bar under a notebook's cell; elsewhere nothing is shown.
 
     The bar is a few lines of HTML, which every notebook shows; it vanishes at the end.
     """
@@ -94,9 +94,9 @@ def _notebook_display() -> Callable[..., Any] | None:
 
 
 def _print_lines(task: Task, file: TextIO, ended: Event) -> None:
-    """Print a line now and then where it says something new; by a thread, since a call of Mitsuba may take long.
+    """Print a line now and then if there is something new; run in a thread, because a call of Mitsuba may take long.
 
-    Before the first step nothing has begun: what is refused until then gets its own line alone, however long it took.
+    Nothing is printed before the first step: an input that is refused until then gets its own line only.
     """
     printed = f"0%, {START}"
     while not ended.wait(LINE_EVERY_S):
@@ -119,7 +119,7 @@ def render_words(error: float, share: float = 0.0) -> str:
 
 
 def compile_note(seconds: float) -> str | None:
-    """Say how long a first render compiled; None where that is short."""
+    """Say how long a first render compiled; None if that is short."""
     if seconds < LEAST_COMPILE_S:
         return None
     return f"render: compiling took {duration(seconds)}, once for these surfaces and so many bands"
