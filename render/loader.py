@@ -251,7 +251,7 @@ def _load(scene: Scene, description: Node, *, merge_meshes: bool = False) -> Mit
 
 
 def with_textures(node: Node) -> Node:
-    """Copy of a scene's dict in which bitmaps whose ``data`` are rows of bytes in hexadecimal are tensors of 0 to 1."""
+    """Return a copy of a scene's dict in which bitmaps with ``data`` of hexadecimal rows are tensors of 0 to 1."""
     made = {key: with_textures(value) if isinstance(value, dict) else value for key, value in node.items()}
     if made.get("type") == "bitmap" and isinstance(made.get("data"), list):
         rows = np.array([list(bytes.fromhex(row)) for row in made["data"]], np.float32)

@@ -183,7 +183,7 @@ def _sampled(mi: ModuleType, wi: Vector, angle: Point2, twosided: bool) -> BsdfS
 
 
 def with_matte_surfaces(node: Node) -> Node:
-    """Copy of a scene's dict in which Lambertian surfaces, one- or two-sided, and bitmaps' blends are ``matte``."""
+    """Return a copy of a scene's dict in which (twosided) Lambertian surfaces and bitmaps' blends are ``matte``."""
     return {key: _as_matte(value) if isinstance(value, dict) else value for key, value in node.items()}
 
 
@@ -206,7 +206,7 @@ def _as_matte(node: Node) -> Node:
 
 
 def with_rows(node: Node) -> tuple[Node, tuple[Spectrum, ...]]:
-    """Copy of a scene's dict in which matte surfaces name the rows of the table; and its curves.
+    """Return a copy of a scene's dict in which matte surfaces name rows of a table, and the table's curves.
 
     A surface of one tabulated spectrum gets ``row``, a blend of two ``other_row`` as well, a checkerboard of two
     ``row``, ``other_row`` and ``which``, a texture of 0 and 1. Others, such as bitmaps of colours, stay as they are,
