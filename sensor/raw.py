@@ -213,8 +213,9 @@ class RawImage:
     def _saturation_e(self, noise: ChannelNoise) -> float:
         """Return the level [e-] from which a channel's sample counts as saturated.
 
-        It lies below the full well by the noise that arises after the well clips: all but that of the dark current; the
-        columns' gains act on the whole well. Rounding takes off half a DN at most, whatever its variance.
+        It lies several standard deviations below the full well. They are those of the noise that arises after the well
+        clips, which is all but that of the dark current; the columns' gains act on the whole well. Rounding takes off
+        half a DN at most, whatever its variance.
         """
         last = self.noise_steps[-1] if self.noise_steps else noise
         dark_e = noise.dark_current_e
