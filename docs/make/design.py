@@ -29,7 +29,7 @@ from skimage.color import rgb2lab
 from isp.design.expected_error import expected_error, sampled
 from isp.design.spectral_prior import PRIORS, load_spectral_prior
 from isp.ple.prior import Prior, load_prior, save_prior
-from isp.processors.catalogue import NAMED, Processor
+from isp.processors.catalogue import NAMED, Processor, require_libraries
 from isp.processors.own import processor_of
 from isp.processors.piecewise import picture_ple
 from render.engine import render
@@ -145,6 +145,8 @@ def simulated(commit: str, network: str) -> list[dict[str, Any]]:
     """Rows of all scenes drawn from a commit's hash; those of finished scenes are read."""
     rows = []
     others = [(mosaic, name) for mosaic, names in OTHERS.items() for name in names]
+    for _, name in others:  # before hours of `ple`
+        require_libraries(name)
     wanted = [*product(LEVELS, product(MOSAICS, ("ple",))), *product(LEVELS, others)]
     for level, (mosaic, developer) in wanted:
         for number in range(SCENES):
