@@ -124,8 +124,8 @@ def _common_area(height: Floats, shift: float, start: float) -> NDArray[np.float
     apart = np.clip(shift * height, radius - 1, radius + 1)
     within = apart > radius - 1
     d = np.where(within, apart, 1.0)
-    # Four times the area of the triangle of both centres and a common point, by Heron's formula. Angles of the same root
-    # keep the sum exact where the circles touch: there each angle alone errs by the root of a rounding error.
+    # Four times the area of the triangle of both centres and a common point, by Heron's formula. Angles of the same
+    # root keep the sum exact where the circles touch: there each angle alone errs by the root of a rounding error.
     root = np.sqrt(np.maximum((1 + radius - d) * (d + 1 - radius) * (d - 1 + radius) * (d + 1 + radius), 0.0))
     small, large = np.arctan2(root, d**2 + 1 - radius**2), np.arctan2(root, d**2 + radius**2 - 1)
     return np.asarray(np.where(within, small + radius**2 * large - root / 2, np.pi))
