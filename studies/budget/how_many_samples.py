@@ -16,7 +16,10 @@ def samples_per_pixel(
     shares: BudgetShares,
     most_spp: int,
 ) -> int:
-    """Samples per pixel that keep Monte Carlo noise within its share in every condition, as far as the study allows.
+    """Return how many samples per pixel keep Monte Carlo noise within its share of the budget in every condition.
+
+    The number is at most `most_spp`, which the study allows. The variance of the noise is inversely proportional to the
+    number of samples, so that the number follows from the variance of one sample.
 
     The variance of the noise falls as 1 over the number of samples, so that the variance of one sample tells how many
     are needed.

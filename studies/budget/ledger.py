@@ -139,7 +139,7 @@ class Plan:
     __repr__ = brief
 
     def samples_a_side(self, scene: SceneChoice) -> int:
-        """Samples of a scene's light along each side of a pixel, by the lenses that its images hold."""
+        """Return how many samples of a scene's light the lenses of its images need along each side of a pixel."""
         images = ((condition, image) for condition, image in self.images.items() if condition.scene == scene)
         sensors = (replace(preset(condition.sensor), lens=image.lens) for condition, image in images)
         return samples_a_side(str(scene.source), sensors)

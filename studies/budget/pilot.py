@@ -53,7 +53,7 @@ class Pilot:
 
     @property
     def rendered(self) -> bool:
-        """Whether it is a render, and no picture file."""
+        """Return whether the pilot is a render, rather than a picture file."""
         return self.opened.scene is not None
 
 

@@ -74,7 +74,7 @@ class ScaledEffects:
     kernel: float
 
     def monte_carlo(self, count: int, spp: int, left_out: frozenset[str]) -> float:
-        """Monte Carlo variance of a model [e-^2]."""
+        """Return the Monte Carlo variance of a model with `count` bands that leaves some effects out [e-^2]."""
         return ((self.sharp if DIFFRACTION in left_out else self.blurred) + self.jitter[count]) / spp
 
 
@@ -134,12 +134,16 @@ def scale_effects(
 
 
 def _rms(pair: Pair, below: NDArray[np.bool_]) -> float:
-    """Root of the mean product of an effect's two estimates, with a margin for how few pixels there are."""
+    """Return an effect's root mean square over the pixels of the mask `below`, raised by a margin against chance.
+
+    The square is estimated without bias as the product of the effect's two estimates, from the even and the odd half.
+    The margin allows for a mean that comes out too small by chance because there are few pixels.
+    """
     return float(np.sqrt(max(_upper((pair[0] * pair[1])[below], EFFECT_MARGIN), 0.0)))
 
 
 def _upper(values: NDArray[np.float64], margin: float) -> float:
-    """Mean over pixels (last axis), raised by a number of its standard errors; 0 without pixels."""
+    """Return the mean over pixels (last axis) plus `margin` times its standard error; 0 where there are no pixels."""
     return float(values.mean() + margin * values.std() / np.sqrt(values.shape[-1])) if values.size else 0.0
 
 

@@ -54,7 +54,7 @@ def plan_from_settings(study: Study) -> Plan:
 
 
 def reference_plan(study: Study) -> Plan:
-    """Model everything: fine bands, four times the samples that the study allows, the whole lens, the exact readout."""
+    """Plan the most exact model: fine bands, four times the study's samples, the whole lens and the exact readout."""
     renders, images = {}, {}
     for opened in open_all(study).values():
         if opened.scene is not None:

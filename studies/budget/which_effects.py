@@ -41,7 +41,10 @@ def effects_left_out(
 
 
 def _fits(row: ScaledEffects, count: int, left_out: Iterable[str], shares: BudgetShares) -> bool:
-    """Whether bands and left-out effects together stay within the budget that Monte Carlo noise leaves to them."""
+    """Return whether the errors of the bands and of the effects left out stay within the budget.
+
+    Their part of the budget is what remains of it after the share of Monte Carlo noise.
+    """
     optional_e = {**row.lens, KERNEL: row.kernel}
     error_e = sum(row.bands[count]) + sum(optional_e.get(name, 0.0) for name in left_out)
     return error_e**2 <= (shares.total - shares.monte_carlo) * row.noise_variance
