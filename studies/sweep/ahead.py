@@ -29,7 +29,7 @@ class Spans:
         return noting_times(lambda start, end: self._spans.append((name, start, end)))
 
     def within(self, start: float, end: float) -> dict[str, float]:
-        """Seconds of each stage between two times of `time.perf_counter`."""
+        """Return how many seconds each stage took between two times of `time.perf_counter`."""
         seconds: dict[str, float] = {}
         for name, first, last in self._spans:
             seconds[name] = seconds.get(name, 0.0) + max(0.0, min(last, end) - max(first, start))

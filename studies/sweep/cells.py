@@ -106,7 +106,7 @@ class Cell:
 
     @property
     def kind(self) -> tuple[str, Condition]:
-        """Cells of one kind differ by their seeds, and share what a processor prepares."""
+        """Return the cell's processor and condition: cells of one kind differ by seed alone, and share preparations."""
         return self.processor, self.condition
 
 
@@ -149,9 +149,10 @@ def cell_keys(
     made_by: Provenance,
     flicker: Waveform | None = None,
 ) -> list[str]:
-    """Key of each seed's cell: its place in the study, which decides its noise, and all that its picture is made from.
+    """Return the key of each seed's cell, the hash of its place in the study and of all that its picture is made from.
 
-    The processor's colours follow from the frame's sensor and light.
+    The place in the study decides the noise. The processor's colours aren't hashed, because they follow from the sensor
+    and the light of the frame.
     """
     lamps: list[object] = [] if flicker is None else [flicker]
     place = rounded([labels(condition), processor])
@@ -160,15 +161,19 @@ def cell_keys(
 
 
 def device_stream(sensor: str, mosaic: str, seed: int) -> np.random.Generator:
-    """Stream of a chip's fixed patterns: they belong to the sensor, its mosaic and the seed, not to the exposure."""
+    """Return the random stream of a chip's fixed patterns.
+
+    They belong to the sensor, its mosaic and the seed, and don't depend on the exposure.
+    """
     return _stream("device", label(sensor), mosaic, seed)
 
 
 def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.Generator:
-    """Stream of one exposure's noise; processors of the same mosaic develop the same exposure.
+    """Return the random stream of one exposure's noise; processors of the same mosaic develop the same exposure.
 
-    It depends on names and values alone, not on their order in the study: one level more leaves the others' noise.
-    All automatic exposures share it: where their rules find the same time, the picture is the same.
+    The stream depends on names and values alone, not on their order in the study: one more level leaves the noise of
+    the others unchanged. All automatic exposures share a stream: where their rules choose the same time, the picture is
+    the same.
     """
     names = labels(condition)
     value, unit = parse_level(condition.level)
@@ -177,12 +182,15 @@ def exposure_stream(condition: Condition, mosaic: str, seed: int) -> np.random.G
 
 
 def shake_stream(seed: int) -> np.random.Generator:
-    """Stream of the hand's paths: one hand holds every camera of a seed, in every light and for every time."""
+    """Return the random stream of the hand's paths, the same for every camera, light and exposure time of a seed."""
     return _stream("shake", seed)
 
 
 def flicker_stream(seed: int) -> np.random.Generator:
-    """Stream of the time at which a seed's exposures start by the lamps' clock: the same for every camera."""
+    """Return the random stream of the moment in the lamps' cycle at which a seed's exposures start.
+
+    It is the same for every camera.
+    """
     return _stream("flicker", seed)
 
 

@@ -166,6 +166,9 @@ def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
 
 
 def _facts() -> tuple[dict[str, str], int, bool]:
-    """What computes in this process, its machine's cores, and whether it imports nothing of its working directory."""
+    """Return the versions that compute in this process, its machine's cores, and whether its working directory is safe.
+
+    It is safe if Python imports nothing from it.
+    """
     safe = sys.flags.safe_path or bool(os.environ.get("PYTHONSAFEPATH"))
     return {**versions(), "engine": backend()}, cores(), safe

@@ -137,7 +137,7 @@ def estimated(
 
 
 def _code_of(versions_text: str) -> str | None:
-    """Version of rodcone among a row's versions; None where the row is damaged, which a sweep makes again."""
+    """Return rodcone's version from the versions in a row; None for a damaged row, which a sweep makes again."""
     try:
         return str(json.loads(versions_text)["rodcone"])
     except (ValueError, TypeError, LookupError):
@@ -173,7 +173,10 @@ def estimate_cost(
 
 
 def _memory(parts: Sequence[_Part], workers: int, *, ahead: bool) -> Memory:
-    """Memory of the scene that needs most; with `ahead` a scene may be rendered beside the cells of any other."""
+    """Return the memory that the most demanding scene needs.
+
+    With `ahead`, one scene's render may be in memory together with the cells of any other scene.
+    """
 
     def of(part: _Part, workers: int) -> Memory:
         held = 2 if part.times else 0  # the middle's light, and the mean of the times that went before
@@ -210,7 +213,7 @@ def _part(study: Study, plan: Plan, opened: OpenedScene) -> _Part:
 def _seconds(
     study: Study, parts: Sequence[_Part], workers: int, planned: bool, frames: bool, cells: float, scale: float
 ) -> float:
-    """Time of a sweep with a share `scale` of its pixels, on idle cores."""
+    """Estimate the time of a sweep on idle cores [s], with its pixels scaled by `scale`."""
     own = [(0.0, 0.0)] if frames else [_develop_s(name) for name in study.processors]
     pixel_s, least_s = _FRAME_S if frames else _CELL_S
     report_s, picture_s, row_s = (0.0, 0.0, 0.0) if frames else _REPORT_S
@@ -237,7 +240,7 @@ def _seconds(
 
 
 def _develop_s(processor: str) -> tuple[float, float]:
-    """Processor seconds of a pixel's development, and of the first calls in a process."""
+    """Return the processor time that developing a pixel takes, and that of the first calls in a process [s]."""
     for words, pixel_s, first_s in _DEVELOP_S:
         if any(word in processor for word in words):
             return pixel_s, first_s

@@ -154,7 +154,7 @@ def _prepare(base: sqlite3.Connection, path: Path) -> None:
 
 
 def _has_tables(base: sqlite3.Connection, path: Path) -> bool:
-    """Whether the file holds tables of this version; `InputError` for any other tables."""
+    """Return whether the file holds tables of this version; raise `InputError` if it holds any other tables."""
     tables = base.execute("SELECT count(*) FROM sqlite_master").fetchone()[0]
     version, owner = (base.execute(f"PRAGMA {name}").fetchone()[0] for name in ("user_version", "application_id"))
     if tables and owner != APPLICATION_ID:
@@ -244,7 +244,14 @@ def note_keys(base: sqlite3.Connection, first: int, keys: Iterable[str]) -> None
 
 
 def noisiest(base: sqlite3.Connection) -> list[Row]:
-    """Row of the largest `mc_share` in each scene of the last run, the first of equal ones, in the study's order.
+    """Return from each scene of the last run the row with the largest `mc_share`, in the study's order.
+
+    Of several rows with the same share the first one counts.
+
+    Raises
+    ------
+    InputError
+        Where one of them isn't what was written.
 
     Raises
     ------
@@ -311,7 +318,7 @@ def _put(base: sqlite3.Connection, table: str, values: list[Any]) -> int:
 
 
 def _is_sound(values: tuple[Any, ...]) -> bool:
-    """Whether a row ends in the digest of the values before it."""
+    """Return whether a row ends in the digest of the values before it."""
     return bool(digest(values[:-1]) == values[-1])
 
 

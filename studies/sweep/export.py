@@ -43,7 +43,7 @@ def stream_rows(folder: Path, everything: bool = False) -> Iterator[Row]:
 
 
 def read_rows(folder: str | Path, everything: bool = False) -> list[Row]:
-    """Rows of a sweep's folder: those of its last run, or all.
+    """Return the rows of a sweep's folder: those of its last run, or with `everything` all of them.
 
     Raises
     ------
@@ -82,7 +82,10 @@ def write_csv(table: Iterable[Row], path: Path) -> None:
 
 
 def results_json(run: LastRun) -> bytes:
-    """Study, seconds by stage and rows of a sweep's last run, as a JSON file.
+    """Return the study, the seconds by stage and the rows of a sweep's last run as the content of a JSON file.
+
+    A row has the columns of `studies.sweep.row.Row`, and those columns that hold JSON are objects; a number that isn't
+    finite is null.
 
     A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
@@ -171,7 +174,10 @@ def lines(
 
 
 def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str]) -> str:
-    """Table in Markdown; ``mean ± half width``, to three digits; no half width where the seeds don't differ."""
+    """Return the table in Markdown, with figures as ``mean ± half width``, to three digits.
+
+    The half width is left out where the seeds don't differ.
+    """
     cells = [[*by, *map(_plain, show)], ["---"] * len(by) + ["---:"] * len(show)]
     for line in table:
         figures = [mean_text(mean, half) for mean, half in zip(line.means, line.halves, strict=True)]
@@ -180,7 +186,7 @@ def markdown(table: Sequence[TableLine], by: Sequence[str], show: Sequence[str])
 
 
 def _plain(text: str) -> str:
-    """Text that Markdown shows as it is: names of files and of figures come from outside."""
+    """Escape a text so that Markdown shows it as it is, because names of files and of figures come from outside."""
     return re.sub(r"([|\[\]`*\\])", r"\\\1", escape(" ".join(text.split()), quote=False))
 
 

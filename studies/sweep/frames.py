@@ -184,9 +184,9 @@ def make_frames(
 def exposure_of(
     frame: UnitFrame, exposure: str, gain: str, luminance_cd_m2: float, longest_s: float
 ) -> tuple[float, SensorConfig]:
-    """Exposure time of a frame at a mean luminance [s], and its camera at its gain.
+    """Return the exposure time of a frame at a mean luminance [s], and the camera at the gain that is used then.
 
-    `exposure` and `gain` are as `studies.study.study.Condition` has them.
+    `exposure` and `gain` are as `studies.study.study.Condition` has them. A rule for the exposure may raise the gain.
     """
     asked_s = parse_exposure(exposure)
     sensor = at_gain(frame.sensor, gain)
@@ -206,7 +206,11 @@ def exposure_of(
 def kept_exposures(
     folder: Path, frame: UnitFrame, exposure: str, gain: str, levels: Sequence[str], longest_s: float
 ) -> list[tuple[float, SensorConfig]]:
-    """`exposure_of` a frame at each of a study's levels; those that need a look at its light are kept beside it."""
+    """Return the exposure time and the camera of a frame, as `exposure_of` does, at each of a study's levels.
+
+    The rule that has to read the frame's light is slow, so its results are stored in the folder and read from there
+    when they are needed again.
+    """
     key = digest_inputs([frame.key, exposure, gain, levels, longest_s])
     facts = read_facts(folder, key) if exposure == AUTO_INFORMATION else None
     sensor = at_gain(frame.sensor, gain)

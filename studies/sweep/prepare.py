@@ -66,12 +66,15 @@ class Job:
 
     @cached_property
     def own(self) -> dict[str, dict[str, str]]:
-        """`own_version` of each processor as the sweep begins: a file that changes meanwhile is refused."""
+        """Return the `own_version` of each processor, found once as the sweep begins.
+
+        A processor whose file changes during the sweep is therefore refused.
+        """
         return {name: own_version(name) for name in self.study.processors}
 
     @cached_property
     def software(self) -> dict[str, Processor]:
-        """Each processor, loaded once."""
+        """Return each processor by its name, loaded once."""
         return {name: processor_of(name, user_versions) for name, user_versions in self.own.items()}
 
 
@@ -88,9 +91,9 @@ Sensors = tuple[SensorConfig, SensorConfig]
 
 
 def known_cells(job: Job, opened: OpenedScene) -> list[Cell] | None:
-    """Cells of one scene in the study's order; None before its render, or where a shared file is damaged.
+    """Return the cells of one scene in the study's order; None before its render, or where a shared file is damaged.
 
-    They lack the colours that `coloured` adds: what is stored already needs none.
+    They lack the colours that `coloured` adds, because cells whose results are stored need none.
     """
     record = render_record(job.base, _request(job, opened))
     return None if record is None else _cells(job, opened, record)
@@ -205,7 +208,10 @@ def _moments(job: Job, opened: OpenedScene) -> MovingLight | None:
 
 
 def _brightest_share(job: Job, opened: OpenedScene, transport: Transport) -> float:
-    """Largest `render_share` of the study's sensors in its brightest light: where a render's noise shows most."""
+    """Return the largest `render_share` of the study's sensors in its brightest light.
+
+    A render's noise is largest there in comparison with the sensor's.
+    """
     study = job.study
     samples = job.plan.samples_a_side(opened.choice)
     shares = []
@@ -230,7 +236,10 @@ def _request(job: Job, opened: OpenedScene) -> str:
 
 
 def _imaged(job: Job, opened: OpenedScene) -> dict[Imaged, Sensors]:
-    """The preset and the sensor as modelled of each frame: levels, exposures and seeds share it."""
+    """Return for each frame of a scene its preset, and its sensor with the lens as it is modelled.
+
+    Levels, exposures and seeds share a frame.
+    """
     sensors = {}
     view_deg = None if opened.scene is None else horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     for condition in conditions(job.study, opened.choice):

@@ -29,7 +29,10 @@ _IMPORTS = re.compile(
 
 
 def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
-    """Version of rodcone, and the hash of the sources that decide a picture, or what modules of `studies` give."""
+    """Return rodcone's version and a hash of the sources that decide a picture.
+
+    With `names`, the sources of `studies` are those of other modules and of what they import.
+    """
     files = [path for name in _WHOLE for path in (root / name).rglob("*") if path.suffix in _CODE]
     files += deciding_modules(root, names)
     contents = {path.relative_to(root).as_posix(): digest_file(path) for path in files}
@@ -37,7 +40,10 @@ def code_version(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> str:
 
 
 def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> list[Path]:
-    """Modules of `studies` that decide a picture, or another result: those named, and all that these import."""
+    """Return the files of the named modules of `studies`, and of all modules of `studies` that these import.
+
+    By default they are the modules that decide a picture.
+    """
     paths = set[Path]()
     waiting = list(names)
     while waiting:
@@ -77,9 +83,10 @@ class Provenance:
 def provenance(
     variant: str, processor: str, on_backend: bool, user_versions: Mapping[str, str], exact: bool
 ) -> Provenance:
-    """Provenance of a cell made in this process; `exact` as `studies.study.model.ImageModel`.
+    """Return the provenance of a cell that is made in this process; `exact` is as in `studies.study.model.ImageModel`.
 
-    A user's own processor is in it by `own`, its `isp.processors.own.own_version`; what its file imports isn't.
+    `user_versions` names the version of a user's own processor (`isp.processors.own.own_version`). What the processor's
+    file imports isn't in it.
     """
     return Provenance(
         variant=variant,
@@ -91,7 +98,7 @@ def provenance(
 
 @cache
 def versions(processor: str | None = None) -> dict[str, str]:
-    """Versions of all that makes numbers, of the backend in use and of a processor's own libraries too."""
+    """Return the versions of rodcone, of all packages that compute, of the backend and of a processor's libraries."""
     names = (*_PACKAGES, *(libraries(processor) if processor else ()))
     result = {"rodcone": _own_code(), **{name: metadata.version(name) for name in names}, "llvm": "none"}
     if backend() != "numpy":
@@ -106,12 +113,12 @@ def _own_code() -> str:
 
 
 def threads() -> int:
-    """Threads that Dr.Jit's kernels use in this process."""
+    """Return the number of threads that Dr.Jit's kernels use in this process."""
     return int(dr.thread_count()) if backend() == "llvm" else 1
 
 
 def in_words(made_by: Provenance) -> dict[str, str]:
-    """Variant, engines and versions by their names in words."""
+    """Return the variant, engines and versions by names for a reader."""
     return {
         "Mitsuba variant": made_by.variant,
         "engine of captures": made_by.readout_engine,
@@ -136,7 +143,7 @@ def require_same(stated: Provenance, processor: str, on_backend: bool, user_vers
 
 
 def made_by(row: Row) -> Provenance:
-    """Provenance of a row."""
+    """Return the provenance of a row."""
     return Provenance(**{field.name: getattr(row, field.name) for field in fields(Provenance)})
 
 

@@ -201,13 +201,13 @@ def sweep(
 
 
 def _noise_notes(worst: Iterable[Row]) -> list[str]:
-    """For each scene whose render's noise exceeds a sensor's, where it does so most."""
+    """Write a note for each scene where the render's noise exceeds a sensor's, about the row where it does so most."""
     notes = [(row, noise_note(row.mc_share, row.spp)) for row in worst]
     return [f"{row.scene}, {row.level}, {row.sensor}, {row.processor}: {note}" for row, note in notes if note]
 
 
 def _noted(study: Study) -> dict[str, Any]:
-    """Study as the results database notes it, with files by the names that rows have."""
+    """Return the study as the results database stores it, with files under the names that rows have for them."""
     named = {axis: [label(value) for value in getattr(study, axis)] for axis in ("processors", "spectra")}
     return asdict(study) | named | {"scenes": [asdict(scene) | {"source": scene.label} for scene in study.scenes]}
 

@@ -57,7 +57,7 @@ def keep_facts(folder: Path, key: str, facts: Mapping[str, Any]) -> None:
 
 
 def read_facts(folder: Path, key: str) -> dict[str, Any] | None:
-    """Facts of `keep_facts`; None where they are missing or damaged."""
+    """Return the facts that `keep_facts` stored; None where they are missing or damaged."""
     try:
         stored = json.loads((folder / f"{key}.json").read_text("utf-8"))
     except (OSError, ValueError):
@@ -68,7 +68,7 @@ def read_facts(folder: Path, key: str) -> dict[str, Any] | None:
 
 
 def is_whole(path: Path) -> bool:
-    """Whether a file is there and holds what it is named after; its content is read once a process."""
+    """Return whether a file exists and has the content that it is named after; its content is read once per process."""
     try:
         status = path.stat()
         return _holds_its_name(path, status.st_mtime_ns, status.st_size)
@@ -82,7 +82,7 @@ def _holds_its_name(path: Path, changed_ns: int, size: int) -> bool:
 
 
 def read_whole(folder: Path, name: str) -> bytes:
-    """Content of a kept file.
+    """Return the content of a kept file.
 
     Raises
     ------

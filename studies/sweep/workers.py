@@ -44,7 +44,7 @@ class Task(Protocol):
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """What a task shares with others of its kind; names it in a message."""
+        """Return what a task shares with others of its kind; messages name the kind by it."""
 
 
 class WorkerLostError(RuntimeError):
@@ -152,7 +152,7 @@ def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task
 
 
 def _finished(running: dict[Future[Any], Task]) -> Iterator[Any]:
-    """Rows of the cells that finished next; an error among them is raised after the rows."""
+    """Wait for the cells that finish next and yield their rows; raise an error among them after the rows."""
     ready, _ = wait(running, return_when=FIRST_COMPLETED)
     for future in [future for future in ready if future.exception() is None]:
         del running[future]
@@ -247,7 +247,10 @@ def _run_on_pools(
 
 @contextmanager
 def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
-    """Pool of spawned processes, all of them started: forked ones would share locks of Dr.Jit's and BLAS's threads."""
+    """Open a pool of spawned processes, and start all of them.
+
+    Processes that are forked would share the locks of Dr.Jit's and BLAS's threads.
+    """
     others = active_children()
     with _inherited(threads):
         pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
@@ -271,7 +274,10 @@ def _end(processes: Sequence[BaseProcess]) -> None:
 
 @contextmanager
 def _inherited(threads: int) -> Iterator[None]:
-    """Environment and signal mask for processes started within: Ctrl-C is for this process to handle."""
+    """Set the environment and the signal mask that processes started within the block inherit.
+
+    They ignore Ctrl-C, because this process handles it.
+    """
     variables = {
         **SAFE_PATH,
         **_ALLOCATION,
