@@ -63,7 +63,7 @@ class Frames:
     seed: int = 0
 
     def part_of(self, preset: str) -> SensorConfig:
-        """Sensor of which one reading or channel is measured, where it has several."""
+        """Return the preset's sensor, or what stands for the chosen reading or channel where the preset has several."""
         require_absent(f"for {preset!r}; allowed: with --from and --dark", window=self.window)
         sensor = sensor_preset(preset)
         readings = chip_readings(sensor, self.exposure)

@@ -24,7 +24,7 @@ _UNITS = {"us", "ms", "s", "lux", "lx", "cd/m2", "cd/m²", "K"}
 
 
 def _converted(kind: object, tokens: Sequence[Token]) -> Any:
-    """Cyclopts' value of the type, but no whole number of a fraction, which it would round."""
+    """Convert a value as Cyclopts does, but refuse a fraction where a whole number is expected: Cyclopts rounds it."""
     if kind is int or int in get_args(kind):
         for token in tokens:
             if _FRACTION.match(token.value) and float(token.value) % 1:
@@ -79,9 +79,10 @@ app.register_install_completion_command(help="Let this shell complete rodcone's 
 
 
 def joined(arguments: Sequence[str]) -> list[str]:
-    """Arguments with ``-o`` and ``-D`` written out, and numbers below 0 and units put to what stands before them.
+    """Return the arguments with ``-o`` and ``-D`` written out, and with numbers and units joined to what stands before.
 
-    Such as ``--level -5lux`` and ``--exposure 20 ms``.
+    A number below 0 is joined with the option before it, such as ``--level -5lux``, and a unit with the number before
+    it, such as ``--exposure 20 ms``.
     """
     result: list[str] = []
     short = {"-o": "--out", "-D": "--define"}
@@ -131,7 +132,7 @@ def main(arguments: list[str] | None = None) -> Any:
 
 
 def _with_notes(message: str, error: BaseException) -> str:
-    """Message and what was noted on the way up, such as where a render is kept."""
+    """Return the message and the notes that were added to the error, such as where a render is kept."""
     return "; ".join([message, *getattr(error, "__notes__", [])])
 
 

@@ -17,7 +17,7 @@ from rodcone.time_text import parse_time
 
 
 def _seconds(_: object, tokens: Sequence[Any]) -> float:
-    """Seconds as a number, or a time with its unit."""
+    """Convert a number of seconds, or a time with its unit, to seconds."""
     text = tokens[0].value
     try:
         return float(text)
@@ -26,7 +26,7 @@ def _seconds(_: object, tokens: Sequence[Any]) -> float:
 
 
 def _time(_: object, tokens: Sequence[Any]) -> float:
-    """Seconds of a time with its unit."""
+    """Convert a time with its unit to seconds."""
     return parse_time(tokens[0].value)
 
 
@@ -54,10 +54,10 @@ class Estimated(Protocol):
     """What a command will cost."""
 
     def words(self) -> str:
-        """One line."""
+        """Return the cost in one line for a reader."""
 
     def facts(self) -> Mapping[str, Any]:
-        """The same as values."""
+        """Return the same cost as values by name."""
 
 
 def announce_cost(cost: Estimated, *, dry_run: bool, json: bool) -> bool:

@@ -72,7 +72,7 @@ class DemoOrder:
     render: bool = False
 
     def of(self, study: Study) -> Study:
-        """Study demo with what is asked for in place of its own."""
+        """Return the study demo with the options that were given in place of its own values."""
         limits: dict[str, Any] = {"size": self.size, "spp": self.spp, "max_seconds": self.max_seconds}
         render = replace(
             study.render,

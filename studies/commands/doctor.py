@@ -81,14 +81,17 @@ def findings() -> tuple[Finding, ...]:
 
 
 def file_findings(name: str) -> list[Finding]:
-    """A file of this folder that has the name of a package: a script beside it would import the file in its place."""
+    """Report a file in the working directory that has the name of one of rodcone's packages.
+
+    A script beside it would import that file in place of the package.
+    """
     path = Path.cwd() / f"{name}.py"
     words = f"{path} would stand in the place of rodcone's package {name} for every script beside it; rename it"
     return [Finding(f"file {path.name}", words, False)] if path.is_file() else []
 
 
 def distribution_finding(name: str, *, needed: bool = True) -> Finding:
-    """Version of a distribution; its absence is a fault only where it is needed."""
+    """Report the version of a distribution; its absence is a fault only where it is needed."""
     try:
         return Finding(name, metadata.version(name))
     except metadata.PackageNotFoundError:
@@ -96,7 +99,7 @@ def distribution_finding(name: str, *, needed: bool = True) -> Finding:
 
 
 def extra_finding(name: str) -> Finding:
-    """Whether an extra is installed, and what it is for; its absence is no fault."""
+    """Report whether an extra is installed, and what it is for; its absence is no fault."""
     purpose, distributions = EXTRAS[name]
     installed = all(distribution_finding(finding, needed=False).value != _ABSENT for finding in distributions)
     state = "installed" if installed else f"not installed; pip install 'rodcone[{name}]'"
@@ -104,9 +107,9 @@ def extra_finding(name: str) -> Finding:
 
 
 def intruders(home: Path) -> dict[str, str]:
-    """Other distributions that installed files into rodcone's own folders in `home`, by package name.
+    """Find other distributions that installed files into rodcone's own folders in `home`; return them by package name.
 
-    Two wheels with one top-level name are merged into one folder, so that its path doesn't tell.
+    Wheels with the same top-level name are merged into one folder, so that a package's path doesn't show whose it is.
     """
     others = (item for item in metadata.distributions() if item.name.lower() != "rodcone")
     neighbours = [item for item in others if Path(str(item.locate_file(""))).resolve() == home.resolve()]
@@ -131,7 +134,7 @@ def package_finding(name: str, home: Path, intruder: str | None = None) -> Findi
 
 
 def llvm_finding(library: Path | None, version: int | None, oldest: int) -> Finding:
-    """Path, version and origin of the LLVM library, and the fix where it can't be used."""
+    """Report the path, version and origin of the LLVM library, or the fix where it can't be used."""
     if library is None:
         return Finding("LLVM", f"none of version {oldest} or newer; pip install {LLVM_WHEEL} (Linux x86-64) brings one")
     fix = f"unset DRJIT_LIBLLVM_PATH or name a library of version {oldest} or newer"

@@ -36,11 +36,11 @@ class _Cost:
 
     @property
     def seconds(self) -> float:
-        """Time on this machine's cores, if they are idle."""
+        """Return the time on this machine's cores if they are idle [s]."""
         return pace() * (START_S + (_TABLES_S + _ERROR_S * self.cameras * self.levels) / cores())
 
     def words(self) -> str:
-        """One line: time and memory, and what half of it would take."""
+        """Return one line for a reader: time and memory, and the time for half the levels."""
         half = replace(self, levels=max(1, self.levels // 2))
         several = "s" * (self.cameras > 1)
         return (
@@ -49,7 +49,7 @@ class _Cost:
         )
 
     def facts(self) -> dict[str, Any]:
-        """The same as values."""
+        """Return the same cost as values by name."""
         return {**vars(self), "seconds": self.seconds, "bytes": _BYTES}
 
 

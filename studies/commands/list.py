@@ -56,7 +56,7 @@ def _write_gallery(kind: Kind | None, out: Path) -> None:
 
 
 def texts(kind: Kind) -> dict[str, str]:
-    """Names of one kind, with what each is."""
+    """Return the names of one kind, each with a description."""
     if kind == "sensors":
         return _sensors()
     if kind == "mosaics":
@@ -72,7 +72,7 @@ def texts(kind: Kind) -> dict[str, str]:
 
 
 def _sensors() -> dict[str, str]:
-    """Presets, each by the remark that its file begins with, and cameras whose response was measured."""
+    """Return the presets, each with the comment that its file begins with, and the cameras with a measured response."""
     from sensor import presets
     from sensor.cameras.library import measured_cameras
 

@@ -131,7 +131,7 @@ def reference(
 
 
 def _so_far(transport: Transport, now: float, until: float) -> str:
-    """One line: samples, the share of the sensor's variance that they leave, and how long the rest takes."""
+    """Write a progress line: samples, the share of the sensor's variance that they leave, and the time for the rest."""
     left_s = transport.seconds * (MARGIN * now / until - 1)
     words = f"; about {duration(left_s)} more to {until:g}" if now > until else ""
     return f"{transport.spp:.0f} samples a pixel: {now:.3g} of the sensor's variance in 95 % of pixels{words}"
@@ -143,7 +143,7 @@ def _most(shares: Mapping[str, Mapping[str, float]]) -> float:
 
 
 def _shares(transport: Transport, study: Study) -> dict[str, dict[str, float]]:
-    """Noise variance over the sensor's own in 95 % of the pixels, by sensor and level."""
+    """Return the noise variance over the sensor's own that 95 % of the pixels stay below, by sensor and level."""
     lux = lux_per_cd_m2(transport, study.levels)
     shares: dict[str, dict[str, float]] = {}
     for name in study.sensors:

@@ -114,12 +114,12 @@ class RenderOrder:
 
     @property
     def samples(self) -> int | None:
-        """Samples per pixel, at most; None where an error or the time ends the render."""
+        """Return the most samples per pixel; None where an error or the time ends the render."""
         return self.spp if self.spp or self.noise or self.max_seconds else DEFAULT_SPP
 
     @property
     def renders(self) -> bool:
-        """Whether something asks for a render though the scene's light is there already."""
+        """Return whether an option asks for a render even if the scene's light is there already."""
         limits = (self.spp, self.noise, self.max_seconds, self.max_depth, self.cache)
         return self.render or self.denoise or self.seed != 0 or any(limit is not None for limit in limits)
 
@@ -216,7 +216,7 @@ def _rendered(
 
 
 def _bands(text: str | None) -> tuple[Floats, Floats] | None:
-    """Centres and widths of evenly spaced bands from ``380:780:10``; None where the lights choose."""
+    """Return the centres and widths [nm] of even bands given as ``380:780:10``; None where the lights choose them."""
     if text is None:
         return None
     try:

@@ -27,7 +27,7 @@ def marked(folder: Path, page: str, results: bytes | None, stored: str) -> bytes
 
 
 def is_current(folder: Path) -> bool:
-    """Whether a folder's page and its results, where it has any, are what would be written now."""
+    """Return whether a folder's page, and its results file if it has one, are what would be written now."""
     page, results = folder / REPORT, folder / RESULTS
     if not page.is_file():
         return False

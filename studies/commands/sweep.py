@@ -58,11 +58,11 @@ class Workers:
 
     @property
     def processes(self) -> int:
-        """On this machine; 0 where a cluster works."""
+        """Return the number of processes on this machine; 0 where a cluster works instead."""
         return 0 if self.cluster else self.workers or cores()
 
     def runner(self) -> AbstractContextManager[Callable[..., Generator[Any, None, None]]]:
-        """What runs tasks, for as long as it is open."""
+        """Return a context whose function runs tasks: in this process, in a pool of processes or on a cluster."""
         if self.cluster is not None:
             return on_cluster(self.cluster)
         if self.processes == 1:

@@ -119,7 +119,7 @@ def _numbers(noise: Path | None, more_gain: Path | None) -> PixelNumbers:
 
 
 def _anchor(text: str) -> tuple[float, float]:
-    """Quantum efficiency and its wavelength [nm] from a text such as 0.5@530."""
+    """Parse a quantum efficiency and its wavelength [nm] from a text such as 0.5@530."""
     parts = text.split("@")
     try:
         value, at_nm = (float(part) for part in parts)

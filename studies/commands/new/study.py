@@ -38,7 +38,7 @@ def study(name: str = "light_levels", /, *, out: Path | None = None) -> None:
 
 
 def _named(study_file: Path) -> list[str]:
-    """Files that an example names, and those that its sensors name, relative to its folder."""
+    """Return the files that an example names, and those that its sensors name, relative to its folder."""
     files = []
     for name in read_toml(study_file).get("sensors", ()):
         if name.endswith(".toml"):
