@@ -78,13 +78,15 @@ class Score:
 
 
 def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Row, list[Score]]:
-    """Score a set's developed pictures beside the processors that a sweep developed it by; return the set's head too.
+    """Score a set's developed pictures, and beside them the pictures of the processors in the set's own sweep.
+
+    Also return the set's head, the first line of its manifest.
 
     Parameters
     ----------
     pictures : Path
-        Folder of files named ``KEY.png``, ``.tif`` or ``.npy`` by the set's keys: encoded sRGB in which white is 1. Of
-        each level and camera all, or none.
+        Folder of files named ``KEY.png``, ``.tif`` or ``.npy`` by the set's keys: encoded sRGB in which white is 1. The
+        pictures of one level and camera are either all there or all missing.
     out : Path
         Folder of `studies.dataset.make_set.make_set`.
     developer : str
@@ -121,7 +123,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
 
 
 def _condition(row: Row) -> tuple[str, str]:
-    """Camera and level."""
+    """Return the name of a row's camera, and its light level."""
     *camera, level = (row[name] for name in _PLACE)
     return ", ".join(camera), level
 
@@ -195,7 +197,10 @@ def read_picture(path: Path, shape: tuple[int, ...]) -> NDArray[np.float64]:
 
 
 def scores(rows: Sequence[Row], developer: str) -> list[Score]:
-    """Scores of each condition; samples of a scene are averaged first, since scenes alone are independent."""
+    """Return the scores of each condition, with intervals over its scenes.
+
+    The samples of a scene are averaged first, because only different scenes are independent of each other.
+    """
     conditions: dict[tuple[str, str], dict[str, list[Row]]] = {}
     for row in rows:
         conditions.setdefault(_condition(row), {}).setdefault(row["scene"], []).append(row)
@@ -211,7 +216,10 @@ def scores(rows: Sequence[Row], developer: str) -> list[Score]:
 
 
 def scores_of_sweep(rows: Sequence[Row]) -> list[Score]:
-    """Scores of each processor by a sweep's single frames; of each white balance apart where there are several."""
+    """Return the scores of each processor from a sweep's cells of one frame.
+
+    If the sweep has several white balances, each of them is scored by itself.
+    """
     single = [row for row in rows if row["processor"] in NAMED and row["frames"] == 1]
     several = len({row["white_balance"] for row in single}) > 1
     developers: dict[str, list[Row]] = {}
@@ -255,7 +263,7 @@ def _check_encoding(rows: Sequence[Row]) -> None:
 
 
 def judge_page(head: Mapping[str, Any], scores: Sequence[Score]) -> str:
-    """Scores of `judge` as a self-contained page: for each camera a chart of PSNR over light, and every metric."""
+    """Write the scores of `judge` as a self-contained page: per camera a chart of PSNR over light, and every metric."""
     by_camera = {camera: list(lines) for camera, lines in groupby(scores, key=lambda score: score.camera)}
     charts = {camera: svg_address(svg_text(psnr_chart(x))) for camera, x in by_camera.items()}
     return write_out("judge.html.j2", head=head, cameras=by_camera, charts=charts, metrics=MEASURED, text=text)

@@ -124,7 +124,7 @@ def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> s
 
 
 def _earlier(folder: Path, identity: str) -> Lines:
-    """Manifest of the set in a folder; nothing of a new one. Foreign files and another set are refused."""
+    """Return the manifest of the set in a folder, empty for a new one; refuse foreign files and another set."""
     for path in folder.iterdir():
         if path.name not in (MANIFEST, CARD) and not _SHARD.fullmatch(path.name) and not is_half_written(path):
             raise InputError(f"out: {folder} holds a foreign file, {path.name!r}; allowed: a set; move it away")
@@ -138,7 +138,10 @@ def _earlier(folder: Path, identity: str) -> Lines:
 
 
 def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Facts, order: SetOrder) -> list[Sample]:
-    """Samples of a scene; cells that differ in what is done with a frame alone are one."""
+    """Return the samples of a scene, one for each frame or part of a frame.
+
+    Cells that differ only in what is done with a frame afterwards share its sample.
+    """
     frames = {_name(x.condition, processor_of(x.processor).mosaic, x.seed): x for x in reversed(cells)}
     windows = _windows(np.load(cells[0].frame.electrons, mmap_mode="r").shape[:2], order.crop)
     return [
@@ -165,7 +168,7 @@ def _name(condition: Condition, mosaic: str, seed: int) -> str:
 
 
 def _windows(shape: tuple[int, ...], crop: int | None) -> list[tuple[int, int, int, int]]:
-    """Parts of a frame: first row and column, height and width; `InputError` where none fits."""
+    """Return the parts of a frame as (first row, first column, height, width); raise `InputError` where none fits."""
     if crop and crop > min(shape):
         raise InputError(f"crop: {crop} exceeds the frames' side, {min(shape)}; allowed: up to that; raise render.size")
     height, width = (crop, crop) if crop else shape
@@ -202,7 +205,10 @@ def _head(study: Study, order: SetOrder, identity: str, samples: int, command: s
 
 
 def card(lines: Lines) -> str:
-    """Card of a set as Markdown, of its manifest's lines: what is in it, how bright and noisy, and who may use it."""
+    """Write a set's card in Markdown from the lines of its manifest.
+
+    It says what the set holds, how bright and noisy its frames are, and who may use it.
+    """
     by_kind = {kind: [line for line in lines if line["kind"] == kind] for kind in ("scene", "shard", "sample")}
     samples = sorted(by_kind["sample"], key=lambda line: line["luminance_cd_m2"])
     noise = {name: [line["render_noise"][name] for line in samples] for name in ("mean", "of_95_percent")}

@@ -58,12 +58,12 @@ class SetOrder:
 
     @property
     def planes(self) -> tuple[str, ...]:
-        """Names of the planes of truth, of `studies.dataset.sample.TRUTH`."""
+        """Return the names of the planes of truth, from `studies.dataset.sample.TRUTH`."""
         return tuple(name.strip() for name in self.truth.split(","))
 
     @property
     def drawn_scenes(self) -> tuple[SceneChoice, ...]:
-        """Scenes whose hashes are counted from the seed."""
+        """Return the scenes that are drawn at random; the seed and a counter decide each one's hash."""
         counts = {"generated": self.generated, "diorama": self.diorama or 0}
         hashes = ((family, digest([self.seed, index])[:12]) for family in counts for index in range(counts[family]))
         return tuple(SceneChoice("-".join(drawn)) for drawn in hashes)
@@ -95,7 +95,7 @@ def check_cameras(study: Study, order: SetOrder) -> None:
 
 
 def bytes_needed(study: Study, plan: Plan, scenes: Iterable[OpenedScene], order: SetOrder) -> float:
-    """Bytes of a set with the renders and frames that it is made from, at most."""
+    """Return the most bytes that a set takes together with the renders and frames that it is made from."""
     total = 0.0
     conditions = len(study.spectra) * len(study.levels) * len(study.exposures) * len(study.seeds)
     for opened in scenes:

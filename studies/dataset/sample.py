@@ -92,7 +92,7 @@ class Sample:
 
 
 def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
-    """Arrays of a sample by name, the raw frame first, and its facts as JSON holds them."""
+    """Return the arrays of a sample by name, the raw frame first, and its facts as values for JSON."""
     cell = sample.cell
     frame = sample.cell.frame
     row, column, height, width = sample.window
@@ -159,15 +159,19 @@ def _facts(
 
 
 def frame_labels(condition: Condition) -> dict[str, Any]:
-    """Scene, spectrum, level, exposure and sensor by their names: of a condition what decides a single frame."""
+    """Return those names of a condition that decide a single frame: scene, spectrum, level, exposure and sensor.
+
+    The gain is among them where it isn't the sensor's own; the white balance and the number of frames aren't.
+    """
     left_out = ("white_balance", "frames", *(["gain"] if condition.gain == OWN else []))
     return {name: value for name, value in labels(condition).items() if name not in left_out}
 
 
 def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -> dict[str, dict[str, float]]:
-    """Variance of a pixel of each channel: a x + b + c x^2 [DN^2], x its mean above black [DN], dark current left out.
+    """Return a, b and c of each channel's noise: the variance of a pixel is a x + b + c x^2 [DN^2].
 
-    b holds all that doesn't depend on light, a x the shot noise, c x^2 what is in proportion to it: PRNU.
+    x is the pixel's mean above black [DN]. The shot noise is a x, and the PRNU c x^2; b is all that doesn't depend on
+    light, except the noise of the dark current, which is left out.
     """
     result = {}
     for name in readings[0].sensor.channels:
@@ -185,7 +189,7 @@ def _opened(path: Path) -> NDArray[Any]:
 
 
 def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: Progress) -> Facts:
-    """Facts of a scene; its files are made where one is missing or damaged.
+    """Return the facts of a scene; make its files anew where one is missing or damaged.
 
     Parameters
     ----------
@@ -214,12 +218,12 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
 
 @cache
 def code_digests() -> list[str]:
-    """Digests of the modules of `studies` that decide a sample: with other code a set is made anew."""
+    """Return the digests of the modules of `studies` that decide a sample, so that other code makes a set anew."""
     return [digest_file(path) for path in deciding_modules(names=("studies.dataset.shards",))]
 
 
 def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> dict[str, Path]:
-    """Files that planes of a cell's frame are cut from; a picture file has none of surfaces."""
+    """Return the files that planes of a cell's frame are cut from; a picture file has no planes about surfaces."""
     folder = (job.out / PLANES).resolve()
     paths = {"mosaic_e": cell.frame.electrons, "rgb": cell.frame.truth}
     paths |= {plane: folder / name for plane, name in facts["files"][_frame_key(cell)].items()}

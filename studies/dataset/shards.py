@@ -58,7 +58,7 @@ class Shard:
 
     @property
     def kind(self) -> tuple[object, ...]:
-        """Its file's name: each shard is of a kind of its own."""
+        """Return the name of the shard's file, because no shard shares work with another."""
         return (self.path.name,)
 
 
@@ -69,7 +69,10 @@ def split_of(scene: str) -> str:
 
 
 def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Shard]:
-    """Samples of each split cut into shards, whose number is in proportion; the order of keys' hashes mixes scenes."""
+    """Divide the samples of each split into shards, whose number is in proportion to the split's samples.
+
+    Samples are sorted by the hash of their keys, which mixes scenes.
+    """
     shards = []
     for split in SPLITS:
         chosen = sorted((x for x in samples if x.split == split), key=lambda x: digest(x.key))
@@ -152,7 +155,7 @@ def _write_manifest(folder: Path, head: Lines, shards: Iterable[Shard]) -> None:
 
 
 def read_manifest(folder: Path) -> Lines:
-    """Lines of a set's manifest.
+    """Read the lines of a set's manifest.
 
     Raises
     ------
@@ -172,21 +175,21 @@ def read_manifest(folder: Path) -> Lines:
 
 
 def shards_of(folder: Path, lines: Lines) -> list[Shard]:
-    """Shards that the manifest of a folder lists."""
+    """Return the shards that a folder's manifest lists."""
     places = [place for place, line in enumerate(lines) if line["kind"] == "shard"]
     parts = [lines[at:end] for at, end in pairwise([*places, len(lines)])]
     return [Shard(x[0]["made_from"], inside(folder, x[0]["name"]).resolve(), lines=x) for x in parts]
 
 
 def is_intact(shard: Shard) -> bool:
-    """Whether a shard's file is what was written."""
+    """Return whether a shard's file has the content that was written."""
     path = shard.path
     head = shard.lines[0]
     return path.is_file() and path.stat().st_size == head["bytes"] and digest_file(path) == head["digest"]
 
 
 def read_shard(path: Path) -> Iterator[tuple[Arrays, dict[str, Any]]]:
-    """Arrays by name and facts of each sample.
+    """Yield each sample's arrays by name and its facts.
 
     Raises
     ------
