@@ -80,7 +80,7 @@ class LitPrior:
 
 @cache
 def view_of(prior_name: str, light_name: str) -> LitPrior:
-    """The prior's coefficients under an illuminant, in bands of 1 nm."""
+    """Return the prior's spectra under an illuminant, in bands of 1 nm."""
     prior = load_spectral_prior(prior_name)
     light = named_light(light_name)
     basis = prior.spectra[np.clip(np.searchsorted(prior.edges_nm, light.wavelength_nm) - 1, 0, len(prior.spectra) - 1)]
@@ -90,16 +90,20 @@ def view_of(prior_name: str, light_name: str) -> LitPrior:
 
 
 def responses_e(sensor: SensorConfig, view: LitPrior) -> Floats:
-    """Electrons of each channel's pixel in a second from a coefficient of 1, reflectance 1 having 1 cd/m^2."""
+    """Return the electrons per second in each channel's pixel for a coefficient of 1, shape (channel, coefficient).
+
+    The light is such that a reflectance of 1 has a luminance of 1 cd/m^2.
+    """
     weights = electrons_per_irradiance(sensor.undivided, view.light.wavelength_nm, view.light.width_nm, 1.0)
     return np.asarray(weights * view.light.spectrum @ view.basis * camera_equation(sensor.lens))
 
 
 def metric_rows(prior: SpectralPrior, view: LitPrior, reflectance: float) -> tuple[Floats, ...]:
-    """R of encoded sRGB, encoded luminance, L* and (a*, b*) for errors of a patch of mean luminous reflectance 1.
+    """Return R for the errors of encoded sRGB, encoded luminance, L* and (a*, b*): |R e|^2 is the squared error of e.
 
-    Each has the shape (component, pixel, direction, coefficient), at the middle pixels; |R e|^2 is the squared error.
-    Reflectance 1 is shown as white. A curve's slope is that of the straight line nearest to it over the values of a
+    Here e is the error of the coefficients of a patch whose mean luminous reflectance is 1. Each R has the shape
+    (component, pixel, direction, coefficient), for the patch's middle pixels. `reflectance` scales the patch, and
+    reflectance 1 is shown as white. A curve's slope is that of the straight line nearest to it over the values of a
     component, which may lie beyond the curve's ends (statistical linearisation, Booton 1954).
     """
     means, factors = prior.patches.means[:, MIDDLE], prior.patches.factors[:, MIDDLE]
@@ -122,7 +126,10 @@ def _lab_root(relative: Floats) -> Floats:
 
 
 def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats:
-    """H of a patch: electrons of each sample from each pixel's coefficients, through lens, filters and crosstalk."""
+    """Return the sampling matrix H of a patch, shape (sample, pixel, coefficient).
+
+    It gives the electrons of each sample from the coefficients of each pixel, through lens, filters and crosstalk.
+    """
     # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
     filters = responses[sites_of(sensor.cfa)]
     spread = spread_of(sensor.pixel.crosstalk)
@@ -157,7 +164,7 @@ def expect(
     prior: str = "drawn",
     blur: bool = False,
 ) -> list[ExpectedError]:
-    """Expected error of a sensor's pictures at each level, in closed form.
+    """Compute the expected error of a sensor's pictures at each level, in closed form.
 
     Parameters
     ----------
@@ -218,7 +225,7 @@ def expect(
 
 @cache
 def _forms(prior: str, light: str) -> Floats:
-    """W = R' R of each metric by reflectance, (reflectance, metric, component, pixel, coefficient, coefficient)."""
+    """Return W = R' R of `metric_rows`, shape (reflectance, metric, component, pixel, coefficient, coefficient)."""
     spectral = load_spectral_prior(prior)
     seen = view_of(prior, light)
     return np.array([[r.swapaxes(-1, -2) @ r for r in metric_rows(spectral, seen, m)] for m in spectral.reflectances])
@@ -226,7 +233,7 @@ def _forms(prior: str, light: str) -> Floats:
 
 @cache
 def drawn_pixels(prior: str) -> Floats:
-    """Coefficients of `METERED` x `METERED` pixels drawn from the prior, which the exposure looks at."""
+    """Draw coefficients of `METERED` x `METERED` pixels from the prior, as a frame from which exposure is metered."""
     spectral = load_spectral_prior(prior)
     rng = np.random.default_rng(0)
     shape = (METERED, METERED)
@@ -240,16 +247,17 @@ def drawn_pixels(prior: str) -> Floats:
 
 
 def exposed(sensor: SensorConfig, per_second_e: Floats, exposure: str | float) -> tuple[float, Noise]:
-    """Exposure of a frame by a rule or a time [s], and the noise of a sample; channels may be read apart by the frame.
+    """Return the exposure time [s] that a rule chooses for a frame, or the given time, and the noise of a sample.
 
-    `per_second_e` are electrons behind every filter, shape (h, w, channel).
+    `per_second_e` are electrons per second behind every filter, shape (h, w, channel). The frame matters because a
+    metered channel may be read with a time of its own.
     """
     time_s = exposure_of_electrons_s(exposure, per_second_e, sensor) if isinstance(exposure, str) else exposure
     return time_s, noise_of(resolve(sensor, behind_filters(per_second_e * time_s, sensor), time_s))
 
 
 def noise_of(readings: Sequence[PlainReading]) -> Noise:
-    """Noise of a patch's samples, every source of the sensor in it; channels may be read apart."""
+    """Return the noise of a patch's samples, with every source of the sensor and each channel's own reading."""
     tile = readings[0].sensor.cfa
     by_channel = [at_channel(readings, name)[0] for name in channels(tile)]
     numbers = [[x.law.shot, x.law.dark_e, x.law.fixed_e, x.law.prnu, x.headroom_e] for x in by_channel]
