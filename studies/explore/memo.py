@@ -14,7 +14,7 @@ class Overtaken(Exception):
 
 
 def never_cancel() -> None:
-    """Never raise `Overtaken`: the work always goes on."""
+    """Do nothing where other checks may raise `Overtaken`, so that the work always goes on."""
 
 
 @dataclass(frozen=True)

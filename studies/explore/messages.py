@@ -109,7 +109,7 @@ def _mosaics() -> Header:
 
 
 def _missing(processor: str) -> bool:
-    """Whether a processor needs a library that isn't installed."""
+    """Return whether a processor needs a library that isn't installed."""
     return any(find_spec(library) is None for library in libraries(processor))
 
 
@@ -146,7 +146,10 @@ def read_message(text: str) -> Header:
 
 
 def is_superseded_by(message: Header, pending: Header) -> bool:
-    """Whether a pending message, newer of the same kind or of a kind answered first, goes before this one."""
+    """Return whether a pending message is answered before this one.
+
+    It is, if it is a newer message of the same kind, or of a kind that comes earlier in `KINDS`.
+    """
     if pending["kind"] == message["kind"]:
         return bool(pending["number"] > message["number"])
     kinds = list(KINDS)

@@ -77,7 +77,7 @@ class Session:
             self._changed.notify()
 
     def disconnect(self, send: Send) -> None:
-        """Rest until a page is opened, because the page of this connection was closed."""
+        """Stop work until a page is opened, because the page of this connection was closed."""
         with self._changed:
             if send is self._send:
                 self._alone = True
@@ -123,7 +123,7 @@ class Session:
         self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
 
     def _begin_page(self, page: str) -> None:
-        """Forget what another page asked."""
+        """Forget the requests and pictures of the page before, and note the page that asks now."""
         self._page = page  # that asks
         self._shown: Header | None = None
         self._sent: list[Bytes] = []  # pictures that the page has
@@ -227,7 +227,7 @@ class Session:
                 self._pending.setdefault("show", self._shown)
 
     def _between_runs(self) -> None:
-        """Between two runs of a render, answer the page's messages until it sends none; then the render goes on."""
+        """Answer the page's messages between two runs of a render until none waits; then the render goes on."""
         source = self._source
         while self._source is source and (message := self._next(lambda: never_cancel)[0]):
             self._turn(message, never_cancel)
@@ -307,5 +307,5 @@ class Session:
 
 
 def _whose(message: Header) -> Header:
-    """What tells the page that it is an answer of its own."""
+    """Return the kind, number and page of a message, by which the page recognises an answer to its own request."""
     return {key: message[key] for key in ("kind", "number", "page") if key in message}

@@ -21,7 +21,7 @@ _RUN = "from studies.explore.slow import work; work()"
 
 
 def is_slow(processor: str) -> bool:
-    """Whether a processor takes seconds: BM3D and the piecewise linear ones, where others take 0.02 to 0.15 s."""
+    """Return whether a processor takes seconds: BM3D and the piecewise linear ones do, others take 0.02 to 0.15 s."""
     return PROCESSORS[processor].extra == BM3D or processor.startswith("ple")
 
 

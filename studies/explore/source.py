@@ -104,7 +104,7 @@ class RenderOptions:
 
 
 def of_transport(transport: Transport) -> Source:
-    """Explore a transport that exists already."""
+    """Return a source that shows a transport that exists already."""
     return Source("transport", lambda _: iter((RenderState(transport, GIVEN, True),)), _coloured(transport.groups))
 
 

@@ -97,7 +97,7 @@ VIEWS: Mapping[str, Callable[[Shot], Bytes]] = MappingProxyType(
 
 
 def explorer_view(transport: Transport, view: str = "picture", **controls: object) -> Any:
-    """A picture or figure of the explorer's page, as *Copy Python* writes it.
+    """Return a picture or figure of the explorer's page, as the page's *Copy Python* asks for it.
 
     Parameters
     ----------
