@@ -40,7 +40,7 @@ def require_finite(**arrays: ArrayLike) -> None:
 
 
 def psnr_db(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> float:
-    """Peak signal-to-noise ratio of values in [0, 1]; inf where they are equal.
+    """Return the peak signal-to-noise ratio of values in [0, 1] [dB]; inf where they equal the truth.
 
     Raises
     ------
@@ -167,9 +167,9 @@ _P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0
 
 
 def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
-    """Perceptually uniform value, 0 to 595.4, of luminance [cd/m^2] of any shape; 100 cd/m^2 give 256.4.
+    """Return the perceptually uniform value, 0 to 595.4, of luminance [cd/m^2] of any shape; 100 cd/m^2 give 256.4.
 
-    Luminance outside 0.005 to 10 000 cd/m^2, noise below 0 included, counts as the nearer end.
+    Luminance outside 0.005 to 10 000 cd/m^2 counts as the nearer end, and so does noise below 0.
 
     Raises
     ------
@@ -183,7 +183,7 @@ def pu21_encode(luminance_cd_m2: ArrayLike) -> NDArray[np.float64]:
 
 
 def pu21_psnr_db(picture_cd_m2: ArrayLike, truth_cd_m2: ArrayLike) -> float:
-    """PSNR [dB] of luminance on PU21's scale, peak 256 (the authors' PSNRY); inf where pictures look the same.
+    """Return the PSNR of luminance on PU21's scale, peak 256 (the authors' PSNRY) [dB]; inf for equal pictures.
 
     Parameters
     ----------

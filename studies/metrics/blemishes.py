@@ -68,12 +68,12 @@ def count_blemishes(picture: NDArray[np.float64], truth: NDArray[np.float64]) ->
 
 
 def _around(values: NDArray[np.float64], reach: int) -> list[NDArray[np.float64]]:
-    """Each pixel's neighbours up to some pixels away and itself, mirrored at the border."""
+    """Return each pixel's neighbours up to `reach` pixels away and the pixel itself, mirrored at the border."""
     padded = np.pad(values, ((reach, reach), (reach, reach), (0, 0)), mode="reflect")
     windows = sliding_window_view(padded, (2 * reach + 1,) * 2, axis=(0, 1))
     return [windows[..., i, j] for i, j in np.ndindex(windows.shape[3:])]
 
 
 def _difference_of_hue(lab: NDArray[np.float64], other: NDArray[np.float64]) -> NDArray[np.float64]:
-    """CIEDE2000 of two colours at the other's lightness."""
+    """Return CIEDE2000 between two colours, both at the lightness of `other`."""
     return np.asarray(deltaE_ciede2000(np.concatenate([other[..., :1], lab[..., 1:]], axis=-1), other))

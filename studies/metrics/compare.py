@@ -44,7 +44,7 @@ class ReferencePicture:
 
     @cached_property
     def truth(self) -> TruePicture:
-        """What comparisons need of the picture, computed once."""
+        """Return what comparisons need of the picture, computed once."""
         return true_picture(self.linear)
 
     @method

@@ -7,15 +7,15 @@ from rodcone.types import Floats
 
 
 def half_width(samples: Floats, confidence: float = 0.95) -> Floats:
-    """Half the width of the mean's interval over the last axis, the seeds; NaN for one seed.
+    """Return half the width of the mean's confidence interval over the last axis, the seeds; NaN for one seed.
 
-    Student's: t s / sqrt(n), t of n - 1 degrees of freedom, s the sample's deviation. It is exact for normally
-    distributed figures, and close for means of many pixels, which are nearly normal.
+    It is Student's t s / sqrt(n) with n - 1 degrees of freedom, where s is the sample's standard deviation. That is
+    exact for normally distributed figures, and close for means of many pixels, which are nearly normal.
 
     Parameters
     ----------
     samples : (..., seed) float64
-        One figure a seed, independent of each other.
+        One figure per seed, independent of each other.
     confidence : float
         Share of such intervals that hold the true mean; most papers state 0.95.
     """

@@ -77,7 +77,7 @@ def edge_response(luminance: ArrayLike) -> EdgeResponse:
 
 
 def _upright(picture: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Picture with its edge nearer the vertical, transposed if need be."""
+    """Return the picture with its edge nearer the vertical, transposed if it was nearer the horizontal."""
     if picture.ndim != 2 or min(picture.shape) < 2 * LEAST_REACH_PX or not np.isfinite(picture).all():
         raise InputError(f"luminance: shape {picture.shape} is not allowed; give (h, w), 16 or more each, all finite")
     h, w = picture.shape[0] // 2, picture.shape[1] // 2
@@ -86,7 +86,10 @@ def _upright(picture: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def _fit_line(picture: NDArray[np.float64]) -> tuple[float, float]:
-    """Line through the edge, column = start + slope row: centroids of the rows' derivatives under a Hamming window."""
+    """Return start and slope of the line through the edge, column = start + slope * row.
+
+    It is fitted to the centroids of the rows' derivatives under a Hamming window.
+    """
     height, width = picture.shape
     derivative = np.diff(picture, axis=1)
     column = np.arange(width - 1) + 0.5
@@ -105,7 +108,7 @@ def _fit_line(picture: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> NDArray[np.float64]:
-    """Windowed line spread, a sample each quarter pixel."""
+    """Return the line spread function under a Hamming window, with a sample every quarter pixel."""
     height, width = picture.shape
     centre = start + slope * np.arange(height)
     cosine = 1 / np.hypot(1, slope)
@@ -132,7 +135,10 @@ def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> ND
 
 
 def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
-    """Frequencies [cycles/px] and response, less that of the derivative (2 bins wide) and of the bin."""
+    """Return the frequencies [cycles/px] and the response at each.
+
+    The responses of the derivative, which is 2 bins wide, and of the bin itself are divided out.
+    """
     fine = 8 * spread.size  # zeros beside it: a finer grid of frequencies
     frequency = np.fft.rfftfreq(fine, 1 / OVERSAMPLING)
     within = frequency <= HIGHEST_CYCLES_PER_PX

@@ -30,15 +30,16 @@ SPREADS = (
 
 
 def eye_transfer(plane: int, cycles_per_degree: Floats) -> Floats:
-    """Factor on the contrast of a grating of each frequency in opponent plane 0, 1 or 2; 1 at frequency 0."""
+    """Return the eye's contrast transfer at each frequency in opponent plane 0, 1 or 2; it is 1 at frequency 0."""
     return np.asarray(_gaussians(plane, cycles_per_degree) @ _weights(plane))
 
 
 def eye_xyz(xyz: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
-    """XYZ (h, w, 3) after the eye's blur, the picture mirrored at its borders.
+    """Return XYZ (h, w, 3) after the eye's blur, with the picture mirrored at its borders.
 
-    In cosine space, where a mirrored blur is a product: exact for any spread, the 4.3 degrees' too, in O(n log n).
-    There each Gaussian is one of the rows' frequencies times one of the columns'.
+    The blur is a product in the space of cosine transforms, which mirror a picture: it is exact for any spread, even
+    that of 4.3 degrees, and takes O(n log n). Each Gaussian is a product of a factor per row frequency and one per
+    column frequency.
     """
     spectrum = scipy.fft.dctn(xyz @ XYZ_TO_OPPONENT.T, axes=(0, 1))
     down, across = (np.arange(n) / (2 * n) * pixels_per_degree for n in xyz.shape[:2])
@@ -60,12 +61,12 @@ def _weights(plane: int) -> Floats:
 
 
 def eye_lab(encoded: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE) -> NDArray[np.float64]:
-    """CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
+    """Return CIELAB of encoded sRGB (h, w, 3) after the eye's blur."""
     return eye_lab_of_light(decode_srgb(encoded), pixels_per_degree)
 
 
 def eye_lab_of_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE) -> Image:
-    """CIELAB of a display's light, linear sRGB (h, w, 3) in [0, 1], after the eye's blur."""
+    """Return CIELAB of a display's light, linear sRGB (h, w, 3) in [0, 1], after the eye's blur."""
     return np.asarray(
         skimage.color.xyz2lab(eye_xyz(linear @ skimage.color.colorconv.xyz_from_rgb.T, pixels_per_degree))
     )
@@ -74,14 +75,14 @@ def eye_lab_of_light(linear: Image, pixels_per_degree: float = PIXELS_PER_DEGREE
 def s_cielab(
     picture: NDArray[np.float64], truth: NDArray[np.float64], pixels_per_degree: float = PIXELS_PER_DEGREE
 ) -> NDArray[np.float64]:
-    """S-CIELAB difference of each pixel, shape (h, w); 1 is about what can just be seen.
+    """Return the S-CIELAB difference of each pixel, shape (h, w); a difference of about 1 can just be seen.
 
     Parameters
     ----------
     picture, truth : (h, w, 3) float64
         Encoded sRGB in [0, 1]; D65 is the white.
     pixels_per_degree : float
-        Of the eye's view. With fewer the picture is nearer, and finer detail is seen.
+        Pixels per degree of the eye's view. With fewer the picture is nearer, and finer detail is seen.
     """
     return np.asarray(
         skimage.color.deltaE_cie76(eye_lab(picture, pixels_per_degree), eye_lab(truth, pixels_per_degree))

@@ -25,7 +25,7 @@ INNER = 0.6  # share of a patch's sides that counts: its border holds the neighb
 
 
 def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
-    """Pixels of each patch of a scene's chart, shape (patch, h, w), in the chart's order.
+    """Return which pixels belong to each patch of a scene's chart, shape (patch, h, w), in the chart's order.
 
     The chart's own placement is projected through the scene's own camera; nothing is searched for in a picture.
 
@@ -55,10 +55,10 @@ def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
 
 
 def _inside(place: NDArray[np.float64], focal_px: float, shape: tuple[int, int]) -> Masks:
-    """Pixels whose centre sees the inner part of a rectangle of side 2 at `place` in the camera's space (h, w).
+    """Return which pixels (h, w) have a centre that sees the inner part of a rectangle.
 
-    The camera looks along +z, +x to its left and +y up: pixel (row, column) looks at ((w / 2 - column - 0.5),
-    (h / 2 - row - 0.5), focal_px).
+    `place` transforms a square of side 2 into the camera's space. The camera looks along +z, +x to its left and +y up:
+    pixel (row, column) looks at ((w / 2 - column - 0.5), (h / 2 - row - 0.5), focal_px).
     """
     rows, columns = np.indices(shape) + 0.5
     rays = np.stack([shape[1] / 2 - columns, shape[0] / 2 - rows, np.full(shape, focal_px)], axis=-1)
@@ -70,20 +70,20 @@ def _inside(place: NDArray[np.float64], focal_px: float, shape: tuple[int, int])
 
 
 def patch_means(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """Mean of each patch, shape (patch, channel), of a picture (h, w, channel)."""
+    """Return the mean of each patch, shape (patch, channel), of a picture (h, w, channel)."""
     return np.stack([picture[mask].mean(axis=0) for mask in masks])
 
 
 def patch_labs(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """CIELAB of each patch's mean colour, shape (patch, 3), of linear sRGB (h, w, 3)."""
+    """Return CIELAB of each patch's mean colour, shape (patch, 3), of linear sRGB (h, w, 3)."""
     return np.asarray(skimage.color.xyz2lab(patch_means(linear, masks) @ SRGB_TO_XYZ.T))
 
 
 def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """SNR 20 log10(mean / standard deviation) of each patch and channel [dB], shape (patch, channel).
+    """Return the SNR of each patch and channel, 20 log10(mean / standard deviation) [dB], shape (patch, channel).
 
-    Of a linear picture (h, w, channel), as ISO 15739 has it. Patches are taken as evenly lit. A mean that isn't above 0
-    gives -inf, without noise too; a patch above 0 without noise gives inf.
+    The picture (h, w, channel) is linear, as in ISO 15739, and each patch is assumed to be evenly lit. A mean that
+    isn't above 0 gives -inf, even without noise; a patch above 0 without noise gives inf.
     """
     mean = patch_means(picture, masks)
     # About each patch's first pixel: an even patch has no deviation then, in whatever order a processor adds.
@@ -94,7 +94,7 @@ def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float
 
 
 def patch_colour_errors(picture: NDArray[np.float64], truth: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """CIEDE2000 between the mean colours of each patch, shape (patch,).
+    """Return CIEDE2000 between the mean colours of each patch in two pictures, shape (patch,).
 
     Parameters
     ----------
@@ -156,7 +156,7 @@ def target_figures(scene: str, linear: NDArray[np.float64], truth: NDArray[np.fl
 
 @cache
 def _chart(height: int, width: int) -> Masks | None:
-    """Pixels of the chart's patches; None in a picture too small for them."""
+    """Return which pixels belong to the patches of `CHART`; None for a picture too small for them."""
     try:
         return patch_masks(load(CHART), (height, width))
     except InputError:
@@ -167,7 +167,7 @@ WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, 
 
 
 def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """CIEDE2000 between the mean colours of patches 0 and 1, 2 and 3, ..., shape (pair,).
+    """Return CIEDE2000 between the mean colours of patches 0 and 1, 2 and 3, ..., shape (pair,).
 
     Parameters
     ----------
@@ -181,9 +181,9 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
 
 
 def true_pair_delta_e(light: str) -> NDArray[np.float64]:
-    """CIEDE2000 that the CIE observer sees within the pairs of scene metamers under a light, shape (pair,).
+    """Return CIEDE2000 that the CIE observer sees within each pair of the scene metamers under a light, shape (pair,).
 
-    In closed form, in the renderer's bands of 10 nm, adapted to D65 as pictures are.
+    It is computed in closed form in the renderer's bands of 10 nm, adapted to D65 as pictures are.
     """
     surfaces, white = _xyz(light, [curve for pair in pairs() for curve in pair])
     lab = skimage.color.xyz2lab(adapt_to_d65(surfaces / white[1], white))
@@ -191,10 +191,10 @@ def true_pair_delta_e(light: str) -> NDArray[np.float64]:
 
 
 def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:
-    """CIEDE2000 between each patch of a ColorChecker and its colour under D65, shape (patch,); parameters as above.
+    """Return CIEDE2000 between each patch of a ColorChecker and its colour under D65, shape (patch,).
 
-    Both show the white patch's luminance, under its own light, at `WHITE_AT`: nothing is fitted to the
-    picture.
+    The parameters are those of `pair_delta_e`. In both, the white patch has the luminance `WHITE_AT` under its own
+    light: nothing is fitted to the picture.
     """
     return np.asarray(
         skimage.color.deltaE_ciede2000(
@@ -205,14 +205,14 @@ def daylight_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.fl
 
 @cache
 def daylight_srgb() -> NDArray[np.float64]:
-    """Linear sRGB of the ColorChecker's patches under D65, shape (patch, 3)."""
+    """Return linear sRGB of the ColorChecker's patches under D65, shape (patch, 3)."""
     xyz, _ = _xyz("D65", [curve for _, curve in color_checker_reflectances()])
     linear = xyz_to_srgb(xyz)
     return np.asarray(linear * (WHITE_AT / luminance_of_srgb(linear)[WHITE_PATCH]))
 
 
 def _xyz(light: str, surfaces: Iterable[Spectrum]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-    """XYZ of reflectances under a light, shape (surface, 3), and that of white, shape (3,)."""
+    """Return XYZ of reflectances under a light, shape (surface, 3), and of a white surface, shape (3,)."""
     nm = DEFAULT_WAVELENGTH_NM
     width = band_widths(DEFAULT_WAVELENGTH_NM)
     watts = illuminant(light).band_average(nm, width)

@@ -48,7 +48,10 @@ def light_in_bands(spectrum: Spectrum, wavelength_nm: Floats, width_nm: Floats) 
 
 
 def named_light(name: str, window_nm: tuple[float, float] = VISIBLE_NM) -> Light:
-    """Illuminant of 1 cd/m^2 in bands of 1 nm over 380-780 nm and a camera's window; dark beyond its table."""
+    """Return an illuminant of 1 cd/m^2 in bands of 1 nm that cover 380-780 nm and a camera's window.
+
+    Bands outside the illuminant's table are dark.
+    """
     first_nm, last_nm = lit_range(window_nm, 1.0)
     nm: Floats = np.arange(first_nm + 0.5, last_nm)
     return light_in_bands(illuminant(name), nm, np.ones_like(nm))
@@ -62,20 +65,22 @@ def lit_range(window_nm: tuple[float, float], step_nm: float) -> tuple[float, fl
 
 
 def shown_white_cd_m2(transport: Transport, luminance_cd_m2: float | None) -> float:
-    """Luminance that is shown as white at a level of the transport's lights; None: at their own powers.
+    """Return the luminance that is shown as white [cd/m^2], for a level of the transport's lights.
 
-    Light that is seen directly doesn't count, nor the part of a pixel that it covers.
+    For a level of None the lights have their own powers. Light that is seen directly doesn't count, nor does the part
+    of a pixel that it covers.
     """
     return white_of_pixels(transport.scattered_luminance(luminance_cd_m2=luminance_cd_m2), transport.coverage.mean)
 
 
 def white_of_pixels(luminance: NDArray[np.float64], coverage: NDArray[np.floating]) -> float:
-    """Luminance that is shown as white, from that of each pixel without light that is seen directly, shape (h, w).
+    """Return the luminance that is shown as white [cd/m^2], from the luminances of all pixels.
 
     Parameters
     ----------
     luminance, coverage : (h, w) array
-        As `render.transport.Transport` has them.
+        Luminance without light that is seen directly, and the share of each pixel that such light covers, as
+        `render.transport.Transport` has them.
     """
     # Without weights the same value comes of a partition, not of a sort: a tenth of the time.
     weights = 1.0 - coverage.astype(np.float64) if coverage.any() else None
@@ -83,18 +88,22 @@ def white_of_pixels(luminance: NDArray[np.float64], coverage: NDArray[np.floatin
 
 
 def true_srgb(radiance: SpectralRadiance, light: Light, white_cd_m2: float) -> NDArray[np.float64]:
-    """Linear sRGB of the scene, Bradford-adapted from its light to D65; `white_cd_m2` reads 1. Shape (h, w, 3)."""
+    """Return linear sRGB of the scene, Bradford-adapted from its light to D65, shape (h, w, 3).
+
+    A luminance of `white_cd_m2` has the value 1.
+    """
     white = tristimulus(light.spectrum, light.wavelength_nm, light.width_nm, light.lamp)
     xyz = tristimulus(radiance.values, radiance.wavelength_nm, radiance.widths_nm, radiance.light)
     return xyz_to_srgb(adapt_to_d65(xyz, white) / white_cd_m2)
 
 
 def neutral_electrons(sensor: SensorConfig, light: Light, exposure_s: float) -> Floats:
-    """Expected electrons of each channel's raw pixel from a neutral of 1 cd/m^2 under the light, shape (channel,).
+    """Return the expected electrons in each channel's raw pixel from a neutral surface of 1 cd/m^2, shape (channel,).
 
-    Crosstalk is in them: they are the means that an even neutral field reads.
+    Crosstalk is included: these are the means that an even neutral field reads.
 
-    Green's is the known scale: a developed picture over it is in cd/m^2, with nothing taken from the noisy picture.
+    Green's electrons are the known scale: a developed picture divided by them is in cd/m^2, and nothing is taken from
+    the noisy picture.
     """
     whole = sensor.undivided
     weights = electrons_per_irradiance(whole, light.wavelength_nm, light.width_nm, exposure_s, light.lamp)
