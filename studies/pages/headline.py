@@ -42,7 +42,7 @@ class Pair:
 
     @cached_property
     def leads(self) -> dict[str, Leads]:
-        """The first one's leads by metric."""
+        """Return by how much the first one leads, by metric."""
         return {metric.key: leads(metric, self.ours[metric.key], self.theirs[metric.key]) for metric in METRICS}
 
 
@@ -66,7 +66,10 @@ def answer(pair: Pair) -> str:
 
 
 def _word(outcomes: dict[str, tuple[str, float]]) -> tuple[str, tuple[int, ...], tuple[int, ...]]:
-    """Verdict of one level from each metric's outcome and lead; where it is mixed, with metrics gained and lost."""
+    """Return the verdict on one level from each metric's outcome and lead.
+
+    Where the verdict is mixed, also return the indices of the metrics in which the first is ahead, and behind.
+    """
     gained, lost = (
         tuple(i for i, metric in enumerate(HEADLINE) if outcomes[metric.key][0] == outcome)
         for outcome in (AHEAD, BEHIND)
@@ -116,7 +119,7 @@ def _to(metric: Metric, rising: NDArray[np.float64]) -> str:
 
 
 def _runs(words: Sequence[object]) -> list[tuple[int, int]]:
-    """First and last index of each run of equal words."""
+    """Return the first and last index of each run of equal words."""
     starts = [i for i, word in enumerate(words) if i == 0 or word != words[i - 1]]
     return list(zip(starts, [*(start - 1 for start in starts[1:]), len(words) - 1], strict=True))
 

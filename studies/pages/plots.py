@@ -125,9 +125,9 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
 def light_charts(
     levels_cd_m2: Sequence[float] | NDArray[np.float64], charts: Mapping[str, Mapping[str, ArrayLike]]
 ) -> Figure:
-    """Charts side by side over luminance: lines (level,) by the chart's title and their names.
+    """Draw charts side by side over luminance, each with its title and its named lines, shape (level,).
 
-    Lines that stay above 0 and span more than 20 times have a logarithmic scale.
+    A chart whose lines stay above 0 and span more than a factor of 20 has a logarithmic scale.
     """
     figure = blank(len(charts) * CHART[0], CHART[1])
     for axes, (title, lines) in zip(figure.subplots(1, len(charts)), charts.items(), strict=True):

@@ -114,10 +114,10 @@ def groups_of(report: ReportData, axis: int, a: int, b: int) -> list[Group]:
 def comparison_words(
     report: ReportData, axis: int, a: int, b: int
 ) -> list[tuple[Group, tuple[str, str, str, str, str]]]:
-    """Groups as of `groups_of`, and what is said of each.
+    """Return the groups of `groups_of`, each with the five sentences that the page says about it.
 
-    That is who is better, what it is worth in light, whether a white balance misses by more, what the two have in
-    common, and RGBW beside the best Bayer; empty where there is nothing to say.
+    They say who is better, what that is worth in light, whether a white balance misses by more, what the two have in
+    common, and how RGBW compares with the best Bayer. A sentence is empty where there is nothing to say.
     """
     groups = groups_of(report, axis, a, b)
     places = report.by_group if axis == CAMERA else [()] * len(groups)

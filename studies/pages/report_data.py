@@ -83,7 +83,7 @@ class ReportCell:
 
     @property
     def first(self) -> Row | None:
-        """The first seed's row: exposure, electrons, engines, times and the picture are its."""
+        """Return the row of the first seed, whose picture, exposure, electrons, engines and times the page shows."""
         return self.rows[0]
 
     def samples(self, key: str) -> Floats:
@@ -95,15 +95,15 @@ class ReportCell:
 
     @cached_property
     def _known(self) -> dict[str, Floats]:
-        """Figures that were asked for: a page asks for each a hundred times."""
+        """Return the figures that were computed already, kept here because a page asks for each a hundred times."""
         return {}
 
     def mean(self, key: str) -> float:
-        """Mean of a figure over the seeds; NaN where it is unknown for one of them."""
+        """Return the mean of a figure over the seeds; NaN where it is unknown for one of them."""
         return float(self.samples(key).mean())
 
     def half(self, key: str) -> float:
-        """Half the width of the mean's 95 % interval; NaN for one seed too."""
+        """Return half the width of the mean's 95 % interval; NaN for one seed too."""
         return float(half_width(self.samples(key)))
 
     @property
@@ -114,7 +114,7 @@ class ReportCell:
 
     @property
     def balance(self) -> dict[str, str]:
-        """How each channel was balanced; ``calibrated`` if it fell back for any seed."""
+        """Return how each channel was balanced; ``calibrated`` if the balance fell back to that for any seed."""
         balances = [json.loads(row.balance) for row in self.rows if row]
         fallen = {channel: how for balance in balances for channel, how in balance.items() if how == "calibrated"}
         return (balances[0] if self.first else {}) | fallen
@@ -179,6 +179,6 @@ class ReportData:
 
     @property
     def by_group(self) -> list[tuple[ReportCell, ...]]:
-        """The cells by group: all levels and cameras of one scene, spectrum, sensor, exposure and balance."""
+        """Return the cells by group: all levels and cameras of one scene, spectrum, sensor, exposure and balance."""
         count = len(self.cameras) * len(self.levels)
         return [self.cells[start : start + count] for start in range(0, len(self.cells), count)]

@@ -42,7 +42,7 @@ MOST_CELLS = 1000
 def sweep_report(
     folder: Path, most_pictures: int | None = None, where: Mapping[str, str] | None = None, run: LastRun | None = None
 ) -> tuple[ReportData, ReportPictures]:
-    """Values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
+    """Return the values and pictures of a sweep, as `studies.pages.report.render_report` takes them.
 
     Parameters
     ----------
@@ -241,7 +241,7 @@ def sensor_of(name: str) -> ReportSensor:
 
 
 def environment() -> dict[str, Any]:
-    """What makes numbers in this process, as JSON holds it: versions, engines and machine."""
+    """Return what makes numbers in this process as values for JSON: versions, engines and machine."""
     return {**versions(), "variant": variant(), "engine": backend(), "threads": threads(), "machine": machine()}
 
 

@@ -48,7 +48,7 @@ class Panel:
 def panels(
     rows: Sequence[Row], metric: Metric, by: str, where: Mapping[str, str], first: str | None = None
 ) -> list[Panel]:
-    """Part a sweep's figures into panels of lines over light.
+    """Divide a sweep's figures into panels of lines over light.
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def _profile(mean: Floats, axis: int) -> tuple[Floats, Floats]:
 
 
 def _spectrum(mean: Floats) -> tuple[Floats, Floats]:
-    """Mean power of the rows, less each row's mean."""
+    """Return the frequencies along a row [cycles/px] and the rows' mean power at each, without each row's mean."""
     rest = mean - mean.mean(axis=1, keepdims=True)
     power = np.mean(np.abs(np.fft.rfft(rest, axis=1)) ** 2, axis=0) / mean.shape[1]
     periods = np.fft.rfftfreq(mean.shape[1])

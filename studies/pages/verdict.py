@@ -113,7 +113,10 @@ def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> 
 
 
 def _offset(x: Floats, curve: Floats, target: float, level: int, rises: NDArray[np.bool_]) -> float:
-    """Distance in log light from a level to the nearest place where a curve has a value; NaN where there is none."""
+    """Return the distance in log light from a level to the nearest place where a curve has the value `target`.
+
+    It is NaN where the curve has that value nowhere.
+    """
     places = [
         x[i] + (target - curve[i]) / (curve[i + 1] - curve[i]) * (x[i + 1] - x[i])
         for i in np.flatnonzero(rises)
