@@ -53,9 +53,10 @@ class Best:
 
 
 def best_time_s(times_s: NDArray[np.floating], quality: NDArray[np.floating]) -> tuple[float, float]:
-    """Time of the highest quality, shape (time,), and that quality.
+    """Return the exposure time [s] of the highest quality, and that quality; `quality` has the shape (time,).
 
-    That is the top of the parabola over log time through the best and its neighbours; at either end it is that time.
+    They are at the top of the parabola over log time through the best time and its two neighbours. If the best time is
+    the first or the last one, it is returned as it is.
     """
     index = int(quality.argmax())
     if index in (0, len(times_s) - 1):
@@ -67,12 +68,12 @@ def best_time_s(times_s: NDArray[np.floating], quality: NDArray[np.floating]) ->
 
 
 def blur_px(sensor: SensorConfig, exposure_s: float) -> float:
-    """Standard deviation of the image's place within an exposure, along each axis [pixels]."""
+    """Return the standard deviation of the image's position during an exposure, along each axis [pixels]."""
     return float(sensor.lens.shake_um / sensor.site_pitch_um * blur_variance(exposure_s) ** 0.5)
 
 
 def measure_best(setup: Setup, subject: View, camera: Camera) -> Mapping[float, Best]:
-    """Best exposure of a camera by level; `subject` at 1 cd/m^2."""
+    """Find the best exposure of a camera at each level; `subject` is the view at 1 cd/m^2."""
     best = {}
     for level in LEVELS_CD_M2:
         lit = at_level(subject, level)
@@ -94,7 +95,7 @@ def measure_best(setup: Setup, subject: View, camera: Camera) -> Mapping[float, 
 
 
 def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], more_light: float) -> tuple[Claim, ...]:
-    """Shorter times and better pictures by hand, at the best time of each camera.
+    """Judge the claims that W makes times shorter and pictures better by hand, with each camera at its best time.
 
     Parameters
     ----------
@@ -129,7 +130,7 @@ def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], 
 
 
 def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Best exposures by hand of Bayer, the paper's camera and the default, and the claims about them."""
+    """Draw the best exposures by hand of Bayer, the paper's camera and the default, and judge the claims about them."""
     subject = close_up(view(setup, "still_life", 1.0))
     best = {name: measure_best(setup, subject, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
     light = named_light("D65")

@@ -58,7 +58,7 @@ class ClaimCheck:
 
     @property
     def holds(self) -> bool:
-        """Whether the whole interval lies in the range; NaN and infinities don't."""
+        """Return whether the value's whole interval lies in the range; no NaN or infinite value does."""
         return bool(
             isfinite(self.value) and self.low <= self.value - self.margin and self.value + self.margin <= self.high
         )
@@ -87,7 +87,11 @@ class Claim:
 
     @property
     def verdict(self) -> Verdict:
-        """Reproduced where every check holds, under a condition where some do."""
+        """Return the verdict that follows from the checks.
+
+        The claim is reproduced where every check holds, reproduced under a condition where some of them hold, and not
+        reproduced where none does.
+        """
         held = sum(check.holds for check in self.checks)
         return VERDICTS[0] if held == len(self.checks) else VERDICTS[1] if held else VERDICTS[2]
 
@@ -179,12 +183,12 @@ class PaperFigure:
 
 
 def paper_figure(name: str, drawing: Figure, **values: object) -> PaperFigure:
-    """Figure with its caption of `claims.toml`, whose braces `values` fill."""
+    """Return a figure with its caption from `claims.toml`, in which `values` fill the braces."""
     return PaperFigure(name, _stated()["captions"][name].format(**values), drawing)
 
 
 def range_text(check: ClaimCheck) -> str:
-    """Where the claim holds, in words: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
+    """Say in words where the claim holds: ``at least 1``, ``9.04 to 10.04``, ``exactly 1``."""
     low, high = (text.significant(value, digits=4) for value in (check.low, check.high))
     if not isfinite(check.high):
         return f"at least {low}"
@@ -205,5 +209,5 @@ def value_text(check: ClaimCheck) -> str:
 
 
 def default_text(check: ClaimCheck) -> str:
-    """What the default camera gives: ``default: 3.1 dB``."""
+    """Say what the default camera gives, such as ``default: 3.1 dB``; an empty text where it isn't known."""
     return "" if check.default is None else f"default: {value_text(replace(check, value=check.default, margin=0.0))}"

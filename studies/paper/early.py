@@ -62,7 +62,10 @@ def range_db(sensor: SensorConfig) -> tuple[float, float]:
 
 
 def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[float, float]:
-    """Noise of linear sRGB about its luminance, grey 1, on an even field: closed form, and read out."""
+    """Return the colour noise of an even grey field, in closed form and as measured on frames that are read out.
+
+    It is the standard deviation of linear sRGB about its own luminance, in which the grey is 1.
+    """
     sensor = Camera(reading, processor).sensor
     light = named_light("D65")
     colours = NAMED[processor].colours
@@ -81,7 +84,7 @@ def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[
 
 
 def ranges_lost_db(reading: str) -> Mapping[str, float]:
-    """Dynamic range of RGBW less that of each of `MATCHED` [dB], in closed form and read out."""
+    """Return the dynamic range of RGBW less that of each mosaic of `MATCHED` [dB], in closed form and as read out."""
     whole = range_db(table1_sensor(reading))
     return {
         f"{reading}, {mosaic}, {how}": ours - theirs
@@ -91,7 +94,7 @@ def ranges_lost_db(reading: str) -> Mapping[str, float]:
 
 
 def colour_noise_ratios(reading: str) -> Mapping[str, float]:
-    """Colour noise of C, M, Y over that of R, G, B by light, in closed form and read out."""
+    """Return the colour noise of C, M, Y over that of R, G, B, by light, in closed form and as read out."""
     ratios = dict[str, float]()
     for name, level in COLOUR_LIGHTS.items():
         theirs, ours = (colour_noise(reading, design, level) for design in (CMYW, RGBW))
@@ -121,7 +124,7 @@ def claims_early(
     noise_ratios: Mapping[str, float],
     lights: Mapping[str, Mapping[str, tuple[float, float]]],
 ) -> tuple[Claim, ...]:
-    """Claims about the earlier designs.
+    """Judge the claims about the earlier designs.
 
     Parameters
     ----------
@@ -155,7 +158,7 @@ def claims_early(
 
 
 def section_2(setup: Setup) -> tuple[Claim, ...]:
-    """All of them, computed."""
+    """Compute what the claims of section 2 need, and judge them."""
     subject = view(setup, "still_life", BRIGHT_CD_M2)
     bright: dict[str, dict[str, float]] = {name: {} for name in DESIGNS}
     for name, reading in product(DESIGNS, READINGS):

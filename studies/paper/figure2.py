@@ -46,13 +46,13 @@ Gains = Mapping[str, Mapping[str, Gain]]  # by sensor and colour
 
 
 def signal_ratios(light: str) -> Ratios:
-    """Electrons of W over those of R, G and B in a light, 380-780 nm."""
+    """Return the electrons of W over those of R, G and B in a light, from 380 to 780 nm."""
     electrons = channel_e(table1_sensor("table1_output"), named_light(light), 1.0, 1.0)
     return dict(zip("RGB", (electrons[3] / electrons[:3]).tolist(), strict=True))
 
 
 def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) -> Mapping[str, Gain]:
-    """W's gain over R, G and B: one pixel of each on a uniform neutral field under D65."""
+    """Return the SNR of a pixel of W over that of a pixel of R, G and B, on a uniform neutral field under D65."""
     sensor = table1_sensor(name) if fixed_pattern else with_even_response(table1_sensor(name))
     electrons = channel_e(sensor, named_light("D65"), luminance_cd_m2, SNR_EXPOSURE_S)
     values = snr(electrons, sensor, SNR_EXPOSURE_S)
@@ -65,19 +65,19 @@ def snr_gains(name: str, luminance_cd_m2: float, *, fixed_pattern: bool = True) 
 
 
 def bright_cd_m2(name: str) -> float:
-    """Luminance at which W is nearly full."""
+    """Return the luminance at which W is nearly full [cd/m^2]."""
     sensor = table1_sensor(name)
     return float(BRIGHT * sensor.pixel.full_well_e / channel_e(sensor, named_light("D65"), 1.0, SNR_EXPOSURE_S)[3])
 
 
 def coverage() -> float:
-    """Least of W's response over the largest of R, G and B, over the range."""
+    """Return the smallest value over the wavelengths of W's response over the largest response of R, G and B."""
     values = rgbw().band_average(tuple(CHANNELS), NM, np.full(NM.size, 2.0))
     return float((values[3] / values[:3].max(axis=0)).min())
 
 
 def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ...]:
-    """W is wideband, and gathers 6 and 10 times as much.
+    """Judge the claims that W is wideband, and that it gathers 6 and 10 times as much light.
 
     Parameters
     ----------
@@ -100,7 +100,7 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
 
 
 def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
-    """W's gain in SNR: the ratio of signals where read noise rules, its root where shot noise does.
+    """Judge the claims that W's gain in SNR is the signals' ratio in read noise, and its square root in shot noise.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
 
 
 def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Curves, tile and W's gain over light, with the claims about them."""
+    """Draw curves, tile and W's gain over light, and judge the claims about them."""
     moon = {name: snr_gains(name, MOONLIGHT_CD_M2) for name in READINGS}
     bright = {name: snr_gains(name, bright_cd_m2(name)) for name in READINGS}
     pure = {name: snr_gains(name, bright_cd_m2(name), fixed_pattern=False) for name in SENSORS}
@@ -144,7 +144,7 @@ def figure_2() -> tuple[PaperFigure, tuple[Claim, ...]]:
 
 @rc_context(STYLE)
 def _drawing() -> Figure:
-    """Responses, the tile, and W's gain."""
+    """Draw the responses, the tile, and W's gain."""
     figure = blank(2 * CHART[0], CHART[1])
     left, middle, right = figure.subplots(1, 3, width_ratios=(10, 2, 10))
     responses = rgbw().band_average(tuple(CHANNELS), NM, np.full(NM.size, 2.0))

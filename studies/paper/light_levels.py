@@ -67,7 +67,7 @@ class LevelCurves:
 
 
 def without_white(raw: RawImage) -> RawImage:
-    """Frame in which W tells nothing: each of its samples is full."""
+    """Return the frame with every sample of W full, so that W says nothing about the scene."""
     return replace(raw, dn=np.where(mask(raw.cfa, "W", raw.shape), raw.dn.dtype.type(raw.white_dn), raw.dn))
 
 
@@ -87,7 +87,7 @@ def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
 
 
 def _row(camera: Camera, raw: RawImage, subject: View) -> tuple[float, ...]:
-    """Fields of `LevelCurves` of one exposure."""
+    """Return the fields of `LevelCurves` for one exposure."""
     truth = encode_srgb(subject.truth)
     linear, picture = develop_view(camera, raw, subject)
     encoded, bare = (encode_srgb(x) for x in (linear, develop_view(camera, without_white(raw), subject, 0.0)[0]))
@@ -123,7 +123,7 @@ def where_white_fills(curves: LevelCurves) -> float:
 
 
 def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
-    """Steps of quality, steps of W's part, and what W gains."""
+    """Judge the claims about the steps of quality, the steps of W's part, and what W gains."""
     how = (
         f"still_life, {READING}, {len(LEVELS_CD_M2)} levels from {LEVELS_CD_M2[0]:g} to {LEVELS_CD_M2[-1]:g} cd/m², "
         "exposed for green up to 66 ms."
@@ -173,7 +173,7 @@ def _step(values: Image) -> float:
 
 
 def figure_a(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Curves of the paper's method and of the default, and the claims about them."""
+    """Draw the curves of the paper's method and of the default, and judge the claims about them."""
     subject = close_up(view(setup, "still_life", 1.0))
     by_camera = {name: curves(setup, subject, Camera(READING, name)) for name in CAMERAS}
     paper, default = by_camera[PAPER], by_camera[DEFAULT]

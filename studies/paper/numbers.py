@@ -23,7 +23,7 @@ FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
 
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
-    """Photons of a range of wavelengths from moonlight on the sensor, through f/5.6 [um^-2 s^-1]."""
+    """Return the photons of a range of wavelengths that moonlight brings to the sensor through f/5.6 [um^-2 s^-1]."""
     sensor = replace(table1_sensor("table1_output"), lens=LensConfig(5.6))
     light = named_light("D65")
     inside = (light.wavelength_nm > first_nm) & (light.wavelength_nm < last_nm)
@@ -31,7 +31,10 @@ def moonlight_photons(first_nm: float, last_nm: float) -> float:
 
 
 def measured_snr_db() -> float:
-    """SNR of a uniform field of 1000 electrons that is read out twice with no noise but that of light [dB]."""
+    """Measure the SNR of a uniform field of 1000 electrons, read out with no noise but that of light [dB].
+
+    The noise is measured on the difference of two frames.
+    """
     sensor = shot_noise_alone(table1_sensor("table1_output"))
     shape = (FLAT_SIDE, FLAT_SIDE)
     rng = np.random.default_rng(0)
@@ -42,7 +45,7 @@ def measured_snr_db() -> float:
 
 
 def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[Claim, ...]:
-    """Moonlight in photons, and 30 dB.
+    """Judge the claims about moonlight in photons, and about 30 dB.
 
     Parameters
     ----------
@@ -63,7 +66,7 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
 
 
 def range_spans(view: View) -> dict[str, float]:
-    """Bright over dark luminance, day over night, in three senses; `view` is a scene at any level."""
+    """Return the ratio of bright to dark luminance, day over night, in three senses; `view` is a scene at any level."""
     levels = [level.luminance_cd_m2 for level in DEMO_LEVELS]
     low, high = np.percentile(view.radiance.luminance(), [0.1, 99.9])
     of_scene = float(high / low) if low > 0 else float("inf")
@@ -75,17 +78,17 @@ def range_spans(view: View) -> dict[str, float]:
 
 
 def range_claim(spans: Mapping[str, float]) -> Claim:
-    """Eight decades from day to night, to the order of magnitude; `spans` as of `range_spans`."""
+    """Judge the claim of eight decades from day to night, to the order of magnitude; `spans` are from `range_spans`."""
     return judge_claim(4, {name: float(np.log10(span)) for name, span in spans.items()})
 
 
 def table_claim(swing_wells: Mapping[str, float]) -> Claim:
-    """Whether Table 1 agrees with itself: the voltage swing [full wells] by reading."""
+    """Judge whether Table 1 agrees with itself, by the voltage swing of each reading [full wells]."""
     return judge_claim(5, swing_wells)
 
 
 def number_claims(view: View) -> tuple[Claim, ...]:
-    """All claims of this module; `view` is the scene whose range counts."""
+    """Judge all claims of this module; `view` is the scene whose range counts."""
     per_um2_s = {f"{low:g}-{high:g} nm": moonlight_photons(low, high) for low, high in ((400.0, 700.0), VISIBLE_NM)}
     pixels = {name: table1_sensor(name).pixel for name in READINGS}
     swing_wells = {name: pixel.swing_e / pixel.full_well_e for name, pixel in pixels.items()}

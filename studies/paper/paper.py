@@ -55,7 +55,7 @@ _MAKERS: Mapping[str, Callable[[Setup], Made]] = MappingProxyType(
 
 
 def makers_of(figures: Sequence[str]) -> dict[str, Callable[[Setup], Made]]:
-    """Functions that make figures of these names, in the paper's order; all where none is named.
+    """Return the functions that make the figures of these names, in the paper's order; all where none is named.
 
     Raises
     ------
@@ -123,7 +123,7 @@ def write(paper: Paper, folder: Path) -> Path:
 
 
 def as_json(paper: Paper) -> dict[str, Any]:
-    """Claims with their checks and verdicts, how many of each verdict, and the facts."""
+    """Return the facts, the number of claims of each verdict, and the claims with their checks, as values for JSON."""
     claims = [
         {
             "where": claim.where,
@@ -139,7 +139,7 @@ def as_json(paper: Paper) -> dict[str, Any]:
 
 
 def as_csv(paper: Paper) -> str:
-    """A row for each check, under its claim's number."""
+    """Write the checks as CSV, a row for each one under its claim's number."""
     head = ("number", "where", "claim", "verdict", "condition", "computed", "claimed", "check", "default")
     rows = []
     for number, claim in enumerate(paper.claims, 1):

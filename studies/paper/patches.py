@@ -61,7 +61,7 @@ class Triplets:
 
 
 def edge_columns(truth: Image) -> NDArray[np.intp]:
-    """Column of each row (h,) at which luminance (h, w) crosses the middle of dark and bright."""
+    """Return the column in each row, shape (h,), at which luminance (h, w) crosses the middle of dark and bright."""
     middle = (truth.min() + truth.max()) / 2
     return np.asarray((truth < middle).sum(axis=1), dtype=np.intp)  # the dark half is on the left
 
@@ -98,12 +98,12 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
 
 
 def claims_4(shares: Mapping[str, float]) -> tuple[Claim, ...]:
-    """The statement of Figure 4; `shares` of the pixels beside the edge by condition."""
+    """Judge the statement of Figure 4; `shares` of the pixels beside the edge confirm it, by condition."""
     return (judge_claim(16, shares, patch=PATCH, ms=EXPOSURE_S * 1e3, aside=ASIDE, away=AWAY),)
 
 
 def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """The edge with three patches, under both readings and at two levels."""
+    """Draw the edge with three patches under both readings, and judge the claim at two levels."""
     shares = {}
     parts = []
     for name, level in LEVELS.items():
@@ -120,7 +120,7 @@ def figure_4(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 
 @rc_context(STYLE)
 def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
-    """For each reading the plane around one x with three boxes, and beside it their patches large."""
+    """Draw for each reading the plane around one x with three boxes, and beside it the boxes' patches enlarged."""
     figure = blank(len(parts) * (SIDE + 150), SIDE + 28)
     for (reading, plane, edge), part in zip(parts, figure.subfigures(1, len(parts), squeeze=False)[0], strict=True):
         axes = part.subplot_mosaic([["plane", name, "."] for name in "xyz"], width_ratios=(10, 3, 5))
@@ -146,7 +146,7 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
 
 
 def noisy_edge(reading: str) -> RawImage:
-    """A ramp with an edge on a sensor of W alone, so that every pixel is a sample, with noise."""
+    """Expose a ramp with an edge on a sensor of W alone, where every pixel is a sample, with noise."""
     sensor = table1_sensor(reading, "mono")
     rng = np.random.default_rng(0)
     field = 500.0 + 60.0 * np.add.outer(np.arange(FRAME_SIDE), np.arange(FRAME_SIDE)) / FRAME_SIDE
@@ -155,7 +155,7 @@ def noisy_edge(reading: str) -> RawImage:
 
 
 def filtered(values: NDArray[np.float64], patch: int) -> NDArray[np.float64]:
-    """Bilateral filter (Tomasi & Manduchi 1998) for a patch of 1, non-local means (Buades et al. 2005) for more."""
+    """Apply the bilateral filter (Tomasi & Manduchi 1998) for a patch of 1, or non-local means (Buades et al. 2005)."""
     half = patch // 2
     windows = np.lib.stride_tricks.sliding_window_view(np.pad(values, half, mode="reflect"), (patch, patch))
     result = np.empty_like(values)
@@ -171,7 +171,7 @@ def filtered(values: NDArray[np.float64], patch: int) -> NDArray[np.float64]:
 
 
 def difference(reading: str, patch: int) -> float:
-    """Largest relative difference of eq. (1) and the filter, over the frame [parts per million]."""
+    """Return the largest relative difference between eq. (1) and the filter over the frame [parts per million]."""
     raw = noisy_edge(reading)
     settings = Settings(neighbourhood=2 * REACH + 1, patch=patch, sigma_d=SIGMA_D, sigma_s=SIGMA_S, distance="raw")
     ours = reconstruct(raw, settings)[..., 0]

@@ -99,7 +99,7 @@ def gain_db(reading: str, *, shot_alone: bool = False) -> float:
 
 
 def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) -> tuple[Claim, ...]:
-    """The gain of 9.54 dB.
+    """Judge the claim that large pixels gain 9.54 dB.
 
     Parameters
     ----------

@@ -108,13 +108,16 @@ class View:
 
     @cached_property
     def truth(self) -> Image:
-        """Linear sRGB of the noise-free scene, white 1, shape (h, w, 3)."""
+        """Return linear sRGB of the noise-free scene, in which white is 1, shape (h, w, 3)."""
         return true_srgb(self.radiance, self.light, self.white_cd_m2)
 
 
 @cache
 def table1_sensor(reading: str, mosaic: str = "rgbw", pitch_um: int | None = None) -> SensorConfig:
-    """Table 1's camera under one reading, or the figures' variation of it with pixels of 2, 3 or 6 um."""
+    """Return Table 1's camera under one reading.
+
+    With `pitch_um` it is the camera that figures vary, with pixels of 2, 3 or 6 um.
+    """
     sensor = preset(reading)
     if pitch_um is not None:
         noise = {name: getattr(sensor.pixel, name) for name in ("read_noise_e", "dsnu_e")}
@@ -143,7 +146,7 @@ class Camera:
 
     @property
     def sensor(self) -> SensorConfig:
-        """Its sensor, with the processor's mosaic."""
+        """Return the camera's sensor, with the processor's mosaic."""
         sensor = table1_sensor(self.reading, NAMED[self.processor].mosaic, self.pitch_um)
         return replace(sensor, lens=held_lens(sensor.lens, self.shake))
 
@@ -180,7 +183,7 @@ def view(setup: Setup, scene: str, luminance_cd_m2: float | None, white: str | N
 
 
 def close_up(subject: View) -> View:
-    """Middle of a view, a quarter of its pixels, for what takes hundreds of pictures."""
+    """Return the middle of a view, a quarter of its pixels, for figures that take hundreds of pictures."""
     rows, columns = (slice((size - side) // 2, (size + side) // 2) for size, side in _sides(subject.radiance.shape))
     return replace(subject, radiance=replace(subject.radiance, values=subject.radiance.values[rows, columns]))
 
@@ -190,14 +193,17 @@ def _sides(shape: tuple[int, int]) -> list[tuple[int, int]]:
 
 
 def at_level(subject: View, luminance_cd_m2: float) -> View:
-    """What a view at 1 cd/m^2 is at another mean luminance."""
+    """Return a view that is given at 1 cd/m^2 as it is at another mean luminance."""
     radiance = replace(subject.radiance, values=subject.radiance.values * luminance_cd_m2)
     white_cd_m2 = subject.white_cd_m2 * luminance_cd_m2
     return replace(subject, level=f"{luminance_cd_m2:.6g}cd/m2", radiance=radiance, white_cd_m2=white_cd_m2)
 
 
 def exposures(camera: Camera, subject: View, exposure: str, count: int = 1) -> list[RawImage]:
-    """Exposures by as many chips, drawn as a sweep draws its cells; `exposure` as studies write it: ``20ms``."""
+    """Take `count` exposures, each by a chip of its own, with the random streams of a sweep.
+
+    `exposure` is written as in a study, such as ``20ms``.
+    """
     sensor = camera.sensor
     exposure_s = parse_exposure(exposure) or 0.0
     mosaic = NAMED[camera.processor].mosaic
@@ -219,7 +225,7 @@ def exposures(camera: Camera, subject: View, exposure: str, count: int = 1) -> l
 
 @lru_cache(maxsize=4)
 def colours_of(camera: Camera, subject: View) -> ColourFit:
-    """Colours of a camera's processor, fitted under a view's light."""
+    """Return the colours of a camera's processor, fitted under a view's light."""
     return colour_fit(camera.sensor, NAMED[camera.processor], subject.light)
 
 
@@ -245,9 +251,9 @@ def develop_view(
 
 
 def noise(pictures: Sequence[Image]) -> float:
-    """Noise of a picture: standard deviation over exposures of its linear luminance, root mean square over pixels.
+    """Return the noise of a picture: the standard deviation of its linear luminance over exposures.
 
-    Blur and wrong colours have no part in it.
+    It is the root mean square over pixels, and free of blur and wrong colours.
 
     Parameters
     ----------
@@ -259,32 +265,32 @@ def noise(pictures: Sequence[Image]) -> float:
 
 
 def quality_db(pictures: Sequence[Image], truth: Image) -> Image:
-    """PSNR of each picture against the truth [dB], both linear and encoded for it, shape (picture,)."""
+    """Return the PSNR of each linear picture against the truth [dB], both encoded first, shape (picture,)."""
     return np.array([psnr_db(encode_srgb(picture), encode_srgb(truth)) for picture in pictures])
 
 
 def photons(light: Light, luminance_cd_m2: float, sensor: SensorConfig) -> float:
-    """Photons on the sensor from a uniform field behind the sensor's lens [um^-2 s^-1]."""
+    """Return the photons on the sensor from a uniform field in front of its lens [um^-2 s^-1]."""
     spectral = light.spectrum * luminance_cd_m2 * camera_equation(sensor.lens)
     return float((spectral * photons_per_joule(light.wavelength_nm) * light.width_nm).sum() * 1e-12)
 
 
 def decibels(ratio: float) -> float:
-    """Ratio of amplitudes [dB]; minus infinity for 0."""
+    """Convert a ratio of amplitudes to dB; 0 gives minus infinity."""
     return float(20 * np.log10(ratio)) if ratio > 0 else -np.inf
 
 
 def with_even_response(sensor: SensorConfig) -> SensorConfig:
-    """Sensor whose pixels respond alike: what a camera has that corrects its fixed pattern."""
+    """Return the sensor with pixels that respond alike, as in a camera that corrects its fixed pattern."""
     return replace(sensor, pixel=replace(sensor.pixel, prnu=0.0))
 
 
 def shot_noise_alone(sensor: SensorConfig) -> SensorConfig:
-    """Sensor with no noise but that of light, and a converter too fine to see."""
+    """Return the sensor without any noise but that of light, and with a converter too fine to matter."""
     pixel = replace(sensor.pixel, read_noise_e=0.0, dsnu_e=0.0, prnu=0.0)
     return replace(sensor, pixel=pixel, bits=16)
 
 
 def grey_picture(plane: NDArray[np.floating], white: float) -> Image:
-    """Plane (h, w) as linear grey (h, w, 3), in which `white` is 1."""
+    """Return a plane (h, w) as linear grey (h, w, 3), in which `white` is 1."""
     return np.repeat(np.asarray(plane, dtype=np.float64)[..., None] / white, 3, axis=-1)

@@ -60,7 +60,7 @@ class Swap:
 def claims_6(
     bayer: Mapping[str, Outcome], interleaved: Mapping[str, Outcome], swaps: Mapping[str, Swap]
 ) -> tuple[Claim, ...]:
-    """Less noise than Bayer, substitution at 5 ms alone, and what that costs.
+    """Judge the claims of less noise than Bayer and of substitution at 5 ms alone, and what substitution costs.
 
     Parameters
     ----------
@@ -86,7 +86,10 @@ def claims_6(
 
 
 def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Pictures of the study `paper_6.toml`, each reading with its own threshold of substitution, and what that does."""
+    """Draw the pictures of the study `paper_6.toml`, and judge the claims about them.
+
+    Each reading has its own threshold of substitution, and what substitution changes is judged too.
+    """
     subject = view(setup, "still_life", LUMINANCE_CD_M2)
     outcomes: dict[str, dict[str, Outcome]] = {name: {} for name in ("bayer", *CAMERAS)}
     table = []
@@ -105,7 +108,7 @@ def figure_6(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
 
 
 def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
-    """Substitution at `DARKEST`, always against never."""
+    """Compare pictures at `DARKEST` whose luminance is always replaced by W with pictures where it never is."""
     raws = exposures(camera, subject, DARKEST, setup.seeds)
     without, with_white = (
         [develop_view(camera, raw, subject, threshold)[0] for raw in raws] for threshold in (0.0, np.inf)
@@ -115,7 +118,7 @@ def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
 
 
 def _photograph(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
-    """Outcome of one condition, and its first picture, encoded."""
+    """Return the outcome of one condition, and its first picture, encoded."""
     developed = [develop_view(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
     pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # as a screen shows them
     decisions = [picture.substituted for _, picture in developed if picture.substituted is not None]

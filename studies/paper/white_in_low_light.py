@@ -43,7 +43,10 @@ class Stages:
 
 
 def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Image, Image]:
-    """Figure 3's linear sRGB from R, G and B alone, balanced by calibration, through the plain matrix, and its W."""
+    """Return Figure 3's colour image from R, G and B alone, in linear sRGB, and its W image.
+
+    The colours are balanced by calibration and go through the matrix for no noise.
+    """
     planes = bilinear(raw)
     neutral = neutral_electrons(camera.sensor, subject.light, raw.exposure_s)
     matrix = colour_fit(camera.sensor, PROCESSORS[DEFAULT], subject.light).matrix()
@@ -53,7 +56,7 @@ def colour_and_white(raw: RawImage, subject: View, camera: Camera) -> tuple[Imag
 
 
 def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
-    """In low light colour is noisy, W is cleaner, and the result better than the colour image."""
+    """Judge the claims that in low light colour is noisy, W cleaner, and the result better than the colour image."""
     light = {"cd_m2": LOW_CD_M2, "ms": LOW_S * 1e3}
     noises = {f"{name}, W's noise over the colours'": x.white_noise / x.colour_noise for name, x in stages.items()}
     gains_db = {f"{name}, PSNR gained": step.gain_db for name, step in stages.items()}
@@ -61,7 +64,7 @@ def claims_3(stages: Mapping[str, Stages]) -> tuple[Claim, ...]:
 
 
 def figure_3(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """Colour image, W image and result under both readings."""
+    """Draw the colour image, the W image and the result under both readings, and judge the claims about them."""
     subject = view(setup, "still_life", LOW_CD_M2)
     stages = {name: dict[str, Stages]() for name in CAMERAS}
     rows = []

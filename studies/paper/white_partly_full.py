@@ -53,7 +53,7 @@ class Bright:
 
 
 def correlation(plane: Image, truth: Image, where: NDArray[np.bool_]) -> float:
-    """Correlation of two planes (h, w) over some pixels; 0 where either is constant or there are none."""
+    """Return the correlation of two planes (h, w) over some pixels; 0 where either is constant or there are none."""
     if where.sum() < 2 or np.ptp(plane[where]) == 0 or np.ptp(truth[where]) == 0:
         return 0.0
     return float(np.corrcoef(plane[where], truth[where])[0, 1])
@@ -74,7 +74,7 @@ def measure_bright(raw: RawImage, result: Image, subject: View) -> Bright:
 
 
 def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
-    """W partly full and the result whole, by reading."""
+    """Judge the claims that W is partly full and the result whole, by reading."""
     whole = {f"{name}, colours not full": shot.result_correlation for name, shot in bright.items()}
     whole |= {f"{name}, a colour full too": shot.full_correlation for name, shot in bright.items()}
     return (
@@ -89,7 +89,7 @@ def claims_5(bright: Mapping[str, Bright]) -> tuple[Claim, ...]:
 
 
 def figure_5(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
-    """R image, W image and result under both readings."""
+    """Draw the R image, the W image and the result under both readings, and judge the claims about them."""
     subject = view(setup, "still_life", BRIGHT_CD_M2)
     bright = {name: dict[str, Bright]() for name in CAMERAS}
     rows = []
