@@ -88,7 +88,7 @@ def _in_bands(spectrum: Spectrum, window_nm: tuple[float, float]) -> Light:
 
 
 def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Floats, Floats]:
-    """Neutral, matrix to sRGB, matrix from XYZ and matrix to XYZ (D50) under one light."""
+    """Return the neutral, the matrix to sRGB, that from XYZ and that to XYZ (D50), all under one light."""
     light = _in_bands(spectrum, sensor.window_nm)
     nm, width = light.wavelength_nm, light.width_nm
     behind_filters_e = electrons_per_irradiance(sensor, nm, width, 1.0, light.lamp)
@@ -119,7 +119,10 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     from_xyz = _srgb_of_xyz(white)
 
     def rows_from_srgb(weights: Floats, of_three: Floats) -> Floats:
-        """Balanced channels from linear sRGB: the inverse of three, and the others fitted."""
+        """Return the matrix from linear sRGB to balanced channels.
+
+        Its first three rows are the inverse of `of_three`, if there are three; the others are fitted.
+        """
         rows = fit_through_neutral(colours, (surfaces * light.spectrum) @ weights.T / (weights @ light.spectrum))
         if len(three) == 3:
             rows[three] = np.linalg.inv(of_three)
@@ -140,18 +143,18 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
 
 
 def _tells_colours(signals: Floats) -> bool:
-    """Whether balanced signals (patch, 3) differ from one another in two directions by more than rounding."""
+    """Return whether balanced signals (patch, 3) differ among each other in two directions by more than rounding."""
     differences = signals[:, :2] - signals[:, 2:]
     return bool(np.linalg.svd(differences, compute_uv=False)[-1] > LEAST_COLOUR * np.linalg.norm(signals))
 
 
 def _nearly_grey(collected: Floats) -> Floats:
-    """Matrix from balanced R, G and B to their mean by electrons, with as little colour as leaves it an inverse."""
+    """Return the matrix from balanced R, G and B to their mean by electrons, with just enough colour for an inverse."""
     return (1 - GREY_COLOUR) * np.tile(collected / collected.sum(), (3, 1)) + GREY_COLOUR * np.eye(3)
 
 
 def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
-    """Matrix from XYZ under a light to linear sRGB, adapted to D65."""
+    """Return the matrix from XYZ under a light to linear sRGB, adapted to D65."""
     return np.asarray(xyz_to_srgb(adapt_to_d65(np.eye(3), white)).T)
 
 
@@ -221,11 +224,11 @@ def develop_to_scale(
 def balance_delta_e(
     raw: RawImage, colours: ColourFit, sensor: SensorConfig, light: Light, balance: ArrayLike | None = None
 ) -> float:
-    """CIEDE2000 of a developed grey card that fills a noise-free frame, after the white balance of an exposure.
+    """Return CIEDE2000 of a grey card after the white balance of an exposure, which measures how far that misses.
 
-    The frame is taken by the sensor under the scene's light, with the charge that neighbours exchange, and developed
-    with the exposure's gains. Its planes are bilinear, and the colour matrix the one for no noise, whatever the
-    processor: the figure tells a balance, not a picture.
+    The card fills a noise-free frame of the sensor under the scene's light, with the charge that neighbours exchange,
+    and is developed with the exposure's gains. Its planes are bilinear and the colour matrix is that for no noise,
+    whatever the processor: the figure measures a balance, not a picture.
 
     Parameters
     ----------
@@ -234,9 +237,9 @@ def balance_delta_e(
     colours : ColourFit
         Of the processor's balanced colours.
     sensor : SensorConfig
-        That took it.
+        The sensor that took the exposure.
     light : Light
-        The scene's.
+        The light of the scene.
     balance : (channel,) array_like, optional
         Response to what should come out neutral; left out, Gray World finds it in the exposure.
     """
@@ -255,7 +258,10 @@ def balance_delta_e(
 
 
 def _even_field(raw: RawImage, sensor: SensorConfig, light: Light) -> tuple[RawImage, float]:
-    """Raw image of an even neutral field without noise, six tiles a side; over what it reads at 1 cd/m^2 in 1 s."""
+    """Return a raw image of an even neutral field without noise, six tiles a side, and the scale of its electrons.
+
+    The scale is the ratio of its electrons to those that the field gives at 1 cd/m^2 in 1 s.
+    """
     weights = electrons_per_irradiance(sensor.undivided, light.wavelength_nm, light.width_nm, 1.0, light.lamp)
     shape = 6 * len(raw.cfa), 6 * len(raw.cfa[0])
     field = np.broadcast_to(weights @ light.spectrum * camera_equation(sensor.lens), (*shape, len(raw.channels)))
@@ -358,6 +364,9 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
 def with_notes(
     raw: RawImage, sensor: SensorConfig, colour: ColourCalibration | None, source: str | Path = ""
 ) -> RawImage:
-    """Raw image with what a camera notes beside a frame: its name, by the sensor's preset or file, lens and colours."""
+    """Return the raw image with what a camera notes beside a frame: its name, f-number, ISO speed and colours.
+
+    The name is that of the preset's file `source`, if one is given.
+    """
     name = Path(source).stem.encode("ascii", "replace").decode() or raw.camera
     return replace(raw, camera=name, f_number=sensor.lens.f_number, iso=iso_speed(sensor), colour=colour)

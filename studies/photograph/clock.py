@@ -72,7 +72,7 @@ def timed(call: Callable[[], Result], *kind: Hashable) -> tuple[Result, float | 
 
 
 def processor_name() -> str:
-    """Model of the processor, whose loops give a float its last bits."""
+    """Return the model of the processor, because a float's last bits depend on it."""
     cpuinfo = Path("/proc/cpuinfo")
     lines = cpuinfo.read_text().splitlines() if cpuinfo.exists() else []
     names = (line.split(":", 1)[1].strip() for line in lines if "model name" in line)
@@ -80,7 +80,7 @@ def processor_name() -> str:
 
 
 def machine() -> str:
-    """Processor, operating system and Python, in words."""
+    """Return the processor, the operating system and the version of Python in words."""
     return f"{processor_name()}, {platform.platform()}, Python {platform.python_version()}"
 
 

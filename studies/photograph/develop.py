@@ -88,7 +88,7 @@ def develop(
 
 
 def _asked_neutral(colour: ColourCalibration, white_balance: str) -> Floats | None:
-    """What a neutral reads under the light that is asked for; None where Gray World finds it in the picture."""
+    """Return a neutral's response under the light that is asked for; None where Gray World finds it in the picture."""
     if white_balance in WHITE_BALANCES:
         return colour.neutral if white_balance == AS_SHOT else None
     try:
@@ -176,7 +176,7 @@ def develop_file(
 
 
 def _size(linear: NDArray[np.float64], height: int | None, width: int | None) -> tuple[int, int]:
-    """Height and width of the picture that is asked for, whose pixels are each the mean of their area."""
+    """Return the picture's height and width as they are asked for; each of its pixels is the mean of its area."""
     raw_size = linear.shape[0], linear.shape[1]
     size = asked_size(raw_size, height, width)
     if size[0] > raw_size[0] or size[1] > raw_size[1]:

@@ -12,14 +12,14 @@ ALL = ""  # in a light group's place: every lamp
 
 
 def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Waveform]:
-    """Waveforms by light group, or `ALL`.
+    """Return the waveforms of flickering lamps by light group, or by `ALL` where groups aren't known.
 
     Parameters
     ----------
     texts : sequence of str
-        ``GROUP=WAVEFORM``, or ``WAVEFORM`` alone for every lamp; a later one takes the place of an earlier.
+        ``GROUP=WAVEFORM``, or ``WAVEFORM`` alone for every lamp; a later text replaces an earlier one.
     groups : collection of str
-        The scene's; none for a picture, whose lamps aren't known apart.
+        Light groups of the scene; empty for a picture, whose lamps aren't known apart.
 
     Raises
     ------

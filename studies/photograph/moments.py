@@ -68,7 +68,12 @@ def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: 
 
 
 def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> Floats:
-    """Shares of the middles of equal parts of a time from 0 on, for exposures that start at times within it."""
+    """Return by how much each of several moments counts for each exposure, shape (moment, exposure).
+
+    The exposures start at `starts_s`. The moments are the middles of `count` equal parts of the time from 0 to
+    `whole_s`. Between two moments the light is interpolated linearly, and before the first and after the last it is
+    constant.
+    """
     times_s = moments_s(whole_s, count)
     step_s = whole_s / count
 
@@ -137,7 +142,7 @@ def time_average(transports: Iterable[Transport]) -> Transport:
 
 
 def _average(transports: Iterable[Transport], shares: Floats | None) -> Transport:
-    """Mean over times, all alike or by shares of each row."""
+    """Return the mean of transports over times, which all count alike, or by their share for each row of the sensor."""
     mean: Transport | None = None
     meters: list[Callable[[], Irradiance] | None] = []
     for each in transports:
@@ -158,7 +163,10 @@ def _average(transports: Iterable[Transport], shares: Floats | None) -> Transpor
 
 
 def _parts(shares: Floats | None, count: int) -> float | Floats:
-    """Over the last of `count` times: the shares of them all, (row, 1), or their number; infinite where it has none."""
+    """Return the shares of the first `count` times together, over the share of the last of them, shape (row, 1).
+
+    It is infinite where the last has no share. Where all times count alike, it is their number.
+    """
     if shares is None:
         return count
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -230,7 +238,7 @@ def _require_alike(name: str, first: Transport, other: Transport) -> None:
 
 
 def _covariance(shared: SharedPaths, transport: Transport) -> Planes:
-    """Covariance of the errors of two groups that share their paths."""
+    """Return the covariance between the errors of two light groups that share their paths."""
     a, b = shared.groups
     return np.asarray(shared.correlation * np.sqrt(transport.variance[a] * transport.variance[b]))
 

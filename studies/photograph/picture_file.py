@@ -29,7 +29,7 @@ _P3_CODES = bytes([12, 13, 0, 1])
 
 
 def to_png(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> bytes:
-    """PNG file (W3C PNG, 3rd edition) of samples (h, w, 3) as `isp.colour.encoding.quantise` gives them."""
+    """Return samples (h, w, 3), as `isp.colour.encoding.quantise` gives them, as a PNG file (W3C PNG, 3rd edition)."""
     height, width = samples.shape[:2]
     bits = 8 * samples.itemsize
     rows = np.frombuffer(samples.astype(f">u{samples.itemsize}").tobytes(), np.uint8).reshape(height, -1)
@@ -74,7 +74,7 @@ def check_picture_file(path: Path, bits: int, encoding: str) -> None:
 
 
 def default_path(raw: Path) -> Path:
-    """Raw file's name with .png; `InputError` where that is a picture which another program wrote."""
+    """Return the raw file's name with .png; raise `InputError` where another program wrote a picture of that name."""
     path = raw.with_suffix(".png")
     if path.is_file() and path != raw:
         with path.open("rb") as file:
@@ -120,7 +120,7 @@ def write_picture(
 
 
 def to_tiff(samples: NDArray[np.unsignedinteger], encoding: str = "srgb") -> bytes:
-    """TIFF file (revision 6.0, deflate) of samples (h, w, 3) as `quantise` gives them, their colour profile in it."""
+    """Return samples (h, w, 3), as `quantise` gives them, as a TIFF file (revision 6.0, deflate) with its profile."""
     import tifffile
 
     file = BytesIO()

@@ -81,7 +81,7 @@ def load_ready(name: str, size: tuple[int, int] | int | None = None) -> Transpor
 
 
 def shipped_scenes() -> list[str]:
-    """Names of the scenes whose light comes with rodcone."""
+    """Return the names of the scenes whose light comes with rodcone."""
     return sorted({path.name.split("-")[0] for path in SHIPPED.glob("*.npz")})
 
 

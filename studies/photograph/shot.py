@@ -478,9 +478,9 @@ def _frames(
 
 
 def _exposure(checked: Checked, per_second_e: NDArray[np.float64]) -> tuple[float, SensorConfig]:
-    """Exposure time [s], asked for or by a rule, and the camera at the gain that it takes.
+    """Return the exposure time [s], given or chosen by a rule, and the camera at the gain that it then has.
 
-    A rule meters the lamps' mean, and cuts its time to whole periods of lamps that flicker.
+    A rule meters the mean over time of lamps that flicker, and cuts its time to whole periods of theirs.
     """
     if checked.exposure_s is not None:
         return checked.exposure_s, checked.sensor
@@ -524,7 +524,7 @@ def _rendered(
 
 
 def _bands(opened: SceneFile, spectra: Mapping[str, Spectrum]) -> tuple[Floats, Floats]:
-    """Centres and widths of the bands in which a scene is rendered."""
+    """Return the centres and widths of the bands in which a scene is rendered [nm]."""
     lamps = [spectra.get(name, group.spectrum) for name, group in opened.scene.groups.items()]
     return fine_bands(lamps, width_nm=RENDER_BAND_NM)
 
@@ -539,7 +539,7 @@ def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> 
 
 
 def _mosaic(channels_e: NDArray[np.float64], sensor: SensorConfig) -> NDArray[np.float64]:
-    """Expected electrons of the raw image's pixels, shape (h, w), of those behind every filter."""
+    """Return the expected electrons of the raw image's pixels, shape (h, w), from those behind every filter."""
     return sensor.pixel_sums(behind_filters(channels_e, sensor))
 
 
@@ -639,22 +639,26 @@ def check(order: Order) -> Checked:
 
 
 def _lies_in_files(light_bytes: float) -> bool:
-    """Whether a render's light is read from files while it is imaged."""
+    """Return whether a render's light is so large that it is read from files while it is imaged."""
     return light_bytes > _MOST_HELD_BYTES
 
 
 def _held(pixels: int, bands: int, groups: int) -> int:
-    """Arrays of all bands that are held of a render's light while it is imaged."""
+    """Return how many arrays of a render's light, with all bands, are in memory while it is imaged."""
     return 0 if _lies_in_files(4.0 * pixels * bands * groups) else _HALVES
 
 
 def _light_arrays(order: Order, sensor: SensorConfig, held: int) -> int | None:
-    """Arrays of all bands that are held; None where an image of each band is formed, and all of them are too."""
+    """Return how many arrays of the light, with all bands, are in memory while bands are imaged one at a time.
+
+    None stands for light whose bands are imaged together: behind a lens that doesn't spread light, or from lamps that
+    flicker.
+    """
     return held if spreads(sensor.lens) and not order.flicker else None
 
 
 def _after_s(sensor: SensorConfig) -> float:
-    """Processor seconds a pixel and band of what follows the light."""
+    """Return the processor time of what follows the light [s per pixel and band]."""
     return _AFTER_S + TABLE_S * bool(sensor.lens.table)
 
 

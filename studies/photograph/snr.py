@@ -38,15 +38,16 @@ class LightForSnr:
 
 
 def channel_e(sensor: SensorConfig, light: Light, luminance_cd_m2: float, exposure_s: float) -> Floats:
-    """Expected electrons of each channel's pixel from a uniform neutral field, shape (channel,)."""
+    """Return the expected electrons of each channel's pixel from a uniform neutral field, shape (channel,)."""
     return neutral_electrons(sensor, light, exposure_s) * luminance_cd_m2
 
 
 def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> Floats:
-    """Mean over noise of a pixel's samples, of one pixel of one chip, fixed patterns included, shape of `electrons`.
+    """Return the mean over the noise of a pixel's samples, fixed patterns included, in the shape of `electrons`.
 
-    Both are of clipped samples, as EMVA 1288 has them: beside the well the ratio rises, for full pixels are alike.
-    Crosstalk plays no part: neighbours exchange the same. A camera that reads channels apart asks for the channel.
+    Mean and noise are those of clipped samples, as in EMVA 1288: near the full well the ratio rises, because full
+    pixels are all alike. Crosstalk plays no part, because neighbours in an even field exchange the same charge. For a
+    camera that reads channels in different ways, `channel` says which one is meant.
 
     Examples
     --------
@@ -95,7 +96,7 @@ def light_for_snr(
 
 
 def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s: float) -> dict[str, Floats]:
-    """SNR of each channel's pixel over light; NaN where its well is full."""
+    """Return the SNR of each channel's pixel at each luminance; NaN where its well is full."""
     of = channel_e(sensor, named_light(light, sensor.window_nm), 1.0, exposure_s)
     electrons = dict(zip(sensor.channels, of[:, None] * luminance_cd_m2, strict=True))
     ratios = {}
@@ -107,12 +108,13 @@ def snr_at(luminance_cd_m2: Floats, sensor: SensorConfig, light: str, exposure_s
 
 
 def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channel: str | None = None) -> float:
-    """Photo-electrons of an even field at which signal over `noise_variance`'s root is `snr`; inf where it never is.
+    """Return the photo-electrons of an even field at which the SNR is `snr`; inf where it is never reached.
 
-    Clipping is left out: the light is less than the well holds.
+    The noise is the root of `noise_variance`, and clipping is left out: the light is less than the well holds.
 
-    A metered channel is seen in its longest time, for light that a shorter one is needed for has more SNR than a full
-    well. Of several readings it is the least light with this SNR; beyond a seam it may be less again for a while.
+    A metered channel is assumed to expose for its longest time, because light that needs a shorter one has more SNR
+    than a full well. For several readings the result is the least light with this SNR; just above the light where one
+    reading takes over from another, the SNR may be lower again.
     """
     readings = at_channel(chip_readings(sensor, exposure_s), channel)
     if sensor.chip.switched:
@@ -123,7 +125,10 @@ def electrons_at_snr(snr: float, sensor: SensorConfig, exposure_s: float, channe
 
 
 def _electrons_of_law(snr: float, reading: PlainReading) -> float:
-    """Photo-electrons at which one reading reaches an SNR.
+    """Return the photo-electrons at which one reading reaches an SNR.
+
+    With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. They are infinite for an
+    SNR above 1 / sqrt(c), the limit that PRNU sets, and where the well is full before.
 
     With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
     1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
