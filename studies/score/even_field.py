@@ -51,12 +51,12 @@ class EvenField:
 
     @cached_property
     def electrons_per_cd_m2(self) -> float:
-        """Mean photo-electrons of the channel's samples at 1 cd/m^2, crosstalk included."""
+        """Return the mean photo-electrons of the channel's samples at 1 cd/m^2, crosstalk included."""
         return float(self.means_e[self.sensor.channels.index(self.channel)])
 
     @cached_property
     def lux_s_per_cd_m2(self) -> float:
-        """Luminous exposure of the sensor at 1 cd/m^2 [lux s]."""
+        """Return the luminous exposure of the sensor at 1 cd/m^2 [lux s]."""
         return camera_equation(self.sensor.lens) * self.exposure_s
 
     def draw_chip(self, rng: np.random.Generator) -> Device:
@@ -74,17 +74,17 @@ class EvenField:
 
     @cached_property
     def readings(self) -> tuple[PlainReading, ...]:
-        """Readings of the channel's pixels that the chip can take."""
+        """Return the readings of the channel's pixels that the chip can take."""
         return tuple(at_channel(chip_readings(self.sensor, self.exposure_s), self.channel))
 
     @cached_property
     def headroom_e(self) -> float:
-        """Photo-electrons of the whole pixel that the largest reading holds."""
+        """Return the photo-electrons of the whole pixel at which its largest reading is full."""
         return max(reading.headroom_e for reading in self.readings)
 
     @cached_property
     def temporal_dark_e(self) -> float:
-        """Standard deviation over frames of a dark pixel [e-]."""
+        """Return the standard deviation of a dark pixel over frames [e-]."""
         if not several(self.readings):
             return float(self.readings[0].law.dark_e)
         sources_e = sources_of(0.0, self.readings)

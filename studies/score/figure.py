@@ -47,7 +47,7 @@ class Merit:
 
     @property
     def agrees(self) -> bool | None:
-        """Whether the closed form lies within the measurement's interval; None where either is not there."""
+        """Return whether the closed form lies within the measurement's interval; None where either is missing."""
         return self.low <= self.computed <= self.high if isfinite(self.low) and isfinite(self.computed) else None
 
 

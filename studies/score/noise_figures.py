@@ -167,7 +167,10 @@ def ratio_at(field: EvenField, luminance: float, rng: np.random.Generator) -> fl
 
 
 def _measured_range(field: EvenField, rng: np.random.Generator) -> float:
-    """Saturation over half the variance of the difference of two dark frames, each in electrons."""
+    """Measure the dynamic range: saturation over the dark noise, both in electrons.
+
+    The dark noise is the standard deviation of the difference of two dark frames over the root of 2.
+    """
     chip = field.draw_chip(rng)
     dark = [field.samples_e(field.shoot(0.0, chip, rng)) for _ in range(2)]
     bright = field.samples_e(field.shoot(1.3 * field.headroom_e / field.electrons_per_cd_m2, chip, rng))

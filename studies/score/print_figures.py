@@ -112,7 +112,7 @@ def _low_light(field: EvenField, like: str, words: str) -> Definition:
 
 
 def _most_gain(field: EvenField) -> float:
-    """Bisect for the largest gain whose least margin isn't negative."""
+    """Return the largest gain at which no margin of `_margins` is negative, found by bisection."""
     low, high = 0.0, log2(MOST_GAIN / LADDER[-1])
     for _ in range(24):
         middle = (low + high) / 2

@@ -185,7 +185,7 @@ def _lit(
 
 
 def _emva(sensor: SensorConfig, exposure_s: float, seed: int) -> list[Merit]:
-    """Characterise the unit channel's reading as an EMVA 1288 laboratory does, and list its figures."""
+    """Return the figures of the unit channel's reading, measured as an EMVA 1288 laboratory measures a chip."""
     reading = at_channel(chip_readings(sensor, exposure_s), sensor.unit_channel)[0].sensor
     chip = characterise(reading, seed=seed)
     conditions = "a chip of 256 x 320 pixels, photon transfer of even fields"
