@@ -75,9 +75,10 @@ def front(pairs: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, NDArray[np.float64]]]:
-    """Last result and seconds of each call, (1 + repeats, 2): on the clock, and of the processor.
+    """Return the last result of each call, and the seconds of all its calls, shape (1 + repeats, 2).
 
-    The calls take turns: where other programs run, all of them meet much the same machine.
+    The columns are seconds on the clock and of the processor. The calls take turns, so that other programs disturb all
+    of them alike.
     """
     results: dict[str, T] = {}
     seconds: dict[str, list[tuple[float, float]]] = {name: [] for name in calls}
@@ -90,7 +91,7 @@ def laps(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[
 
 
 def time_calls(calls: Mapping[str, Callable[[], T]], repeats: int) -> dict[str, tuple[T, Times]]:
-    """Last result and times of each call; without repeats the first call counts."""
+    """Return the last result and the times of each call; without repeats the time of the first call counts."""
     points = {}
     for name, (result, seconds) in laps(calls, repeats).items():
         points[name] = result, Times(float(seconds[0, 0]), *np.median(seconds[min(repeats, 1) :], axis=0).tolist())
@@ -161,7 +162,7 @@ class NoiseReference:
 
 
 def electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> Image:
-    """Expected electrons behind every filter at every pixel, shape (channel, h, w)."""
+    """Return the expected electrons behind every filter at every pixel, shape (channel, h, w)."""
     return np.moveaxis(channel_electrons(form_image(radiance, sensor), sensor, exposure_s), -1, 0)
 
 
@@ -178,13 +179,20 @@ def yardstick(
 
 
 def share_map(image_e: Image, yard: NoiseReference) -> Image:
-    """Squared error over the sensor's noise variance, (channel, h, w): pooled over 3x3 pixels, NaN outside."""
+    """Return the squared error over the sensor's noise variance, shape (channel, h, w).
+
+    It is pooled over 3x3 pixels, and NaN outside the pixels that `yard` counts.
+    """
     first, second = yard.references
     return pooled_share((image_e - first) * (image_e - second), yard)
 
 
 def pooled_share(squared_e2: Image, yard: NoiseReference) -> Image:
-    """Pool each pixel's own share, over the pixels inside alone: no bright error counts against a dark pixel."""
+    """Return the mean over 3x3 pixels of each pixel's squared error over its own noise variance; NaN outside.
+
+    Only pixels inside count, and each by its own variance, so that a bright pixel's error isn't set against the noise
+    of a dark one.
+    """
     weight = pooled(yard.inside.astype(np.float64))
     total = pooled(np.where(yard.inside, squared_e2 / yard.noise_e2, 0.0))
     return np.where(yard.inside, total / np.maximum(weight, 1 / 9), np.nan)

@@ -83,7 +83,7 @@ class Bench:
 
     @property
     def level_cd_m2(self) -> float:
-        """Mean scene luminance."""
+        """Return the mean scene luminance [cd/m^2]."""
         return parse_level(self.level)[0]
 
 
@@ -240,17 +240,17 @@ def _auto_exposure_s(bench: Bench, sensor: SensorConfig, transport: Transport) -
 
 
 def _electrons(radiance: SpectralRadiance, sensor: SensorConfig, exposure_s: float) -> Image:
-    """Expected electrons of the mosaic, (h, w)."""
+    """Return the expected electrons of the mosaic, shape (h, w)."""
     return expected_electrons(form_image(radiance, sensor), sensor, exposure_s)
 
 
 def _rms_e(image_e: NDArray[np.floating], truth_e: Image, sensor: SensorConfig) -> float:
-    """RMS of a difference over pixels below saturation [e-]."""
+    """Return the root mean square of a difference over pixels below saturation [e-]."""
     below = truth_e < sensor.pixel.full_well_e
     return float(np.sqrt(np.mean((image_e.astype(np.float64) - truth_e)[below] ** 2)))
 
 
 def _noise_e(expected_e: Image, sensor: SensorConfig, exposure_s: float) -> float:
-    """The sensor's own noise: root of its mean variance below saturation [e-]."""
+    """Return the sensor's own noise, the root of its mean variance over pixels below saturation [e-]."""
     below = expected_e < sensor.pixel.full_well_e
     return float(np.sqrt(noise_variance(expected_e, sensor, exposure_s)[below].mean()))
