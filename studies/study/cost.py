@@ -77,7 +77,7 @@ class PictureCost:
 
     @property
     def memory(self) -> Memory:
-        """Memory at the peak."""
+        """Return the memory at the peak."""
         groups = self.groups if self.spp != 0 else 1
         mean = int(self.times > 1)  # the light of the times that went before
         return memory(
@@ -92,7 +92,10 @@ class PictureCost:
 
     @property
     def seconds(self) -> float:
-        """Time on this machine's cores, if they are idle; of a render until an error, for 64 samples."""
+        """Return the time on this machine's cores if they are idle [s].
+
+        For a render that goes on until it reaches an error, it is the time of 64 samples per pixel.
+        """
         spp = PILOT_FROM if self.spp is None else self.spp
         render = render_seconds(self.pixels, self.bands, self.groups, spp) * (1.5 if self.denoised else 1.0)
         another = another_s(self.pixels, self.bands, self.groups)
@@ -101,13 +104,13 @@ class PictureCost:
         return pace() * (START_S + compiled + self.after_s * self.pixels * self.bands) + render
 
     def facts(self) -> dict[str, Any]:
-        """What ``--dry-run --json`` prints."""
+        """Return the values that ``--dry-run --json`` prints."""
         values = {"size": list(self.size), "bands": self.bands, "samples_per_pixel": self.spp, "times": self.times}
         half = {"half_samples_seconds": self._fewer().seconds, "half_size_seconds": self._smaller().seconds}
         return values | {"seconds": self.seconds, "bytes": self.memory.total} | half
 
     def words(self) -> str:
-        """One line: time, memory and samples, and what half of it would take."""
+        """Return one line for a reader: time, memory and samples, and the time with half the samples or the size."""
         height, width = self.size
         samples = f", {self.spp:g} samples per pixel" if self.spp else ""
         samples += f" at each of {self.times} times" if self.times > 1 else ""
@@ -132,19 +135,19 @@ class PictureCost:
 
 
 def render_seconds(pixels: int, bands: int, groups: int, spp: float) -> float:
-    """Time of a render on this machine's cores."""
+    """Return the time of a render on this machine's cores [s]."""
     samples = spp + (PILOT_SPP if spp > PILOT_FROM else 0)
     each_s = _RENDER_S * (_PATHS + (1 - _PATHS) * bands / 20)
     return pace() * each_s * pixels * groups * samples / cores()
 
 
 def another_s(pixels: float, bands: int, groups: int) -> float:
-    """Processor seconds of a render of the same scene at another time, beside its samples."""
+    """Return the processor time that a render of the same scene at another time takes beside its samples [s]."""
     return _ANOTHER_S[0] + averaged_s(pixels, bands, groups)
 
 
 def averaged_s(pixels: float, bands: int, groups: int) -> float:
-    """Processor seconds of a render that is read and averaged with others."""
+    """Return the processor time of reading a render and averaging it with others [s]."""
     return _ANOTHER_S[1] * pixels * bands * groups
 
 
@@ -155,7 +158,7 @@ def pace() -> float:
 
 
 def _work_s() -> float:
-    """Processor seconds of a loop in Python and of transforms and exponentials in NumPy, a third each or so."""
+    """Measure the processor time of fixed work [s], about a third each of Python loops, transforms and exponentials."""
     begun = process_time()
     total = 0
     picture = np.linspace(0.1, 1.0, 1 << 16, dtype=np.float32).reshape(256, 256)
@@ -169,12 +172,12 @@ def _work_s() -> float:
 
 
 def kernels_kept() -> bool:
-    """Whether an earlier run left compiled kernels on disk."""
+    """Return whether an earlier run left compiled kernels on disk."""
     return KERNELS.is_dir() and any(KERNELS.iterdir())
 
 
 def cores() -> int:
-    """Processor cores that this process may use."""
+    """Return how many processor cores this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 

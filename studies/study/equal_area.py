@@ -32,23 +32,23 @@ class EqualArea:
     coarsest_um: float
 
     def shape(self, picture: tuple[int, int], pitch_um: float, block: int = 1) -> tuple[int, int]:
-        """Height and width in whole blocks of pixels of a pitch, in a picture's proportions."""
+        """Return height and width in pixels of a pitch, in a picture's proportions and in whole blocks of pixels."""
         blocks = self.side_um / (pitch_um * block * max(picture))
         return block * max(1, round(picture[0] * blocks)), block * max(1, round(picture[1] * blocks))
 
     def view(self, radiance: SpectralRadiance, pitch_um: float, block: int = 1) -> SpectralRadiance:
-        """Radiance at the pixels of a pitch, in whole blocks."""
+        """Return the radiance averaged over the pixels of a pitch, in whole blocks."""
         return replace(radiance, values=area_average(radiance.values, self.shape(radiance.shape, pitch_um, block)))
 
 
 def sensor_shapes(area: EqualArea, sensors: Sequence[str], picture: tuple[int, int]) -> dict[str, tuple[int, int]]:
-    """Height and width of each sensor in pixels, for a picture's proportions."""
+    """Return the height and width of each sensor in pixels, for a picture's proportions."""
     opened = {name: preset(name) for name in sensors}
     return {name: area.shape(picture, *site_grid(sensor)) for name, sensor in opened.items()}
 
 
 def site_grid(sensor: SensorConfig) -> tuple[float, int]:
-    """Pitch of a sensor's pixels [um], and along either side how many of them are a pixel of its raw image."""
+    """Return the pitch of a sensor's pixels [um], and how many along either side make a pixel of its raw image."""
     return sensor.site_pitch_um, sensor.sites
 
 
@@ -63,7 +63,7 @@ def require_pixels(area: EqualArea, sensors: Sequence[str], picture: tuple[int, 
 
 
 def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]:
-    """Mean of a picture over each pixel of another grid on the same area, pixels taken as even squares.
+    """Average a picture over each pixel of another grid on the same area, with pixels as even squares.
 
     Parameters
     ----------
@@ -84,7 +84,7 @@ def area_average(values: NDArray[Real], shape: tuple[int, int]) -> NDArray[Real]
 
 
 def in_pixels(radiance: SpectralRadiance, samples: int) -> SpectralRadiance:
-    """Radiance at whole pixels of `samples` along each side."""
+    """Average the radiance over whole pixels of `samples` samples along each side."""
     if samples == 1:
         return radiance
     height, width = radiance.shape

@@ -11,21 +11,22 @@ from sensor.lens.focus import focal_length_of_view_mm, pupil_mm
 def in_focus(
     scene: Scene, sensor: SensorConfig, size: tuple[int, int], focus_m: float, focal_length_mm: float | None = None
 ) -> tuple[Scene, str]:
-    """Scene as a lens sees it that is focused at a distance, and the lens in words.
+    """Return the scene as a lens focused at a distance sees it, and the lens in words.
 
-    A render of it is one of this f-number alone, and is kept apart from others.
+    A render of it holds for this f-number alone, and is stored apart from others.
 
     Parameters
     ----------
     scene : Scene
         Its lengths are in metres.
     sensor : SensorConfig
-        Its lens's f-number and its pixels.
+        Gives the f-number of its lens, and its pixels.
     size : (int, int)
-        Of the picture, in photodiodes.
+        Height and width of the picture in photodiodes.
     focus_m : float
     focal_length_mm : float, optional
-        Left out, that of a sensor as wide as the picture's pixels; few pixels then see a lens of a small pupil.
+        Left out, that of a sensor as wide as the picture's pixels; a picture of few pixels then has a lens with a small
+        pupil.
 
     Raises
     ------

@@ -16,10 +16,12 @@ _ROUNDING = 0.015  # a base speed of 51.56 is asked for as 51
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:
-    """Saturation-based speed of green under D65; None without G, where it collects nothing, and beyond what files hold.
+    """Return the saturation-based speed of green under D65; None where there is none.
 
-    Of the exposure in which green's mean reads the converter's top; no half stop of headroom is taken off. It is in
-    proportion to the gain. D65's table ends at 780 nm: a camera whose window opens further sees it dark from there on.
+    A camera has none without G, where G collects nothing, or where the speed is beyond what files can hold. The speed
+    is that of the exposure in which green's mean reads the converter's top value, without half a stop of headroom; it
+    is in proportion to the gain. D65's table ends at 780 nm: a camera that sees longer wavelengths gets no light from
+    there on.
     """
     if "G" not in sensor.channels:
         return None
@@ -55,14 +57,14 @@ def at_gain(sensor: SensorConfig, text: str) -> SensorConfig:
 
 
 def gain_text(gain: float | None, iso: float | None) -> str:
-    """Text for `at_gain` of a gain or a speed, at most one of which is given."""
+    """Return the text for `at_gain` that stands for a gain or a speed, at most one of which is given."""
     if gain is not None and iso is not None:
         raise InputError(f"gain: {gain:g} beside iso {iso:g}; allowed: one of the two; leave one out")
     return OWN if gain is None and iso is None else f"{gain:.12g}" if gain is not None else f"{ISO} {iso:.12g}"
 
 
 def gain_for_iso(sensor: SensorConfig, iso: float) -> float:
-    """Gain at which a camera has a saturation-based speed.
+    """Return the gain at which a camera has a given saturation-based speed.
 
     Raises
     ------

@@ -17,7 +17,7 @@ _FORM = re.compile(r"\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(.*?)\s*$"
 
 
 def parse_level(text: str) -> tuple[float, str]:
-    """Value and unit of a light level; one that has a name is in cd/m2.
+    """Parse the value and the unit of a light level; a level that is given by name is in cd/m2.
 
     Raises
     ------
@@ -43,7 +43,7 @@ def parse_level(text: str) -> tuple[float, str]:
 
 
 def levels_between(over: str) -> dict[str, float]:
-    """Named levels from one to another, such as street:classroom."""
+    """Return the named levels from one to another, given as street:classroom [cd/m^2]."""
     names = list(NAMED)
     first, colon, last = over.partition(":")
     if not colon or first not in names or last not in names or names.index(first) > names.index(last):
@@ -53,9 +53,9 @@ def levels_between(over: str) -> dict[str, float]:
 
 
 def parse_exposure(text: str, name: str = "exposures", least_s: float = 1e-9) -> float | None:
-    """Exposure time [s] of ``10ms``, ``0.5s``, ``200us`` or ``1/50``; None for a rule of `sensor.exposure.RULES`.
+    """Parse an exposure time such as ``10ms``, ``0.5s``, ``200us`` or ``1/50`` [s]; None for a rule.
 
-    Errors call the value by `name`.
+    The rules are `sensor.exposure.RULES`. Errors call the value by `name`.
 
     Raises
     ------

@@ -152,7 +152,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
 
 
 def _whole_s(study: Study, rows: int) -> float:
-    """Time that all exposures of a scene that moves lie within [s]."""
+    """Return the length of time in which all exposures of a scene that moves lie [s]."""
     exposures_s = [parse_exposure(exposure) or 0.0 for exposure in study.exposures]
     return longest_span_s([preset(name) for name in study.sensors], rows, exposures_s)
 
@@ -277,13 +277,13 @@ def under(transport: Transport, spectrum: str) -> Transport:
 
 
 def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
-    """Illuminants by light group, each at the luminance of the group's own spectrum.
+    """Return the illuminants that are asked for by light group, each at the luminance of the group's own spectrum.
 
     Parameters
     ----------
     scene : Scene
     lights : sequence of str
-        ``GROUP=ILLUMINANT``, or ``ILLUMINANT`` alone for every group; a later one takes the place of an earlier.
+        ``GROUP=ILLUMINANT``, or ``ILLUMINANT`` alone for every group; a later text replaces an earlier one.
 
     Raises
     ------
@@ -311,17 +311,17 @@ def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
 
 
 def lux_per_cd_m2(lit: Transport, levels: Sequence[str]) -> float | None:
-    """Illuminance of the reference plane at 1 cd/m^2; None without a plane, and where no level is in lux."""
+    """Return the reference plane's illuminance at 1 cd/m^2 [lux]; None without a plane, or if no level is in lux."""
     return lit.illuminance_lux(1.0) if in_lux(levels) else None
 
 
 def in_lux(levels: Sequence[str]) -> bool:
-    """Whether a level is in lux: the illuminance is then traced, which takes its time."""
+    """Return whether a level is in lux, because the illuminance then has to be traced, which takes time."""
     return any(parse_level(level)[1] == "lux" for level in levels)
 
 
 def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
-    """Mean scene luminance of a level [cd m^-2]."""
+    """Return the mean scene luminance of a level [cd m^-2]."""
     value, unit = parse_level(level)
     if unit == "cd/m2":
         return value

@@ -86,18 +86,18 @@ class ImageModel:
 
 
 def samples_a_side(scene: str, sensors: Iterable[SensorConfig]) -> int:
-    """Samples of the light along each side of a pixel that cameras need of a scene, by its name.
+    """Return how many samples of a scene's light cameras need along each side of a pixel.
 
-    A scene that measures sharpness takes as many as the sharpest lens asks for (`sensor.optics.least_samples`): by one
-    sample per pixel its MTF50 would be too low. All others take one.
+    A scene that measures sharpness takes as many as the sharpest lens needs (`sensor.optics.least_samples`): with one
+    sample per pixel its MTF50 would be too low. All other scenes take one.
     """
     return max((least_samples(sensor) for sensor in sensors), default=1) if scene == EDGE else 1
 
 
 def unit_exposure_s(radiance: SpectralRadiance, preset: SensorConfig, channel: str | None = None) -> float:
-    """Auto exposure of a scene at 1 cd/m^2 [s], without a longest time; `_DARK_S` where there is no light.
+    """Return the auto exposure of a scene at 1 cd/m^2 [s], without a limit; `_DARK_S` where there is no light.
 
-    It is the same for every model of the lens, and for G, with the preset's own mosaic, for every processor, so that
+    It is the same for every model of the lens and, for G with the preset's own mosaic, for every processor, so that
     their pictures can be compared.
     """
     glare = "veiling_glare", "scatter", "eye_age_years"

@@ -37,7 +37,7 @@ def monte_carlo_share(
     *,
     of_pixels: float | None = None,
 ) -> float:
-    """Monte Carlo variance of a frame's electrons over the sensor's own noise variance; 0 where the well is full.
+    """Return the Monte Carlo variance of a frame's electrons over the sensor's own; 0 where the well is full.
 
     Parameters
     ----------
@@ -45,12 +45,14 @@ def monte_carlo_share(
         Monte Carlo error [e-]: one draw of it, such as half the difference of its halves, or its standard
         deviation.
     expected_e : (h, w) or (channel, h, w) float64
-        Of the whole render [e-], of the mosaic or behind every filter. Pixels that reach the well are left out.
+        Expected electrons of the whole render, of the mosaic or behind every filter. Pixels that reach the full well
+        are left out.
     sensor : SensorConfig
     exposure_s : float
-        For the dark current [s].
+        Exposure time, for the dark current [s].
     of_pixels : float, optional
-        The share that so many of the pixels (0 to 1) stay under; left out, mean variance over mean variance.
+        Share of pixels (0 to 1): the result is the quantile that this share of the pixels stays under. Left out, the
+        result is the mean variance over the sensor's mean variance.
     """
     if expected_e.ndim == 2:
         variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
@@ -111,20 +113,21 @@ def render_share(
     *,
     samples: int = 1,
 ) -> float:
-    """Monte Carlo share that `OF_PIXELS` of the pixels stay under at a mean luminance, over every channel.
+    """Return the Monte Carlo share that `OF_PIXELS` of the pixels stay under, over every channel.
 
-    Bands of a path rise and fall together, so their standard errors are added; that is the most that the variance can
-    be. It is pooled over 3x3 pixels.
+    Bands of a path rise and fall together, so their standard errors are added, which is the most that the variance can
+    be. The variance is pooled over 3x3 pixels.
 
     Parameters
     ----------
     transport : Transport
     sensor : SensorConfig
     luminance_cd_m2 : float
+        Mean scene luminance.
     longest_s : float
-        Of the auto exposure [s].
+        Longest auto exposure [s].
     exposure_s : float, optional
-        Left out, the auto exposure.
+        Exposure time; left out, the auto exposure.
     samples : int
         Samples of the light along each side of a pixel.
     """

@@ -50,25 +50,25 @@ def open_scene(
     define: Sequence[str] = (),
     time_s: float | None = None,
 ) -> SceneFile:
-    """Scene, the size of its film and notes.
+    """Open a scene by its name or file; return it with the size of its film and notes.
 
     Parameters
     ----------
     source : str
         Name in the catalogue, or a Mitsuba scene (``.xml``).
     trust, extend
-        As of `load_scene_file`.
+        As in `load_scene_file`.
     light, chart : str, optional
         Options of a catalogue scene's builder: its light, and a file of reflectances for color_checker's patches.
     define : sequence of str
         ``NAME=VALUE`` of a scene file's $parameters.
     time_s : float, optional
-        Of a scene that moves: its builder's option, or a scene file's parameter $time_s.
+        Time at which a scene that moves is seen: its builder's option, or a scene file's parameter $time_s.
 
     Raises
     ------
     InputError
-        For an unknown name, a time of a scene that doesn't move, a scene file that isn't allowed, `trust` for a
+        For an unknown name, a time for a scene that doesn't move, a scene file that isn't allowed, `trust` for a
         catalogue scene, or `light` or `chart` for a file.
     """
     if Path(source).suffix.lower() == ".xml":
@@ -93,7 +93,7 @@ def open_scene(
 
 
 def defined(texts: Sequence[str]) -> dict[str, str]:
-    """Values of a scene file's $parameters by name."""
+    """Return the values of a scene file's $parameters by name."""
     for text in texts:
         if "=" not in text[1:]:
             raise InputError(f"define: {text!r} is not allowed; write NAME=VALUE, as -D depth=4")
@@ -146,7 +146,7 @@ class AdoptedWhite:
 
 
 def first_light(groups: Mapping[str, LightGroup], default: Spectrum) -> Spectrum:
-    """Spectrum of a scene's first light, or `default` where that has colours of its own."""
+    """Return the spectrum of a scene's first light, or `default` where that light has colours of its own."""
     first = next(iter(groups.values()))
     return default if first.coloured else first.spectrum
 

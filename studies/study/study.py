@@ -285,13 +285,13 @@ class Study:
 
     @property
     def gain_texts(self) -> tuple[str, ...]:
-        """Values of the axis of gains, as `Condition` has them."""
+        """Return the values of the axis of gains, as `Condition` has them."""
         texts = [gain_text(gain, None) for gain in self.gains] + [gain_text(None, iso) for iso in self.isos]
         return tuple(texts) or (OWN,)
 
     @cached_property
     def equal_area(self) -> EqualArea | None:
-        """Size that all sensors share; None where each has the render's pixels."""
+        """Return the size that all sensors share; None where each sensor has the render's pixels."""
         if self.sensor_side_um is None:
             return None
         return EqualArea(self.sensor_side_um, max(preset(name).pixel.pitch_um for name in self.sensors))
@@ -310,12 +310,12 @@ def conditions(study: Study, scene: SceneChoice | None = None) -> list[Condition
 
 
 def most_spp(study: Study, scene: SceneChoice) -> int:
-    """Samples a pixel of a scene, at most."""
+    """Return the most samples per pixel of a scene."""
     return scene.spp or study.render.spp
 
 
 def study_mosaics(study: Study) -> tuple[str, ...]:
-    """Mosaics that the study's processors take, each once."""
+    """Return the mosaics that the study's processors take, each once."""
     return tuple(dict.fromkeys(processor_of(name).mosaic for name in study.processors))
 
 

@@ -103,7 +103,7 @@ def _beside(value: Any, folder: Path) -> Any:
 
 
 def _scene(value: object, _: object) -> SceneChoice:
-    """Scene by its name alone, or as a table."""
+    """Read a scene, which is given by its name alone or as a table."""
     if isinstance(value, str):
         return SceneChoice(value)
     if not isinstance(value, dict):
@@ -112,7 +112,7 @@ def _scene(value: object, _: object) -> SceneChoice:
 
 
 def _axis(kind: object) -> Callable[[Any, Any], Any]:
-    """Hook for a tuple, in which one value stands for a list of one."""
+    """Return a hook that reads a tuple, in which one value may stand for a list of one."""
     item = get_args(kind)[0]
     return lambda value, _: tuple(
         _CONVERTER.structure(entry, item) for entry in (value if isinstance(value, list) else [value])
