@@ -59,12 +59,15 @@ class KnownLight:
     weights: Floats
 
     def signals(self, reflectance: Floats) -> Floats:
-        """Signals (..., channel) of reflectances (..., band); what is taken for white reads 1 in every channel."""
+        """Return the signals (..., channel) of reflectances (..., band).
+
+        What the camera takes for white has the value 1 in every channel.
+        """
         return np.asarray(reflectance @ self.weights.T)
 
 
 def neutral_ratios(sensor: SensorConfig, lights: Sequence[str]) -> Floats:
-    """Electrons of R, G, B and W from white under each light, relative to G, shape (light, 4)."""
+    """Return the electrons of R, G, B and W from white under each light, relative to G, shape (light, 4)."""
     collected = np.array([_collected(sensor, light).sum(axis=1) for light in lights])
     return np.asarray(collected / collected[:, 1:2])
 
@@ -92,7 +95,7 @@ def draw_illuminant(rng: np.random.Generator) -> str:
 
 
 def _collected(sensor: SensorConfig, light: str) -> Floats:
-    """Electrons from a white surface in each band, any scale, shape (4, band)."""
+    """Return the electrons from a white surface in each band, in any scale, shape (4, band)."""
     width = band_widths(NM)
     photons = illuminant(light).band_average(NM, width) * photons_per_joule(NM) * width
     return np.asarray(sensor.responses.band_average(CHANNELS, NM, width) * photons)
@@ -129,7 +132,7 @@ def leaf_picture(rng: np.random.Generator, light: KnownLight, shapes: int = 900)
 
 
 def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Places:
-    """Pixels of an ellipse, a polygon or a thin bar."""
+    """Draw the pixels of an ellipse, a polygon or a thin bar."""
     kind = rng.integers(4)
     if kind == 0:
         y, x = ellipse(*at, radius, radius * rng.uniform(0.3, 1), shape=(side, side), rotation=rng.uniform(0, np.pi))
@@ -142,7 +145,10 @@ def _shape(rng: np.random.Generator, at: Floats, radius: float, side: int) -> Pl
 
 
 def _painted(rng: np.random.Generator, light: KnownLight, at: Places, radius: float) -> Floats:
-    """Signals of a shape's pixels: even, shaded, speckled, or striped in two colours; shape (pixel, channel)."""
+    """Draw the signals of a shape's pixels, shape (pixel, channel).
+
+    The shape is even, shaded, speckled, or striped in two colours.
+    """
     y, x = at
     colour = light.signals(draw_surface(rng))
     kind = rng.random()
@@ -218,5 +224,5 @@ def draw_pictures(
 
 
 def photograph_hashes() -> dict[str, str]:
-    """SHA-256 of each photograph's pixels."""
+    """Return the SHA-256 of each photograph's pixels."""
     return {name: sha256(getattr(data, name)().tobytes()).hexdigest() for name in PHOTOGRAPHS}

@@ -78,7 +78,10 @@ def fit_prior(
 
 
 def _first_parts(reduced: Matrix, rng: np.random.Generator) -> Matrix:
-    """Initial components: one third by contrast, so that flat patches get their own; the rest by k-means."""
+    """Return which initial component each patch belongs to, shape (patch, component), 1 for its own and else 0.
+
+    One third of the components are formed by contrast, so that flat patches get their own; the rest by k-means.
+    """
     count = len(reduced)
     even = COMPONENTS // 3
     centres = reduced[rng.choice(count, COMPONENTS - even, replace=False)]
@@ -146,7 +149,7 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
 
 
 def training_provenance(command: str, seed: int, pictures_sha256: str, patches: int) -> str:
-    """What a prior was trained from, as JSON."""
+    """Return as JSON what a prior was trained from."""
     source = {
         "command": command,
         "versions": {library: metadata.version(library) for library in _LIBRARIES},
