@@ -60,12 +60,12 @@ class TwinFigure:
 
     @property
     def ratio(self) -> float:
-        """Twin over camera."""
+        """Return the twin's figure over the camera's."""
         return self.twin / self.camera
 
     @property
     def verdict(self) -> str:
-        """A sentence that says what was found."""
+        """Return a sentence that says what was found."""
         told = "not told apart" if self.alike else "told apart"
         return (
             f"{self.name}: {self.ratio:.3f} of the camera's {self.place}, interval {self.low:.3f} to {self.high:.3f}: "
@@ -92,7 +92,7 @@ class Response:
     source: str
 
     def light_e(self, signal_dn: Floats, white_dn: float) -> Floats:
-        """Electrons that read as a signal."""
+        """Return the electrons whose response is a given signal [DN]."""
         if not self.bend:
             return np.asarray(signal_dn / self.gain_dn_per_e)
         slope = 1 + self.bend
@@ -238,7 +238,7 @@ def response_of(figures: FrameFigures) -> Response:
     signal, gain, photons = signal[used], gain[used], photons[used]
 
     def fitted(bend: float) -> tuple[float, float]:
-        """Misfit and gain of a bend."""
+        """Return the misfit of a bend, and the gain that fits best with it."""
         slope = 1 + bend
         share = Response(bend, 1.0, "").light_e(signal, white_dn) / white_dn
         shape = (slope - 2 * bend * share) ** 2 / (slope - bend * share)
@@ -264,9 +264,9 @@ def _with_patterns(
     dark: Sequence[NDArray[Any]],
     bright: Sequence[NDArray[Any]],
 ) -> PixelNumbers:
-    """Numbers with the columns' share taken out of DSNU and PRNU, the rows' noise, the response, and the whole well.
+    """Return the numbers with the columns' part taken out of DSNU and PRNU, and with row noise, bend and full well.
 
-    The well is that of a whole black level; electrons are those of the response's gain.
+    Electrons are counted by the response's gain, and the full well from a black level in whole DN.
     """
     gain = response.gain_dn_per_e
     black = round(figures.black_dn)
@@ -291,9 +291,10 @@ def _with_patterns(
 
 
 def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
-    """Variance of the columns' means over what the pixels of a column leave in them [DN^2].
+    """Return the variance of the columns' means, without what the noise of a column's own pixels adds to it [DN^2].
 
-    It goes by the difference of neighbours, because a decay along the rows isn't white as a preset's columns are.
+    It is found from the differences between neighbouring columns: real columns may decay slowly along the rows, while a
+    preset's columns are independent of each other.
     """
     image = without_surface(_mean_image(frames))
     of_pixels = float(np.mean(np.var(image, axis=0, ddof=1))) / int(image.shape[0])
@@ -302,7 +303,10 @@ def _column_variance(frames: Sequence[NDArray[Any]]) -> float:
 
 
 def _row_variance(frames: Sequence[NDArray[Any]]) -> float:
-    """Temporal variance that the pixels of a row have together, over what their own noise leaves in its mean [DN^2]."""
+    """Return the temporal variance that the pixels of a row have in common [DN^2].
+
+    What the pixels' own noise adds to the variance of the row's mean is taken off.
+    """
     mean = _mean_image(frames)
     freedom = (len(frames) - 1) / len(frames)
     rest = [frame - mean - (frame.mean() - mean.mean()) for frame in frames]
@@ -324,7 +328,7 @@ def _sensor(numbers: PixelNumbers, figures: FrameFigures) -> SensorConfig:
 
 
 def _site_light(electrons: Floats, figures: FrameFigures, shape: tuple[int, ...]) -> Floats:
-    """Electrons by position of the tile, as an image."""
+    """Return electrons that are given by position in the tile as an image (h, w)."""
     tile = electrons.reshape(len(figures.cfa), len(figures.cfa[0]))
     rows, columns = np.arange(shape[0]) % tile.shape[0], np.arange(shape[1]) % tile.shape[1]
     return np.asarray(tile[rows[:, None], columns[None, :]])
@@ -337,7 +341,7 @@ def _taken(
 
 
 def _relative_error(error_dn2: Floats, variance_dn2: Floats, stack: LightStack) -> float:
-    """Standard error of the ratio of two standard deviations, each the root of a mean over positions."""
+    """Return the standard error of the ratio of two standard deviations, each the root of a mean over positions."""
     camera = sqrt(float(np.sum(error_dn2**2))) / float(np.sum(variance_dn2))
     sites = stack.sites
     errors = [site.error_dn2 for site in sites]
@@ -354,7 +358,7 @@ def _compared(name: str, place: str, camera: float, twin: float, error: float, t
 
 
 def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[Any]]) -> list[TwinFigure]:
-    """Fixed pattern by rows, columns and pixels, noise of whole rows, and the histogram of one frame."""
+    """Compare the fixed pattern by rows, columns and pixels, and the noise of whole rows, of camera and twin."""
     found = []
     images = [without_surface(_mean_image(frames)) for frames in (camera, twin)]
     height, width = images[0].shape
