@@ -76,7 +76,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
 
 
 def merge_radiance(radiance: SpectralRadiance, groups: Sequence[NDArray[np.intp]]) -> SpectralRadiance:
-    """Average radiance over wide bands, as bands would hold it that follow light and scene within themselves."""
+    """Average radiance over wide bands, as if light and scene were followed exactly within each of them."""
     nm, width_nm = wide_bands(radiance.wavelength_nm, radiance.widths_nm, groups)
     values = radiance.values @ _means(radiance.widths_nm, groups).T.astype(radiance.values.dtype)
     return replace(radiance, values=values, wavelength_nm=nm, width_nm=width_nm)
@@ -91,5 +91,5 @@ def _means(width_nm: Floats, groups: Sequence[NDArray[np.intp]]) -> Floats:
 
 
 def _merge(matrix: Floats, planes: NDArray[np.float32]) -> NDArray[np.float32]:
-    """Average (group, band, h, w) over the bands of each wide band."""
+    """Average (group, band, h, w) over the fine bands of each wide band."""
     return np.asarray(np.einsum("wf,gfyx->gwyx", matrix, planes, optimize=True), dtype=np.float32)

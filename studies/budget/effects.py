@@ -34,16 +34,18 @@ NORMAL_REACH = 6.7  # standard deviations at which `sensor.kernel.kernel.normal_
 
 @dataclass(frozen=True)
 class BandErrors:
-    """What one choice of wide bands does.
+    """Errors that one choice of wide bands makes.
 
     Attributes
     ----------
     response : (2, h, w) float64
-        Light and response vary together within a band: exact radiance averaged over wide bands, less the fine bands'.
+        Error because light and response vary together within a band: exact radiance averaged over wide bands, less that
+        in fine bands.
     light : (2, h, w) float64
-        The light and what the scene does with it vary together within a band: product of averages, less their average.
+        Error because the light and what the scene does with it vary together within a band: the product of their
+        averages, less the average of their product.
     jitter : (h, w) float64
-        Variance of one path's electrons by the wavelength within the bands that it draws.
+        Variance of one path's electrons because it draws its wavelengths within the bands at random.
     """
 
     response: Pair
@@ -58,14 +60,14 @@ class Effects:
     Attributes
     ----------
     full : (2, h, w) float64
-        Everything modelled, fine bands.
+        Electrons with everything modelled, in fine bands.
     blurred, sharp : (draw, h, w) float64
-        Draws of the pilot's Monte Carlo noise, with diffraction and without. Diffraction evens noise out, and brings
-        that of a lamp's rim to pixels below saturation.
+        Draws of the pilot's Monte Carlo noise, with diffraction and without. Diffraction evens noise out, but it also
+        carries noise from the rim of a lamp to pixels below saturation.
     lens : mapping of str to (2, h, w) float64
-        What leaving one term of the lens out changes.
+        Change when one term of the lens is left out.
     bands : mapping of int to BandErrors
-        By the count of `studies.budget.bands.COUNTS`.
+        Errors by the count of `studies.budget.bands.COUNTS`.
     """
 
     full: Pair
@@ -83,6 +85,9 @@ def find_effects(
     rng: np.random.Generator,
 ) -> Effects:
     """Find all effects for a sensor under the transport's own spectra.
+
+    They are the effects on the light. Crosstalk is left out: it spreads an effect as it spreads charge, and makes no
+    mean square larger.
 
     They are those of the light: crosstalk, which spreads an effect as it spreads charge, makes no mean square larger.
 
@@ -119,7 +124,7 @@ def find_effects(
 def shake_effect(
     transport: Transport, sensor: SensorConfig, lens: LensConfig, exposure_s: float, rng: np.random.Generator
 ) -> Pair:
-    """Return what a still camera changes, as `Effects.lens`, for the path among `PATHS` that costs most."""
+    """Return the change if camera shake is left out, as in `Effects.lens`, for the path of `PATHS` with the most."""
     halves = transport.relight_halves(luminance_cd_m2=1.0)
     held = replace(sensor, lens=lens)
     still = [imaged_electrons(half, held, 1.0) for half in halves]
@@ -177,7 +182,10 @@ def _band_errors(
 def _jitter(
     halves: Sequence[SpectralRadiance], sensor: SensorConfig, groups: Sequence[NDArray[np.intp]]
 ) -> NDArray[np.float64]:
-    """Return the variance over the positions within all wide bands together, as a path draws one offset for all."""
+    """Return the variance of the electrons over the wavelengths within wide bands that a path may draw, shape (h, w).
+
+    All bands are varied together, because a path draws one offset for all of them.
+    """
     positions = max(len(group) for group in groups)
     if positions == 1:
         return np.zeros(halves[0].shape)

@@ -13,7 +13,7 @@ from studies.study.study import BudgetShares, Condition
 
 @dataclass(frozen=True)
 class Choice:
-    """What a scene's render and the images of its conditions hold.
+    """Model of a scene's render and of the images of its conditions.
 
     Attributes
     ----------

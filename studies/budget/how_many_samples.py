@@ -20,9 +20,6 @@ def samples_per_pixel(
 
     The number is at most `most_spp`, which the study allows. The variance of the noise is inversely proportional to the
     number of samples, so that the number follows from the variance of one sample.
-
-    The variance of the noise falls as 1 over the number of samples, so that the variance of one sample tells how many
-    are needed.
     """
     needed = max(
         row.monte_carlo(count, 1, left_out[row.condition]) / (shares.monte_carlo * row.noise_variance) for row in rows

@@ -38,11 +38,12 @@ class Ledger:
     condition : Condition
     mosaic : str
     exposure_s, noise_e : float
-        Time, and the sensor's own noise: root of its mean variance [e-].
+        Exposure time, and the sensor's own noise: the root of its mean variance [e-].
     terms : tuple of Term
     rms_e, share : float
-        All together. Noise of the render and of its level is independent of the others and adds in square; these can
-        act alike, and the RMS of a sum is at most the sum of the RMS (Minkowski's inequality).
+        Error of all terms together. The noise of the render and of its level is independent of the other errors and
+        adds in square. The others may have the same sign; the RMS of a sum is at most the sum of the RMS (Minkowski's
+        inequality).
     """
 
     condition: Condition

@@ -58,7 +58,9 @@ class Pilot:
 
 
 def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: Path | None = None) -> Pilot:
-    """Render a scene's pilot, and group its fine bands into each of some numbers of wide ones.
+    """Render a scene's pilot, and group its fine bands into wide ones, for each number in `counts`.
+
+    A picture file keeps its own bands; if it is larger than `FILE_SIDE`, whole blocks of pixels are averaged into one.
 
     A picture file keeps its own bands; of a larger one than `FILE_SIDE`, whole blocks of pixels become one.
     """
@@ -83,9 +85,9 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
 
 
 def _in_blocks(transport: Transport, side: int) -> Transport:
-    """Average blocks of so many rows and columns, those at the far borders smaller.
+    """Average blocks of `side` x `side` pixels into one; blocks at the far borders are smaller.
 
-    What levels are computed from stays that of the whole picture.
+    The means that levels are computed from stay those of the whole picture.
     """
     if side == 1:
         return transport

@@ -41,7 +41,11 @@ def plan_json(study: Study, plan: Plan, reference: Plan) -> dict[str, Any]:
 
 
 def plan_table(plan: Plan) -> Table:
-    """Return a table of the worse mosaic of each condition: a column per term, its share of the noise variance.
+    """Return a table with a row for the worse mosaic of each condition, and each term's share of the noise variance.
+
+    A share in brackets belongs to an effect that is modelled. The table is narrow: its title holds what all conditions
+    have in common, conditions with the same figures share a line, and a line below names the terms that are under
+    `LEAST_SHOWN` everywhere.
 
     A share in brackets is of an effect that is modelled. The table is narrow: its title holds what all conditions have
     in common, conditions with the same figures share a line, and a line below names the terms that are under

@@ -28,7 +28,7 @@ class PilotNoise:
     spp, half_spp : float
         Samples per pixel of the pilot, and of one of its halves.
     level : float
-        Variance of the level over its square, of one sample per pixel and for as many pixels as the render has.
+        Relative variance of the picture's mean luminance, for one sample per pixel and the render's number of pixels.
     """
 
     spp: float
