@@ -11,7 +11,7 @@ from studies.photograph.shot import Order, carry_out, check
 
 
 def capture(order: Annotated[Order, Parameter(name="*")], *, dry_run: bool = False, json: bool = False) -> None:
-    """Photograph a scene and write raw files that raw converters open; prints their paths.
+    """Photograph a scene, write raw files that raw converters open, and print their paths.
 
     Parameters
     ----------

@@ -31,7 +31,7 @@ def dataset(
     dry_run: bool = False,
     json: bool = False,
 ) -> int:
-    """Make raw frames of every scene, light, sensor and seed of a study, with the truth behind them; prints the folder.
+    """Make raw frames of every scene, light, sensor and seed of a study, and the truth behind them; print the folder.
 
     Tar shards in WebDataset's layout, a manifest and a card. Whatever ends it, the same command goes on.
 

@@ -41,7 +41,7 @@ class DemoOrder:
     longest_exposure : float, optional
         Longest exposure time, such as 66ms, the default, or 1/15.
     spp : int, optional
-        Samples a pixel of the render, at most; 288 by default.
+        Samples per pixel of the render, at most; 288 by default.
     max_seconds : float, optional
         Time for the render, at most; 65 by default.
     seed : int
@@ -104,7 +104,7 @@ def demo(
     force: bool = False,
     dry_run: bool = False,
 ) -> None:
-    """Photograph one scene from moonlight to daylight with RGBW and Bayer and write a report; prints its path.
+    """Photograph one scene from moonlight to daylight with RGBW and Bayer, write a report and print its path.
 
     It is a sweep of the study demo (`rodcone new study demo`) as it is stated, without a plan.
 

@@ -28,7 +28,7 @@ class DevelopOrder:
         interleaved removes noise, and bayer doesn't.
         Or a function in a Python file of your own, mine.py:develop, with --trust-code; or FILE.whl:bayer_net.
     bits : int
-        Bits a channel: 8 or 16.
+        Bits per channel: 8 or 16.
     ev : float, optional
         Brightness in stops; at 0 a full well is white. By default the exposure's 99th percentile of luminance is shown
         at 90 % of white, by every processor alike.
@@ -63,7 +63,7 @@ DEFAULT = DevelopOrder()
 def develop(
     raw: Path, /, *more: Path, order: Annotated[DevelopOrder, Parameter(name="*")] = DEFAULT, json: bool = False
 ) -> None:
-    """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture; prints its path.
+    """Develop a raw file of `rodcone capture`, or any camera's with a Bayer mosaic, into a picture, and print its path.
 
     Parameters
     ----------

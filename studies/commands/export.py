@@ -9,7 +9,7 @@ from studies.sweep.export import stream_rows, write_csv
 
 
 def export(folder: Path, /, *, out: Path, everything: Annotated[bool, Parameter(name="--all")] = False) -> None:
-    """Write the cells of a sweep as a table, a row a cell; prints its path.
+    """Write the cells of a sweep as a table, a row per cell, and print its path.
 
     Parameters
     ----------

@@ -19,7 +19,7 @@ def paper(
     seeds: int = 4,
     json: bool = False,
 ) -> None:
-    """Compute the figures and claims of Parmar & Wandell 2009 and check each claim; prints the page's path.
+    """Compute the figures and claims of Parmar & Wandell 2009, check each claim and print the page's path.
 
     Parameters
     ----------
@@ -31,7 +31,7 @@ def paper(
     size
         Side of the pictures in pixels.
     spp
-        Samples a pixel of the renders.
+        Samples per pixel of the renders.
     seeds
         Exposures of each condition.
     json

@@ -21,7 +21,7 @@ def plot(
     first: str | None = None,
     where: list[str] | None = None,
 ) -> None:
-    """Draw a metric of a sweep over light, and the first line's lead over each other one; prints the file's path.
+    """Draw a metric of a sweep over light, with the first line's lead over each other one, and print the file's path.
 
     Lines are means over the seeds, bands their 95 % intervals (Student's t); a lead's is of the pairs of one seed.
     What else the sweep varies stands in rows of the figure.

@@ -44,7 +44,7 @@ def reference(
     out: Path | None = None,
     dry_run: bool = False,
 ) -> int:
-    """Render light whose noise is below the sensor's, for `render.reference` of a study and the demo; prints its path.
+    """Render light with less noise than the sensor's, for `render.reference` of a study and the demo; print its path.
 
     It may take hours. The file so far is there after every 512 samples. Whatever ends the render, the same command goes
     on from that file, and without --out from the file that comes with rodcone too.

@@ -63,7 +63,7 @@ class RenderOrder:
         Light level such as 25cd/m2 (mean scene luminance) or 500lux (on the scene's reference plane); the scene's own
         by default.
     spp : int, optional
-        Samples a pixel, at most.
+        Samples per pixel, at most.
     noise : float, optional
         Relative Monte Carlo error to reach, such as 0.02.
     max_seconds : float, optional
@@ -125,7 +125,7 @@ class RenderOrder:
 
 
 def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool = False, json: bool = False) -> int:
-    """Render a scene into a spectral OpenEXR file; prints its path.
+    """Render a scene into a spectral OpenEXR file, and print its path.
 
     Light of the scene that is there already, such as that of still_life which comes with rodcone, is taken as it is. A
     render stops at whichever comes first of --spp, --noise and --max-seconds; with none of them after 64 samples per

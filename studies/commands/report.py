@@ -23,7 +23,7 @@ def report(
     camera: str | None = None,
     where: list[str] | None = None,
 ) -> None:
-    """Write the report of a sweep as one self-contained HTML file; prints its path.
+    """Write the report of a sweep as one self-contained HTML file, and print its path.
 
     With an --out that ends in .md: its answer and its leads as Markdown tables.
 

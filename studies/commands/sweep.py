@@ -102,7 +102,7 @@ class SweepOrder:
             require_absent("beside --reference", as_stated=self.as_stated)
 
     def plan(self, study: Study, step: Step) -> Plan:
-        """Plan of a study: of its pilots, as it is stated, or of everything."""
+        """Return the study's plan: made by its pilots, as the study is stated, or with everything modelled."""
         if self.reference:
             return reference_plan(study)
         if self.as_stated:
@@ -122,7 +122,7 @@ def sweep(
     *,
     json: bool = False,
 ) -> int:
-    """Make every picture of a study, note its figures in a results database, and write a report; prints its path.
+    """Make every picture of a study, note its figures in a results database, write a report and print its path.
 
     Whatever ends it (Ctrl-C, a kill, a full disk), the same command goes on with the cells that are missing.
 

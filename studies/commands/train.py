@@ -15,7 +15,7 @@ from studies.training.train import train_prior
 def train(
     *, sensor: str | None = None, spectral: str | None = None, out: Path, seed: int = 1, json: bool = False
 ) -> None:
-    """Train a prior over patches: of a sensor's curves, for ple, or of reflectances, for expect; prints its path.
+    """Train a prior over patches: of a sensor's curves, for ple, or of reflectances, for expect, and print its path.
 
     Takes some three minutes on two cores and 1.5 GB. The prior serves every noise, well, exposure and mosaic of
     these curves: isp.processors.catalogue.PROCESSORS["ple"].develop(..., prior=load_prior(path)).
