@@ -162,7 +162,7 @@ def _samples_of(job: Job, opened: OpenedScene, cells: Sequence[Cell], facts: Fac
 
 
 def _name(condition: Condition, mosaic: str, seed: int) -> str:
-    """Name of a frame, in letters that any reader takes."""
+    """Return the name of a frame, in letters that any reader takes."""
     parts = (*frame_labels(condition).values(), mosaic, f"s{seed}")
     return "_".join(_NOT_IN_KEYS.sub("-", part.removesuffix(".toml").replace(".", "p")) for part in parts)
 
@@ -222,7 +222,7 @@ def card(lines: Lines) -> str:
 
 
 def _histogram(values: Sequence[float], edges: Sequence[float]) -> dict[str, int]:
-    """Number of values between edges, by the words of the card."""
+    """Count the values between edges, by the words of the card."""
     between = (f"{low:g} to {high:g}" for low, high in pairwise(edges))
     names = (f"under {edges[0]:g}", *between, f"{edges[-1]:g} and more")
     counts = np.bincount(np.searchsorted(edges, values, side="right"), minlength=len(names))

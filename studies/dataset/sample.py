@@ -184,7 +184,7 @@ def noise_coefficients(readings: Sequence[PlainReading], gain_e_per_dn: float) -
 
 @lru_cache(maxsize=64)
 def _opened(path: Path) -> NDArray[Any]:
-    """Open an array of which only what is used is read."""
+    """Open an array as a memory map, so that only the part that is used is read."""
     return np.asarray(np.load(path, mmap_mode="r", allow_pickle=False))
 
 
@@ -231,7 +231,7 @@ def plane_files(job: Job, facts: Facts, cell: Cell, planes: Sequence[str]) -> di
 
 
 def scene_hash(opened: OpenedScene) -> str:
-    """Hash of a scene's shapes, whatever lights them and in whatever size; of a picture that of its file."""
+    """Return the hash of a scene's shapes, whatever its light and size; of a picture, that of its files."""
     if opened.scene is None:
         return digest([digest_file(file) for file in files_of(opened.choice.source)])
     return digest_inputs([opened.scene.geometry, file_digests(opened.scene.geometry)])
@@ -268,7 +268,10 @@ def _make_files(job: Job, opened: OpenedScene, frames: Mapping[str, Cell], trans
 
 
 def group_shares(lit: Transport, shape: tuple[int, int]) -> NDArray[np.float64]:
-    """Share of each light group in the luminance of each of `shape` pixels, (h, w, group); 0 in those without light."""
+    """Return the share of each light group in the luminance of each pixel, (h, w, group); 0 in pixels without light.
+
+    `shape` is the number of pixels, (h, w).
+    """
     bands = OBSERVER_NM, lit.wavelength_nm, lit.width_nm
     # The eye's weights of bands follow each group's own lamp, to its lines.
     weights = [x.power * transport_weights(observer, *bands, x.spectrum)[0][1] for x in lit.groups.values()]

@@ -63,7 +63,7 @@ class Shard:
 
 
 def split_of(scene: str) -> str:
-    """Split of a scene by its hash alone, so that it never is in two."""
+    """Return the split that a scene belongs to, by its hash alone, so that no scene is in two splits."""
     place = int(scene[:12], 16) / 16**12
     return next(split for split, end in SPLITS.items() if place < end)
 
@@ -84,7 +84,7 @@ def into_shards(samples: Sequence[Sample], count: int, folder: Path) -> list[Sha
 
 
 def shard_key(samples: Sequence[Sample]) -> str:
-    """Hash of all that decides a shard: its samples, and the versions and code that make it."""
+    """Return the hash of all that decides a shard: its samples, and the versions and code that make it."""
     made_from = [(x.key, x.cell.key, x.window, x.part, [path.name for path in x.files.values()]) for x in samples]
     return digest([made_from, versions(), code_digests()])
 
@@ -111,7 +111,7 @@ def make_shards(folder: Path, shards: Sequence[Shard], earlier: Lines, head: Lin
 
 
 def make_shard(shard: Shard) -> Shard:
-    """Write a shard, whole or not at all; the same samples give the same bytes, whoever writes them and when.
+    """Write a shard, whole or not at all; the same samples give the same bytes on any machine and at any time.
 
     Raises
     ------
