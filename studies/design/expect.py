@@ -36,17 +36,17 @@ _NODES, _SHARES = np.polynomial.hermite_e.hermegauss(40)  # quadrature over a Ga
 
 @dataclass(frozen=True)
 class ExpectedError:
-    """Expected error under the prior of the best estimate: where the patch's component is known, and a linear one.
+    """Expected error under the prior: that of the best estimate if a patch's component is known, and of a linear one.
 
     Attributes
     ----------
     luminance_cd_m2 : float
-        Mean of the scene.
+        Mean luminance of the scene.
     exposure_s : float
     psnr_db, linear_psnr_db : float
-        Of encoded sRGB, as PSNR is, by the curve's slope; component known, and linear estimate.
+        PSNR of encoded sRGB, by the curve's slope, of the estimate with the component known and of the linear one.
     luminance_db : float
-        Of encoded luminance alone; component known.
+        PSNR of encoded luminance alone; component known.
     lightness, colour : float
         Root mean square of the error of L*, and of (a*, b*) together, in Lab, linearised; component known.
     """
@@ -62,7 +62,7 @@ class ExpectedError:
 
 @dataclass(frozen=True, eq=False)
 class LitPrior:
-    """A prior's coefficients under a light.
+    """A prior's spectra under a light.
 
     Attributes
     ----------
@@ -70,7 +70,7 @@ class LitPrior:
     basis : (band, coefficient) float64
         Reflectance of a coefficient of 1 in the light's bands.
     xyz : (3, coefficient) float64
-        Adapted to D65; reflectance 1 has Y = 1.
+        XYZ of a coefficient of 1, adapted to D65; reflectance 1 has Y = 1.
     """
 
     light: Light
@@ -137,7 +137,10 @@ def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats
 
 
 def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
-    """Share of each pixel's light (second axis) on each pixel of a patch: the unit matrix, or the lens's at 550 nm."""
+    """Return the share of each pixel's light (second axis) that falls on each pixel of a patch (first axis).
+
+    It is the unit matrix, or with `blur` the lens's at 550 nm.
+    """
     points = np.eye(PATCH**2).reshape(-1, PATCH, PATCH)
     if blur:  # as `sensor.optics.form_image` has diffraction and defocus
         otf = sampled_otf((PATCH, PATCH), sensor.pixel.pitch_um, sensor.lens, folded=False)(WAVELENGTH_NM)
@@ -146,12 +149,12 @@ def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
 
 
 def sites_of(tile: Tile) -> NDArray[np.intp]:
-    """Number among a tile's channels of that of each pixel of a patch, shape (pixel,)."""
+    """Return for each pixel of a patch the number of its channel among the tile's channels, shape (pixel,)."""
     return np.array([channels(tile).index(name) for name in channel_map(tile, (PATCH, PATCH)).flat])
 
 
 def spread_of(crosstalk: float) -> Floats:
-    """Share of each pixel's electrons (second axis) that each pixel of a patch collects (first axis)."""
+    """Return the share of each pixel's electrons (second axis) that each pixel of a patch collects (first axis)."""
     shape = (PATCH, PATCH)
     return np.stack([spread_charge(one.reshape(shape), crosstalk).ravel() for one in np.eye(PATCH**2)]).T
 
