@@ -160,7 +160,10 @@ def seen_level(report: ReportData) -> int:
 
 
 def reference_name(render: ReportRender) -> str:
-    """Name of the picture that all are measured against: it is rendered, and so has noise of its own."""
+    """Return the name of the picture that all others are measured against.
+
+    It states the render's samples, because that picture has noise of its own.
+    """
     return "Reference" + (f", {text.significant(render.spp)} samples" if render.spp else "")
 
 
@@ -171,7 +174,7 @@ def known_shares(report: ReportData) -> list[tuple[float, int]]:
 
 
 def place_name(report: ReportData, groups: Sequence[GroupView], place: int) -> str:
-    """Level, group and camera of a cell."""
+    """Return the level, group and camera of a cell in words."""
     cell = report.cells[place]
     group = groups[place // len(groups[0].cells)]
     return f"{report.levels[cell.level].name}, {group.title}, {text.camera_name(cell.camera)}"

@@ -108,7 +108,7 @@ class ReportCell:
 
     @property
     def substitution(self) -> float | None:
-        """Share of the seeds in which W stood for luminance; None where that isn't known of all."""
+        """Return the share of the seeds in which W replaced the luminance; None where one of them doesn't say."""
         states = [row.substitution for row in self.rows if row and row.substitution is not None]
         return sum(states) / len(states) if len(states) == len(self.rows) else None
 

@@ -78,7 +78,7 @@ def counts(ours: Figures, theirs: Figures) -> dict[str, dict[str, int]]:
 
 
 def light_ratio(light_cd_m2: Sequence[float], better: Floats, worse: Floats) -> Floats:
-    """Light that `worse` needs for the PSNR that `better` has, over the level's own, by interpolation between levels.
+    """Return the factor on each level's light with which `worse` has the PSNR of `better`, interpolated between levels.
 
     Parameters
     ----------
