@@ -118,7 +118,7 @@ def judge_claim(number: int, values: Values, **words: object) -> Claim:
 
 
 def within(values: Values, low: float = -inf, high: float = inf, unit: str = "") -> tuple[ClaimCheck, ...]:
-    """Check that each value lies in a range; of what exposures gave, shape (seed,), the mean with its interval."""
+    """Check that each value lies in a range; for values over exposures, shape (seed,), the mean with its interval."""
     return tuple(ClaimCheck(name, float(np.mean(x)), low, high, unit, margin=_margin(x)) for name, x in values.items())
 
 
@@ -198,7 +198,7 @@ def range_text(check: ClaimCheck) -> str:
 
 
 def value_text(check: ClaimCheck) -> str:
-    """Number and unit, with enough digits to differ from a near end of its range."""
+    """Write a check's value and unit, with enough digits to differ from a near end of its range."""
     for digits in range(3, 7):
         shown = text.significant(check.value, digits=digits)
         ends = [text.significant(end, digits=digits) for end in (check.low, check.high) if isfinite(end)]

@@ -38,9 +38,10 @@ COLOUR_LIGHTS = {"moonlight": MOONLIGHT_CD_M2, "low light": LOW_CD_M2, "25 cd/mÂ
 
 
 def range_db(sensor: SensorConfig) -> tuple[float, float]:
-    """Light that fills the most sensitive colour over the light in which W's SNR is 1: closed form, and read out [dB].
+    """Return the dynamic range [dB], in closed form and as measured on frames that are read out.
 
-    Read out, the first is where half of the pixels are full, and the second follows from the SNR that W has there.
+    It is the light that fills the most sensitive colour over the light in which W's SNR is 1. On frames the first is
+    the light in which half of the pixels are full, and the second follows from W's SNR at the closed form's light.
     """
     light = named_light("D65")
     names = sensor.channels
@@ -103,7 +104,10 @@ def colour_noise_ratios(reading: str) -> Mapping[str, float]:
 
 
 def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
-    """Light of Kijima's combined colour sample over that of W's, by colour: closed form, and by read out shot noise."""
+    """Return the light of Kijima's combined colour sample over that of a W pixel, by colour.
+
+    The first number is the closed form, the second is derived from shot noise in frames that are read out.
+    """
     per_cd_m2 = channel_e(table1_sensor("table1_output"), named_light("D65"), 1.0, 1.0)
     weights = np.outer(tent(MATCHED_RADIUS), tent(MATCHED_RADIUS))
     shape = (FLAT_SIDE, FLAT_SIDE)

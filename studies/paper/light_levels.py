@@ -104,10 +104,11 @@ def _row(camera: Camera, raw: RawImage, subject: View) -> tuple[float, ...]:
 
 
 def largest_step(values: Image, sign: float) -> tuple[float, Image]:
-    """Level [cd/m^2] up to which values (level, seed) times `sign` grow most from the one below, and that step (seed,).
+    """Return the largest step from one level to the next: its upper level [cd/m^2], and the step of each seed (seed,).
 
-    A `sign` of 0 asks for the largest step either way. Largest is the one whose interval begins highest: in the dark
-    means of few exposures rise and fall by chance.
+    Steps are those of `values` (level, seed) times `sign`; a `sign` of 0 stands for steps in either direction. The
+    largest step is that whose confidence interval begins highest, because in the dark means of few exposures rise and
+    fall by chance.
     """
     steps = np.diff(values, axis=0)
     sizes = steps * sign if sign else np.abs(steps)
@@ -117,7 +118,10 @@ def largest_step(values: Image, sign: float) -> tuple[float, Image]:
 
 
 def where_white_fills(curves: LevelCurves) -> float:
-    """Level at which half as many of W's pixels are full as at most [cd/m^2]; the brightest where none ever is."""
+    """Return the level at which half as many of W's pixels are full as at the level with the most [cd/m^2].
+
+    It is the brightest level where no pixel is ever full.
+    """
     full = curves.white_full.mean(axis=1)
     return float(LEVELS_CD_M2[int((full >= full.max() / 2).argmax()) if full.any() else -1])
 

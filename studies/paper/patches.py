@@ -56,7 +56,7 @@ class Triplets:
 
     @property
     def share(self) -> float:
-        """Share of the x that are nearer to their y."""
+        """Return the share of the x that are nearer to their y than to their z."""
         return float((self.to_y < self.to_z).mean())
 
 

@@ -61,7 +61,7 @@ class Setup:
     size : int
         Side of the pictures [pixels].
     spp : int
-        Samples a pixel of the renders.
+        Samples per pixel of the renders.
     band_nm : float
         Width of their bands.
     seeds : int
