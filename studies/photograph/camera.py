@@ -159,7 +159,7 @@ def _srgb_of_xyz(white: Floats) -> NDArray[np.float64]:
 
 
 def colour_fit(sensor: SensorConfig, processor: Processor, light: Light) -> ColourFit:
-    """Fit of the processor's balanced colours, and the mosaic's other channels, under a light on the ColorChecker."""
+    """Fit the processor's colours and the mosaic's other channels under a light, on the ColorChecker's patches."""
     nm, width = light.wavelength_nm, light.width_nm
     surfaces = np.array([held(reflectance).band_average(nm, width) for _, reflectance in color_checker_reflectances()])
     colours = processor.colours or sensor.channels

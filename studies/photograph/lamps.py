@@ -43,7 +43,9 @@ def flicker_of(texts: Sequence[str], groups: Collection[str]) -> dict[str, Wavef
 def lamp_parts(
     transport: Transport, spectra: Mapping[str, Spectrum], level: Mapping[str, float], flicker: Mapping[str, Waveform]
 ) -> list[tuple[Waveform, SpectralRadiance | None]]:
-    """Light of each waveform's lamps alone, as bright as they are among all lamps; nothing is rendered.
+    """Return the light of each waveform's lamps alone, as bright as it is among all lamps; nothing is rendered.
+
+    None stands for the whole light, where all lamps have one waveform.
 
     None stands for the whole light, where one waveform is that of every lamp.
 

@@ -57,7 +57,7 @@ def _chunk(name: bytes, content: bytes) -> bytes:
 
 @cache
 def icc_profile(encoding: str) -> bytes:
-    """Display profile of an encoding: its primaries, chromatic adaptation to D50, and the curve of IEC 61966-2-1."""
+    """Return the ICC display profile of an encoding: primaries, adaptation to D50, and the curve of IEC 61966-2-1."""
     return (DATA / f"{encoding}.icc").read_bytes()
 
 

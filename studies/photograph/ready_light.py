@@ -36,7 +36,7 @@ def find_ready(
     spectra: Iterable[Spectrum],
     bands: tuple[Floats, Floats] = BANDS,
 ) -> Ready | None:
-    """Light of a scene at the size asked for; without one at the light's own. None where none fits.
+    """Find a scene's light that is there already, at the size asked for, else at its own size; None where none fits.
 
     Parameters
     ----------
@@ -44,8 +44,9 @@ def find_ready(
     own : (int, int)
         Height and width that the scene has by itself.
     asked : (int, int) or None
+        Height and width asked for.
     spectra : iterable of Spectrum
-        Of the lights; a lamp of lines needs bands of its own, so nothing fits it.
+        Spectra of the lights. A lamp with lines needs bands of its own, so that no stored light fits it.
     bands : (array, array)
         Centres and widths [nm].
     """
@@ -60,7 +61,7 @@ def find_ready(
 
 
 def load_ready(name: str, size: tuple[int, int] | int | None = None) -> Transport:
-    """Light of a scene of the catalogue that is there already, at the size asked for or its own.
+    """Load light of a scene of the catalogue that is there already, at the size asked for or at the light's own.
 
     Raises
     ------

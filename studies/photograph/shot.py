@@ -130,7 +130,7 @@ class Order:
     width : int, optional
         Pixels; as height.
     spp : int, optional
-        Samples a pixel of the render; 64 by default, where the scene's light isn't there already.
+        Samples per pixel of the render; 64 by default, where the scene's light isn't there already.
     render : bool
         Render the scene here, even if its light is there already; --spp does so too.
     frames : int
@@ -491,7 +491,10 @@ def _exposure(checked: Checked, per_second_e: NDArray[np.float64]) -> tuple[floa
 def _rendered(
     checked: Checked, opened: SceneFile, spectra: Mapping[str, Spectrum], step: Step | None, kept: Path
 ) -> Transport:
-    """Light of a scene, rendered here; of one that moves the mean over the exposure, by paths of their own each."""
+    """Render the light of a scene; for one that moves, average the light over the exposure.
+
+    Each time of the exposure has paths of its own, so that their errors are independent.
+    """
     order, samples = checked.order, checked.samples
     height, width = _size(order, opened)
     if step:
@@ -530,7 +533,7 @@ def _bands(opened: SceneFile, spectra: Mapping[str, Spectrum]) -> tuple[Floats, 
 
 
 def _ready(order: Order, opened: SceneFile, spectra: Mapping[str, Spectrum]) -> Ready | None:
-    """Light that is there already, where no number asks for a render."""
+    """Return light that is there already, unless an option asks for a render."""
     if order.render or order.spp is not None:
         return None
     asked = None if (order.size, order.height, order.width) == (None, None, None) else _size(order, opened)

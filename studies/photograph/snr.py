@@ -71,7 +71,7 @@ def snr(electrons: Floats, sensor: SensorConfig, exposure_s: float, channel: str
 def light_for_snr(
     ratio: Annotated[float, (1e-6, 1e6, "give signal over noise")], sensor: SensorConfig, light: str, exposure_s: float
 ) -> list[LightForSnr]:
-    """Light for an SNR by channel, in the order of `sensor.cfa.channels`.
+    """Return the light in which each channel's pixel reaches an SNR, in the order of `sensor.cfa.channels`.
 
     Parameters
     ----------
@@ -129,9 +129,6 @@ def _electrons_of_law(snr: float, reading: PlainReading) -> float:
 
     With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. They are infinite for an
     SNR above 1 / sqrt(c), the limit that PRNU sets, and where the well is full before.
-
-    With the variance a + b e + c e^2 they solve (1 - snr^2 c) e^2 - snr^2 b e - snr^2 a = 0. Beyond an SNR of
-    1 / sqrt(c), by PRNU, no light is enough; nor is it where the well is full before.
     """
     law = reading.law
     a, b = law.dark_e**2 + law.fixed_e**2, law.shot
