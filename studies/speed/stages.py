@@ -55,7 +55,7 @@ class Bench:
     bands : tuple of int
         Numbers of bands; may be given several times, as all that follow.
     samples : tuple of int
-        Samples a pixel, increasing; two renders of twice the last are the references.
+        Samples per pixel, increasing; two renders of twice the last are the references.
     neighbourhoods : tuple of int
         Widths of the reconstruction's neighbourhood.
     patches : tuple of int
