@@ -72,7 +72,7 @@ class PictureCost:
 
     @property
     def pixels(self) -> int:
-        """Number of pixels."""
+        """Return the number of pixels."""
         return self.size[0] * self.size[1]
 
     @property
@@ -153,7 +153,7 @@ def averaged_s(pixels: float, bands: int, groups: int) -> float:
 
 @cache
 def pace() -> float:
-    """Measure the time that this machine takes for what takes 1 on the machine of the numbers, by a piece of work."""
+    """Return how much longer this machine takes than the machine of the numbers, as measured on a piece of work."""
     return min(_work_s() for _ in range(3)) / _WORK_S
 
 

@@ -92,7 +92,10 @@ def in_pixels(radiance: SpectralRadiance, samples: int) -> SpectralRadiance:
 
 
 def _overlaps(pixels: int, other: int) -> NDArray[np.float64]:
-    """Share of each of `pixels` intervals in each of `other` on the same length, (other, pixels); rows sum to 1."""
+    """Return the share of each of `pixels` intervals in each of `other` on the same length, shape (other, pixels).
+
+    Each row has the sum 1.
+    """
     ends, starts = np.arange(1, pixels + 1) / pixels, np.arange(pixels) / pixels
     low, high = np.arange(other)[:, None] / other, np.arange(1, other + 1)[:, None] / other
     return np.asarray(np.maximum(np.minimum(ends, high) - np.maximum(starts, low), 0.0) * other)

@@ -80,7 +80,7 @@ class OpenedScene:
 
     @cached_property
     def white(self) -> AdoptedWhite:
-        """Light that the cameras' colours are set to under the scene's own lights, or a file's."""
+        """Return the light that cameras' colours are set to under the scene's own lights, or a file's."""
         if self.scene is None:
             return file_white(self.choice.source, self.choice.light)
         return AdoptedWhite(first_light(self.scene.groups, illuminant(LIGHT)))
@@ -158,7 +158,7 @@ def _whole_s(study: Study, rows: int) -> float:
 
 
 def _at(choice: SceneChoice, time_s: float | None) -> SceneFile:
-    """Open a scene as it is at a time; None for one that stands still."""
+    """Open a scene as it is at a time, or with None one that stands still."""
     return open_scene(
         choice.source, extend=choice.extend, light=choice.light, chart=choice.chart, define=choice.define, time_s=time_s
     )
@@ -259,14 +259,14 @@ def film_of(opened: OpenedScene, model: RenderModel, samples: int = 1) -> Film:
 
 
 def photographed(lit: Transport, luminance_cd_m2: float) -> SpectralRadiance:
-    """Light that a study photographs, at a mean luminance: the denoised where it was asked for."""
+    """Return the light that a study photographs, at a mean luminance; denoised light if the study asked for it."""
     if lit.denoised is None:
         return lit.relight(luminance_cd_m2=luminance_cd_m2)
     return relight_denoised(lit, luminance_cd_m2=luminance_cd_m2)[0]
 
 
 def under(transport: Transport, spectrum: str) -> Transport:
-    """Transport whose lights all have another spectrum, each at the luminance of its own; ``own`` changes nothing."""
+    """Return the transport with another spectrum in all lights, each at its own luminance; ``own`` changes nothing."""
     if spectrum == OWN:
         return transport
     groups = {
@@ -306,7 +306,7 @@ def asked_spectra(scene: Scene, lights: Sequence[str]) -> dict[str, Spectrum]:
 
 
 def white_spectrum(opened: OpenedScene, spectrum: str) -> Spectrum:
-    """Light that the cameras' colours are set to where all lights have a spectrum of the study."""
+    """Return the light that cameras' colours are set to where all lights have a spectrum of the study."""
     return opened.white.spectrum if spectrum == OWN else illuminant(spectrum)
 
 
@@ -331,10 +331,10 @@ def level_luminance(level: str, lux_per_cd_m2: float | None) -> float:
 
 
 def open_all(study: Study) -> dict[SceneChoice, OpenedScene]:
-    """Open every scene of a study: done before the first render, so that a fault in the last scene stops it at once."""
+    """Open every scene of a study before the first render, so that a fault in the last one stops the study at once."""
     return {choice: open_choice(choice, study) for choice in study.scenes}
 
 
 def digest_scene(scene: Scene) -> str:
-    """Hash of a scene, the meshes and bitmaps that it names by their content."""
+    """Return the hash of a scene, in which the meshes and bitmaps that it names count by their content."""
     return digest_inputs([scene, file_digests(scene.geometry)])

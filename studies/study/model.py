@@ -18,7 +18,7 @@ _DARK_S = 1e7  # longer than any exposure
 
 @dataclass(frozen=True)
 class RenderModel:
-    """How one scene is rendered for all of its conditions: bands [nm], samples a pixel, which light is photographed."""
+    """Way to render one scene for all its conditions: bands [nm], samples per pixel, the light that is photographed."""
 
     wavelength_nm: tuple[float, ...]
     width_nm: tuple[float, ...]

@@ -15,7 +15,7 @@ class RenderFacts:
     integrator, variant, stopped_by : str
     seconds : float
     spp : float
-        Samples a pixel, in the mean.
+        Samples per pixel, in the mean.
     bands : int
     relative_mc_error, relative_level_error : float or None
         Of the lit scene, as `render.radiance.SpectralRadiance`.

@@ -166,7 +166,7 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
     share : float
         Monte Carlo variance over the sensor's own.
     spp : float
-        Samples a pixel of the render; 0 of a file, for which no number of samples can be given.
+        Samples per pixel of the render; 0 of a file, for which no number of samples can be given.
     speckles : (pixel,) float64, optional
         Of `speckle_sizes`.
     """
@@ -202,7 +202,7 @@ def render_quietly(
         The render's noise variance over the sensor's own, such as `render_share`.
     most_share : float
     max_spp : int
-        Samples a pixel, at most.
+        Samples per pixel, at most.
     max_seconds : float or None
         Time, at most.
     **options

@@ -111,7 +111,7 @@ def asked_size(size: tuple[int, int], height: int | None, width: int | None) -> 
 
 
 def asked_level(scene: Scene, text: str | None) -> dict[str, float]:
-    """Level as `render.transport.Transport.relight` takes it: luminance_cd_m2, illuminance_lux, or the lights' own.
+    """Return a level as arguments of `render.transport.Transport.relight`; empty for the lights' own powers.
 
     Raises
     ------

@@ -68,7 +68,7 @@ class SceneChoice:
     define : tuple of str
         ``NAME=VALUE`` of a Mitsuba scene's $parameters.
     spp : int, optional
-        Samples a pixel, in place of `RenderLimits.spp`.
+        Samples per pixel, in place of `RenderLimits.spp`.
     spectra : str, optional
         Of a photograph's colours, ``surfaces``, which is the default, or ``srgb_basis``
         (`render.radiance_files.photo.read_photo`).
@@ -100,7 +100,10 @@ class SceneChoice:
 
     @property
     def label(self) -> str:
-        """Name in rows: of the scene, its file or its chart, the lens that it is seen through, and its times."""
+        """Return the scene's name in rows: its own, its file's or its chart's.
+
+        The lens that it is seen through, and the number of its times, are parts of the name.
+        """
         focal = "" if self.focal_length_mm is None else f"{self.focal_length_mm:g} mm "
         lens = "" if self.focus_m is None else f", {focal}focused at {self.focus_m:g} m"
         moving = "" if self.moments is None else f", at {self.moments} times"
@@ -127,7 +130,7 @@ class RenderLimits:
     band_nm : float
         Width of the bands without a plan; 20 nm do for smooth spectra.
     spp : int
-        Samples a pixel.
+        Samples per pixel.
     max_seconds : float, optional
         Time for each render; with it results depend on the machine's speed.
     seed : int
@@ -320,7 +323,7 @@ def study_mosaics(study: Study) -> tuple[str, ...]:
 
 
 def label(value: object) -> str:
-    """Name of a value of an axis in rows and seeds: a file's name without its folder, any other value as it is."""
+    """Return the name of an axis's value in rows and seeds: a file's name without folder; others stay as they are."""
     text = str(value)
     user_code = user_file(text)
     if user_code is not None:
