@@ -134,7 +134,10 @@ def _check_encryption(address: str) -> None:
 
 
 def _survey(client: Any, address: str, patience_s: float) -> tuple[int, int]:
-    """Number of workers, and threads for Dr.Jit in each: its machine's cores over the workers there."""
+    """Check the workers; return their number, and how many threads Dr.Jit may use in each.
+
+    The threads are a machine's cores divided by the number of its workers.
+    """
     try:
         client.wait_for_workers(1, timeout=patience_s)
     except TimeoutError as error:

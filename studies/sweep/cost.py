@@ -90,9 +90,9 @@ class Estimate:
 
 @dataclass(frozen=True)
 class _Part:
-    """One scene of a sweep: its pixels, bands, light groups and samples, 0 of a picture file.
+    """One scene of a sweep: its pixels, bands, light groups, and samples per pixel (0 for a picture file).
 
-    A scene that moves is rendered at `times` by so many samples, and at its middle by as many as all of them.
+    A scene that moves is rendered at `times` with so many samples each, and at its middle with as many as all of them.
     """
 
     pixels: int
@@ -105,7 +105,7 @@ class _Part:
 
     @property
     def renders(self) -> int:
-        """Number of renders."""
+        """Return the number of renders."""
         return self.times + 1 if self.spp else 0
 
 

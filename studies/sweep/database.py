@@ -252,11 +252,6 @@ def noisiest(base: sqlite3.Connection) -> list[Row]:
     ------
     InputError
         Where one of them isn't what was written.
-
-    Raises
-    ------
-    InputError
-        Where one of them isn't what was written.
     """
     ranked = (
         "SELECT key, row_number() OVER (PARTITION BY scene ORDER BY mc_share DESC, place) AS rank, "
@@ -299,7 +294,7 @@ def note_stages(base: sqlite3.Connection, run: int, stages: Mapping[str, float])
 
 
 def render_record(base: sqlite3.Connection, request: str) -> RenderRecord | None:
-    """Record of a render that was asked for before; None where there is none, or a damaged one."""
+    """Return the record of a render that was asked for before; None where there is none, or a damaged one."""
     values = base.execute("SELECT * FROM renders WHERE request = ?", (request,)).fetchone()
     if values is None or not _is_sound(values):
         return None

@@ -86,8 +86,6 @@ def results_json(run: LastRun) -> bytes:
 
     A row has the columns of `studies.sweep.row.Row`, and those columns that hold JSON are objects; a number that isn't
     finite is null.
-
-    A row has the columns of `studies.sweep.row.Row`, those in JSON as objects; a number that isn't finite is null.
     """
     cells = []
     for row in run.rows:

@@ -41,7 +41,7 @@ def kept_plan(study: Study, folder: Path, step: Step | None = None) -> Plan:
 
 
 def _key(study: Study) -> str:
-    """Hash of all that a plan is made from: the study, its files by their content, and what computes it."""
+    """Return the hash of all that a plan is made from: the study, its files' contents, and the code that makes it."""
     lights = [illuminant(name) for name in study.spectra if name != OWN]
     scenes = [opened.identity for opened in open_all(study).values()]
     code = [digest_file(path) for path in deciding_modules(names=("studies.budget.plan",))]

@@ -79,10 +79,10 @@ class Job:
 
 
 class StageClock(Protocol):
-    """What notes the seconds of stages."""
+    """Clock that notes the seconds of stages."""
 
     def stage(self, name: str) -> AbstractContextManager[None]:
-        """Add what is done within to a stage."""
+        """Add the seconds of the ``with`` block to a stage."""
 
 
 # What a frame belongs to: spectrum, sensor, modelled lens, exposure of a scene that moves (else none) and mosaic.
@@ -116,13 +116,13 @@ def coloured(job: Job, opened: OpenedScene, cells: Sequence[Cell]) -> list[Cell]
 
 
 def _image_of(job: Job, condition: Condition) -> tuple[str, str, LensConfig, str]:
-    """Return what a frame belongs to, but for the mosaic."""
+    """Return what identifies a frame but for the mosaic: spectrum, sensor, modelled lens, a moving scene's exposure."""
     exposure = "" if condition.scene.moments is None else condition.exposure
     return condition.spectrum, condition.sensor, job.plan.images[condition].lens, exposure
 
 
 def _portable(processor: str) -> str:
-    """Name of a processor; a user's file by its whole path, as its worker may start elsewhere."""
+    """Return a processor's name; a user's file is named by its whole path, because its worker may start elsewhere."""
     return str(Path(processor).resolve()) if user_file(processor) else processor
 
 

@@ -40,7 +40,7 @@ class Task(Protocol):
 
     @property
     def key(self) -> str:
-        """Hash of all that decides the result."""
+        """Return the hash of all that decides the result."""
 
     @property
     def kind(self) -> tuple[object, ...]:
@@ -128,7 +128,7 @@ def run(
 
 
 def _made(make: Callable[[Any], Any], threads: int | None, task: Task) -> Any:
-    """Run a task with so many threads of Dr.Jit (None: as many as it has already), and return its result."""
+    """Run a task with `threads` threads of Dr.Jit (None keeps the present number), and return its result."""
     if threads is not None:
         _limit_threads(threads)
     return make(task)
@@ -142,7 +142,7 @@ def _limit_threads(most: int) -> None:
 
 
 def _take(waiting: dict[Hashable, deque[Task]], running: Iterable[Task]) -> Task:
-    """Take the next cell: of a kind that none runs of, so that the worker which has just made one makes its others."""
+    """Take the next cell, of a kind of which none runs, so that a worker goes on with the kind that it has just had."""
     busy = {cell.kind for cell in running}
     kind = next((kind for kind in waiting if kind not in busy), next(iter(waiting)))
     cell = waiting[kind].popleft()
