@@ -26,7 +26,10 @@ _LEAST_PART = 1e-3  # probability that a patch belongs to a component, below whi
 
 
 def draw_patches(pictures: Iterable[Planes], rng: np.random.Generator) -> Matrix:
-    """Draw patches, turned and mirrored: the root of each signal over the patch's mean W; shape (patch, 8 * 8 * 4)."""
+    """Draw patches that are turned and mirrored at random, shape (patch, 8 * 8 * 4).
+
+    Each number is the root of a signal over the patch's mean of W.
+    """
     rows = []
     for picture in pictures:
         patches = cut_patches(picture, rng)
