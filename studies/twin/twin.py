@@ -209,7 +209,7 @@ def _pixels(light: LightFrames, frames: FrameSet) -> list[NDArray[Any]]:
 
 
 def _largest(frames: FrameSet, *, lit: bool, most_dn: float = np.inf) -> LightFrames:
-    """Light with the most frames, and of those the brightest under a level."""
+    """Return the light with the most frames, lit or dark; of several, the brightest whose mean is at most `most_dn`."""
     ranked = []
     for light in frames.lights:
         if light.lit is lit and len(light.frames) > 1:
