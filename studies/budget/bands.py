@@ -12,9 +12,9 @@ from render.radiance import SpectralRadiance
 from render.transport import Transport
 from rodcone.types import Floats
 
-FINE_NM = 10.0  # of the reference's bands (design: 380-780 nm in 10 nm bands)
-# Bands that a plan may choose, where no line asks for one of its own: the renderer works on four at a time, so that
-# numbers between cost as much as the next multiple.
+FINE_NM = 10.0  # nm, width of the reference's bands over 380-780 nm
+# Numbers of bands that a plan may choose; each line of a lamp adds a band of its own. The renderer computes four
+# bands at a time, so that numbers between these cost as much as the next multiple of four.
 COUNTS = (4, 8, 12, 16, 20, 28, 40)
 
 
@@ -53,7 +53,7 @@ def merge_transport(transport: Transport, groups: Sequence[NDArray[np.intp]]) ->
     nm, width_nm = wide_bands(transport.wavelength_nm, transport.width_nm, groups)
     matrix = _means(transport.width_nm, groups)
     means = transport.scene_means
-    # Of all light groups' bands, and of the uncovered part that stands behind them.
+    # The covariance is that of the bands of all light groups, followed by the uncovered part.
     every = scipy.linalg.block_diag(*[matrix] * len(transport.groups), 1.0)
 
     def merged(halves: Halves) -> Halves:

@@ -10,10 +10,10 @@ from studies.budget.effects import KERNEL, LENS_TERMS
 from studies.budget.ledger import Plan
 from studies.study.study import SceneChoice
 
-BANDS_AT_ONCE = 4  # that the renderer works on; numbers between cost as much as the next multiple
+BANDS_AT_ONCE = 4  # The renderer computes four bands at a time; other numbers cost as much as the next multiple.
 TRACING_BANDS = 12
 SAMPLE_BAND_NS = 85.0
-# Nanoseconds per pixel and band, and per pixel, of the same picture.
+# Nanoseconds per pixel and band of each effect of the lens, and per pixel of the exact readout, on the same picture.
 LENS_BAND_NS = {"diffraction": 55.0, "veiling glare": 4.5, "cos^4": 0.7, "camera shake": 10.0}
 EXACT_NS = 40.0
 

@@ -19,15 +19,15 @@ from sensor.response import behind_filters, imaged_electrons
 from sensor.shake import shaken
 from studies.budget.bands import merge_radiance, merge_transport
 
-Pair = NDArray[np.float64]  # (2, h, w): from the even and from the odd half [e- per cd/m^2 and s]
+Pair = NDArray[np.float64]  # (2, h, w): electrons from the even and from the odd half [e- per cd/m^2 and s]
 
 DIFFRACTION = "diffraction"
 IMAGING_TERMS = {DIFFRACTION: "diffraction", "veiling glare": "veiling_glare", "cos^4": "horizontal_view_deg"}
-KERNEL = "kernel"  # the fast readout in place of the exact one
-SHAKE = "camera shake"  # the only one that depends on the exposure time
+KERNEL = "kernel"  # name of the error of the fast readout, which replaces the exact one
+SHAKE = "camera shake"  # the only effect of the lens that depends on the exposure time
 LENS_TERMS = IMAGING_TERMS | {SHAKE: "shake_um"}
-DRAWS = 2  # of Monte Carlo noise
-PATHS = 8  # of a shaking camera
+DRAWS = 2  # number of draws of Monte Carlo noise
+PATHS = 8  # number of paths of a shaking camera that are tried
 SINGLE_EPSILON = 2.0**-24  # largest relative rounding error of one operation in single precision
 NORMAL_REACH = 6.7  # standard deviations at which `sensor.kernel.kernel.normal_pair` ends
 
@@ -167,7 +167,7 @@ def _band_errors(
     groups: Sequence[NDArray[np.intp]],
 ) -> BandErrors:
     averaged = [merge_radiance(half, groups) for half in halves]
-    # A level is reached by the luminance that the wide bands tell, so their share in that error is counted here.
+    # A level is reached by the luminance that the wide bands compute, whose error is therefore counted here.
     mean = SpectralRadiance(
         transport.mean_radiance(luminance_cd_m2=1.0)[None, None],
         transport.wavelength_nm,

@@ -29,9 +29,9 @@ from studies.study.model import unit_exposure_s
 from studies.study.scene_source import open_radiance_file
 from studies.study.study import OWN, Study, conditions, most_spp, study_mosaics
 
-PILOT_SIDE = 64  # pixels of a pilot's longer side; at fewer pixels a picture is no smoother, so no effect is smaller
-FILE_SIDE = 128  # the same of a picture file's pilot, which costs no render
-PILOT_SEED = 1 << 32  # added to the study's seed: the pilot is no part of a render, and the cache keeps them apart
+PILOT_SIDE = 64  # pixels of a pilot's longer side; fewer pixels make a picture no smoother, so no effect smaller
+FILE_SIDE = 128  # pixels of the longer side of a picture file's pilot, which costs no render
+PILOT_SEED = 1 << 32  # added to the study's seed, so that pilots share no samples with renders, nor files in the cache
 PILOT_SPP = 128
 
 
@@ -123,12 +123,12 @@ def reference_bands(opened: OpenedScene, study: Study) -> tuple[Floats, Floats]:
 def full_lens(study: Study, lens: LensConfig, opened: OpenedScene) -> LensConfig:
     """Return the reference's lens: the study's, else the sensor's own, else a good lens in the scene."""
     view = 0.0
-    if opened.scene is not None and not (study.lens.table or lens.table):  # a table has its own falloff
+    if opened.scene is not None and not (study.lens.table or lens.table):  # a table states its own falloff
         view = horizontal_view_deg(opened.scene.geometry["sensor"], opened.size)
     whole = replace(
         lens,
-        diffraction=lens.diffraction or 1.0,  # for an ideal aperture
-        veiling_glare=lens.veiling_glare or 0.01,  # of a good photographic lens, by the index of ISO 9358
+        diffraction=lens.diffraction or 1.0,  # 1 is the diffraction of an ideal aperture
+        veiling_glare=lens.veiling_glare or 0.01,  # a good photographic lens, by the index of ISO 9358
         horizontal_view_deg=lens.horizontal_view_deg or view,
     )
     return study.lens.on(whole)

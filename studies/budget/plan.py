@@ -74,7 +74,7 @@ def plan(study: Study, *, cache: str | Path | None = None, step: Step | None = N
             renders[scene] = models.renders[scene]
         images |= {condition: models.images[condition] for condition in conditions(study, scene)}
         ledgers += [ledger(row, choice.count, choice.spp, choice.left_out[row.condition]) for row in rows]
-    by_share = sorted(ledgers, key=lambda row: row.share)  # so that the worst mosaic's share of a condition stays
+    by_share = sorted(ledgers, key=lambda row: row.share)  # so that each condition keeps its worst mosaic's share
     shares = {row.condition: row.share for row in by_share}
     made = Plan(renders=renders, images=images, shares=shares, ledgers=tuple(ledgers))
     return replace(made, summary=summary(study, made, reference_plan(study)))

@@ -12,9 +12,9 @@ from sensor.readout import light_variance
 from studies.budget.effects import DIFFRACTION, Effects, Pair, kernel_rms_e
 from studies.study.study import Condition
 
-# Standard errors added to a mean over the pilot's pixels. A few pixels may hold most of the noise, here and in the
-# render that is predicted: whatever its distribution, at most 5 % exceed the mean by root 19 standard deviations
-# (Cantelli's inequality).
+# Standard errors that are added to a mean over the pilot's pixels. A few pixels may hold most of the noise, in the
+# pilot and in the render that is predicted. Whatever its distribution, at most 5 % of such means are too low by more
+# than the root of 19 standard errors (Cantelli's inequality).
 EFFECT_MARGIN = 2.0
 NOISE_MARGIN = 19.0**0.5
 
@@ -100,15 +100,15 @@ def scale_effects(
     pilot : PilotNoise
     """
     scale = level_cd_m2 * exposure_s
-    # Beside a lamp a lens that is sampled once per pixel undershoots; a picture has no light there (`form_image`).
+    # Beside a lamp a lens that is sampled once per pixel undershoots below 0, where `form_image` gives no light.
     expected_e = scale * np.maximum(effects.full.mean(axis=0), 0.0)
     readings = resolve(sensor, expected_e, exposure_s)
     below = unsaturated(expected_e, readings)
-    # Where every pixel is saturated no error reaches the raw image: each is 0, of a variance of 1.
+    # Where every pixel is saturated no error reaches the raw image: each error is 0, and the variance counts as 1.
     noise_e2 = _mean(light_variance(expected_e, readings)[below]) or 1.0
     blurred, sharp = effects.blurred**2 * pilot.spp, effects.sharp**2 * pilot.spp
-    # Wavelengths are stratified within a half, and the light that a path carries is independent of its wavelength. Both
-    # are of light before diffraction, and a pixel without light has neither noise nor jitter.
+    # Wavelengths are stratified within a half, and the light that a path carries is independent of its wavelength.
+    # Signal and noise are those before diffraction, and a pixel without light has neither noise nor jitter.
     signal = (effects.full + effects.lens.get(DIFFRACTION, 0.0)).mean(axis=0)
     relative = np.divide(sharp.mean(axis=0), signal**2, out=np.zeros_like(signal), where=signal > 0)
     spread = relative + 1 / pilot.half_spp

@@ -17,7 +17,7 @@ from studies.study.model import ImageModel, in_bands
 from studies.study.study import DEFAULT, FAST, OWN, REFERENCE, Study, conditions, most_spp
 
 FAST_BANDS, FAST_SPP = 8, 128
-REFERENCE_SAMPLES = 4  # times what the study allows: the reference's noise is then at most half of the plan's
+REFERENCE_SAMPLES = 4  # times the samples that the study allows, so that the reference has at most half of its noise
 MOST_SPP = 1 << 16
 
 
