@@ -121,7 +121,7 @@ def characterise(
     if json:
         print_json(_facts(chip))
         return
-    # The last column is measured less configured in standard errors; a figure without an error has none.
+    # The last column is the difference of measured and configured value in standard errors, if there is an error.
     rows = []
     for figure in chip.figures:
         error = f"{figure.error:.2g}"

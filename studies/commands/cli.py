@@ -14,8 +14,8 @@ from rodcone.errors import InputError, is_out_of_memory
 from studies.commands.console import INTERRUPTED, say
 from studies.commands.watched import survive_sudden_end
 
-# Commands are imported when they run: other distributions have packages named render, sensor, ..., and `doctor`, which
-# says which ones Python finds, has to start all the same.
+# Commands are imported only when they run, because other distributions have packages named render, sensor and so on:
+# `doctor`, which says whose packages Python finds, has to start in any case.
 BAD_INPUT = 2
 _BELOW_ZERO = re.compile(r"-[\d.]")
 _NUMBER = re.compile(r"^-?[\d.]+$")
@@ -39,9 +39,9 @@ app = App(
         "-o is short for --out. Beside a NAME.dng of RGBW, or of another mosaic that raw converters take for a wrong "
         "one such as GMCY, lies NAME_bayer.dng: give them that one."
     ),
-    help_format="plaintext",  # to import Markdown's parser takes a third of the seconds of --help
+    help_format="plaintext",  # because importing Markdown's parser takes a third of the time of --help
     version=lambda: import_module("importlib.metadata").version("rodcone"),
-    # A flag has no --no-flag, a list no --empty-list; that a flag is off and a list empty goes without saying.
+    # A flag has no --no-flag and a list no --empty-list: flags are off and lists are empty by default.
     default_parameter=Parameter(
         negative=(), converter=_converted, show_default=lambda value: None if value is False or value == () else value
     ),
@@ -103,7 +103,7 @@ def main(arguments: list[str] | None = None) -> Any:
     """Run the command; one line on stderr and exit code 2 for bad input, 1 for a file that can't be written."""
     try:
         with warnings.catch_warnings():
-            # Warnings look like errors, without the place in the code; each is printed once.
+            # Warnings are printed like errors, without the place in the code, and each only once.
             once = cache(say)
             warnings.showwarning = lambda message, *_: once(str(message))
             given = joined(sys.argv[1:] if arguments is None else arguments)
@@ -120,8 +120,8 @@ def main(arguments: list[str] | None = None) -> Any:
             raise
         fix = "take a smaller picture (--size), fewer bands or fewer workers"
         fail(_with_notes(f"memory: it ran out ({what}); {fix}", error), BAD_INPUT)
-    except BrokenPipeError:  # the reader, such as head, has enough
-        sys.stdout = None  # which Python would flush at its end, to nobody
+    except BrokenPipeError:  # the reader, such as head, wants no more
+        sys.stdout = None  # because Python would flush it at the end, with nobody to read it
         sys.exit(0)
     except OSError as error:
         where = f"{error.filename or 'file'}: {error.strerror or error}; choose another place with --out"

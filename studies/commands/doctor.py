@@ -16,7 +16,7 @@ from studies.commands.console import print_table
 
 PACKAGES = ("scenes", "render", "sensor", "isp", "studies")
 NEEDED = ("mitsuba", "drjit", "numpy", "scipy", "colour-science", "OpenEXR", "scikit-image")
-# What pip install 'rodcone[...]' brings for a user, and what for.
+# Extras that pip install 'rodcone[...]' brings for a user, with their purpose and distributions.
 EXTRAS = {
     "explore": ("the explorer", ("starlette", "uvicorn", "websockets", "anywidget")),
     "opponents": ("Malvar's and Menon's demosaicking", ("colour-demosaicing",)),
@@ -160,7 +160,7 @@ def engine_findings() -> list[Finding]:
         from rodcone import jit, llvm
 
         backend = jit.backend()
-    except (ImportError, NameError) as error:  # Dr.Jit stumbles with a NameError over a failed import of its own
+    except (ImportError, NameError) as error:  # Dr.Jit raises a NameError where an import of its own has failed
         cause = str(error.__context__ or error)
         fix = "; Debian: apt install libatomic1" if "libatomic" in cause else ""
         return [Finding("engine", f"can't be imported: {cause}{fix}", False)]

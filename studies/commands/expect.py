@@ -23,7 +23,7 @@ from studies.pages.gain_plot import gain_svg
 from studies.study.cost import START_S, cores, pace
 from studies.study.levels import UNITS, levels_between, parse_exposure, parse_level
 
-_TABLES_S, _ERROR_S = 12.0, 0.05  # processor seconds: tables of the prior, and a camera at one level
+_TABLES_S, _ERROR_S = 12.0, 0.05  # processor seconds for the prior's tables, and for a camera at one level
 _BYTES = 0.6e9
 
 

@@ -16,7 +16,7 @@ from rodcone.types import Plane
 from studies.commands.console import print_json, print_table, require_place
 from studies.metrics.mtf import EdgeResponse, edge_response
 
-AT = (0.125, 0.25, 0.5)  # cycles per pixel at which the response is printed
+AT = (0.125, 0.25, 0.5)  # frequencies at which the response is printed [cycles per pixel]
 
 
 def mtf(

@@ -38,8 +38,8 @@ def paper(
         Print the claims, their numbers and verdicts as one JSON object instead of the path.
     """
     setup = Setup(out, size, spp, seeds=seeds)
-    makers_of(figure)  # an unknown name fails before a folder is made
-    out.mkdir(parents=True, exist_ok=True)  # a folder that can't be written fails before the first render
+    makers_of(figure)  # so that an unknown name fails before a folder is made
+    out.mkdir(parents=True, exist_ok=True)  # so that a folder that can't be written fails before a render
     with progress(sys.stderr) as step:
         results = make(replace(setup, step=step), figure)
     page = write(results, out)

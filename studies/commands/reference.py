@@ -29,8 +29,8 @@ from studies.study.study import SceneChoice, Study
 from studies.study.study_file import DEMO_STUDY, read_study
 from studies.sweep.provenance import versions
 
-SEED = 34  # none of a demo's: its render is independent of the reference
-STEP_SPP = 512  # samples from one look, and one file, to the next
+SEED = 34  # a seed that no demo has, so that its render is independent of the reference
+STEP_SPP = 512  # samples per pixel after which the noise is measured and the file is written
 
 
 def reference(
@@ -68,7 +68,7 @@ def reference(
         Print what the first 512 samples per pixel cost, and how far the light that is there already has come; render
         nothing.
     """
-    # What to render, as the demo would
+    # What to render: the same as the demo.
     require_range("until", until, 1e-4, 1e3, "give a share of the sensor's noise variance: 0.03")
     study = read_study(DEMO_STUDY)
     choice = SceneChoice(scene, define=define)
@@ -80,7 +80,7 @@ def reference(
     assert opened.scene is not None
     path = reference_path(folder, opened.scene, film)
     found = read_reference(path, opened.scene) if out else find_reference(opened.scene, film)
-    transport = found.transport if found else None  # light that is there already is continued
+    transport = found.transport if found else None  # continue the light that is there already
     if not transport:
         cost = PictureCost(
             size=film.size,
@@ -96,7 +96,7 @@ def reference(
     elif dry_run:
         print(_so_far(transport, _most(_shares(transport, study)), until))
         return 0
-    # Go on until the noise is low enough, and keep the file after each step
+    # Go on until the noise is low enough, and write the file after each step.
     with progress(sys.stderr) as step:
         while True:
             most_samples = STEP_SPP
@@ -124,7 +124,7 @@ def reference(
                 resume=transport,
                 progress=lambda share, error: step(render_words(error, share), share),
             )
-            if transport.spp == samples:  # the time is up
+            if transport.spp == samples:  # no sample was added, because the time is up
                 break
     print(path)
     return INTERRUPTED if transport.stopped_by == "interrupt" else 0

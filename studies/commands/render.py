@@ -31,8 +31,8 @@ from studies.study.scene_source import asked_level, asked_size, open_scene
 
 MOST_BANDS = 1000
 DEFAULT_SPP = 64
-_WRITE_S = 2.5e-7  # processor seconds a pixel and band: relit light, and the file
-READING = "reading the scene"  # 100 000 shapes take a minute
+_WRITE_S = 2.5e-7  # processor seconds per pixel and band to relight and to write the file
+READING = "reading the scene"  # the reading is announced because 100 000 shapes take a minute
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +138,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
     json
         Print one JSON object with the path and facts of the render instead of the path.
     """
-    # Check what can be checked before the render
+    # Check what can be checked before the render.
     require_ending(order.out, ".exr")
     bands = _bands(order.bands)
     with progress(sys.stderr) as step:
@@ -170,7 +170,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
         return 0
     require_memory(cost.memory, order.force)
     check_place(order.out)
-    # Render and write
+    # Render and write.
     with kept_beside(order.out) as kept:
         if ready:
             transport = ready.transport
@@ -183,7 +183,7 @@ def render(order: Annotated[RenderOrder, Parameter(name="*")], *, dry_run: bool 
             relight_denoised(transport, spectra, **lit_at)[0] if order.denoise else transport.relight(spectra, **lit_at)
         )
         write_exr(radiance, order.out, scene=scene.name)
-    # Say what was done
+    # Say what was done.
     say(*notes)
     interrupted = transport.stopped_by == "interrupt"
     if interrupted:

@@ -81,7 +81,7 @@ def write_results(folder: Path) -> Path:
     count = len(run.rows)
     results = None if count > MOST_ROWS else results_json(run)
     files = {folder / REPORT: marked(folder, page, results, run.content)}
-    if results is None:  # none stays that says less than the sweep
+    if results is None:  # an old file is removed, because it holds less than the sweep
         write_files(files)
         (folder / RESULTS).unlink(missing_ok=True)
         say(f"{count} rows are too many for {RESULTS}: rodcone export {folder} -o rows.csv writes them")

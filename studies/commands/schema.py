@@ -49,12 +49,12 @@ def file_schema(kind: Kind) -> dict[str, Any]:
 def sensor_schema() -> dict[str, Any]:
     """Return the schema of a sensor file; of a pixel that is read more than once the readings hold the noise."""
     stated = get_type_hints(SensorConfig)
-    # What the table leaves to the sensor's own checks has the sensor's types.
+    # Fields that the table leaves for the sensor to check have the types of the sensor's fields.
     levels = ("bits", "black_level_dn", "white_level_dn", "window_nm")
     named = (*levels, "gain", "converter_noise_dn", "gain_limit", "row_time_us")
     known: dict[Any, Mapping[str, Any]] = {
         (SensorTable, "cfa"): _MOSAIC,
-        (LensConfig, "table_digest"): {},  # which the reader of the file states
+        (LensConfig, "table_digest"): {},  # left out, because the reader of the file computes it
         (SensorTable, "binning"): {"enum": list(BINNINGS)},
         (SensorTable, "readout"): {"enum": [MERGED, SWITCHED]},
     }
@@ -81,7 +81,7 @@ def study_schema() -> dict[str, Any]:
     scene = {"anyOf": [{"type": "string"}, schema_of(SceneChoice, {})]}
     known: dict[Any, Mapping[str, Any]] = {
         SceneChoice: scene,
-        (Study, "trust_code"): {},  # no file may ask for it
+        (Study, "trust_code"): {},  # left out, because no file may give this consent
         (BudgetShares, "model"): {"enum": [AUTOMATIC, *STARTING_POINTS]},
     }
     return schema_of(Study, known, single=True)

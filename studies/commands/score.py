@@ -98,7 +98,7 @@ def score(
     if sweep:
         _print_sweep(cameras, light, exposure, seed, out, json=json)
         return
-    # Figures, and where they go.
+    # Figures, and where they are written.
     found = {}
     for name, sensor in cameras.items():
         say(f"{name}: measuring, some 10 s" if not names else f"{name}: measuring")

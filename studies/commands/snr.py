@@ -17,7 +17,7 @@ from studies.pages.plots import snr_svg
 from studies.pages.report_text import MISSING
 from studies.photograph.snr import light_for_snr
 
-RELATIVE = "*"  # behind the name of a sensor whose responses are relative
+RELATIVE = "*"  # mark behind the name of a sensor whose responses are relative
 HEAD = ("sensor", "channel", "electrons", "cd/m2", f"lux on {GREY:.0%} grey")
 
 

@@ -186,7 +186,7 @@ def make_all(
     """
     with ExitStack() as at_work:
         run_cells = at_work.enter_context(runner)
-        # The folder comes before the plan, so that one that can't be written fails before anything is rendered.
+        # The folder is made before the plan, so that one that can't be written fails before anything is rendered.
         with locked_folder(out), saying_what_is_kept(out), progress(sys.stderr) as step:
             with clock.stage("plan"):
                 plan = planned(step)
@@ -194,7 +194,7 @@ def make_all(
             at_work.close()
             report = out / REPORT
             if swept.made or not is_current(out):
-                from studies.commands.report import write_results  # takes a second, for what draws a page
+                from studies.commands.report import write_results  # slow: it imports what draws a page
 
                 report = write_results(out)
     say(*swept.notes)

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from rodcone.child_process import end_with_parent
 
-COMMANDS = ("capture", "demo", "render", "sweep")  # that render
+COMMANDS = ("capture", "demo", "render", "sweep")  # commands that render
 SUDDEN = (signal.SIGSEGV, signal.SIGBUS, signal.SIGABRT, signal.SIGILL, signal.SIGTRAP, signal.SIGKILL)
-_OUT = "shot.dng", "render.exr"  # of commands that do not name their file
+_OUT = "shot.dng", "render.exr"  # outputs of commands whose file wasn't named
 
 
 def survive_sudden_end(arguments: Sequence[str]) -> None:
@@ -39,7 +39,7 @@ def survive_sudden_end(arguments: Sequence[str]) -> None:
     if not child:
         end_with_parent()
         return
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends it to the child too, which says what it keeps
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the terminal sends Ctrl-C to the child too, which reports on it
     signal.signal(signal.SIGTERM, lambda *_: os.kill(child, signal.SIGTERM))
     status = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
     if status >= 0:
@@ -48,7 +48,7 @@ def survive_sudden_end(arguments: Sequence[str]) -> None:
     if ended_by not in SUDDEN:
         os._exit(128 - status)
     error = MemoryError(f"the system ended the run by {ended_by.name}, as where a compiler gets no more")
-    from render.cache import note_kept  # imports Dr.Jit
+    from render.cache import note_kept  # imported late, because it imports Dr.Jit
 
     named = any(text.startswith(("-o", "--out")) for text in arguments)
     for text in arguments[1:] if named else _OUT:

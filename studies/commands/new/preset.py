@@ -23,7 +23,7 @@ from studies.commands.console import require_new, say
 from studies.commands.new.example_files import copy_example
 from studies.study.study_file import EXAMPLES
 
-_EYE = EXAMPLES / "sensors" / "eye.toml"  # its receptors make no colour matrix, so it is no preset of `sensor.presets`
+_EYE = EXAMPLES / "sensors" / "eye.toml"  # no preset of `sensor.presets`, because receptors make no colour matrix
 
 
 def preset(
@@ -74,23 +74,23 @@ def preset(
     curves_file = out.parent / f"{out.stem}_curves.csv"
     require_new(curves_file, ".csv")
     lender = None if name is None else read_preset(name)
-    # what the sources tell
+    # Numbers that the sources state.
     measured = None if camera is None else measured_camera(camera)
     numbers = _numbers(noise, more_gain)
     if anchor is not None:
         numbers = replace(numbers, efficiency=_anchor(anchor), source=f"{numbers.source}; anchor {anchor} as given")
-    # what a preset lends
+    # Curves that a preset lends where the sources have none.
     shape = None if measured is None else measured_curves(measured)
     if lender is not None:
         numbers = completed(numbers, lender, str(name))
         if shape is None and numbers.efficiency is not None:
             shape = borrowed_curves(lender, str(name), numbers)
-    if shape is None and anchor and noise and noise.suffix.lower() != ".toml":  # a report is of a chip without filters
+    if shape is None and anchor and noise and noise.suffix.lower() != ".toml":  # a .toml report is of a chip alone
         raise InputError(
             f"anchor: {anchor} scales a response, and {noise.name!r} has none; allowed with "
             "--camera, or with a preset that lends its curves; add low_noise, or leave --anchor out"
         )
-    # the files
+    # The files that are written.
     curves = curves_csv(numbers, shape)
     title = f"{measured.maker} {measured.model}" if measured else numbers.source.split(":")[0]
     text = preset_text(f"{title}, as its sources tell it.", numbers, shape, curves_file.name if curves else "")
