@@ -37,8 +37,9 @@ EXPECTED_UNDER = "D65"
 FROZEN_LIST = "benchmark"
 SENSORS = Path(__file__).parents[1] / "configs" / "sensors"
 ENDINGS = (".png", ".tif", ".tiff", ".npy")
-_OVERSHOOT = 0.01  # of values in an array, beyond 0 to 1
-# What is often mistaken, and what would undo it: pictures that come this much nearer to the truth by it are refused.
+_OVERSHOOT = 0.01  # by so much values of an array may lie outside 0 to 1
+# Common mistakes, each with a function that undoes it. Pictures are refused if such a function brings them nearer to
+# the truth by `_NEARER_DB`.
 _MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = {
     "linear values; encode them as sRGB": encode_srgb,
     "encoded twice; encode them once": decode_srgb,
@@ -47,7 +48,7 @@ _MISTAKES: Mapping[str, Callable[[NDArray[np.float64]], NDArray[np.float64]]] = 
     "mirrored": lambda picture: picture[:, ::-1],
 }
 _NEARER_DB = 3.0
-_PLACE = ("sensor", "mosaic", "spectrum", "exposure", "level")  # of a condition: camera, then level
+_PLACE = ("sensor", "mosaic", "spectrum", "exposure", "level")  # a condition's camera, then its level
 
 Row = dict[str, Any]
 
@@ -131,7 +132,7 @@ def _condition(row: Row) -> tuple[str, str]:
 def expected(samples: Lines, study: str) -> list[Score]:
     """Compute by `rodcone expect` the PSNR of each condition whose sensor is a preset or a file of the frozen list."""
     known = {name: name for name in preset_names()}
-    if study == FROZEN_LIST:  # another study's file of the same name is another sensor
+    if study == FROZEN_LIST:  # because the sensor files of other studies may share these names
         known |= {path.name: str(path) for path in SENSORS.glob("*.toml")}
     conditions = {_condition(line): line for line in samples if line["sensor"] in known}
     nothing = {metric.key: math.nan for metric in MEASURED}
@@ -139,7 +140,7 @@ def expected(samples: Lines, study: str) -> list[Score]:
     for (camera, level), line in conditions.items():
         light = line["luminance_cd_m2"]
         exposure = parse_exposure(line["exposure"]) or line["exposure"]
-        sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # brings the mosaic's filters too
+        sensor = vary(preset(known[line["sensor"]]), line["mosaic"])  # with the filters of the mosaic
         error = expect(sensor, [light], EXPECTED_UNDER, exposure)[0]
         means = nothing | {"psnr_db": error.psnr_db}
         result.append(Score(camera, level, f"expect, {EXPECTED_UNDER}", light, 0, means, nothing))

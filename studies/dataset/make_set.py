@@ -86,7 +86,7 @@ def make_set(
         earlier = _earlier(folder, identity)
         job = Job(study, plan_from_settings(study), out, base)
         require_room(bytes_needed(study, job.plan, scenes.values(), order), out)
-        # the files that samples are cut from
+        # The files that samples are cut from.
         samples = list[Sample]()
         scene_lines = Lines()
         for index, opened in enumerate(scenes.values()):
@@ -114,7 +114,7 @@ def _identity(study: Study, scenes: Iterable[OpenedScene], order: SetOrder) -> s
     InputError
         For two frames of one name.
     """
-    alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # which develop one frame
+    alike = conditions(replace(study, white_balances=study.white_balances[:1]))  # balances share a frame
     names = [_name(*frame) for frame in product(alike, study_mosaics(study), study.seeds)]
     name, count = Counter(names).most_common(1)[0]
     if count > 1:

@@ -19,9 +19,9 @@ from studies.study.lit_scene import OpenedScene
 from studies.study.study import SceneChoice, Study, study_mosaics
 
 _SCENES = 0, 100_000, "give a number of scenes"
-_BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # a pixel; others by channel, group
-_SAMPLE_BYTES = 20_000  # heads of its files, and its facts
-RENDERS = 0.9  # of a set's time, for the progress bar: 97 % of the frozen list's, less where samples are few
+_BYTES = {"rgb": 12, "xyz": 12, "depth": 4, "normals": 12, "ids": 4, "mosaic_e": 4}  # [bytes per pixel]
+_SAMPLE_BYTES = 20_000  # the heads of a sample's files, and its facts
+RENDERS = 0.9  # share of a set's time, for the progress bar: 97 % for the frozen list, less for few samples per pixel
 
 
 @dataclass(frozen=True, kw_only=True)

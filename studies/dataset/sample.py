@@ -36,7 +36,7 @@ from studies.sweep.prepare import PLANES, Job, scene_transport
 from studies.sweep.provenance import deciding_modules, versions
 from studies.sweep.stored import is_whole, keep_array, keep_facts, read_facts
 
-# Truth that a sample may hold beside its raw frame; channel, group and colour are last axes.
+# Planes of truth that a sample may hold beside its raw frame; channel, group and colour are their last axes.
 TRUTH = {
     "mosaic_e": "expected photo-electrons of the mosaic",
     "channels_e": "expected photo-electrons behind every filter at every pixel, in the order of `channels`",
@@ -100,7 +100,7 @@ def make_sample(sample: Sample) -> tuple[Arrays, dict[str, Any]]:
     light = cell.luminance_cd_m2 * cell.exposure_s
     expected_e = np.asarray(_opened(frame.electrons)[place], dtype=np.float64) * light
     sensor = frame.sensor
-    # a channel's metered time is the frame's, in its parts too
+    # The whole frame decides the time of a metered channel, for the frame's parts too.
     readings = resolve(sensor, np.asarray(_opened(frame.electrons) * light), cell.exposure_s)
     stream = exposure_stream(cell.condition, sample.mosaic, cell.seed)
     if sample.part is not None:
@@ -125,7 +125,8 @@ def _facts(
     cell = sample.cell
     sensor = sample.cell.frame.sensor
     variance_e2, light_e2 = frame_variance(expected_e, readings), light_variance(expected_e, readings)
-    # one draw's square has few digits a pixel: pooled over 3x3, as a render's variance is
+    # The square of one draw is a very noisy estimate of a pixel's variance, so it is pooled over 3x3 pixels as a
+    # render's variance is.
     shares = uniform_filter(errors_e[0] * errors_e[-1] / light_e2, 3)
     mean_e = {name: float(expected_e[mask(sensor.cfa, name, raw.shape)].mean()) for name in sensor.channels}
     by_channel = {name: at_channel(readings, name) for name in mean_e}
@@ -273,7 +274,7 @@ def group_shares(lit: Transport, shape: tuple[int, int]) -> NDArray[np.float64]:
     `shape` is the number of pixels, (h, w).
     """
     bands = OBSERVER_NM, lit.wavelength_nm, lit.width_nm
-    # The eye's weights of bands follow each group's own lamp, to its lines.
+    # The eye's weights of the bands follow the spectrum of each group's own lamp, even its lines.
     weights = [x.power * transport_weights(observer, *bands, x.spectrum)[0][1] for x in lit.groups.values()]
     radiance = (lit.denoised or lit).radiance
     planes = area_average(np.einsum("gb,gbhw->hwg", weights, radiance, dtype=np.float64, optimize=True), shape)

@@ -21,19 +21,19 @@ from studies.dataset.sample import Arrays, Sample, code_digests, make_sample
 from studies.sweep.provenance import versions
 
 MANIFEST = "manifest.jsonl"
-# Facts of a sample that stand in its manifest line.
+# Facts of a sample that its line in the manifest holds too.
 _LISTED = ("key", "scene", "scene_hash", "spectrum", "level", "luminance_cd_m2", "exposure", "sensor", "mosaic", "tile",
            "snr_db", "saturated", "render_noise")  # fmt: skip
-# What is read of a manifest's lines, by their kind.
+# Keys that each kind of line of a manifest must have.
 _READ = {
     "set": ("name", "rodcone", "command", "identity", "samples", "planes"),
     "scene": ("split", "licence"),
     "shard": ("name", "split", "samples", "bytes", "digest", "made_from"),
     "sample": _LISTED,
 }
-SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # ends of the splits' ranges of a scene's hash, from 0 to 1
+SPLITS = {"train": 0.8, "validation": 0.9, "test": 1.0}  # upper end of each split in a scene's hash, taken as 0 to 1
 Lines = list[dict[str, Any]]
-Runner = Callable[..., Generator[Any, None, None]]  # of tasks, by `make`; such as `studies.sweep.workers.run`
+Runner = Callable[..., Generator[Any, None, None]]  # runs tasks by `make`, as `studies.sweep.workers.run` does
 
 
 @dataclass(frozen=True)
@@ -143,7 +143,7 @@ def make_shard(shard: Shard) -> Shard:
 
 
 def _add(tar: tarfile.TarFile, name: str, content: bytes) -> None:
-    member = tarfile.TarInfo(name)  # of time 0 and no owner
+    member = tarfile.TarInfo(name)  # without time and owner, so that bytes are the same
     member.size = len(content)
     tar.addfile(member, BytesIO(content))
 
