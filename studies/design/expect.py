@@ -26,11 +26,11 @@ from sensor.readout import spread_charge
 from sensor.response import behind_filters, electrons_per_irradiance
 from studies.metrics.truth import Light, named_light
 
-# Numbers of the pixels whose error counts, row by row: a patch's others lack neighbours.
+# Indices, row by row, of the pixels whose error counts: those nearer to a patch's border lack neighbours.
 MIDDLE = np.arange(PATCH**2).reshape(PATCH, PATCH)[2:-2, 2:-2].ravel()
-METERED = 64  # side of the frame, drawn from the prior, that the exposure looks at
-_LAB_LINEAR = 216 / 24389  # CIE 15: where the cube root of Lab becomes a line
-_LAB = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])  # L*, a*, b* of roots of X, Y, Z
+METERED = 64  # pixels along the side of a frame that is drawn from the prior to meter the exposure
+_LAB_LINEAR = 216 / 24389  # CIE 15: below it the cube root of Lab is replaced by a line
+_LAB = np.array([[0.0, 116.0, 0.0], [500.0, -500.0, 0.0], [0.0, 200.0, -200.0]])  # L*, a*, b* from roots of X, Y, Z
 _NODES, _SHARES = np.polynomial.hermite_e.hermegauss(40)  # quadrature over a Gaussian
 
 
@@ -130,7 +130,8 @@ def sampling_of(sensor: SensorConfig, responses: Floats, lens: Floats) -> Floats
 
     It gives the electrons of each sample from the coefficients of each pixel, through lens, filters and crosstalk.
     """
-    # What a filter passes at a pixel goes to its neighbours: the channel is that of the pixel that the light fell on.
+    # A filter passes light at one pixel and crosstalk moves its charge to neighbours, so a charge has the channel of
+    # the pixel on which its light fell.
     filters = responses[sites_of(sensor.cfa)]
     spread = spread_of(sensor.pixel.crosstalk)
     return np.asarray(np.einsum("st,tp,tc->spc", spread, lens, filters, optimize=True))
@@ -142,7 +143,7 @@ def lens_of(sensor: SensorConfig, blur: bool) -> Floats:
     It is the unit matrix, or with `blur` the lens's at 550 nm.
     """
     points = np.eye(PATCH**2).reshape(-1, PATCH, PATCH)
-    if blur:  # as `sensor.optics.form_image` has diffraction and defocus
+    if blur:  # diffraction and defocus, as in `sensor.optics.form_image`
         otf = sampled_otf((PATCH, PATCH), sensor.pixel.pitch_um, sensor.lens, folded=False)(WAVELENGTH_NM)
         points = scipy.fft.idctn(otf * scipy.fft.dctn(points, axes=(1, 2)), axes=(1, 2))
     return points.reshape(PATCH**2, -1).T
@@ -192,7 +193,7 @@ def expect(
     if several(readings := chip_readings(sensor, exposure_s=0.0)):
         count = len(readings)
         raise InputError(f"readings: {count} of a pixel; allowed: none; give [pixel] the well and noise of one of them")
-    if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # else a patch's middle lacks sites
+    if 4 % len(sensor.cfa) or 4 % len(sensor.cfa[0]):  # because the middle of a patch would lack sites of the tile
         raise InputError(f"cfa: {sensor.cfa} isn't 1, 2 or 4 pixels high and wide; allowed: these; give such a tile")
     spectral = load_spectral_prior(prior)
     forms = _forms(prior, light)
@@ -200,7 +201,7 @@ def expect(
     lens = lens_of(sensor, blur)
     sampling = sampling_of(sensor, responses, lens)
     frame_e = np.maximum(drawn_pixels(prior) @ responses.T, 0.0)
-    # Component known, and one Gaussian in the mixture's place.
+    # With the component known, and with one Gaussian in place of the mixture.
     pooled_forms = np.einsum("k,rmkpce->rmpce", spectral.patches.weights, forms)[:, :, None]
     mixtures = ((spectral.patches, forms), (single_gaussian(spectral.patches), pooled_forms))
     by_mixture = [(sampled(patches, sampling, MIDDLE, lens), metrics) for patches, metrics in mixtures]
@@ -245,7 +246,7 @@ def drawn_pixels(prior: str) -> Floats:
     factors = spectral.patches.factors[component, pixel]
     off = (factors @ rng.standard_normal((*shape, factors.shape[-1], 1)))[..., 0]
     coefficients = (spectral.patches.means[component, pixel] + off) * rng.choice(spectral.reflectances, (*shape, 1))
-    # No surface reflects more light of any wavelength than falls on it: a deep colour is no bright one.
+    # No surface reflects more light of a wavelength than falls on it, so deep colours are never bright.
     return np.asarray(coefficients / np.maximum(1.0, (coefficients @ spectral.spectra.T).max(axis=-1, keepdims=True)))
 
 
