@@ -37,7 +37,7 @@ def written(message: Header, controls: Controls, rendered: RenderState, memo: Me
         note = noise_note(noise_share(exposed, controls, memo), rendered.transport.spp) if rendered.last else ""
         if note and memo.kept("noise note", "") is None:
             memo.keep("noise note", "", note)
-            print(f"rodcone: {note}", file=sys.stderr)  # once for each render
+            print(f"rodcone: {note}", file=sys.stderr)  # printed once per render
         python = python_text(rendered, controls, kind, drops)
         return {"histogram": histogram(exposed.raw), "python": python, "noise_note": note}, ()
     row, column = message["row"], message["column"]

@@ -40,7 +40,7 @@ from studies.study.gain import iso_speed
 from studies.study.study import AS_SHOT
 
 Development = Callable[[], tuple[Image, Picture]]  # linear sRGB at the scale of the truth, and the processor's result
-_CHIP, _FRAME, _START = 0, 1, 2  # second part of the seed, the first two equal to `studies.photograph.shot`'s
+_CHIP, _FRAME, _START = 0, 1, 2  # second part of the seed; the first two are those of `studies.photograph.shot`
 _LONGEST_S = 1e7
 
 
@@ -172,7 +172,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     optics = (controls.sensor, controls.mosaic, _items(controls.lens), controls.lens_table)
     spectra = tuple((name, lamp.spectrum, lamp.table) for name, lamp in lamps)
 
-    # Light
+    # Light.
     lit, light, scale_1 = memo.of(
         "light", (lamps, controls.reference_light), lit_transport, transport, dict(lamps), controls.reference_light
     )
@@ -182,12 +182,12 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     own_gain = sensor.gain
     speed = memo.of("speed", camera, iso_speed, sensor)
 
-    # Lens and filters
+    # Lens and filters.
     frames = {}
     for (name, group), spectrum in zip(lit.groups.items(), spectra, strict=True):
         if group.power > 0:
             radiance = memo.of("radiance", spectrum, only_group(lit, name).relight)
-            # one image for both cameras' mosaics: of a lens by data it takes seconds
+            # Cameras that differ by mosaic share an image, because forming one behind a lens by data takes seconds.
             seen_so = (spectrum, sensor.site_pitch_um, sensor.lens)
             image = memo.of("image", seen_so, form_image, radiance, sensor)
             frames[name] = memo.of("frame", (spectrum, optics), _group_frame, image, sensor)
@@ -197,7 +197,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     per_second_e = memo.of("electrons", lit_so, _weighted, powers, [frame.electrons for frame in frames.values()])
     mosaicked_e = memo.of("mosaicked", lit_so, behind_filters, per_second_e, sensor)
 
-    # Exposure
+    # Exposure.
     exposure_s = controls.exposure_s
     if controls.exposure != TIME:
         rule = AUTO if controls.exposure == AUTO_INFORMATION else controls.exposure
@@ -227,7 +227,7 @@ def expose_scene(transport: Transport, controls: Controls, memo: Memo) -> Exposu
     if controls.flicker_depth:
         expected_e = np.mean(frames_e, axis=0)
     raw = merged_raw(exposures)
-    iso = None if speed is None else speed * sensor.gain / own_gain  # which an automatic exposure may have raised
+    iso = None if speed is None else speed * sensor.gain / own_gain  # the exposure may have raised the gain
     return Exposure(
         *(sensor, lit, light, scale, white_1, frames, exposure_s, expected_e, device, raw, controls.shot_noise, iso)
     )

@@ -34,16 +34,16 @@ from studies.study.study import AS_SHOT, MOST_FRAMES, OWN, WHITE_BALANCES
 
 TIME = "time"  # as an exposure rule, this means the time that `exposure_s` states
 LENS = ("f_number", "defocus_um", "diffraction", "veiling_glare")
-OF_TABLE = ("f_number", "defocus_um", "diffraction")  # what a lens by data states itself
+OF_TABLE = ("f_number", "defocus_um", "diffraction")  # terms that a lens by data states itself
 PIXEL = (
     *("read_noise_e", "dsnu_e", "prnu", "dark_current_e_per_s", "column_gain_spread", "column_offset_e"),
     *("hot_pixel_share", "hot_pixel_dark_current_e_per_s", "crosstalk", "full_well_e"),
 )
 SETTINGS = ("neighbourhood", "patch", "sigma_d", "sigma_s")
-# Processors with settings of their own, and the defaults of these.
+# Processors with adjustable settings, and the defaults of these.
 ADJUSTABLE: Mapping[str, Settings] = MappingProxyType({"interleaved": DEFAULTS, "interleaved_paper": PAPER})
-MOST_POINTS = 2000  # points of a spectrum from a file
-WIDEST = 41  # pixels on a side of Omega; they take four times the default's time
+MOST_POINTS = 2000  # most points of a spectrum from a file
+WIDEST = 41  # most pixels along the side of Omega; so many take four times as long as the default
 
 
 @dataclass(frozen=True)
@@ -222,7 +222,7 @@ def controls_from(content: object, dropped: Iterable[str] = ()) -> Controls:
     lamps = content.get("lamps")
     emitters = lamps.values() if isinstance(lamps, dict) else ()
     spectra = [lamp.get("spectrum") for lamp in emitters if isinstance(lamp, dict)]
-    for light in (content.get("reference_light"), *spectra):  # is checked here, before anything reads it
+    for light in (content.get("reference_light"), *spectra):  # checked here, before anything uses it
         if isinstance(light, str) and is_curve_file(light):
             raise InputError(
                 f"light: {light!r} is a file on this machine; allowed: an illuminant's name; load the "

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from typing import Any, TypeVar
 
 T = TypeVar("T")
-_KEPT = 8  # results per stage: four light groups of two cameras
+_KEPT = 8  # results that are kept per stage: four light groups of two cameras
 
 
 class Overtaken(Exception):

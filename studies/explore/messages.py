@@ -36,10 +36,10 @@ from studies.study.study import WHITE_BALANCES
 
 Header: TypeAlias = dict[str, Any]
 
-MOST_CHARACTERS = 200_000  # characters of a message; three tables of spectra fit
-MOST_OF_A_PAGE = 40  # characters of a page's name
-# Keys of each kind of message beside `kind`, `number` and, where pages share a connection, `page`; in this order they
-# are answered.
+MOST_CHARACTERS = 200_000  # most characters of a message; three tables of spectra fit into it
+MOST_OF_A_PAGE = 40  # most characters of a page's name
+# Keys that each kind of message has beside `kind`, `number` and, where pages share a connection, `page`. Kinds that
+# stand earlier are answered first.
 KINDS: Mapping[str, tuple[str, ...]] = MappingProxyType(
     {
         "hello": (),

@@ -36,8 +36,8 @@ HEADERS = {
     "Cache-Control": "no-store",
 }
 EXTRA = "explore"
-# What one connection is read of. A page that has one request of each kind under way stays far below; a hostile one
-# leaves the others their turn.
+# Most messages and characters per second that are read of one connection. A page with one request of each kind under
+# way stays far below. A hostile page doesn't keep the others from their turn.
 MOST_A_SECOND = 400
 MOST_CHARACTERS_A_SECOND = 20 * MOST_CHARACTERS
 BURST_S = 1.0
@@ -84,7 +84,7 @@ def make_app(session: Session, port: int, token: str) -> App:
             while (message := await socket.receive())["type"] == "websocket.receive":
                 text = message.get("text") or ""
                 due_s = max(due_s, loop.time() - BURST_S) + 1 / MOST_A_SECOND + len(text) / MOST_CHARACTERS_A_SECOND
-                await asyncio.sleep(max(0.0, due_s - loop.time()))  # messages that a page sends meanwhile stay unread
+                await asyncio.sleep(max(0.0, due_s - loop.time()))  # meanwhile the page's messages stay unread
                 session.take(text, send)
         finally:
             sending.cancel()
@@ -157,7 +157,7 @@ def listen(port: int) -> socket.socket:
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
     try:
         listener.bind((HOST, port))
-        listener.listen()  # before the address is printed: a browser that comes at once waits, and isn't refused
+        listener.listen()  # before the address is printed, so that a browser that comes at once isn't refused
     except OSError as error:
         listener.close()
         raise InputError(f"port: {port} can't be listened on ({error.strerror}); leave it out for a free one") from None
@@ -223,12 +223,12 @@ def explore(transport: Transport) -> Any:
     def send(header: Header, buffers: Any) -> None:
         if loop is None:
             widget.send(header, list(buffers))
-        else:  # a notebook's kernel sends messages from its own thread alone
+        else:  # because a notebook's kernel sends messages from its own thread alone
             loop.call_soon_threadsafe(widget.send, header, list(buffers))
 
     session.connect(send)
     widget.on_msg(lambda _, content, __: session.take(json.dumps(content), send))
-    widget.session = session  # the session lives as long as the widget
+    widget.session = session  # so that the session lives as long as the widget
     return widget
 
 

@@ -34,8 +34,8 @@ Send: TypeAlias = Callable[[Header, Sequence[bytes]], None]
 
 SOON = ("hello", "scene", "sensor")  # kinds of message that don't wait for a render
 REST_S = 0.4  # seconds without a new setting, after which a slow processor begins
-TRIM_AFTER = 100  # turns of its thread
-MOST_NOTES = 8  # of an answer
+TRIM_AFTER = 100  # answered messages after which unused memory is returned
+MOST_NOTES = 8  # most notes in an answer
 
 
 class Session:
@@ -55,7 +55,7 @@ class Session:
         self._dropped: list[str] = []  # the sensors among them
         self._pending: dict[str, Header] = {}
         self._message: Header | None = None  # the message that is being answered
-        self._slow: dict[str, Callable[[], None]] = {}  # functions that end the jobs at work, by camera
+        self._slow: dict[str, Callable[[], None]] = {}  # by camera, the functions that end running jobs
         self._send: Send = lambda header, buffers: None
         self._begin_page("")
         self._begin_source(source)
@@ -97,7 +97,7 @@ class Session:
             page = message.get("page", "")
             if send is not self._send or (page != self._page and message["kind"] != "hello"):
                 return
-            if page != self._page:  # a notebook may show one widget several times over one connection
+            if page != self._page:  # because a notebook may show one widget several times over one connection
                 send({"kind": "taken over", "page": page}, ())
                 self._begin_page(page)
             self._pending[message["kind"]] = message
@@ -120,13 +120,13 @@ class Session:
         self._states = source.states(self._between_runs)
         self._memo = Memo(self._check)
         self._rendered: RenderState | None = None
-        self._rendering, self._failure = True, ""  # whether a finer state follows, and why none does
+        self._rendering, self._failure = True, ""  # whether a finer state follows, and if not, why
 
     def _begin_page(self, page: str) -> None:
         """Forget the requests and pictures of the page before, and note the page that asks now."""
-        self._page = page  # that asks
+        self._page = page  # the page that asks now
         self._shown: Header | None = None
-        self._sent: list[Bytes] = []  # pictures that the page has
+        self._sent: list[Bytes] = []  # pictures that the page already has
         self._pending.clear()
         self._end_slow()
 
@@ -160,7 +160,7 @@ class Session:
                 pass
             except InputError as error:
                 self._fail(message, str(error))
-            except Exception as error:  # the traceback goes to the terminal
+            except Exception as error:  # shown on the page as one line; the traceback is printed
                 traceback.print_exc(file=sys.stderr)
                 words = f"the program failed: {type(error).__name__}: {error}; see its terminal"
                 self._fail(message, str(InputError(words)))
@@ -214,7 +214,7 @@ class Session:
         """Render the next, finer state, and answer the page's last request once more, from that state."""
         try:
             rendered = next(self._states)
-        except Exception as error:  # it ends the generator: only another scene gives new states
+        except Exception as error:  # the error ends the generator, and only another scene gives new states
             self._rendering = isinstance(error, Overtaken)
             words = cut(f"the render ended with {type(error).__name__}: {one_line(error)}")
             self._failure = "" if self._rendering else words
@@ -291,7 +291,7 @@ class Session:
                 def done(result: tuple[Image, Picture] | InputError, key: str = key, memo: Memo = memo) -> None:
                     with self._changed:
                         self._slow.pop(key, None)
-                        memo.keep("slow", key, result)  # checked as an answer is; errors are shown too
+                        memo.keep("slow", key, result)  # errors are kept too, and are shown
                         if self._shown is message:
                             self._pending.setdefault("show", message)
                         self._changed.notify()

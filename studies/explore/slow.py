@@ -16,7 +16,7 @@ from rodcone.types import Image
 from studies.explore.chain import Development
 from studies.explore.controls import Controls, options_of
 
-MOST_SUMS = 65_536 * 4_000  # pixels x neighbourhood^2 x patch that aren't slow: half a second of processor time
+MOST_SUMS = 65_536 * 4_000  # most pixels x neighbourhood^2 x patch that count as quick: half a second of processor time
 _RUN = "from studies.explore.slow import work; work()"
 
 

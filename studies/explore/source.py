@@ -32,7 +32,7 @@ from studies.study.scene_source import (
 )
 
 GIVEN = "transport = ...  # the one that was given to rodcone.explore\n"
-FIRST_SIDE, FIRST_SPP = 64, 16  # pixels of the first picture, which is shown at once
+FIRST_SIDE, FIRST_SPP = 64, 16  # longer side and samples per pixel of the first picture, which appears at once
 _SPP, _LEAST_BANDS = 64, 4
 
 
@@ -119,7 +119,7 @@ def open_source(source: str, options: RenderOptions) -> Source:
     if is_radiance_file(source):
         check_radiance_file(source, ())
         require_memory(memory(*extent_of(source)), options.force)
-        # an ISETCam scene's illuminant isn't one, because it has no name, which the page's lights need
+        # The illuminant of an ISETCam scene isn't used, because the page names lights and it has no name.
         transport, notes = open_radiance_file(source, default_white(source))
         transport = _with_its_light(transport, source)
         code = f"transport = rodcone.load_transport({source!r})\n"

@@ -28,11 +28,11 @@ from studies.metrics.flip import flip
 
 Bytes = NDArray[np.uint8]
 
-MOST_SIGMAS = 4.0  # standard deviations of noise that are shown as black or white
-MOST_LUMINANCE_ERROR = 0.25  # of white
+MOST_SIGMAS = 4.0  # standard deviations of noise at which the picture is black or white
+MOST_LUMINANCE_ERROR = 0.25  # luminance error that is shown as black or white, as a share of white
 MOST_DELTA_E, MOST_SNR_DB = 10.0, 40.0
-BINS, LEAST_E = 80, 0.5  # of the histogram
-# Colours of the channels in the raw mosaic, linear; W's is white.
+BINS, LEAST_E = 80, 0.5  # bins of the histogram, and its lower end [e-]
+# Linear colours in which the raw mosaic's channels are shown; W is white.
 _TINTS = {"R": (1, 0.1, 0.1), "G": (0.1, 1, 0.1), "B": (0.15, 0.2, 1), "C": (0, 1, 1), "M": (1, 0, 1), "Y": (1, 1, 0)}
 
 
@@ -52,7 +52,7 @@ def raw_picture(shot: Shot) -> Bytes:
 def noise_picture(shot: Shot) -> Bytes:
     """Show the raw image less the expected electrons: grey is 0, black and white are four standard deviations."""
     exposed = shot.exposed
-    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's frames, or several readings' share
+    light = exposed.raw.exposure_s / exposed.exposure_s  # a burst's number of frames, or several readings' share
     noise_e = exposed.raw.electrons / light - _collected_e(exposed)
     return _grey(0.5 + 0.5 * noise_e * round(light) ** 0.5 / (MOST_SIGMAS * noise_scale_e(exposed)))
 
