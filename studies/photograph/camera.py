@@ -119,10 +119,7 @@ def _under(sensor: SensorConfig, spectrum: Spectrum) -> tuple[Floats, Floats, Fl
     from_xyz = _srgb_of_xyz(white)
 
     def rows_from_srgb(weights: Floats, of_three: Floats) -> Floats:
-        """Return the matrix from linear sRGB to balanced channels.
-
-        Its first three rows are the inverse of `of_three`, if there are three; the others are fitted.
-        """
+        """Return the matrix from linear sRGB to balanced channels: the inverse of three, and fits of the others."""
         rows = fit_through_neutral(colours, (surfaces * light.spectrum) @ weights.T / (weights @ light.spectrum))
         if len(three) == 3:
             rows[three] = np.linalg.inv(of_three)
