@@ -160,9 +160,9 @@ def appearance(linear: Image, truth: TruePicture, white_cd_m2: float) -> Appeara
     )
 
 
-LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # the encoding's range: luminance outside counts as its end
+LEAST_CD_M2, MOST_CD_M2 = 0.005, 10_000.0  # range of the encoding; luminance outside counts as its nearer end
 PEAK = 256.0  # the authors' peak for PSNR: about the value of a 100 cd/m^2 display's white, as 255 is in 8 bits
-# Fit "banding_glare", the authors' own choice: steps in smooth gradients are seen, through the glare of the eye.
+# The authors' preferred fit, "banding_glare": visibility of steps in smooth gradients, with the glare of the eye.
 _P = (0.353487901, 0.3734658629, 8.277049286e-05, 0.9062562627, 0.09150303166, 0.9099517204, 596.3148142)
 
 

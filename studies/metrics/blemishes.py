@@ -15,9 +15,9 @@ from skimage.color import deltaE_ciede2000, rgb2lab
 from rodcone.colour_spaces import decode_srgb, luminance_of_srgb
 from studies.metrics.appearance import require_finite
 
-SPOT = 20.0  # CIEDE2000 to every neighbour's truth: another colour by name
-LIGHT, HOLE = 0.5, 0.2  # a light is half as bright as white or more; its hole a fifth of that, or less
-EVEN, DOT = 1.0, 5.0  # CIEDE2000: the truth of an even surface varies less, a dot differs by more
+SPOT = 20.0  # CIEDE2000 to every neighbour's truth: a colour with another name
+LIGHT, HOLE = 0.5, 0.2  # a light has half of white's brightness or more, its hole a fifth of white's or less
+EVEN, DOT = 1.0, 5.0  # CIEDE2000: by less the truth of an even surface varies, by more a dot differs
 
 
 @dataclass(frozen=True)

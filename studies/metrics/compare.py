@@ -22,7 +22,7 @@ from studies.metrics.appearance import picture_quality as quality_of
 from studies.metrics.truth import light_in_bands, true_srgb, white_of_pixels
 
 _CELL_PX = 8
-_MOST_DOUBLED = 40  # times that a lamp's light may exceed what white leaves of it, as a power of 2
+_MOST_DOUBLED = 40  # doublings of the factor that are tried
 
 
 @dataclass(frozen=True)
@@ -136,9 +136,9 @@ def _brightness(luminance: Image, reference: Image) -> float:
         return float(np.average(np.minimum(factor * cells, 1.0), weights=counts))
 
     wanted = shown(scene, 1.0)
-    low = wanted / float(luminance.mean())  # clipping takes light away, so that the factor is never less
+    low = wanted / float(luminance.mean())  # clipping takes light away, so that the factor is this or more
     high = next((k for k in low * 2.0 ** np.arange(1, _MOST_DOUBLED) if shown(picture, k) >= wanted), None)
-    if high is None or shown(picture, low) >= wanted:  # nothing clips, to within rounding
+    if high is None or shown(picture, low) >= wanted:  # nothing clips, but for rounding
         return low
     return float(scipy.optimize.brentq(lambda k: shown(picture, k) - wanted, low, high))
 

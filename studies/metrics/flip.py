@@ -17,14 +17,14 @@ from rodcone.colour_spaces import decode_srgb
 from rodcone.types import Floats, Image
 from studies.metrics.s_cielab import PIXELS_PER_DEGREE
 
-# Section 4.1.1, Table 1: weights a and widths b [degree^2] of the Gaussians a sqrt(pi / b) exp(-pi^2 r^2 / b) that blur
-# each plane of YCxCz as the eye's contrast sensitivity does.
+# Section 4.1.1, Table 1: weights a and widths b [degree^2] of the Gaussians a sqrt(pi / b) exp(-pi^2 r^2 / b) which
+# blur each plane of YCxCz as the eye's contrast sensitivity does.
 CONTRAST = (((1.0, 0.0047),), ((1.0, 0.0053),), ((34.1, 0.04), (13.5, 0.025)))
-WIDEST = 0.04  # of these b: all filters reach as far as its third standard deviation
+WIDEST = 0.04  # the largest b: all filters reach to three standard deviations of its Gaussian
 Q_COLOUR, P_COLOUR, P_KNEE = 0.7, 0.4, 0.95  # section 4.1.3: q_c, p_c, p_t
 FEATURE_DEG = 0.082  # section 4.2.1: width w of the features' filters; their standard deviation is w / 2
 Q_FEATURE = 0.5  # equation 13: q_f
-# Of linear sRGB under D65, as the authors' program has it; its rows sum to the white.
+# Matrix from linear sRGB under D65, as in the authors' program; its rows sum to the white.
 TO_XYZ = np.array(
     [
         [10135552 / 24577794, 8788810 / 24577794, 4435075 / 24577794],
@@ -33,7 +33,7 @@ TO_XYZ = np.array(
     ]
 )
 WHITE = TO_XYZ.sum(axis=1)
-_SLOPE = 6 / 29  # CIELAB's root becomes a line below its cube
+_SLOPE = 6 / 29  # below its cube CIELAB's cube root is replaced by a line
 
 
 @dataclass(frozen=True)

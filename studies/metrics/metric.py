@@ -43,14 +43,14 @@ MTF50 = Metric("mtf50_cy_per_px", "MTF50", 3, "cy/px", higher=True, threshold=0.
 CHART = Metric("chart_delta_e_mean", "ΔE2000 of the chart", 1, "", higher=False, threshold=1.0)
 PATCHES = Metric("patch_snr_db", "SNR of the patches", 1, "dB", higher=True, threshold=0.5)
 _TEXTS = tomllib.loads(Path(__file__).with_name("meanings.toml").read_text("utf-8"))
-# Where the sizes in `Metric.threshold` come from; what each metric says, and where it misleads, by its key.
+# Sources of the differences in `Metric.threshold`; and by key what each metric says, and where it misleads.
 SEEN_BY: str = _TEXTS["seen_by"]
 MEANINGS: dict[str, str] = _TEXTS["meanings"]
-ON_TARGETS = (MTF50, CHART, PATCHES)  # known on the scene alone that they are made for
+ON_TARGETS = (MTF50, CHART, PATCHES)  # metrics that are known only on the scene that they are made for
 METRICS = (PSNR, SSIM, DELTA_E, DELTA_E_95, S_CIELAB, S_CIELAB_95, FLIP, PU21, *ON_TARGETS)
-# Metrics that a report speaks of and draws at first: no other one makes a verdict in words, which a reader would look
-# for in the charts in vain.
+# Metrics that a report draws at first, and on which its verdict in words is based: a reader can look up in the charts
+# what the words claim.
 HEADLINE = (PSNR, DELTA_E, FLIP)
-# One of each family, known on every scene: an undecided one leaves a level so, and two levels whose pictures are alike
-# by all of them give one picture. PU21 weighs errors by the light.
+# One metric of each family, known on every scene: the columns of `rodcone judge`, and the metrics by which two levels
+# count as one where a person sees no difference in any. PU21 isn't among them, because it weighs errors by the light.
 DECIDING = (PSNR, SSIM, DELTA_E, FLIP)

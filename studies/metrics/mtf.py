@@ -17,10 +17,10 @@ from rodcone.errors import InputError
 from rodcone.types import Floats
 from sensor.diffraction import half_frequency
 
-OVERSAMPLING = 4  # bins a pixel, as the standard has it
-LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % here
-HIGHEST_CYCLES_PER_PX = 1.0  # twice Nyquist: beyond, the derivative has little response left to divide by
-_PASSES = 4  # each centres the rows' window on the line found before; the standard makes two
+OVERSAMPLING = 4  # bins per pixel, as in the standard
+LEAST_REACH_PX = 8.0  # the window takes 0.46 pi^2 / (2 reach^2) off the variance of a 1-pixel blur: 3.5 % at this reach
+HIGHEST_CYCLES_PER_PX = 1.0  # twice Nyquist; above it the derivative's response is too small to divide by
+_PASSES = 4  # passes, each with the rows' windows centred on the line of the one before; the standard makes two
 
 
 @dataclass(frozen=True)
@@ -70,7 +70,7 @@ def edge_response(luminance: ArrayLike) -> EdgeResponse:
             f"luminance: the edge moves {picture.shape[0] * abs(slope):.2f} pixels over the picture; allowed: 1 or "
             "more; tilt it by 5 degrees, or give more of it"
         )
-    picture = picture[: round(turns / abs(slope))]  # whole turns: each bin's samples lie evenly in it
+    picture = picture[: round(turns / abs(slope))]  # so that each bin's samples are spread evenly over it
     spread = _line_spread(picture, slope, start)
     frequency, mtf = _spectrum(spread)
     return EdgeResponse(float(np.degrees(np.arctan(slope))), frequency, mtf, _first_half(frequency, mtf))
@@ -121,7 +121,7 @@ def _line_spread(picture: NDArray[np.float64], slope: float, start: float) -> ND
     half = int(reach * OVERSAMPLING)
     distance = (
         np.arange(width) - centre[:, None]
-    ) * cosine * OVERSAMPLING + half  # in bins, from the first one's start
+    ) * cosine * OVERSAMPLING + half  # in bins, counted from the start of the first one
     within = (distance >= 0) & (distance < 2 * half)
     bins = distance[within].astype(int)
     middles = np.arange(2 * half) + 0.5
@@ -139,7 +139,7 @@ def _spectrum(spread: NDArray[np.float64]) -> tuple[Floats, Floats]:
 
     The responses of the derivative, which is 2 bins wide, and of the bin itself are divided out.
     """
-    fine = 8 * spread.size  # zeros beside it: a finer grid of frequencies
+    fine = 8 * spread.size  # padded with zeros, for a finer grid of frequencies
     frequency = np.fft.rfftfreq(fine, 1 / OVERSAMPLING)
     within = frequency <= HIGHEST_CYCLES_PER_PX
     size = np.abs(np.fft.rfft(spread, fine))[within]

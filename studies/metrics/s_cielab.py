@@ -12,11 +12,12 @@ from numpy.typing import NDArray
 from rodcone.colour_spaces import decode_srgb
 from rodcone.types import Floats, Image
 
-# A 3840 pixels wide, 0.7 m wide display seen from 0.7 m: FLIP's own default, so that both look from one place.
+# Pixels per degree of a display 3840 pixels and 0.7 m wide, seen from 0.7 m, as by FLIP's default.
 PIXELS_PER_DEGREE = 3840 * np.pi / 180
 
-# XYZ to light-dark, red-green, blue-yellow, in the digits of the authors' program. Copies of the formulas
-# give the second row's 0.077 a minus; cones (Hunt-Pointer-Estevez) times the opponent planes' weights give a plus.
+# Matrix from XYZ to light-dark, red-green and blue-yellow, with the digits of the authors' program. Reprints of the
+# formulas give the 0.077 of the second row a minus; cones (Hunt-Pointer-Estevez) times the weights of the opponent
+# planes give a plus.
 XYZ_TO_OPPONENT = np.array(
     [[0.2787336, 0.7218031, -0.1065520], [-0.4487736, 0.2898056, 0.0771569], [0.0859513, -0.5899859, 0.5011089]]
 )

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from rodcone.types import Image
 
-SIGMA_PX, REACH_PX = 1.5, 5  # of the window: its standard deviation, and its pixels on each side
+SIGMA_PX, REACH_PX = 1.5, 5  # standard deviation of the window, and its pixels on each side of the middle
 C1, C2 = 0.01**2, 0.03**2  # equations 7 and 9, for values in [0, 1]
 
 

@@ -21,7 +21,7 @@ from scenes.reflectances import color_checker_reflectances
 from studies.metrics.mtf import edge_response
 
 Masks = NDArray[np.bool_]
-INNER = 0.6  # share of a patch's sides that counts: its border holds the neighbours' light, blurred and mosaicked
+INNER = 0.6  # share of a patch's sides that counts; its border holds blurred and mosaicked light of its neighbours
 
 
 def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
@@ -86,10 +86,11 @@ def patch_snr_db(picture: NDArray[np.float64], masks: Masks) -> NDArray[np.float
     isn't above 0 gives -inf, even without noise; a patch above 0 without noise gives inf.
     """
     mean = patch_means(picture, masks)
-    # About each patch's first pixel: an even patch has no deviation then, in whatever order a processor adds.
+    # Values are taken relative to each patch's first pixel, so that an even patch has exactly no deviation, in whatever
+    # order a processor adds.
     deviation = np.stack([(picture[mask] - picture[mask][0]).std(axis=0, ddof=1) for mask in masks])
     lit = mean > 0
-    with np.errstate(divide="ignore"):  # no noise at all
+    with np.errstate(divide="ignore"):  # a patch may have no noise
         return np.where(lit, 20 * (np.log10(np.where(lit, mean, 1.0)) - np.log10(deviation)), -np.inf)
 
 
@@ -142,7 +143,7 @@ def target_figures(scene: str, linear: NDArray[np.float64], truth: NDArray[np.fl
     if scene == EDGE:
         try:
             return TargetFigures(mtf50_cy_per_px=edge_response(luminance_of_srgb(linear)).mtf50_cycles_per_px)
-        except InputError:  # the edge can't be followed through the noise, or blur leaves none
+        except InputError:  # noise hides the edge, or blur leaves none
             return TargetFigures()
     masks = _chart(truth.shape[0], truth.shape[1]) if scene == CHART else None
     if masks is None:
@@ -163,7 +164,7 @@ def _chart(height: int, width: int) -> Masks | None:
         return None
 
 
-WHITE_PATCH = 18  # of the ColorChecker's 24: its 99th percentile of luminance, which pictures show at `WHITE_AT`
+WHITE_PATCH = 18  # number of the ColorChecker's white among its 24 patches, which pictures show at `WHITE_AT`
 
 
 def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float64]:

@@ -82,7 +82,7 @@ def white_of_pixels(luminance: NDArray[np.float64], coverage: NDArray[np.floatin
         Luminance without light that is seen directly, and the share of each pixel that such light covers, as
         `render.transport.Transport` has them.
     """
-    # Without weights the same value comes of a partition, not of a sort: a tenth of the time.
+    # Without weights NumPy finds the same value by partition instead of sorting, in a tenth of the time.
     weights = 1.0 - coverage.astype(np.float64) if coverage.any() else None
     return float(np.percentile(luminance, WHITE_PERCENTILE, weights=weights, method="inverted_cdf")) / WHITE_AT
 
