@@ -17,7 +17,7 @@ def gain_svg(by_camera: Mapping[str, Sequence[ExpectedError]]) -> str:
     for index, name in enumerate(others):
         pairs = list(zip(by_camera[name], by_camera[reference], strict=True))
         light = [row.luminance_cd_m2 for row, _ in pairs]
-        style = {"marker": ".", "linestyle": "-" if index < 10 else "--"}  # colours begin anew
+        style = {"marker": ".", "linestyle": "-" if index < 10 else "--"}  # colours repeat after 10
         decibels.semilogx(light, [row.psnr_db - beside.psnr_db for row, beside in pairs], label=name, **style)
         colours.semilogx(light, [beside.colour - row.colour for row, beside in pairs], **style)
     for axes, title in ((decibels, "expected gain in PSNR [dB]"), (colours, "less error of a*, b*")):

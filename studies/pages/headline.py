@@ -14,9 +14,9 @@ from studies.pages.report_text import NBSP, camera_name, duration_text, fixed, l
 from studies.pages.verdict import AHEAD, BEHIND, LEVEL, UNKNOWN, Figures, Leads, leads, light_ratio
 from studies.study.study import GRAY_WORLD
 
-CLEARLY = 2.0  # times what a person sees
-SAME_TIME = 1.01  # exposure times whose ratio is below count as one
-# The same method on both mosaics, the one with a white pixel first; and what the paper compares.
+CLEARLY = 2.0  # factor on what a person sees, from which on a lead is clear
+SAME_TIME = 1.01  # ratio of exposure times below which they count as one
+# The same method on both mosaics, the one with a white pixel first; and the pair that the paper compares.
 WHITE_PIXEL = ("ple_rgbw", "ple_bayer")
 
 
@@ -169,10 +169,10 @@ def in_light(pair: Pair) -> str:
 
 
 _SHARES = {1 / 2: "half", 1 / 3: "a third", 1 / 4: "a quarter"}
-_ROUND = 0.05  # largest relative difference at which a share is named by its word; the interval stands beside it
+_ROUND = 0.05  # largest relative difference at which a share is named by its word, beside its interval
 
 
-# Words of pairs in their places
+# Words on pairs and their conditions
 
 
 @dataclass(frozen=True)

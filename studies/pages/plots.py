@@ -26,11 +26,11 @@ from sensor.emva1288.characterise import Characterisation
 from studies.pages.page import TEMPLATES
 from studies.photograph.snr import snr_at
 
-UNIT = 1 / 72  # inches: lengths below are points, which are the units of Matplotlib's SVG
+UNIT = 1 / 72  # in inches; lengths below are in points, the unit of Matplotlib's SVG
 SIDE = 192  # width of a picture [points]
-TITLE_LETTERS = 32  # of a line that is no wider than a picture
+TITLE_LETTERS = 32  # letters in a title line that is no wider than a picture
 CHART = (460, 250)  # width and height of a chart [points]
-LABEL_GAP = 15  # between the names at the ends of lines [points]
+LABEL_GAP = 15  # least gap between the names at the ends of lines [points]
 PNG_DPI = 144
 GREEN, PURPLE = "#00795a", "#8d4a78"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
@@ -115,7 +115,7 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
         Where each line ends.
     """
     box = axes.transLimits
-    high = CHART[1] * 0.7  # of the axes, about [points]
+    high = CHART[1] * 0.7  # height of the axes, about [points]
     heights = [float(box.transform(axes.transScale.transform((1.0, y)))[1]) * high for _, y, _ in ends]
     for (name, _, colour), height in zip(ends, spread(heights, LABEL_GAP, 0.0, high), strict=True):
         axes.text(1.02, height / high, name, color=colour, va="center", transform=axes.transAxes)
@@ -162,14 +162,14 @@ def spread(heights: Sequence[float], gap: float, low: float, high: float) -> lis
     return placed
 
 
-COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; width of all, and height of the highest [points]
+COLUMNS, WIDTH, HIGHEST = 4, 480.0, 200.0  # panels in a row; total width, and height of the tallest panel [points]
 BAND_NM = 5.0  # lines of lamps are drawn as wide as the published tables' steps
 NM = np.arange(380.0 + BAND_NM / 2, 780.0, BAND_NM)
-# line styles, which sensors take in turn
+# Line styles, which sensors take in turn.
 LINES: tuple[Any, ...] = ("-", "--", ":", "-.", (0, (6, 1, 1, 1, 1, 1)), (0, (1, 3)), (0, (9, 3)), (0, (3, 1)))
-MOST_NAMES = 20  # names that a plot lists one above the other
-LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # starlight to sunlit snow
-SNR = 10.0  # 20 dB
+MOST_NAMES = 20  # most names that a plot lists one above the other
+LEAST_CD_M2, MOST_CD_M2, POINTS = 1e-4, 1e5, 181  # from starlight to sunlit snow
+SNR = 10.0  # corresponds to 20 dB
 
 Curves = Mapping[str, tuple[NDArray[np.float64], NDArray[np.float64]]]  # by channel: wavelength [nm], value
 
@@ -198,7 +198,7 @@ def _svg(panels: Mapping[str, Curves]) -> str:
     for axes, (name, curves) in zip(grid.flat, panels.items(), strict=False):
         for channel, (nm, values) in curves.items():
             axes.plot(nm, values, color=CHANNEL_COLOURS.get(channel, INK), linewidth=0.9)
-        axes.set_title(name.replace("$", r"\$"), fontsize=8)  # a formula's sign
+        axes.set_title(name.replace("$", r"\$"), fontsize=8)  # $ would begin a formula
         axes.set(xlim=(380, 780), ylim=(0, 1.05))
         axes.tick_params(labelsize=7)
         plain_ticks(axes)
@@ -217,7 +217,7 @@ def snr_svg(sensors: Mapping[str, SensorConfig], light: str, exposure_s: float, 
     for index, (name, sensor) in enumerate(sensors.items()):
         for channel, ratio in snr_at(luminance, sensor, light, exposure_s).items():
             colour = CHANNEL_COLOURS.get(channel, SOFT)
-            # a formula's sign
+            # A $ would begin a formula.
             line = LINES[index % len(LINES)]
             label = f"{name} {channel}".replace("$", r"\$")
             axes.semilogx(luminance, 20 * np.log10(ratio), ls=line, color=colour, label=label)
@@ -237,7 +237,7 @@ def transfer_svg(result: Characterisation, title: str) -> str:
     transfer, gain = result.transfer, result.gain_dn_per_e
     signal_dn = transfer.mean_dn - result.dark_mean_dn
     signal_e = signal_dn / gain
-    useful = (signal_dn > 0) & (transfer.light_e <= result.saturation_e)  # beyond it clipping hides the noise
+    useful = (signal_dn > 0) & (transfer.light_e <= result.saturation_e)  # clipping hides noise above it
     dark_e = float(np.sqrt(max(result.dark_variance_dn2, 0.0)) / gain)
     light_e = np.geomspace(signal_e[signal_e > 0].min(), signal_e.max(), 60)
     figure = blank(2 * CHART[0], 2.3 * CHART[1])

@@ -35,10 +35,10 @@ from studies.pages.report_data import ReportCell, ReportData, ReportLevel, Repor
 from studies.pages.report_pictures import ReportPictures
 from studies.study.render_noise import MOST_SHARE, noise_note
 
-# One script, in this order.
+# Scripts that the page joins into one, in this order.
 SCRIPTS = ("report_numbers.js", "report_colour.js", "report_charts.js", "report_viewer.js", "report.js")
-IN_LUX, IN_CD_M2 = ("lux", "illuminance, lux"), ("x", "scene luminance, cd/m²")  # of the charts' axis of light
-SEEN_DB = 22.0  # PSNR from which on a picture shows what is in it
+IN_LUX, IN_CD_M2 = ("lux", "illuminance, lux"), ("x", "scene luminance, cd/m²")  # key and title of light's axis
+SEEN_DB = 22.0  # PSNR from which on a picture shows more scene than noise
 
 
 def balance_text(balance: Mapping[str, str]) -> str:
@@ -236,7 +236,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
     str
         HTML that may fetch nothing but the pictures beside it, and these only where it leaves some out.
     """
-    # What several parts of the page show
+    # What several parts of the page show.
     groups = group_views(report)
     of = first_comparison(report)
     data = viewer_data(report, groups)
@@ -246,7 +246,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
     errors = {name: address("webp", content) for name, content in pictures.flip_maps.items()}
     data["flip"] = [errors.get(cell.picture or "", "") for cell in report.cells]
     script = "".join(own_file(name) for name in SCRIPTS)
-    # The page
+    # The page.
     return write_out(
         "report.html.j2",
         script=Markup(script),
@@ -276,7 +276,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
         meanings=[text.BALANCE_MEANINGS.get(balance, balance) for balance in report.balances],
         speed=speed_rows(report),
         stages=sorted(report.stages.items(), key=lambda stage: -stage[1]),
-        # Effect and cost, as `sensor.optics.left_out` parts them.
+        # Effect and cost, which `sensor.optics.left_out` separates by a colon.
         left_out=[line.partition(": ")[::2] for line in report.left_out],
         snr=_snr_address(report),
         text=text,

@@ -17,11 +17,11 @@ from studies.pages.report_data import ReportCell, ReportData
 from studies.pages.verdict import AHEAD, BEHIND, OUTCOMES, Leads, counts, leads
 from studies.study.study import OWN
 
-# Axes by their place in `ReportData.cells`, and in which order one is taken to compare or to part the charts by.
+# Axes by their place in `ReportData.cells`; and in which order an axis is chosen to be compared along, and for rows.
 SCENE, LIGHT, SENSOR, EXPOSURE, BALANCE, BRIGHTNESS, CAMERA = range(7)
 ALONG_FIRST = (BRIGHTNESS, EXPOSURE, SENSOR, LIGHT, SCENE, BALANCE, CAMERA)
 ROWS_FIRST = (SENSOR, EXPOSURE, SCENE, LIGHT, BALANCE, CAMERA, BRIGHTNESS)
-RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes and lights are what it is chosen for
+RIVALS = (CAMERA, SENSOR, EXPOSURE, BALANCE)  # what a person chooses; scenes and lights are the conditions
 
 
 @dataclass(frozen=True)

@@ -15,8 +15,8 @@ from studies.pages.report_compare import Comparison
 from studies.sweep.prepare import PICTURES
 from studies.sweep.stored import read_whole
 
-SHOWN_BYTES = 6.5e6  # of pictures and maps: a page of 300 cells stays under 10 MB
-# Pictures stay lossless: WebP with a loss halves the resolution of colours, which is what mosaics are judged by.
+SHOWN_BYTES = 6.5e6  # most bytes of pictures and maps; a page of 300 cells then stays below 10 MB
+# Pictures stay lossless, because lossy WebP halves the resolution of colours, by which mosaics are judged.
 LOSSLESS = {"lossless": True, "method": 1, "quality": 20}
 OF_MAPS = {"quality": 85, "method": 2}
 LOUPE = (16, 32)  # rows and columns that the loupe shows

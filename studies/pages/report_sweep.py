@@ -34,8 +34,8 @@ from studies.sweep.provenance import in_words, made_by, require_alike, threads, 
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import read_whole
 
-# Pictures of the first seed that a page takes; a larger study is shown in part, because the page compares any two
-# values of an axis in words.
+# Most pictures of the first seed in a page. A larger study is shown in part, because the page compares any two values
+# of an axis in words.
 MOST_CELLS = 1000
 
 
@@ -167,7 +167,8 @@ def shown_part(study: Mapping[str, Any], where: Mapping[str, str]) -> tuple[dict
     ]
 
 
-# What a page shows of a study, and its name in words; for each axis of a row where it stands there.
+# Parts of a study that a page may show in part, with their names in words; and for each axis of a row its part, and its
+# place in a value of that part.
 _SHOWN = {
     "scenes": "scenes",
     "spectra": "lights",

@@ -90,7 +90,7 @@ def camera_name(camera: str) -> str:
     if own is None:
         return CAMERA_NAMES.get(camera, camera)
     path, function = own
-    plain = path.stem.split("-")[0] if path.suffix == ".whl" else path.stem  # a wheel's name goes on with its version
+    plain = path.stem.split("-")[0] if path.suffix == ".whl" else path.stem  # without the wheel's version
     return plain.replace("_", " ") + ("" if function == "develop" else f" ({function.replace('_', ' ')})")
 
 

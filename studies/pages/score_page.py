@@ -11,9 +11,9 @@ from studies.pages.plots import CHART, COLOURS, STYLE, blank, plain_ticks, svg_t
 from studies.score.figure import Merit
 from studies.score.over_light import AtLight
 
-MOST_ON_A_PAGE = 2  # cameras; of more, each row's conditions stand below it
-MOST_VISUAL_NOISE = 10.0  # that is drawn
-PLAIN = 1000.0  # from which on a figure has no decimals
+MOST_ON_A_PAGE = 2  # cameras; with more of them each row's conditions stand below it
+MOST_VISUAL_NOISE = 10.0  # largest visual noise that is drawn
+PLAIN = 1000.0  # value from which on a figure has no decimals
 
 
 def score_page(

@@ -10,7 +10,7 @@ from studies.pages import report_text as text
 from studies.pages.page import svg_address, write_out
 from studies.pages.plots import BLUE, CHART, ORANGE, SOFT, STYLE, blank, name_at_ends, plain_ticks, svg_text
 
-LEAST_SHARE = 1e-5  # that is told as a figure
+LEAST_SHARE = 1e-5  # smallest share that is written as a figure
 
 
 def bench_page(results: Mapping[str, Any]) -> str:

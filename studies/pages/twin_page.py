@@ -12,7 +12,7 @@ from studies.pages.page import svg_address, write_out
 from studies.pages.plots import CHART, STYLE, blank, plain_ticks, svg_text
 from studies.twin.twin import FramePair, Twin
 
-CROP = 96  # pixels of a side that are shown
+CROP = 96  # side of the crops that are shown [pixels]
 NAMES = (("camera", BLUE, "-"), ("twin", ORANGE, "--"))
 
 
