@@ -135,7 +135,7 @@ def figure_b(setup: Setup) -> tuple[PaperFigure, tuple[Claim, ...]]:
     best = {name: measure_best(setup, subject, Camera(READING, name, shake="hand")) for name in (BAYER, PAPER, DEFAULT)}
     light = named_light("D65")
     rgbw, bayer = (channel_e(Camera(READING, name).sensor, light, 1.0, 1.0) for name in (PAPER, BAYER))
-    more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # Bayer's tile has green twice
+    more_light = float(rgbw.sum() / (bayer @ [1.0, 2.0, 1.0]))  # a tile of Bayer's has two pixels of green
     claims = with_default(lambda of: claims_held(best[BAYER], of, more_light), best)
     names = {"Bayer": best[BAYER], "interleaved": best[PAPER], "the default": best[DEFAULT]}
     charts = {

@@ -23,7 +23,7 @@ T = TypeVar("T")
 Verdict = Literal["reproduced", "reproduced under a condition", "not reproduced"]
 VERDICTS: tuple[Verdict, ...] = get_args(Verdict)
 
-# What "about" may mean: a number given to one digit stands for a fifth more or less.
+# The paper's "about": a number given to one digit stands for a range of a fifth on either side.
 ABOUT = 0.2
 Values = Mapping[str, float | NDArray[np.float64]]  # by condition
 

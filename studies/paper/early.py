@@ -30,10 +30,10 @@ from studies.photograph.snr import channel_e, electrons_at_snr
 GINDELE = "rgbw_gindele_published"
 DESIGNS = ("rgbw_sato_published", "rgbw_kijima_published", GINDELE)  # judged where W is full
 MATCHED = ("rgbw_nd", "cmyw")  # Yamagami's mosaics
-CMYW, RGBW = "cmyw_yamagami_published", "rgbw_sato_published"  # whose colours are compared
+CMYW, RGBW = "cmyw_yamagami_published", "rgbw_sato_published"  # their colours are compared
 HOW = ("closed form", "read out")
-EXPOSURE_S, FLAT_SIDE = 0.020, 256  # of the even fields
-WHITE_E = 1e4  # of a W pixel beside combined colours
+EXPOSURE_S, FLAT_SIDE = 0.020, 256  # exposure time and side of the even fields
+WHITE_E = 1e4  # electrons of a W pixel that combined colours are compared with
 COLOUR_LIGHTS = {"moonlight": MOONLIGHT_CD_M2, "low light": LOW_CD_M2, "25 cd/m²": 25.0}
 
 
@@ -72,7 +72,7 @@ def colour_noise(reading: str, processor: str, luminance_cd_m2: float) -> tuple[
     colours = NAMED[processor].colours
     electrons = channel_e(sensor, light, luminance_cd_m2, EXPOSURE_S)[[sensor.channels.index(x) for x in colours]]
     matrix = colour_fit(sensor, NAMED[processor], light).matrix(colours) / electrons
-    chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB less its luminance
+    chroma = (np.eye(3) - SRGB_TO_XYZ[1]) @ matrix  # sRGB without its luminance
     variance = noise_variance(electrons, sensor, EXPOSURE_S)
     rng = np.random.default_rng(0)
     shape = (FLAT_SIDE, FLAT_SIDE)
@@ -116,7 +116,7 @@ def gathered(tile: Tile) -> Mapping[str, tuple[float, float]]:
     for channel, mean_e in zip("RGB", WHITE_E * per_cd_m2[:3] / per_cd_m2[3], strict=True):
         sites = mask(tile, channel, shape).astype(np.float64)
         total, squares = (scipy.ndimage.convolve(sites, kernel, mode="wrap") for kernel in (weights, weights**2))
-        samples = 1 / float((squares / total**2).mean())  # as many as a plain mean of equal noise has
+        samples = 1 / float((squares / total**2).mean())  # number of samples whose plain mean has the same noise
         combined = tent_means(rng.poisson(mean_e, shape).astype(np.float64), tile, channel)[8:-8, 8:-8]
         lights[channel] = samples * mean_e / WHITE_E, float(combined.mean() ** 2 / combined.var()) / WHITE_E
     return lights

@@ -21,12 +21,12 @@ from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, TODAY, table1_sensor, with_even_response
 from studies.photograph.snr import channel_e, snr
 
-NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range
+NM: Floats = np.arange(400.0, 701.0, 2.0)  # the paper's range [nm]
 CHANNELS = "RGBW"
 CLAIMED = {"R": 10.0, "G": 6.0, "B": 10.0}
-SNR_EXPOSURE_S = 0.020  # Figure 6's longest
-BRIGHT = 0.9  # share of the well that W holds in "bright light": beyond it, W saturates
-LEVELS = np.geomspace(1e-3, 1e2, 51)  # [cd/m^2]; W is full beyond
+SNR_EXPOSURE_S = 0.020  # the longest exposure of Figure 6
+BRIGHT = 0.9  # share of the full well that W reaches in "bright light"; above it W saturates
+LEVELS = np.geomspace(1e-3, 1e2, 51)  # [cd/m^2]; W is full at more
 FILLS = {"R": "#c8504b", "G": "#5a9e58", "B": "#4d72c0", "W": "#f4f4f0"}
 SENSORS = (*READINGS, TODAY)
 

@@ -36,11 +36,11 @@ from studies.paper.setup import (
     view,
 )
 
-LEVELS_CD_M2 = np.geomspace(1e-4, 1e4, 40)  # mean of the scene: a moonless sky to full sun and beyond
+LEVELS_CD_M2 = np.geomspace(1e-4, 1e4, 40)  # mean luminance: from a moonless sky to more than full sun
 READING = "table1_output"
-SMOOTH = 0.5  # step of a share that two levels, 0.68 octaves apart, may differ by
-LEVEL_DB, GAIN_DB = 0.1, 1.0  # PSNR that is no difference, and one that is easily seen
-SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # a difference that is just seen; of FLIP what is taken for it
+SMOOTH = 0.5  # largest step of a share between two levels, which are 0.68 octaves apart
+LEVEL_DB, GAIN_DB = 0.1, 1.0  # a PSNR that counts as no difference, and one that is easily seen
+SEEN_DELTA_E, SEEN_FLIP = 1.0, 0.05  # differences that are just seen; for FLIP a value assumed to be
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,7 @@ def curves(setup: Setup, subject: View, camera: Camera) -> LevelCurves:
     unit_s = auto_exposure_s(form_image(subject.radiance, camera.sensor), camera.sensor, LONGEST_S * 1e6)
     rows: list[list[tuple[float, ...]]] = []
     for level in LEVELS_CD_M2:
-        # Once the time is under the longest, light and time cancel: brighter levels give the same electrons.
+        # Once the exposure time is below the longest, it falls as light rises: brighter levels give the same electrons.
         if len(rows) > 1 and unit_s / LEVELS_CD_M2[len(rows) - 1] < LONGEST_S:
             rows.append(rows[-1])
             continue
@@ -112,7 +112,7 @@ def largest_step(values: Image, sign: float) -> tuple[float, Image]:
     """
     steps = np.diff(values, axis=0)
     sizes = steps * sign if sign else np.abs(steps)
-    moved = (sizes != 0).any(axis=1)  # not between levels that hold the same electrons
+    moved = (sizes != 0).any(axis=1)  # levels with the same electrons don't count
     index = int(np.where(moved, sizes.mean(axis=1) - half_width(sizes), -np.inf).argmax())
     return float(LEVELS_CD_M2[index + 1]), sizes[index]
 
@@ -149,14 +149,14 @@ def claims_levels(curves: LevelCurves) -> tuple[Claim, ...]:
         *at_most({"PSNR, fall over the octave in which W fills": before - after}, GAIN_DB, "dB"),
     )
     places = {"psnr_at": psnr_at, "delta_at": delta_at, "flip_at": flip_at, "fills_at": fills_at}
-    # W's part
+    # W's part.
     parts = (
         *at_most({"share of similarity by W, largest step": _step(curves.similarity)}, SMOOTH),
         *at_most({"substitution's weight, largest step": _step(curves.weight)}, SMOOTH),
         *within({"share of similarity by W, in starlight": curves.similarity[0].mean()}, 0.95, 1.0),
         *at_most({"share of similarity by W, in full sun": curves.similarity[-1].mean()}, 0.5),
     )
-    # What W gains
+    # What W gains.
     means = curves.gain_db.mean(axis=1)
     margins = half_width(curves.gain_db)
     best = curves.gain_db[(means - margins).argmax()]

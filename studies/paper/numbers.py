@@ -16,10 +16,10 @@ from studies.paper.claims import Claim, claim, judge_claim, within_margin
 from studies.paper.setup import READINGS, View, decibels, photons, shot_noise_alone, table1_sensor
 
 MOONLIGHT_CD_M2 = DEMO_LEVELS[0].luminance_cd_m2
-FULL_SUN_LUX = 1e5  # as `DEMO_LEVELS`
+FULL_SUN_LUX = 1e5  # the same as in `DEMO_LEVELS`
 # A clear night without moon, airglow included: 0.002 lux (Schlyter, "Radiometry and photometry in astronomy", 2009).
 NIGHT_SKY_LUX = 2e-3
-FLAT_SIDE = 256  # of the uniform field that is read out [pixels]
+FLAT_SIDE = 256  # side of the uniform field that is read out [pixels]
 
 
 def moonlight_photons(first_nm: float, last_nm: float) -> float:
@@ -54,7 +54,7 @@ def photon_claims(per_um2_s: Mapping[str, float], measured_db: float) -> tuple[C
     measured_db : float
         SNR of 1000 electrons as read out.
     """
-    # The spread of n differences has the relative error 1/sqrt(2 n): 5 of them, a false alarm in 2 million.
+    # The spread of n differences has the relative error 1 / sqrt(2 n); 5 of these give a false alarm in 2 million.
     margin = decibels(1 + 5 / sqrt(2 * FLAT_SIDE**2)) + 0.01
     under_d65 = {f"D65, {name}": value for name, value in per_um2_s.items()}
     in_pixels = {name: value * 2.0**2 * 0.025 for name, value in under_d65.items()}

@@ -28,13 +28,13 @@ from studies.paper.claims import Claim, PaperFigure, judge_claim, paper_figure
 from studies.paper.numbers import MOONLIGHT_CD_M2
 from studies.paper.setup import READINGS, Camera, Setup, exposures, table1_sensor, view
 
-PATCH = 5  # ours: the paper doesn't say
-ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and to z: even, so that all lie alike in the tile
-CROP = 40  # pixels of the picture that are shown
+PATCH = 5  # our choice, because the paper states none
+ASIDE, AWAY = 4, 8  # pixels from the edge to x, and from x to y and z; even, so that all lie alike in the tile
+CROP = 40  # side of the part of the picture that is shown [pixels]
 EXPOSURE_S = 0.020
 LEVELS = {"25 cd/m²": 25.0, "moonlight": MOONLIGHT_CD_M2}
-# Section 3.1
-FRAME_SIDE, REACH = 32, 10  # of the test frame, and the neighbourhood's, 21 x 21 [pixels]
+# Section 3.1.
+FRAME_SIDE, REACH = 32, 10  # side of the test frame, and reach of the neighbourhood of 21 x 21 [pixels]
 SIGMA_D, SIGMA_S = 3.0, 60.0  # [pixels], [electrons]
 
 
@@ -136,12 +136,12 @@ def _drawing(parts: list[tuple[str, Image, Triplets]]) -> Figure:
         words = {"x": "x", "y": f"y, {edge.to_y[middle]:.1f} away", "z": f"z, {edge.to_z[middle]:.1f} away"}
         for name, down, across in (("x", 0, 0), ("y", AWAY, 0), ("z", 0, -AWAY)):
             i, j = row + down - PATCH // 2, column + across - PATCH // 2
-            corner = j - left - 0.5, i - top - 0.5  # a pixel's middle has whole coordinates
+            corner = j - left - 0.5, i - top - 0.5  # because a pixel's middle has whole coordinates
             axes["plane"].add_patch(Rectangle(corner, PATCH, PATCH, fill=False, edgecolor=ORANGE, linewidth=1.6))
             axes["plane"].text(*corner, name, color=ORANGE, weight="bold", va="top")
             show_picture(axes[name], grey[i : i + PATCH, j : j + PATCH])
             distance = axes[name].text(1.1, 0.5, words[name], va="center", transform=axes[name].transAxes)
-            distance.set_in_layout(False)  # the empty column holds it
+            distance.set_in_layout(False)  # because the empty column has room for it
     return figure
 
 

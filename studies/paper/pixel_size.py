@@ -34,9 +34,9 @@ from studies.paper.setup import (
 )
 from studies.photograph.snr import channel_e, snr
 
-LARGE = "table1_output_6um"  # Figure 1(b)'s larger pixel, as cameras of the time had
+LARGE = "table1_output_6um"  # the larger pixel of Figure 1(b), as in cameras of the time
 DARK_GAIN = LIT_CD_M2 / DARK_CD_M2  # the factor that shows the dark half as bright as the lit one
-# Figure 1(b)
+# Figure 1(b).
 LUMINANCE_CD_M2, EXPOSURE_S = 100.0, 0.010
 LARGE_UM, SMALL_UM = 6, 2
 
@@ -93,7 +93,7 @@ def gain_db(reading: str, *, shot_alone: bool = False) -> float:
         sensor = table1_sensor(reading, "bayer", pitch_um)
         sensor = shot_noise_alone(sensor) if shot_alone else sensor
         electrons = channel_e(sensor, named_light("D65"), LUMINANCE_CD_M2, EXPOSURE_S)
-        # The converter's rounding belongs to noise too; with shot noise alone it is left out of the closed form.
+        # The converter's rounding is noise as well; the closed form leaves it out where shot noise alone is asked for.
         values.append(float(np.sqrt(electrons[1]) if shot_alone else snr(electrons, sensor, EXPOSURE_S)[1]))
     return decibels(values[0] / values[1])
 

@@ -37,7 +37,7 @@ from studies.study.lit_scene import make_transport, open_choice
 from studies.study.study import OWN, Condition, RenderLimits, SceneChoice, Study
 from studies.sweep.cells import device_stream, exposure_stream, shake_stream
 
-RENDERS = "renders"  # folder of them, below the command's own
+RENDERS = "renders"  # folder of the renders, in the command's own folder
 # Readings of Table 1, each with the SNR under which W replaces the luminance (docs/decisions/0005).
 READINGS: Mapping[str, float] = MappingProxyType(
     {"table1_pixel": SUBSTITUTION_SNR_TABLE1_PIXEL, "table1_output": SUBSTITUTION_SNR}
@@ -45,8 +45,9 @@ READINGS: Mapping[str, float] = MappingProxyType(
 TODAY = "low_noise"  # a pixel of today with Table 1's geometry, for comparison
 # The paper's own method, which its claims are tested with, and the default, whose values stand beside them.
 PAPER, DEFAULT = CAMERAS = ("interleaved_paper", "interleaved")
-# Samples over those of the setup: the dark half's own noise hides far more, and a constant environment needs few.
 RESULT = {PAPER: "result", DEFAULT: "by the default"}  # words above the pictures
+# Scenes that need only a share of the setup's samples: the dark half's own noise hides far more than the render's, and
+# light from a constant environment has little noise.
 _SPP_SHARE = {"lit_and_shadowed": 0.25, "slanted_edge": 0.25}
 
 

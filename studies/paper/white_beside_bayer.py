@@ -27,7 +27,7 @@ from studies.paper.setup import (
 )
 
 LUMINANCE_CD_M2 = 25.0
-SUBSTITUTED = {"5ms": True, "10ms": False, "20ms": False}  # what the paper shows
+SUBSTITUTED = {"5ms": True, "10ms": False, "20ms": False}  # whether W replaces the luminance, as the paper shows it
 DARKEST = "5ms"
 
 
@@ -120,7 +120,7 @@ def swap(setup: Setup, subject: View, camera: Camera) -> Swap:
 def _photograph(setup: Setup, subject: View, camera: Camera, exposure: str) -> tuple[Outcome, Image]:
     """Return the outcome of one condition, and its first picture, encoded."""
     developed = [develop_view(camera, raw, subject) for raw in exposures(camera, subject, exposure, setup.seeds)]
-    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # as a screen shows them
+    pictures = [np.clip(linear, 0.0, 1.0) for linear, _ in developed]  # clipped, as a screen shows them
     decisions = [picture.substituted for _, picture in developed if picture.substituted is not None]
     share = float(np.mean(decisions)) if decisions else None
     return Outcome(noise(pictures), quality_db(pictures, subject.truth), share), encode_srgb(pictures[0])
