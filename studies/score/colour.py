@@ -27,10 +27,10 @@ from studies.photograph.camera import calibrate
 from studies.score.even_field import without_blur
 from studies.score.figure import Definition, Merit, not_measured, without_noise_bias
 
-GREYS = 6  # the chart's last row
+GREYS = 6  # number of greys in the chart's last row
 SIDE_PX, CHIPS = 64, 8  # side of a patch [pixels], and number of chips that see it in one measurement
-# A chip takes several frames if its read noise is above this share of the converter's top, so many that their mean's
-# noise comes down to it; and the most frames that it takes.
+# A chip takes several frames if its read noise exceeds this share of the converter's top value: as many as bring the
+# noise of their mean down to it, but at most `MOST_FRAMES`.
 FRAMES_SHARE = 0.003
 MOST_FRAMES = 16
 ACROSS, BORDER = 5, 2  # patches in a row, and the border of a patch that crosstalk reaches [pixels]
@@ -67,7 +67,7 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
     )
     try:
         matrix = calibrate(plain, known.lamp).to_srgb
-    except InputError as error:  # a channel that the light doesn't reach, or three that are alike in the window
+    except InputError as error:  # a channel gets no light, or three are alike in the window
         return Definition(tuple(replace(x, missing=one_line(error)) for x in (INDEX, DIFFERENCE)), not_measured)
     named = color_checker_reflectances()
     surfaces = np.array([held(x).band_average(known.wavelength_nm, known.width_nm) for _, x in named])
@@ -82,7 +82,8 @@ def colour_figures(sensor: SensorConfig, light: str, exposure_s: float) -> Defin
         lab = xyz2lab(np.clip(balanced @ matrix.T, 0.0, None) @ SRGB_TO_XYZ.T)
         return np.asarray(deltaE_ciede2000(standard_lab, lab)), np.asarray(deltaE_cie76(standard_lab, lab))
 
-    # The same on frames, less the chip's dark. A noisy camera takes several, for differences of colour are curved.
+    # The same on frames, less the chip's dark. A noisy camera takes several, because its noise would bias the
+    # differences of colour, which aren't linear.
     frames = int(np.clip((plain.read_noise_e / plain.top_e / FRAMES_SHARE) ** 2, 1, MOST_FRAMES))
 
     def means_of(chips: int, rng: np.random.Generator) -> Floats:

@@ -27,10 +27,10 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit
 
 CONTRAST, TOLERANCE = 0.2, 0.5  # K and d
-EQUAL = 1e-5  # a contrast this far beyond a limit counts as on it: readings are whole numbers, and many lie on it
-COUNTED_E = 1000.0  # below this many electrons their distribution is Poisson's, from here on a normal one
+EQUAL = 1e-5  # a contrast so far beyond a limit still counts as on it, because many whole readings lie on it
+COUNTED_E = 1000.0  # mean electrons from which on a normal distribution stands for Poisson's
 TAIL = 1e-12  # share of Poisson's distribution that is left out
-LUX = (0.1, 1.0, 10.0, 100.0)  # on an 18 % grey card that has the pair's mean luminance
+LUX = (0.1, 1.0, 10.0, 100.0)  # [lux] on an 18 % grey card that has the pair's mean luminance
 
 
 def contrast_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:
@@ -79,7 +79,7 @@ def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floa
     gain = seen.gain_e_per_dn
     mean_e, dark_e = expected_e * share, seen.pixel.dark_current_e_per_s * reading.exposure_s
     temporal_e2 = max(law.dark_e**2 - gain**2 / 12 - dark_e, 0.0)
-    # Beside Poisson's count, light raises what the columns' gains make of it and of the dark current together.
+    # Besides Poisson's count, light raises the noise of PRNU and of the columns' gains, which also act on dark current.
     lit_e2 = (law.prnu * mean_e) ** 2 + (law.shot - 1) * mean_e
     rest_e = float(np.sqrt(temporal_e2 + law.fixed_e**2 + lit_e2))
     counts = np.array([mean_e + dark_e])
@@ -95,7 +95,7 @@ def reading_distribution(field: EvenField, luminance_cd_m2: float) -> tuple[Floa
     dn = np.arange(low, high + 1.0)
     edges = np.concatenate(([-np.inf], (dn[1:] + dn[:-1]) / 2, [np.inf]))
     below = ndtr((edges - centre[:, None]) / max(rest_e / gain, 1e-9))
-    # Less the dark current's mean, which is in a raw image's black level.
+    # The dark current's mean is subtracted, because a raw image's black level includes it.
     return ((dn - seen.black_dn) * gain - dark_e) / share, np.asarray(weights @ np.diff(below, axis=1))
 
 

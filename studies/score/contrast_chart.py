@@ -13,7 +13,7 @@ from rodcone.types import Floats, Plane
 from scenes.contrast_patches import PatchPair, patch_pairs
 from studies.score.contrast import CONTRAST, EQUAL, TOLERANCE
 
-MARGIN = 0.15  # of a patch's side, left off on each side
+MARGIN = 0.15  # share of a patch's side that is left off on each side
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def pair_accuracy(bright: Floats, dark: Floats, contrast: float = CONTRAST, tole
     lowest, highest = (contrast * (1 + sign * tolerance) + sign * EQUAL for sign in (-1, 1))
     values = np.sort(np.ravel(dark))
     known = np.ravel(bright)
-    known = known[known > 0]  # a value of 0 or less can't be the brighter one of a pair with a positive sum
+    known = known[known > 0]  # the brighter one of a pair with a positive sum is above 0
     darkest, brightest = (known * (1 - c) / (1 + c) for c in (highest, lowest))
     right = np.searchsorted(values, brightest, side="right") - np.searchsorted(values, darkest, side="left")
     return float(right.sum() / (np.size(bright) * values.size))

@@ -41,11 +41,11 @@ from studies.score.texture import LEAST_SAMPLES, SIDE_PX, figures_of, texture_me
 from studies.score.texture_response import texture_response
 from studies.score.visual_noise import STANDARD, WHITE_SHARE, visual_noise
 
-EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and what is left off around
-RANGE_PX = 48  # side of bright even pictures, whose mean alone counts
-BRIGHT_SIDE = slice(BORDER_PX, EDGE_PX // 2 - BORDER_PX)  # columns of two patches that make a picture
+EDGE_PX, PATCH_PX, BORDER_PX = 96, 24, 8  # sides of the edge's picture and of a patch, and the border left off [px]
+RANGE_PX = 48  # side of bright even pictures, of which only the mean counts [pixels]
+BRIGHT_SIDE = slice(BORDER_PX, EDGE_PX // 2 - BORDER_PX)  # columns of the picture of two patches
 DARK_SIDE = slice(EDGE_PX // 2 + BORDER_PX, EDGE_PX - BORDER_PX)
-ACROSS = 5  # patches
+ACROSS = 5  # patches in a row
 ACCURACY = "IEEE 2020-2024 (there CTA, before CDP), all pairs of pixels of two patches of one picture"
 RANGE = "like ISO 15739:2023, 6.4: brightest value within 1 % of proportion over the dark's temporal noise by its slope"
 
@@ -109,7 +109,7 @@ def developed_figures(
         bright, dark = (luminance[BORDER_PX:-BORDER_PX, columns] for columns in (BRIGHT_SIDE, DARK_SIDE))
         return pair_accuracy(bright, dark)
 
-    # Noise, sharpness, texture, colour.
+    # Noise, sharpness, texture and colour.
     words = (
         f"{processor}, {light}, {exposure_s * 1e3:.4g} ms, balanced as shot, white at {100 * WHITE_SHARE:.0f} % of the "
         "well; no closed form"

@@ -11,12 +11,12 @@ import numpy as np
 
 from rodcone.types import Plane
 
-MIDDLE = 0.5  # reflectance at which the picture's proportion to light is taken
-MOST = 16.0  # reflectance up to which the picture may go on, a perfect white is 1
-BEHIND = 0.99  # of what is in proportion: what is shown less, is saturated
-STEP_OCTAVES = 0.005  # to which the saturation is found
-RISE = 3.0  # of the camera's own noise: the light by which the slope at black is taken
-LEAST_SLOPE = 1e-3  # of a picture that shows no such light
+MIDDLE = 0.5  # reflectance at which the picture's ratio to light is measured
+MOST = 16.0  # largest reflectance that is tried; a perfect white is 1
+BEHIND = 0.99  # share of the proportional value below which a picture counts as saturated
+STEP_OCTAVES = 0.005  # octaves to which the saturation is found
+RISE = 3.0  # multiple of the camera's own noise: the light by which the slope at black is measured
+LEAST_SLOPE = 1e-3  # slope that is assumed where a picture doesn't show that light
 
 
 def picture_range(shoot: Callable[[float, int], Plane], noise: float) -> float:
@@ -29,13 +29,13 @@ def picture_range(shoot: Callable[[float, int], Plane], noise: float) -> float:
     noise : float
         Of the camera's own dark, as a reflectance.
     """
-    # The least: noise that changes between frames, over the rise from black to a little light.
+    # The least luminance: noise that changes between frames, over the slope from black to a little light.
     dark = [shoot(0.0, frame) for frame in (0, 1)]
     left = max(float(np.std(dark[0] - dark[1], ddof=1)) / 2**0.5, 1e-9)
     black = float(np.mean(dark))
     lit = float(np.mean([shoot(RISE * noise, frame) for frame in (0, 1)]))
     least = left / max((lit - black) / (RISE * noise), LEAST_SLOPE)
-    # The brightest: found by halves, on frames whose noise is the same in proportion.
+    # The brightest luminance, by bisection on frames whose noise is the same in proportion to the light.
     slope = (float(shoot(MIDDLE, 2).mean()) - black) / MIDDLE
     low, high = log2(MIDDLE), log2(MOST)
     while high - low > STEP_OCTAVES:

@@ -20,8 +20,8 @@ from sensor.readout import sources_of
 from sensor.response import expected_electrons
 from studies.metrics.truth import Light, neutral_electrons
 
-TEMPORAL = ("read noise", "converter noise", "quantisation", "dark current")  # sources that change between frames
-SIDE_PX = 128  # of a frame: 4096 samples of a channel that has one pixel in four
+TEMPORAL = ("read noise", "converter noise", "quantisation", "dark current")  # they change between frames
+SIDE_PX = 128  # side of a frame; a channel in one pixel of four has 4096 samples
 
 
 @dataclass(frozen=True)

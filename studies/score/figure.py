@@ -8,7 +8,7 @@ from math import isfinite, nan
 import numpy as np
 import scipy
 
-REPEATS = 8  # measurements, each of fresh chips
+REPEATS = 8  # number of measurements, each on fresh chips
 CONFIDENCE = 0.95
 
 

@@ -20,7 +20,7 @@ from studies.score.figure import Definition, Merit, not_measured
 from studies.score.sharpness import bands_of
 
 PATCH_PX, BORDER_PX = 32, 2  # the black square's side, and the pixels of its border that crosstalk reaches
-WHITE_SHARE = 0.8  # of the converter's top
+WHITE_SHARE = 0.8  # share of the converter's top value at which a perfect white is read
 
 
 VIEW_PX = 96, 128  # height and width of the picture whose corners are measured

@@ -13,8 +13,8 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit, not_measured
 
 LAMP, EXPOSURE_S = "metal_halide@100Hz", 0.002  # a lamp on the mains, and a fifth of its period
-FRAMES = 40  # of a measurement, that start at random
-WHITE_SHARE = 0.4  # of what the largest reading holds, for the lamp's mean light
+FRAMES = 40  # frames per measurement, which start at random moments
+WHITE_SHARE = 0.4  # share of what the largest reading holds, in the lamp's mean light
 
 
 def flicker(plain: EvenField, light: str) -> Definition:
@@ -58,7 +58,7 @@ def flicker(plain: EvenField, light: str) -> Definition:
         chip = field.draw_chip(rng)
         dark = field.samples_e(field.shoot(0.0, chip, rng)).mean()
         phases = rng.random(FRAMES)
-        rows = field.sensor.sites  # of photodiodes, exposed together
+        rows = field.sensor.sites  # rows of photodiodes that are exposed together
         light_of = [row_weights(lamp, field.sensor, rows, EXPOSURE_S, x * lamp.period_s)[0] for x in phases.tolist()]
         frames = (field.shoot(mean_cd_m2 * float(x), chip, rng) for x in light_of)
         seen = np.array([field.samples_e(raw).mean() - dark for raw in frames])

@@ -30,7 +30,7 @@ def information(frequency: Floats, mtf: Floats, bright_e: float, dark_e: float, 
     quanta = ((bright_e + dark_e) / 2 * float(np.interp(0.25, frequency, mtf))) ** 2 / noise_e2
     shape = np.sinc(OBJECT_PX * middles) ** 2
     around = np.interp(np.hypot(middles[:, None], middles), frequency, mtf) ** 2 / noise_e2
-    seen = OBJECT_PX**4 * float(shape @ around @ shape) / STEPS**2  # four quadrants of (1/2)^2 each
+    seen = OBJECT_PX**4 * float(shape @ around @ shape) / STEPS**2  # the integral over four quadrants of (1/2)^2 each
     bits = np.log2(1 + (bright_e - dark_e) ** 2 * power / 12)
     return [
         quanta,

@@ -12,7 +12,7 @@ from studies.metrics.truth import named_light, neutral_electrons
 from studies.score.figure import Definition, Merit, not_measured
 from studies.score.noise_figures import SNR1S
 
-EVERYWHERE = "E"  # the light of equal energy, 300-1100 nm, whose figures have the same names
+EVERYWHERE = "E"  # the light of equal energy over 300-1100 nm, for which the same figures exist
 
 
 def unlit(sensor: SensorConfig, light: str) -> str:

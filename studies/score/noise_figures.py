@@ -21,18 +21,19 @@ from studies.score.even_field import EvenField, even_field
 from studies.score.figure import Definition, Merit
 from studies.study.gain import ISO_SATURATION_LUX_S
 
-ISO_NOISE_LUX_S = 10.0  # the noise-based speed is 10 over the exposure that has the signal-to-noise ratio
-REFERENCE_SHARE = 0.13  # of the saturation luminance, at which ISO 15739 takes the signal-to-noise ratio
-RAMP_TOP = 0.65  # of saturation: light of the grey scale's brightest patch, at which the response is measured
-# Light of the grey scale of ISO 14524, whose 12 patches have a contrast of 100, over saturation.
+ISO_NOISE_LUX_S = 10.0  # the noise-based speed is this over the exposure with the signal-to-noise ratio
+REFERENCE_SHARE = 0.13  # share of the saturation luminance at which ISO 15739 measures the ratio
+RAMP_TOP = 0.65  # light of the grey scale's brightest patch, as a share of saturation
+# Light of the 12 patches of ISO 14524's grey scale, whose contrast is 100, over the saturation light.
 RAMP: Floats = RAMP_TOP / BRIGHTEST * np.array(grey_scale(12, 100.0))
-# Of an overexposed field's samples, which reads the converter's top: half of them are less, by what noise took off.
+# Percentile of an overexposed field's samples that counts as saturated, the converter's top value. Noise leaves half of
+# the samples below it.
 SATURATED_PERCENT = 95.0
-LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # of the light that the closed form gives, around which a figure is searched
-SNR1S = ("3200 K", 1 / 60, 1.4)  # of SNR1s: colour temperature, exposure time, f-number
+LADDER = (0.94, 0.97, 1.0, 1.03, 1.06)  # factors on the closed form's light, among which a figure is searched
+SNR1S = ("3200 K", 1 / 60, 1.4)  # colour temperature, exposure time and f-number of SNR1s
 
 
-Named = tuple[Merit, Callable[[float], float]]  # a figure without value, and its value by luminance
+Named = tuple[Merit, Callable[[float], float]]  # a figure without its value, and its value by luminance
 
 
 def noise_figures(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Iterator[Definition]:

@@ -17,7 +17,7 @@ from studies.score.even_field import EvenField
 from studies.score.figure import Definition, Merit
 from studies.score.noise_figures import ISO_NOISE_LUX_S, light_for
 
-OUTPUT = 118 / 255  # sRGB value of 8 bits that standard output sensitivity is defined by
+OUTPUT = 118 / 255  # 8-bit sRGB value that defines standard output sensitivity
 NODES, WEIGHTS = np.polynomial.hermite_e.hermegauss(21)
 
 
@@ -30,7 +30,8 @@ def output_speeds(field: EvenField, words: str) -> Iterator[Definition]:
         return ISO_NOISE_LUX_S / (luminance * field.lux_s_per_cd_m2)
 
     def measure_output(rng: np.random.Generator) -> list[float]:
-        # Decoded, the output is straight over light in logarithms: the curve's bend would lower the speed by 5e-5.
+        # The decoded output is a straight line over light in logarithms. The sRGB curve isn't, and its bend would lower
+        # the speed by 5e-5.
         found = light_for(lambda x: decoded(_measured_output(field, x, rng)), decoded(OUTPUT), at_output)
         return [speed(found)]
 

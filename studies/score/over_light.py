@@ -15,7 +15,7 @@ from studies.score.contrast import accuracy, accuracy_on_frames
 from studies.score.even_field import EvenField, even_field
 from studies.score.visual_noise import colour_fields, expected_noise, measured_noise
 
-LEAST_RATIO = 3.0  # of the noisiest channel, from which on the closed form of visual noise holds
+LEAST_RATIO = 3.0  # SNR of the noisiest channel from which on visual noise has a closed form
 LUX: tuple[float, ...] = tuple(float(f"{10 ** (step / 3):.3g}") for step in range(-6, 13))  # 0.01 to 10 000
 
 

@@ -23,12 +23,12 @@ from studies.score.figure import Definition, Merit, not_measured
 from studies.score.noise_figures import SATURATED_PERCENT, light_for, ratio_at
 from studies.study.gain import ISO_SATURATION_LUX_S
 
-GREY_SHARE = 0.18  # of saturation, at which the low-light speed takes its ratio
-LEAST_DB, LEAST_STOPS, LEAST_BITS = 30.0, 9.0, 18.0  # of the low-light speed
-WHITE_SHARE = 0.9  # of saturation, up to which colours are counted: beyond, noise is clipped
-NODES = (10, 4)  # of the first step of levels, and of each beyond a seam of the readings, where noise is smooth
-LADDER = (0.9, 0.95, 1.0, 1.05, 1.1)  # of the gain that the closed form gives
-CONFUSION_UM, PDR_RATIO = 22.0, 20.0  # circle on a sensor of 36 x 24 mm, and the ratio in it
+GREY_SHARE = 0.18  # share of saturation at which the low-light speed's ratio is measured
+LEAST_DB, LEAST_STOPS, LEAST_BITS = 30.0, 9.0, 18.0  # what the low-light speed requires
+WHITE_SHARE = 0.9  # share of saturation up to which colours are counted; above it noise is clipped
+NODES = (10, 4)  # nodes of the integral in the first step of levels, and in each step beyond a seam of the readings
+LADDER = (0.9, 0.95, 1.0, 1.05, 1.1)  # factors on the closed form's gain
+CONFUSION_UM, PDR_RATIO = 22.0, 20.0  # circle on a sensor of 36 x 24 mm, and the SNR in it
 
 
 def print_figures(field: EvenField, words: str) -> Iterator[Definition]:

@@ -46,7 +46,7 @@ GROUPS = (
     "developed",
 )
 Processing = tuple[str, bool]  # a processor, and the consent to run it where it is a file
-NORMAL_95 = 1.959964  # standard errors on either side, of an interval of 95 %
+NORMAL_95 = 1.959964  # half the width of a 95 % interval, in standard errors
 
 
 def score(
@@ -111,7 +111,7 @@ def score(
         for definition in definitions(sensor, light, exposure_s, only, (processor, trust_code) if processor else None)
         if any(_wanted(merit.name, only) for merit in definition.merits)
     ]
-    # Its measurement.
+    # How it is measured.
     found: list[Merit] = []
     with progress_bar(step) as tell:
         for number, definition in enumerate(wanted):

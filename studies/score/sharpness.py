@@ -25,15 +25,13 @@ from studies.score.figure import Definition, Merit, without_noise_bias
 from studies.score.information import information, information_merits
 
 SIDE_PX = 192
-QUARTER_PX = SIDE_PX // 4  # columns at either side, whose noise is measured
-ANGLE_DEG, CONTRAST = 5.0, 4.0  # of ISO 12233's edge
-FRAMES = (
-    8  # each of a chip of its own, whose mean is measured: noise lowers the first frequency at which a transfer is half
-)
-BRIGHT_SHARE = 0.6  # of the well
+QUARTER_PX = SIDE_PX // 4  # columns at either side, in which the noise is measured
+ANGLE_DEG, CONTRAST = 5.0, 4.0  # angle and contrast of ISO 12233's edge
+FRAMES = 8  # number of frames, each by a chip of its own, that are averaged, because noise lowers the measured MTF50
+BRIGHT_SHARE = 0.6  # share of the full well on the edge's bright side
 BAND_NM = 20.0
 GRID: Floats = np.arange(-6000, 6001) / 2000.0  # frequencies of the closed form [cycles per pixel]
-# IEEE 1858 (CPIQ): relative contrast sensitivity v^0.8 exp(-0.2 v), v in cycles per degree.
+# Relative contrast sensitivity of IEEE 1858 (CPIQ): v^0.8 exp(-0.2 v), v in cycles per degree.
 CSF_POWER, CSF_DECAY = 0.8, 0.2
 
 

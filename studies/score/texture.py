@@ -19,8 +19,8 @@ from studies.score.sharpness import acutance, bands_of, every_pixel, grey_radian
 from studies.score.texture_response import TextureResponse, expected_response, texture_response
 
 SIDE_PX = 96
-LEAST_SAMPLES = 4  # of a chart along a side of a pixel
-WHITE_SHARE = 0.6  # of the well, for a perfect white
+LEAST_SAMPLES = 4  # least samples of the chart along a side of a pixel
+WHITE_SHARE = 0.6  # share of the full well for a perfect white
 
 
 def texture(sensor: SensorConfig, light: str, exposure_s: float, channel: str) -> Definition:

@@ -39,7 +39,7 @@ def expected_response(transfer: Floats) -> TextureResponse:
     frequency = np.fft.fftfreq(transfer.shape[0])
     steep = (
         np.maximum(np.hypot(frequency[:, None], frequency), 1 / transfer.shape[0]) ** -3.0
-    )  # as the chart's spectrum
+    )  # weights like the spectrum of the chart
     return _by_annulus(transfer * steep, steep, transfer.shape[0])
 
 

@@ -26,11 +26,11 @@ from studies.score.even_field import SIDE_PX, EvenField, even_field
 from studies.score.figure import Definition, Merit, not_measured
 from studies.score.sharpness import every_pixel
 
-WEIGHTS = np.array([1.0, 0.852, 0.323])  # of L*, u* and v*
-WHITE_SHARE = 0.7  # of the well, in the channel that fills first
-COLUMNS = ("column gains", "column offsets")  # sources that all pixels of a column share
+WEIGHTS = np.array([1.0, 0.852, 0.323])  # weights of L*, u* and v*
+WHITE_SHARE = 0.7  # share of the full well of a white, in the channel that fills first
+COLUMNS = ("column gains", "column offsets")  # shared by all pixels of a column
 STANDARD = "like ISO 15739:2013, annex B: s(L*) + 0.852 s(u*) + 0.323 s(v*)"
-STEP = 1e-6  # of XYZ, for the slopes of CIELUV
+STEP = 1e-6  # step of XYZ by which the slopes of CIELUV are found
 
 
 def visual_noise(linear: NDArray[np.float64]) -> float:
@@ -55,7 +55,7 @@ def raw_visual_noise(sensor: SensorConfig, light: str, exposure_s: float) -> Def
         return Definition((replace(merit, missing="the mosaic tells no colours"),), not_measured)
     try:
         fields, matrix = colour_fields(sensor, light, exposure_s)
-    except InputError as error:  # as of `colour_figures`
+    except InputError as error:  # with the reasons of `colour_figures`
         return Definition((replace(merit, missing=one_line(error)),), not_measured)
     white_cd_m2 = min(WHITE_SHARE * field.headroom_e / field.electrons_per_cd_m2 for field in fields)
     return Definition(
@@ -102,7 +102,7 @@ def _variances(field: EvenField, electrons: float) -> Floats:
     else:
         by_source = {name: float(law.variance(light_e)[0]) for name, law in readings[0].sources.items()}
     columns = sum(by_source[name] for name in COLUMNS)
-    pixel = readings[0].sensor.pixel  # whose share of the read noise merged readings are taken to have as well
+    pixel = readings[0].sensor.pixel  # merged readings are assumed to have its share of row noise
     rows = by_source["read noise"] * (pixel.row_noise_e / pixel.read_noise_e) ** 2 if pixel.row_noise_e else 0.0
     return np.array([sum(by_source.values()) - columns - rows, columns, rows])
 
@@ -115,7 +115,7 @@ def _expected(variances: Floats, matrix: Floats, side: int) -> float:
     """
     cycles = np.arange(side) / (2 * side) * PIXELS_PER_DEGREE
     passed = np.stack([eye_transfer(plane, np.hypot(cycles[:, None], cycles)) for plane in range(3)], axis=-1)
-    passed[0, 0] = 0.0  # the mean isn't noise
+    passed[0, 0] = 0.0  # because the mean isn't noise
     every = np.einsum("hwi,hwj->ij", passed, passed) / side**2
     kept = (every, passed[0].T @ passed[0] / side, passed[:, 0].T @ passed[:, 0] / side)
     to_xyz = SRGB_TO_XYZ @ matrix
