@@ -32,7 +32,7 @@ from studies.study.levels import parse_level
 
 MOST_BANDS = 40
 STAGES = 5
-Stage = dict[str, Any]  # of `studies.speed.points.stage_json`
+Stage = dict[str, Any]  # a result of `studies.speed.points.stage_json`
 T = TypeVar("T")
 
 
@@ -158,7 +158,7 @@ def _readout(bench: Bench, sensor: SensorConfig, radiance: SpectralRadiance, exp
     """Compare the fast readout with the exact one."""
     calls = {name: _capture(bench, sensor, radiance, exposure_s, exact=name == "exact") for name in ("fast", "exact")}
     frames = time_calls(calls, bench.repeats + 1)
-    # The two draw different frames of the same statistics: only the mean over the frame can be compared.
+    # The two draw different frames with the same statistics, so that only the mean over the frame can be compared.
     means = {name: (float(raw.electrons.mean()), times) for name, (raw, times) in frames.items()}
     question = "Which readout? Error: of the frame's mean, whose own random error both frames have"
     noise_e = _noise_e(_electrons(radiance, sensor, exposure_s), sensor, exposure_s)
