@@ -18,17 +18,18 @@ from render.limits import PILOT_FROM
 from rodcone.memory import GB, Memory, memory
 from rodcone.progress import duration
 
-START_S = 1.3  # a process's imports
-_RENDER_S = 1.1e-6  # a pixel, sample and light group in 20 bands
+START_S = 1.3  # imports of a process
+_RENDER_S = 1.1e-6  # per pixel, sample and light group, in 20 bands
 _PATHS = 0.7  # share of it that doesn't grow with the bands
-_COMPILE_S = 0.3  # a band, where no kernel is kept on disk
-PILOT_SPP = 32  # samples per pixel of the pilot that goes before a long render
-# A fixed piece of work on the machine of these numbers: 2.2 times less than on one with AVX2, as `make test` is.
+_COMPILE_S = 0.3  # per band, if no kernel is stored on disk
+PILOT_SPP = 32  # samples per pixel of the pilot that a long render begins with
+# A fixed piece of work on the machine of these numbers. A machine with AVX2, as `make test` is measured on, takes 2.2
+# times as long.
 _WORK_S = 8.8e-3
-# A render of the same scene at another time, which is loaded and traced anew, and its light in each pixel, band and
-# group, which is kept and averaged.
+# Time that a render of the same scene at another moment adds: for loading and tracing it anew, and for storing and
+# averaging its light, per pixel, band and light group.
 _ANOTHER_S = 0.8, 1.2e-7
-# A pixel and band of an exposure behind a lens by data, whose places have images of their own: by 512 px.
+# An exposure behind a lens by data, which has different images at different places: per pixel and band, by 512 px.
 TABLE_S = 1.6e-6
 KERNELS = Path.home() / ".drjit"
 
@@ -79,7 +80,7 @@ class PictureCost:
     def memory(self) -> Memory:
         """Return the memory at the peak."""
         groups = self.groups if self.spp != 0 else 1
-        mean = int(self.times > 1)  # the light of the times that went before
+        mean = int(self.times > 1)  # the mean light of the earlier times
         return memory(
             self.pixels,
             self.bands,

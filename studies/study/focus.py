@@ -35,7 +35,7 @@ def in_focus(
     """
     camera = scene.geometry["sensor"]
     f_number = sensor.lens.f_number
-    thin_lens(camera, 1.0, focus_m)  # refuses a camera that has no angle of view
+    thin_lens(camera, 1.0, focus_m)  # raises an error for a camera without an angle of view
     view_deg = horizontal_view_deg(camera, size)
     if focal_length_mm is None:
         focal_length_mm = focal_length_of_view_mm(size[1] * sensor.site_pitch_um * 1e-3, view_deg, focus_m)

@@ -11,8 +11,8 @@ from sensor.raw import ISO_RANGE
 from studies.metrics.truth import light_in_bands, neutral_electrons
 
 ISO = "ISO"
-ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is 78 / exposure that saturates [lux s]
-_ROUNDING = 0.015  # a base speed of 51.56 is asked for as 51
+ISO_SATURATION_LUX_S = 78.0  # ISO 12232:2019: saturation-based speed is this over the saturating exposure [lux s]
+_ROUNDING = 0.015  # tolerance because users round: a base speed of 51.56 is asked for as 51
 
 
 def iso_speed(sensor: SensorConfig) -> float | None:

@@ -72,10 +72,10 @@ def parse_exposure(text: str, name: str = "exposures", least_s: float = 1e-9) ->
     return seconds
 
 
-LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # of `render.spectrum.flat`, black bodies and the sun's table
+LOWEST_NM, HIGHEST_NM = 300.0, 1100.0  # range of `render.spectrum.flat`, black bodies and the sun's table
 LEAST_RANGE_NM = 100.0  # the widest band that `RenderLimits.band_nm` takes
-# A light whose table ends short of the bands, at no more than this share of its peak, is taken as dark from there on;
-# white LEDs of the CIE end at 780 nm with 0.6 to 5 %.
+# A light whose table ends before the bands do counts as dark beyond it if its last value is at most this share of its
+# peak. White LEDs of the CIE end at 780 nm with 0.6 to 5 %.
 _RUN_OUT = 0.01
 
 

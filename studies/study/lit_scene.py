@@ -47,7 +47,7 @@ from studies.study.scene_source import (
 )
 from studies.study.study import OWN, SceneChoice, Study
 
-LIVE_SPP = 64  # of a render that is compared with a reference
+LIVE_SPP = 64  # samples per pixel of a render that is compared with a reference
 
 
 @dataclass(frozen=True)
@@ -119,7 +119,7 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
             ]
         )
         return OpenedScene(choice=choice, scene=None, size=(0, 0), identity=identity)
-    # a scene that is rendered
+    # A scene that is rendered.
     require_absent(f"for {choice.source!r}; allowed: with a photograph", spectra=choice.spectra)
     opened = _at(choice, None if choice.moments is None else 0.0)
     scene = opened.scene
@@ -137,10 +137,10 @@ def open_choice(choice: SceneChoice, study: Study) -> OpenedScene:
         check_frame(preset(name), size)
     if study.equal_area is not None:
         require_pixels(study.equal_area, study.sensors, size)
-    # as the lens sees it, and at its times
+    # The scene as the lens sees it, and at its times.
     scenes = [scene]
     whole_s = 0.0
-    if choice.moments is not None:  # the middle, and the times
+    if choice.moments is not None:  # the middle, then the times
         whole_s = _whole_s(study, size[0])
         scenes = [_at(choice, float(at_s)).scene for at_s in (whole_s / 2, *moments_s(whole_s, choice.moments))]
     if choice.focus_m is not None:

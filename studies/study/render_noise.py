@@ -18,15 +18,15 @@ from sensor.readings.resolve import PlainReading, resolve, unsaturated
 from sensor.readout import light_variance
 from sensor.response import channel_electrons, electrons_per_irradiance
 
-# What Monte Carlo noise may add to the sensor's own noise variance before it counts as part of the result, and for how
-# many of the pixels it has to hold: a few look at a lamp's rim or a caustic.
+# Share of the sensor's own noise variance that Monte Carlo noise may add without counting as part of the result; and
+# the share of pixels for which that has to hold, because a few see a lamp's rim or a caustic.
 MOST_SHARE = 0.03
 OF_PIXELS = 0.95
 
 SPECKLE = 5.0  # standard deviations of the sensor's noise: chance alone gives 1 pixel in 2 million
-FIRST_SPP = 128  # enough to tell how many more it takes
-MARGIN = 1.05  # on samples that the share so far asks for: it is an estimate
-MOST_GROWTH = 4.0  # of samples from one look to the next
+FIRST_SPP = 128  # samples per pixel that are enough to predict how many more are needed
+MARGIN = 1.05  # factor on the predicted number of samples, because it is an estimate
+MOST_GROWTH = 4.0  # largest factor on the samples from one prediction to the next
 
 
 def monte_carlo_share(
@@ -135,7 +135,7 @@ def render_share(
     time_s = auto_exposure_s(irradiance, sensor, longest_s) if exposure_s is None else exposure_s
     expected_e = np.moveaxis(channel_electrons(irradiance, sensor, time_s), -1, 0)
     variance = transport.relight_variance(luminance_cd_m2=luminance_cd_m2)
-    if samples > 1:  # the errors of a pixel's samples are independent
+    if samples > 1:  # because the errors of a pixel's samples are independent
         bands, height, width = variance.shape
         blocks = variance.reshape(bands, height // samples, samples, width // samples, samples)
         variance = blocks.mean(axis=(2, 4)) / samples**2
@@ -177,7 +177,7 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
     elif speckles is not None and speckles.size:
         spots = f"{speckles.size} pixels are speckles" if speckles.size > 1 else "1 pixel is a speckle"
         what = f"{spots}: the render's noise there is over {SPECKLE:g} times the sensor's"
-        factor = float(speckles.max()) / SPECKLE  # a sample's part of a pixel falls as their number grows
+        factor = float(speckles.max()) / SPECKLE  # because one sample's part of a pixel falls as their number grows
     else:
         return ""
     remedy = f"; {2 ** ceil(log2(spp * factor))} samples a pixel would do" if spp else ""

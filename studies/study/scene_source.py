@@ -33,7 +33,7 @@ _OTHER_FILES = {
     ".toml": "a study or a sensor, for rodcone sweep or --sensor",
 }
 
-_TIME = "time_s"  # what a scene that moves is asked by
+_TIME = "time_s"  # option or parameter that sets the time of a scene that moves
 
 _UPSAMPLED = {
     SURFACES: "reflectance of measured surfaces that looks like it (Otsu et al. 2018)",
@@ -133,7 +133,7 @@ _SMOOTH = (
     "its light is taken to be smooth within bands; of a lamp with lines bands of 20 nm lose up to 6 % so, which naming "
     "it as the light mends"
 )
-LIGHT = "D65"  # what sRGB takes for white, where nothing tells the light of the picture
+LIGHT = "D65"  # white of sRGB, for pictures that don't state their light
 
 
 @dataclass(frozen=True)

@@ -36,15 +36,15 @@ from studies.study.gain import at_gain, gain_text
 from studies.study.levels import check_known, check_rendered_range, parse_exposure, parse_level
 from studies.study.model import LensTerms
 
-OWN = "own"  # the spectrum that the scene's lights have
+OWN = "own"  # stands for the spectra of the scene's own lights
 MOST_FRAMES = 64
-# The neutral of the scene's light, as a camera notes it in its raw files, or Gray World from the picture.
+# The neutral of the scene's light, which a camera notes in its raw files; or Gray World, found in the picture.
 WHITE_BALANCES = AS_SHOT, GRAY_WORLD = "as-shot", "gray-world"
-PAPER_METHOD = "interleaved_paper"  # the processor to whose published method Gray World belongs
+PAPER_METHOD = "interleaved_paper"  # the processor whose published method includes Gray World
 _LISTS = ("scenes", "spectra", "levels", "exposures", "sensors", "white_balances", "processors", "frames", "seeds")
 _GAINS = ("gains", "isos")
 SPP = 1, 1 << 16, "give samples per pixel"
-# What a study's pictures hold: the cheapest model within the budget, or one of three starting points.
+# What a study's pictures model: the cheapest model within the budget, or one of three starting points.
 AUTOMATIC = "automatic"
 STARTING_POINTS = FAST, DEFAULT, REFERENCE = "fast", "default", "reference"
 FILES = (".xml", ".toml", *CURVES, *ENDINGS)  # endings of values that name a file
@@ -110,7 +110,7 @@ class SceneChoice:
         return label(self.chart or self.source) + lens + moving
 
     def __post_init__(self) -> None:
-        source: object = self.source  # from Python it may be a Path
+        source: object = self.source  # a Path if it comes from Python
         object.__setattr__(self, "source", str(source) if isinstance(source, Path) else source)
         require_fields(self)
         if self.focus_m is None and self.focal_length_mm is not None:
@@ -394,7 +394,7 @@ def _check_cameras(study: Study) -> None:
         if study.flicker:
             with in_place(f"sensor {label(name)}"):
                 check_flicker(replace(sensor, lens=study.lens.on(sensor.lens)))
-        # sensors of one size are compared at the coarsest's pixels
+        # Sensors of one size are compared in the pixels of the coarsest sensor.
         if study.sensor_side_um is None and sensor.sites != preset(study.sensors[0]).sites:
             raise InputError(
                 f"sensors: of {name!r} and {study.sensors[0]!r} one bins, so that its pictures are half as large; "
@@ -444,6 +444,6 @@ def _check_moments(study: Study) -> None:
             "render.noise_share": limits.noise_share,
             "render.max_seconds": limits.max_seconds,
             "render.denoise": limits.denoise,
-            "sensor_side_um": study.sensor_side_um if rolls else None,  # whose rows aren't the render's
+            "sensor_side_um": study.sensor_side_um if rolls else None,  # its rows aren't the render's
         },
     )

@@ -13,7 +13,7 @@ from studies.study.study import FILES, SceneChoice, Study
 
 _VALUES = {"levels": '"1lux" or "25cd/m2"', "exposures": '"10ms"'}
 EXAMPLES = Path(__file__).parents[1] / "configs"
-DEMO_STUDY = EXAMPLES / "demo.toml"  # that `rodcone demo` and `rodcone reference` start from
+DEMO_STUDY = EXAMPLES / "demo.toml"  # the study that `rodcone demo` and `rodcone reference` begin with
 MOST_SEEDS = 100_000
 
 
