@@ -15,7 +15,7 @@ from rodcone.types import Progress
 from studies.photograph.clock import noting_times
 
 Result = TypeVar("Result")
-LOOK_S = 0.2  # how often one who waits shows how far it is
+LOOK_S = 0.2  # seconds between two reports of progress while a caller waits
 
 
 class Spans:
@@ -56,7 +56,7 @@ class Ahead(Generic[Result]):
         self.share = 0.0
         self._error = float("inf")
         self._future: Future[Result] = Future()
-        # no worker of a pool, which Python waits for at its end: a second Ctrl-C leaves at once
+        # It is no pool's worker, for which Python would wait at its end: a second Ctrl-C ends the program at once.
         Thread(target=self._make, args=(call,), daemon=True).start()
 
     def _make(self, call: Callable[[Spans, Progress], Result]) -> None:

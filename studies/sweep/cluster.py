@@ -20,7 +20,7 @@ from studies.sweep.provenance import versions
 from studies.sweep.run_cell import run_cell
 from studies.sweep.workers import Task, run
 
-PATIENCE_S = 30.0  # for scheduler and workers to answer
+PATIENCE_S = 30.0  # time for scheduler and workers to answer
 
 
 @contextmanager

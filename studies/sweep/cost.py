@@ -22,15 +22,15 @@ from studies.study.study import REFERENCE, SceneChoice, Study, conditions, study
 from studies.sweep.database import FILE, made_with, read_results
 from studies.sweep.provenance import versions
 
-# Processor seconds on a server's cores with AVX-512, by 16 cells of the demo in one process.
-_SHARED_S = 7e-7  # a pixel and band of each image that cells share
-_READ_S = 3e-7  # a pixel and band of a picture file
-_PILOT_S = 6.0  # a scene's pilot render and the effects that a plan weighs on it
-_PICTURE_PILOT_S = 1.1  # of a picture file, which has nothing to render and is made smaller: by a resume of two
-_LIVE_SPP = 64  # samples of the render that is compared with a reference
-_CELL_S = 5e-6, 0.03  # a pixel's capture, metrics and files, and a cell of any size
-_FRAME_S = 5e-7, 0.02  # the same of a raw frame and its truth
-# Development of a pixel, and what its first calls take in each process, by what a processor's name holds.
+# Processor seconds on a server's cores with AVX-512, measured on 16 cells of the demo in one process.
+_SHARED_S = 7e-7  # per pixel and band of each image that cells share
+_READ_S = 3e-7  # per pixel and band of a picture file
+_PILOT_S = 6.0  # a scene's pilot render, and the effects that a plan computes from it
+_PICTURE_PILOT_S = 1.1  # the same for a picture file, which is only made smaller; measured by going on with two
+_LIVE_SPP = 64  # samples per pixel of the render that is compared with a reference
+_CELL_S = 5e-6, 0.03  # capture, metrics and files per pixel, and in a cell of any size
+_FRAME_S = 5e-7, 0.02  # the same for a raw frame and its truth
+# Development per pixel, and the first calls in each process, by words in a processor's name.
 _DEVELOP_S = (
     (("bm3d", "park"), 4e-5, 2.0),
     (("ple",), 5e-6, 2.2),
@@ -40,8 +40,8 @@ _DEVELOP_S = (
 _ANY_DEVELOP_S = 1e-6, 0.3
 _FIRST_S = 0.7  # first captures and metrics of a process
 _REPORT_S = 2.5, 0.05, 1e-4  # the report, each cell whose picture it shows, and each other cell
-SHOWN = 1000  # cells whose pictures a report shows: `studies.pages.report_sweep.MOST_CELLS`, slow to import
-_HALF_SIZE = 0.25  # pixels of half the size
+SHOWN = 1000  # cells whose pictures a report shows, `MOST_CELLS` of `report_sweep`, which is slow to import
+_HALF_SIZE = 0.25  # share of the pixels at half the width and height
 
 
 @dataclass(frozen=True)
@@ -179,7 +179,7 @@ def _memory(parts: Sequence[_Part], workers: int, *, ahead: bool) -> Memory:
     """
 
     def of(part: _Part, workers: int) -> Memory:
-        held = 2 if part.times else 0  # the middle's light, and the mean of the times that went before
+        held = 2 if part.times else 0  # the middle's light, and the mean light of the earlier times
         sizes = part.pixels, part.bands, part.groups, workers
         return memory(*sizes, spp=part.spp, denoised=part.denoised, held=held)
 
@@ -227,7 +227,7 @@ def _seconds(
         pixels, of_sensor = part.pixels * scale, part.sensor_pixels * scale
         light = render_seconds(1, part.bands, part.groups, part.spp) * pixels if part.spp else 0.0
         lights += min(light, study.render.max_seconds or light) * max(1, 2 * part.times)
-        exposed = len(study.exposures) if part.times else 1  # each reads its times and has images of its own
+        exposed = len(study.exposures) if part.times else 1  # each reads its times and forms its images
         of_light = pixels, part.bands, part.groups
         seconds += part.times * (another_s(*of_light) + exposed * averaged_s(*of_light))
         each = least_s + (pixel_s + sum(costs[0] for costs in own) / len(own)) * of_sensor

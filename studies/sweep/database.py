@@ -24,11 +24,11 @@ from studies.sweep.cells import RenderRecord
 from studies.sweep.row import AXES, Row
 from studies.sweep.stored import is_whole
 
-VERSION = 8  # of the tables; raise it with any change to them
-APPLICATION_ID = 0x726F6463  # "rodc": tells this file from other SQLite files
+VERSION = 8  # version of the tables; raise it with any change to them
+APPLICATION_ID = 0x726F6463  # "rodc", by which this file differs from other SQLite files
 FILE = "ledger.sqlite"
 _DAMAGED = (sqlite3.SQLITE_NOTADB, sqlite3.SQLITE_CORRUPT, sqlite3.SQLITE_ERROR, sqlite3.SQLITE_TOOBIG)
-_WAIT_S = 30.0  # for another process that writes: a row takes milliseconds
+_WAIT_S = 30.0  # time for another process to finish writing; a row takes milliseconds
 _TYPES: dict[Any, str] = {
     str: "TEXT NOT NULL",
     int: "INTEGER NOT NULL",
@@ -40,7 +40,7 @@ _HINTS = get_type_hints(Row)
 COLUMNS = tuple(field.name for field in fields(Row))
 _COLUMNS = ", ".join(f"cells.{name}" for name in (*COLUMNS, "digest"))
 _REAL = {name for name in COLUMNS if _HINTS[name] in (float, float | None)}
-_TEXT = partial(str, encoding="utf-8", errors="replace")  # of bytes that have changed; the digest then tells
+_TEXT = partial(str, encoding="utf-8", errors="replace")  # changed bytes don't stop the reader; the digest shows them
 _CREATE = (
     "CREATE TABLE cells ("
     + ", ".join(f"{name} {_TYPES[_HINTS[name]]}" + (" PRIMARY KEY" if name == "key" else "") for name in COLUMNS)
@@ -99,8 +99,8 @@ def read_results(folder: Path) -> Iterator[sqlite3.Connection]:
     path = folder / FILE
     if not path.is_file():
         raise InputError(f"{folder}: it holds no {FILE}; allowed: the folder of a sweep; run rodcone sweep first")
-    # SQLite reads the write-ahead log too, and makes one, which only a connection that may write takes away again.
-    # Where the folder can't be written and has no log, nobody else writes, and the file alone is read.
+    # SQLite also reads the write-ahead log, and it makes one that only a connection with the right to write removes. If
+    # the folder can't be written and has no log, nobody else writes, and the file alone can be read.
     log = path.with_name(f"{FILE}-wal")
     options = "mode=rw" if os.access(folder, os.W_OK) else "mode=ro" if log.exists() else "mode=ro&immutable=1"
     with _connected(path, options) as base:
@@ -119,11 +119,11 @@ def _connected(path: Path, options: str) -> Iterator[sqlite3.Connection]:
         with closing(sqlite3.connect(address, timeout=_WAIT_S, isolation_level=None, uri=True)) as base:
             base.text_factory = _TEXT
             yield base
-    except UnicodeDecodeError as error:  # SQLite quotes the damaged file in its message
+    except UnicodeDecodeError as error:  # SQLite's message quotes the damaged file
         raise InputError(f"{path}: it is no results database (its names are no text); move it away") from error
     except sqlite3.DatabaseError as error:
         code = getattr(error, "sqlite_errorcode", None)
-        if code is None:  # an error in our statement, not in the file
+        if code is None:  # the error is in our statement, not in the file
             raise
         if code & 0xFF in _DAMAGED:
             raise InputError(
@@ -142,7 +142,7 @@ def _check_whole(base: sqlite3.Connection, path: Path) -> None:
 def _prepare(base: sqlite3.Connection, path: Path) -> None:
     """Check the version, or make the tables, write ahead: readers don't wait, a killed writer leaves no half."""
     if not _has_tables(base, path):
-        base.execute("BEGIN IMMEDIATE")  # of two sweeps that start at once one makes the tables
+        base.execute("BEGIN IMMEDIATE")  # so that of two sweeps only one makes the tables
         if not _has_tables(base, path):
             for statement in _CREATE:
                 base.execute(statement)

@@ -99,13 +99,13 @@ def _harmless(value: object) -> Any:
     return f"'{value}" if isinstance(value, str) and value.startswith(_FORMULA) else value
 
 
-# A mean smaller than this is 0. So is an interval's half width smaller than this share of its mean: the seeds' figures
-# then differ by rounding alone.
+# A mean smaller than this counts as 0. So does an interval's half width smaller than this share of its mean, because
+# the seeds' figures then differ by rounding alone.
 SAME = 1e-6
-ELECTRONS = "electrons_"  # prefix of a channel's name: mean electrons of its pixels
+ELECTRONS = "electrons_"  # prefix of a channel's name, for the mean electrons of its pixels
 MOST_ROWS = 10_000  # rows in results.json, 2.5 kB each; a larger sweep is exported as CSV
 CHARTS = {"pair_delta_e": ("metamers", pair_delta_e), "daylight_delta_e": ("color_checker", daylight_delta_e)}
-TRUE_PAIRS = "true_pair_delta_e"  # of the light alone, whatever the camera
+TRUE_PAIRS = "true_pair_delta_e"  # a figure of the light alone, whatever the camera
 FIGURES = tuple(field.name for field in fields(Row) if "float" in str(field.type) or field.name == "substitution")
 
 
@@ -194,7 +194,7 @@ def _line(at: tuple[str, ...], group: Sequence[Row], folder: Path, show: Sequenc
     for name in show:
         figures = [_figure(row, name, folder) for row in group]
         values = [value for value in figures if value is not None]
-        whole = len(values) == len(figures)  # a mean over the seeds that happen to have the figure would be biased
+        whole = len(values) == len(figures)  # because a mean over only some of the seeds would be biased
         means.append(float(np.mean(values)) if whole else None)
         halves.append(float(half_width(np.array(values))) if whole and len(values) > 1 else None)
     return TableLine(at, tuple(means), tuple(halves))

@@ -192,7 +192,7 @@ def exposure_of(
     sensor = at_gain(frame.sensor, gain)
     if asked_s is not None:
         return asked_s, sensor
-    less = frame.sensor.gain / sensor.gain  # the frame's times fill the converter's range at its own gain
+    less = frame.sensor.gain / sensor.gain  # because the frame's times fill the converter's range at its own gain
     if exposure in (AUTO, AUTO_W):
         unit_s = frame.auto_s if exposure == AUTO else frame.auto_w_s
         return amplified(sensor, less * at_level_s(unit_s, luminance_cd_m2, exposure, frame.sensor), longest_s)

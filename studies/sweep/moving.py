@@ -15,8 +15,8 @@ from studies.study.lit_scene import OpenedScene, make_transport
 from studies.study.model import RenderModel
 from studies.study.study import SPP, Study
 
-_MOMENT = 0x7473  # parts the paths of the times from the middle's
-_LEAST_SHARE = 1e-9  # of a time that a row takes, beyond rounding
+_MOMENT = 0x7473  # makes the paths of the times differ from the middle's
+_LEAST_SHARE = 1e-9  # share of a row at or below which a time doesn't count, because it is rounding
 
 
 @dataclass(frozen=True)

@@ -49,7 +49,7 @@ from studies.sweep.frames import UnitFrame, colours_under, frame_key, kept_expos
 from studies.sweep.moving import MovingLight, part_of
 from studies.sweep.provenance import provenance, versions
 
-# Folders beside the results database: the fourth of a plan's renders, the last two of a data set's planes and shards.
+# Folders beside the results database: the fourth holds a plan's renders, the last two a data set's planes and shards.
 FOLDERS = RENDERS, FRAMES, PICTURES, PILOTS, PLANES, SET = "renders", "frames", "pictures", "pilots", "planes", "set"
 FELL_BACK = ("Neither LLVM nor CUDA answered: captures and the reconstruction ran their NumPy forms.",)
 
@@ -85,7 +85,7 @@ class StageClock(Protocol):
         """Add the seconds of the ``with`` block to a stage."""
 
 
-# What a frame belongs to: spectrum, sensor, modelled lens, exposure of a scene that moves (else none) and mosaic.
+# What identifies a frame: spectrum, sensor, modelled lens, exposure of a scene that moves (else empty), and mosaic.
 Imaged = tuple[str, str, LensConfig, str, str]
 Sensors = tuple[SensorConfig, SensorConfig]
 
@@ -166,7 +166,7 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
             transport, assumed = moments.middle(part_of(progress, 0, 2))
             content, seconds = moments.content(transport, part_of(progress, 1, 2))
     with clock.stage("what cells share"), warnings.catch_warnings():
-        if job.plan.ledgers:  # they charge the error within bands
+        if job.plan.ledgers:  # the plan's ledgers charge the error within bands
             warnings.simplefilter("ignore", WideBandsWarning)
         facts = render_facts(transport, photographed(transport, 1.0))
         if moments is None:
@@ -279,7 +279,7 @@ def _make_files(
 
 def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | None:
     """Return the cells of a scene whose files are there, without their colours; None where a file is missing."""
-    # Frames that the cells share, by what they image.
+    # Frames that the cells share, by what identifies them.
     frames = dict[Imaged, UnitFrame]()
     for imaged, sensors in _imaged(job, opened).items():
         key = frame_key(record.content, opened, imaged[0], job.study, *sensors, imaged[-2])
@@ -287,7 +287,7 @@ def _cells(job: Job, opened: OpenedScene, record: RenderRecord) -> list[Cell] | 
         if frame is None:
             return None
         frames[imaged] = frame
-    # Processors, balances and seeds share exposures: of each frame, by rule and gain, one for each level.
+    # Processors, balances and seeds share exposures: each frame has one per rule, gain and level.
     exposures = dict[tuple[str, str, str], list[tuple[float, SensorConfig]]]()
     cells = []
     lamps = waveform(job.study.flicker) if job.study.flicker else None

@@ -16,12 +16,12 @@ from rodcone.jit import backend, compiler_version, dr
 from studies.sweep.row import Row
 
 ROOT = Path(__file__).resolve().parents[2]
-_WHOLE = ("rodcone", "render", "scenes", "sensor", "isp")  # beside `studies`, all of them decide a picture
-# Of `studies` what making a frame and running a cell import; the other modules only ask, store and show.
+_WHOLE = ("rodcone", "render", "scenes", "sensor", "isp")  # packages of which everything decides a picture
+# Modules of `studies` which, with what they import, make frames and run cells. The others only ask, store and show.
 _DECIDING = ("studies.sweep.run_cell", "studies.sweep.frames")
-_CODE = (".py", ".toml", ".csv", ".json", ".npz")  # code, and the tables and priors that it takes
-# An import of something in `studies` where a line begins, found in the text: a syntax tree takes twenty times as long.
-# What else such a line may be, in a docstring, names no module, or one more that decides.
+_CODE = (".py", ".toml", ".csv", ".json", ".npz")  # code, and the tables and priors that it reads
+# Imports of modules of `studies` at the beginning of a line, searched in the text because a syntax tree takes twenty
+# times as long. A line of a docstring that looks like an import names no module, or one module too many.
 _IMPORTS = re.compile(
     r"^[ \t]*(?:from[ \t]+(studies[\w.]*)[ \t]+import[ \t]*(\([^)]*\)|[^\n]*)|import[ \t]+(studies[\w.]*))",
     re.MULTILINE,
@@ -49,7 +49,7 @@ def deciding_modules(root: Path = ROOT, names: Sequence[str] = _DECIDING) -> lis
     while waiting:
         name = waiting.pop()
         path = root.joinpath(*name.split(".")).with_suffix(".py")
-        if not path.is_file() or path in paths:  # a package, which decides nothing, or a name within a module
+        if not path.is_file() or path in paths:  # a package decides nothing, and some names are functions
             continue
         paths.add(path)
         for module, names_within, whole in _IMPORTS.findall(path.read_text("utf-8")):

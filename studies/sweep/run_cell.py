@@ -58,7 +58,7 @@ def run_cell(cell: Cell) -> Row:
     electrons, true_linear, errors = (read_array(path) for path in (frame.electrons, frame.truth, frame.errors))
     unmoved_e = np.asarray(electrons, dtype=np.float64) * light
     expected_e = behind_filters(unmoved_e, sensor) if sensor.lens.shake_um else unmoved_e
-    # A truth of photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
+    # A truth in photodiodes is binned as the sensor bins. With `sensor_side_um` it has the coarsest sensor's pixels.
     bins_truth = sensor.sites > 1 and true_linear.shape[:2] == expected_e.shape
     truth, truth_png = _true_picture(frame.truth, bins_truth)
     pixels_e = sensor.pixel_sums(expected_e)
@@ -83,14 +83,14 @@ def run_cell(cell: Cell) -> Row:
     raw, capture_s, first_capture_s = timed(burst, *("capture", engine, stated["sensor"], shape, frames))
     # Develop to linear sRGB in which white is 1.
     saturated = raw.saturated
-    # The neutral of the scene's light, as a raw file would note it, sets the scale; as shot, the balance too.
+    # The neutral of the scene's light, which a raw file would note, sets the scale, and as shot also the balance.
     neutral = neutral_electrons(sensor, frame.light, raw.exposure_s)
     options = {"balance": neutral} if stated["white_balance"] == AS_SHOT else {}
     (linear, picture), develop_s, first_develop_s = timed(
         lambda: develop_to_scale(raw, processor, cell.fit, sensor, neutral, cell.white_cd_m2, **options),
-        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # each has other kernels
+        *("develop", cell.processor, shape, bool(saturated.any()), bool(saturated.all())),  # they choose kernels
     )
-    if linear.shape != truth.linear.shape:  # of sensors of one size: compared at the coarsest's pixels
+    if linear.shape != truth.linear.shape:  # sensors of one size are compared in the coarsest's pixels
         linear = area_average(linear, truth.linear.shape[:2])
     encoded = encode_srgb(linear)
     # Measure.
@@ -136,7 +136,7 @@ def run_cell(cell: Cell) -> Row:
     )
 
 
-@lru_cache(maxsize=2)  # cells of one scene under one spectrum follow each other
+@lru_cache(maxsize=2)  # because cells of one scene and spectrum follow each other
 def _true_picture(path: Path, binned: bool) -> tuple[TruePicture, bytes]:
     """Return the true picture, binned by 2x2 pixels if the camera bins, and its PNG."""
     linear = np.array(read_array(path))

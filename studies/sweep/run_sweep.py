@@ -53,7 +53,7 @@ from studies.sweep.prepare import (
 from studies.sweep.row import Row
 from studies.sweep.workers import InThisProcess, run
 
-MARKER = ".rodcone-sweep"  # locked by each sweep at work: the lock ends with its process, however that ends
+MARKER = ".rodcone-sweep"  # file that each sweep at work locks; the lock ends with its process, however that ends
 
 
 @contextmanager
@@ -98,10 +98,10 @@ def _remove_half_written(out: Path) -> None:
                     path.unlink(missing_ok=True)
 
 
-# Such as `partial(studies.sweep.workers.run_in_processes, workers=4)`.
+# Runs cells and yields their rows, as `partial(studies.sweep.workers.run_in_processes, workers=4)` does.
 Runner = Callable[[Sequence[Cell]], Generator[Row, None, None]]
-NOTE_S = 1.0  # of a killed run's seconds so many are lost; to note them with every row costs a write each
-RENDER_SHARE = 0.5  # of the progress bar that a scene's render takes; how long it takes isn't known before
+NOTE_S = 1.0  # seconds of a run that a kill may lose; noting them with every row would cost a write each
+RENDER_SHARE = 0.5  # share of the progress bar for a scene's render, whose time isn't known before
 
 
 @dataclass(frozen=True)
@@ -231,7 +231,7 @@ def _scenes(
             elif cells is None:
                 cells = scene_cells(job, opened, rendered)
             if index + 1 < len(scenes):
-                following = known[index + 1] or known_cells(job, scenes[index + 1])  # it may be of one just made
+                following = known[index + 1] or known_cells(job, scenes[index + 1])  # it may just have been made
                 if ahead and following is None:
                     coming = Ahead(partial(make_scene, job, scenes[index + 1]))
             shares.coming = coming
@@ -246,7 +246,7 @@ class Shares:
 
     def __init__(self, step: Step, count: int) -> None:
         self._step, self._count = step, count
-        self.coming: Ahead[Any] | None = None  # the next scene, while cells are made
+        self.coming: Ahead[Any] | None = None  # the next scene, made beside the cells
 
     def rendered(self, index: int, share: float, error: float) -> None:
         """Show how far the render of a scene is that is waited for."""
@@ -286,7 +286,7 @@ def _run(job: Job, run: int, missing: Sequence[Cell], runner: Runner, part: Step
             seconds[f"develop {row.processor}"] += row.develop_s or 0.0
             seconds["metrics"] += row.measure_s or 0.0
             seconds[FIRST] += row.first_s
-            # as wall time: the workers work at the same time
+            # Divided to wall time, because the workers work at the same time.
             on_the_clock.update((name, value / len(workers)) for name, value in seconds.items())
             if time.monotonic() - noted_s >= NOTE_S:
                 noted_s = time.monotonic()

@@ -22,13 +22,13 @@ from studies.sweep.run_cell import run_cell
 
 MOST_WORKERS = 1024
 LEAVE_S = 10.0  # time for an idle worker to end, while libraries release threads and memory
-MOST_DEATHS = 3  # a cell is given up after it was held by so many workers that died; the last two ran it alone
-# What BLAS libraries and OpenMP read at their import: set before a worker starts.
+MOST_DEATHS = 3  # a cell is given up after so many workers died while they held it; the last two ran it alone
+# Variables that BLAS libraries and OpenMP read when they are imported; they are set before a worker starts.
 _THREAD_VARIABLES = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "NUMEXPR_NUM_THREADS")
-# What glibc comes to by itself once 32 MB were freed at once. Arrays of a small frame lie just above its first bounds:
-# a new worker would ask the system for each of them anew, a fifth of its time.
+# The settings to which glibc adapts once 32 MB were freed at once. Arrays of a small frame are just larger than its
+# initial limits: a new worker would ask the system for memory for each of them, which takes a fifth of its time.
 _ALLOCATION = {"MALLOC_MMAP_THRESHOLD_": str(1 << 25), "MALLOC_TRIM_THRESHOLD_": str(1 << 26)}
-# After a kill, multiprocessing's own process removes the semaphores, and would warn that it did.
+# After a kill, multiprocessing's own process removes the semaphores, and would print a warning about it.
 _QUIET_TRACKER = "ignore:resource_tracker:UserWarning"
 
 
@@ -254,7 +254,7 @@ def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
     others = active_children()
     with _inherited(threads):
         pool = ProcessPoolExecutor(workers, multiprocessing.get_context("spawn"), _begin)
-        for _ in range(workers):  # each submission starts one, as none is idle yet
+        for _ in range(workers):  # each submission starts one process, because none is idle yet
             pool.submit(cores)
     impatience = threading.Timer(LEAVE_S, _end, ([process for process in active_children() if process not in others],))
     try:
@@ -268,7 +268,7 @@ def _pool(workers: int, threads: int) -> Iterator[ProcessPoolExecutor]:
 def _end(processes: Sequence[BaseProcess]) -> None:
     """End workers that can't leave: one killed while it held the queue's lock leaves it locked for the others."""
     for process in processes:
-        with suppress(ProcessLookupError):  # gone just now
+        with suppress(ProcessLookupError):  # it has just ended
             process.kill()
 
 
