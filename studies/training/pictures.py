@@ -27,11 +27,11 @@ Planes = NDArray[np.float32]
 Places = tuple[NDArray[np.intp], NDArray[np.intp]]
 
 CHANNELS = ("R", "G", "B", "W")
-# Of scikit-image's wheel, without a download. Public domain: astronaut (NASA), coins (Brooklyn Museum), rocket
-# (SpaceX). CC0: camera (L. Varshney), chelsea (S. van der Walt), coffee (R. Michetti), brick and gravel (CC0Textures),
-# grass (D. A. Nash's, linearlabs).
+# Photographs in scikit-image's wheel, which need no download. Public domain: astronaut (NASA), coins (Brooklyn Museum),
+# rocket (SpaceX). CC0: camera (L. Varshney), chelsea (S. van der Walt), coffee (R. Michetti), brick and gravel
+# (CC0Textures), grass (D. A. Nash's, linearlabs).
 PHOTOGRAPHS = ("astronaut", "camera", "chelsea", "coffee", "coins", "rocket", "brick", "grass", "gravel")
-# Ends and middles of what `draw_light` draws; D65 first.
+# The ends and middles of the ranges from which `draw_light` draws, with D65 first.
 LIGHTS = (
     "D65",
     "D4000K",
@@ -45,11 +45,11 @@ LIGHTS = (
     "sodium_low",
 )
 KINDS = ("leaves",) * 20 + ("gratings",) * 10 + PHOTOGRAPHS
-UNKNOWN = 6  # of so many pictures one whose light the camera doesn't know
+UNKNOWN = 6  # one picture in so many has a light that the camera doesn't know
 SIDE = 256  # pixels of a generated picture
 NM = np.arange(385.0, 780.0, 10.0)
-_FINE = 3  # samples a pixel and direction, which pixels then average
-_DARKEST = 2e-3  # of white
+_FINE = 3  # samples per pixel along each side, which are averaged
+_DARKEST = 2e-3  # share of white
 
 
 @dataclass(frozen=True)

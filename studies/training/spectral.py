@@ -31,9 +31,9 @@ from studies.training.train import cut_patches, fit_prior, training_provenance
 
 BANDS, COEFFICIENTS, DIRECTIONS = 20, 8, 144
 KINDS_OF = {"drawn": KINDS, "photographs": 3 * PHOTOGRAPHS}
-QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # middles of five equal parts
+QUANTILES = (0.1, 0.3, 0.5, 0.7, 0.9)  # the middles of five equal parts
 _SURFACES = 6000
-_LEAST_REFLECTANCE = 5e-3  # of a patch in the mean: darker ones are grain
+_LEAST_REFLECTANCE = 5e-3  # mean of a patch below which it is mostly grain, and doesn't count
 
 
 def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
@@ -51,7 +51,7 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
     to_bands = np.repeat(np.eye(BANDS), len(NM) // BANDS, axis=1) * BANDS / len(NM)
     rng = np.random.default_rng([seed, 1])
     surfaces = np.stack([draw_surface(rng) for _ in range(_SURFACES)]) @ to_bands.T
-    # Of mean square 1, so that coefficients are of the size of reflectances.
+    # Scaled to a mean square of 1, so that coefficients are about as large as reflectances.
     spectra = np.linalg.svd(surfaces, full_matrices=False)[2][:COEFFICIENTS].T * np.sqrt(BANDS)
     edges_nm = np.linspace(380.0, 780.0, BANDS + 1)
     middle_nm = (edges_nm[1:] + edges_nm[:-1]) / 2
@@ -98,7 +98,7 @@ def photographs_reflectances() -> NDArray[np.float64]:
         encoded = getattr(data, name)() / 255.0
         linear = decode_srgb(encoded)
         luminance = luminance_of_srgb(linear) if linear.ndim == 3 else linear
-        side = 2 * PATCH  # training halves the photographs
+        side = 2 * PATCH  # because training halves the photographs
         height, width = (size // side * side for size in luminance.shape)
         blocks = luminance[:height, :width].reshape(height // side, side, width // side, side).mean(axis=(1, 3))
         by_photograph.append(np.quantile(blocks[blocks > _LEAST_REFLECTANCE], np.linspace(0.0, 1.0, 1001)))

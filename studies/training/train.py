@@ -113,7 +113,7 @@ def _expect_and_maximise(reduced: Matrix, parts: Matrix) -> tuple[Matrix, Matrix
             part = parts[members_of, k, None]
             centres[k] = (part * reduced[members_of]).sum(axis=0) / members[k]
             off = reduced[members_of] - centres[k]
-            # The covariance of a component of few patches is drawn towards 0, because they can't determine it.
+            # The covariance of a component with few patches is drawn towards 0, because they can't determine it.
             covariance = ((off * part).T @ off).astype(np.float64) / (members[k] + size)
             factors[k] = np.linalg.cholesky(covariance + _FLOOR * np.eye(size))
             inverse = np.linalg.inv(factors[k].astype(np.float64)).astype(np.float32)
