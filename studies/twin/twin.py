@@ -29,10 +29,10 @@ from sensor.emva1288.from_frames import (
 )
 from sensor.pixel import PixelConfig
 
-APART = 0.01  # probability under which two samples are told apart, over all tests of one kind
-LEAST_BENT = 4  # lights from which the response's bend is fitted
-MOST_BENT = 0.3  # bend that is looked for
-SIMULATED_UM = 5.0  # pitch of the simulated pixel, which light given in electrons doesn't ask for
+APART = 0.01  # level of significance at which two samples are told apart, for all tests of one kind together
+LEAST_BENT = 4  # least number of lights to which the response's bend is fitted
+MOST_BENT = 0.3  # largest bend that is tried
+SIMULATED_UM = 5.0  # pitch of the simulated pixel, which doesn't matter for light given in electrons
 
 
 @dataclass(frozen=True)
@@ -161,7 +161,7 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
     numbers = _with_patterns(frame_numbers(figures, [Path(name)]), figures, response, dark_dn, bright_dn)
     sensor = _sensor(numbers, figures)
 
-    # The same lights with the twin
+    # The same lights with the twin.
     rng = np.random.default_rng([seed, 1])
     device = draw_device(sensor, mean[True].shape, np.random.default_rng([seed, 0]))
     range_dn = figures.white_dn - figures.black_dn
@@ -177,7 +177,7 @@ def twin_of(frames: FrameSet, name: str, seed: int = 0) -> Twin:
     light_e = surface / surface.mean() * response.light_e(signal.mean(), range_dn)
     twin_bright = _taken(light_e, sensor, device, rng, len(bright_dn))
 
-    # Figures of both
+    # Figures of both.
     camera_dn2 = np.array([point.variance_dn2.mean() for point in points])
     twin_dn2 = np.array([np.mean([site.variance_dn2 for site in stack.sites]) for stack in stacks])
     both = list(zip(points, stacks, strict=True))
@@ -371,6 +371,6 @@ def _of_pair(kind: str, camera: Sequence[NDArray[Any]], twin: Sequence[NDArray[A
         ("row noise", [float(np.std(flicker.mean(axis=1), ddof=1)) for flicker in flickers], height),
     )
     for name, (of_camera, of_twin), samples in parts:
-        # Two standard deviations of `samples` draws each: sqrt(2 / (2 samples)) of their ratio.
+        # The relative error of the ratio of two standard deviations of `samples` draws each is sqrt(2 / (2 samples)).
         found.append(_compared(name, f"in {kind} frames", of_camera, of_twin, sqrt(1 / samples), 2))
     return found
