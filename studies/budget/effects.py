@@ -97,11 +97,11 @@ def find_effects(
         The pilot, in fine bands.
     sensor : SensorConfig
     lens : LensConfig
-        With everything that the reference models.
+        The lens with everything that the reference models.
     groups : mapping of int to sequence of index arrays
         Choices of wide bands, as `studies.budget.bands.band_groups` makes them.
     rng : numpy.random.Generator
-        For the draws of Monte Carlo noise.
+        Generator for the draws of Monte Carlo noise.
     """
     halves = transport.relight_halves(luminance_cd_m2=1.0)
     bare = replace(sensor, lens=without_terms(lens, IMAGING_TERMS.values()))

@@ -126,7 +126,7 @@ class Plan:
     shares : mapping of Condition to float
         Share of the sensor's own noise variance that the model is predicted to add.
     ledgers : tuple of Ledger
-        What each share is made of, for each condition and mosaic.
+        The parts of each share, for each condition and mosaic.
     summary : tuple of str
         A paragraph for each scene: what is left out, what that costs and what it saves.
     """

@@ -44,7 +44,7 @@ class Pilot:
     opened : OpenedScene
     transport : Transport
     groups : mapping of int to sequence of index arrays
-        By each number of bands that a model may have, the fine bands that make each of them.
+        The fine bands that make each wide one, by each number of wide bands that a model may have.
     """
 
     opened: OpenedScene

@@ -95,7 +95,7 @@ def scale_effects(
     mosaic : str
     sensor : SensorConfig
     effects : Effects
-        At 1 cd/m^2 and 1 s.
+        Effects at 1 cd/m^2 and 1 s.
     level_cd_m2, exposure_s : float
     pilot : PilotNoise
     """

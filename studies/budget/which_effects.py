@@ -20,7 +20,7 @@ def effects_left_out(
     Parameters
     ----------
     rows : sequence of ScaledEffects
-        Of the sensors and mosaics that are compared with each other, so that all of them have one lens.
+        Effects on the sensors and mosaics that are compared with each other, so that all of them have one lens.
     count, bands : int
         Number of bands as it is asked for, and as it is with the lines of lamps.
     shares : BudgetShares
