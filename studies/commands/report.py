@@ -74,7 +74,7 @@ def write_results(folder: Path) -> Path:
     Raises
     ------
     InputError, OSError
-        As `write_report`.
+        As for `write_report`.
     """
     run = last_run(folder)
     page = render_report(*sweep_report(folder, run=run))
@@ -98,7 +98,7 @@ def write_report(
     Raises
     ------
     InputError
-        As `studies.pages.report_sweep.sweep_report`.
+        As for `studies.pages.report_sweep.sweep_report`.
     OSError
         Where the file can't be written.
     """

@@ -177,7 +177,7 @@ def make_all(
     clock : Clock
         Started when the run was.
     ahead : bool
-        As `studies.sweep.run_sweep.sweep` takes it.
+        As in `studies.sweep.run_sweep.sweep`.
 
     Returns
     -------

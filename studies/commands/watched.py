@@ -25,12 +25,12 @@ def survive_sudden_end(arguments: Sequence[str]) -> None:
     Parameters
     ----------
     arguments : sequence of str
-        Of the command line.
+        Arguments of the command line.
 
     Raises
     ------
     MemoryError
-        Where a signal ended the child that no person sends; it names the render that is kept.
+        If a signal that no person sends ended the child; the message names the render that is kept.
     """
     limited = resource.getrlimit(resource.RLIMIT_AS)[0] != resource.RLIM_INFINITY
     if not arguments or arguments[0] not in COMMANDS or not (limited or "--force" in arguments):
