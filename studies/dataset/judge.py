@@ -63,7 +63,7 @@ class Score:
         Sensor, mosaic, light and exposure.
     level : str
     developer : str
-        Whose pictures; a processor of the project's own goes by its name.
+        Whoever made the pictures; the project's own processors go by their names.
     luminance_cd_m2 : float
     scenes : int
     means, halves : dict of str to float
@@ -93,7 +93,7 @@ def judge(pictures: Path, out: Path, developer: str, runner: Runner) -> tuple[Ro
     developer : str
         Name of whoever made the pictures.
     runner : callable
-        As `make_set` takes it.
+        As in `make_set`.
 
     Raises
     ------

@@ -54,11 +54,11 @@ def make_set(
         Folder; renders and frames stay in it, where a sweep of the same study finds them.
     order : SetOrder
     command : str
-        That makes the set, for manifest and card.
+        Command that makes the set, for manifest and card.
     runner : callable
-        Takes shards and ``make``, gives what `studies.dataset.shards.make_shard` returns as it comes.
+        Function of shards and ``make`` that yields the results of `studies.dataset.shards.make_shard` as they come.
     step : callable, optional
-        Called with what is being done and the share that is done.
+        Function that is called with what is being done and the share that is done.
 
     Returns
     -------

@@ -64,9 +64,9 @@ class Sample:
     cell : Cell
         The frame. Its processor and white balance don't matter.
     mosaic : str
-        As `sensor.presets.vary` takes it.
+        Mosaic as in `sensor.presets.vary`.
     scene_hash : str
-        Of the scene's shapes, whatever its light.
+        Hash of the scene's shapes, whatever its light.
     split : str
     files : mapping of str to Path
         Array of the whole frame that each of its `TRUTH` is cut from; electrons are at 1 cd/m^2 and 1 s, XYZ at
@@ -195,9 +195,9 @@ def scene_facts(job: Job, opened: OpenedScene, cells: Sequence[Cell], progress: 
     Parameters
     ----------
     cells : sequence of Cell
-        Of the scene, with their frames.
+        Cells of the scene, with their frames.
     progress : callable
-        As of `studies.sweep.prepare.scene_transport`.
+        As in `studies.sweep.prepare.scene_transport`.
 
     Returns
     -------

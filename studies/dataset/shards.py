@@ -46,9 +46,9 @@ class Shard:
         `shard_key` of its samples.
     path : Path
     samples : tuple of Sample
-        That it is made from; none of one that is made.
+        Samples from which the shard is made; empty for one that is made already.
     lines : sequence of dict
-        In the manifest, once it is made: its own line, then one a sample.
+        Lines in the manifest, once the shard is made: its own line, then one per sample.
     """
 
     key: str
