@@ -129,7 +129,7 @@ def python_of(render: str, controls: Controls, view: str = "picture") -> str:
         Lines that make `transport` (`studies.explore.source.RenderState`), or `studies.explore.source.GIVEN`.
     controls : Controls
     view : str
-        Of `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
+        Name in `studies.explore.views.VIEWS`, ``histogram``, or ``pixel ROW COLUMN``.
     """
     settings = to_json(controls)
     defaults = to_json(Controls())

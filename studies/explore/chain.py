@@ -66,9 +66,9 @@ class Exposure:
     ----------
     sensor : SensorConfig
     transport : Transport
-        With the lamps' spectra and powers.
+        The transport with the lamps' spectra and powers.
     light : Light
-        That the camera's colours are set to.
+        The light that the camera's colours are set to.
     scale : float
         Factor from the lamps' own powers to the level.
     white_at_own_cd_m2 : float
@@ -76,13 +76,13 @@ class Exposure:
     frames : mapping of str to GroupFrame
         Light groups that shine, at power 1.
     exposure_s : float
-        Of each frame of the burst.
+        Exposure time of each frame of the burst.
     expected_e : (h, w) float64
         Photo-electrons of one frame, without dark current.
     device : Device
     raw : RawImage
     shot_noise : bool
-        Of `Controls`.
+        As in `Controls`.
     iso : float or None
         Saturation-based speed at the gain of the exposure; None of a camera that has none.
     """

@@ -72,7 +72,7 @@ class Controls:
     Attributes
     ----------
     lamps : mapping of str to Lamp
-        By light group; groups that are left out stay as they are.
+        Lamps by light group; groups that are left out stay as they are.
     level_cd_m2 : float
         Mean luminance of the scene.
     reference_light : str
@@ -80,7 +80,7 @@ class Controls:
     exposure : str
         A rule of `sensor.exposure.RULES`, or ``time``.
     exposure_s : float
-        Where `exposure` is ``time``; else the longest that the rule may choose.
+        Exposure time where `exposure` is ``time``; else the longest time that the rule may choose.
     sensor : str
         A preset's name, or a ``.toml`` file.
     mosaic : str
@@ -90,7 +90,7 @@ class Controls:
     lens_table : str
         A shipped lens by data (`sensor.lens.table.shipped`) in front of the sensor, or ``own``, the sensor's own.
     bits : int or None
-        Of the converter; None takes the preset's.
+        Bits of the converter; None takes the preset's.
     gain : float or None
         Between pixel and converter; None takes the preset's, which an automatic exposure may raise.
     iso : float or None
@@ -98,15 +98,15 @@ class Controls:
     shot_noise : bool
         Whether light and dark current come as Poisson counts; False, which no camera does, takes their means.
     processor : str
-        Of `isp.processors.catalogue.PROCESSORS`.
+        Name in `isp.processors.catalogue.PROCESSORS`.
     settings : mapping of str to float
         Fields of `isp.settings.Settings` (`SETTINGS`) that differ from the processor's.
     white_balance : str
-        Of `studies.study.study.WHITE_BALANCES`.
+        Name in `studies.study.study.WHITE_BALANCES`.
     seed : int
-        Of the chip's patterns and of the exposures' noise.
+        Seed of the chip's patterns and of the exposures' noise.
     exposure_number : int
-        Which exposure of that chip: each has noise of its own.
+        Number of the exposure among those of that chip; each has noise of its own.
     frames : int
         Exposures of a burst, merged into one (`sensor.burst.merged_raw`).
     flicker_depth, flicker_hz : float

@@ -24,7 +24,7 @@ class Memo:
     Attributes
     ----------
     check : callable
-        Called before each stage; raises `Overtaken` where nobody waits for the result.
+        Function that is called before each stage; raises `Overtaken` where nobody waits for the result.
     """
 
     check: Callable[[], None] = never_cancel

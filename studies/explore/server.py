@@ -53,7 +53,7 @@ def make_app(session: Session, port: int, token: str) -> App:
     ----------
     session : Session
     port : int
-        That the server listens on: part of the host and origin that are let in.
+        Port that the server listens on; part of the host and origin that are let in.
     token : str
         First part of every path.
     """
@@ -201,7 +201,7 @@ def explore(transport: Transport) -> Any:
     Parameters
     ----------
     transport : Transport
-        As `rodcone.render` gives it.
+        As `rodcone.render` returns it.
 
     Returns
     -------

@@ -47,11 +47,11 @@ def begin(
     Parameters
     ----------
     name : str
-        Of the processor.
+        Name of the processor.
     development : callable
-        As `studies.explore.chain.development_of` gives it.
+        As `studies.explore.chain.development_of` returns it.
     report : callable
-        Called in a thread of its own with what came of it; not where it was ended.
+        Function that is called with the result in a thread of its own, unless the process was ended.
     """
     process = subprocess.Popen(
         [sys.executable, "-c", _RUN], stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=safe_environment()

@@ -53,11 +53,12 @@ class Source:
     ----------
     title : str
     states : callable
-        Gives `RenderState` ones, coarse to fine; calls its argument between two runs, which ends the render by raising.
+        Function that yields `RenderState` objects, coarse to fine. It calls its argument between two runs of the
+        render, which ends the render by raising an error.
     groups : mapping of str to bool
         Light groups, and whether one has colours of its own.
     notes : tuple of str
-        What had to be assumed.
+        Notes on what had to be assumed.
     """
 
     title: str
@@ -180,7 +181,8 @@ def load_transport(path: str | Path, light: str = LIGHT, *, size: tuple[int, int
     light : str
         Illuminant of reflectances, which other lamps may replace; radiance has its light in it.
     size : (int, int) or int, optional
-        Of a scene's light: height and width in pixels, or the longer side, to which it is averaged; left out, its own.
+        Size of a scene's light: height and width in pixels, or the longer side, to which it is averaged; left out, the
+        light's own size.
 
     Raises
     ------

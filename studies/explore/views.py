@@ -102,7 +102,7 @@ def explorer_view(transport: Transport, view: str = "picture", **controls: objec
     Parameters
     ----------
     transport : Transport
-        As `rodcone.render` or `rodcone.load_transport` gives it.
+        As `rodcone.render` or `rodcone.load_transport` returns it.
     view : str
         ``picture``, ``truth``, ``raw``, ``noise``, ``luminance error``, ``colour error``, ``flip``, ``snr``;
         ``histogram`` or ``pixel ROW COLUMN``.
