@@ -83,9 +83,9 @@ class TruePicture:
     eye_lab : (h, w, 3) float64
         CIELAB after the eye's blur.
     seen : Seen
-        What FLIP needs of it.
+        Quantities of the picture that FLIP compares.
     moments : LocalMoments
-        What SSIM needs of it.
+        Quantities of the picture that SSIM compares.
     """
 
     linear: Image
@@ -107,7 +107,7 @@ class Appearance:
     flip_mean : float
         0 (no difference) to 1.
     pu21_psnr_db : float
-        Of luminance in cd/m^2.
+        PSNR of luminance in cd/m^2, on PU21's scale.
     """
 
     s_cielab_median: float

@@ -27,13 +27,13 @@ class Blemishes:
     Attributes
     ----------
     spots : int
-        Of a hue that no truth within a pixel has.
+        Pixels of a hue that no truth within a pixel has.
     holes : int
         Dark where the truth is a light.
     dots : int
         Standing out of an even surface.
     even : int
-        On even surfaces.
+        Pixels on even surfaces.
     """
 
     spots: int

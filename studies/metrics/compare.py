@@ -62,7 +62,7 @@ def reference_picture(radiance: SpectralRadiance, light: Spectrum | None = None)
     Parameters
     ----------
     radiance : SpectralRadiance
-        What `capture` was given.
+        The radiance that `capture` was given.
     light : Spectrum, optional
         Lamp whose colour is shown as white, or an illuminant's name; left out, the one that the radiance states, else
         D65, which `capture` takes too.
@@ -90,9 +90,9 @@ def measure(picture: Picture | ArrayLike, reference: ReferencePicture) -> dict[s
     Parameters
     ----------
     picture : Picture or (h, w, 3) array
-        As `develop` gives it; or linear sRGB of any scale.
+        A picture from `develop`, or linear sRGB of any scale.
     reference : ReferencePicture
-        Of the same size, from `reference_picture`.
+        A reference of the same size, from `reference_picture`.
 
     Returns
     -------

@@ -86,7 +86,7 @@ def flip(
     picture, truth : (h, w, 3) array or Seen
         Encoded sRGB in [0, 1]; or what `seen` made of it. An array is then seen at the other's pixels per degree.
     pixels_per_degree : float
-        Of the eye's view; the default is FLIP's own.
+        Pixels per degree of the eye's view; the default is FLIP's own.
     """
     second = truth if isinstance(truth, Seen) else seen(truth, pixels_per_degree)
     first = picture if isinstance(picture, Seen) else seen(picture, second.pixels_per_degree)

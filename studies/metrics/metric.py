@@ -12,7 +12,7 @@ class Metric:
     Attributes
     ----------
     key : str
-        In a cell and in a row.
+        Name in a cell and in a row.
     name : str
     digits : int
         Decimals.

@@ -32,7 +32,7 @@ class EdgeResponse:
     angle_deg : float
         Angle from the vertical, anticlockwise; for an edge nearer the horizontal, of the transposed picture.
     frequency_cycles_per_px : (n,) float64
-        From 0 to 1; Nyquist is 0.5.
+        Frequencies from 0 to 1; Nyquist is 0.5.
     mtf : (n,) float64
         1 at frequency 0.
     mtf50_cycles_per_px : float

@@ -32,7 +32,7 @@ def patch_masks(scene: Scene, shape: tuple[int, int]) -> Masks:
     Parameters
     ----------
     scene : Scene
-        With rectangles ``patch00``, ``patch01``, ...: `scenes.color_checker`, or a scene that holds its chart.
+        A scene with rectangles ``patch00``, ``patch01``, ...: `scenes.color_checker`, or a scene that holds its chart.
     shape : (int, int)
         Height and width of the picture.
 
@@ -117,7 +117,7 @@ class TargetFigures:
     Attributes
     ----------
     mtf50_cy_per_px : float or None
-        Of the slanted edge's luminance (ISO 12233); None also where noise hides the edge.
+        MTF50 of the slanted edge's luminance (ISO 12233); None also where noise hides the edge.
     chart_delta_e_mean : float or None
         CIEDE2000 between mean colours, mean over the ColorChecker's patches; None where these have under four pixels.
     patch_snr_db : float or None
@@ -175,7 +175,7 @@ def pair_delta_e(linear: NDArray[np.float64], masks: Masks) -> NDArray[np.float6
     linear : (h, w, 3) float64
         Linear sRGB, in which white is 1.
     masks : (patch, h, w) bool
-        Of `studies.metrics.target_figures.patch_masks`.
+        As from `studies.metrics.target_figures.patch_masks`.
     """
     lab = patch_labs(linear, masks)
     return np.asarray(skimage.color.deltaE_ciede2000(lab[0::2], lab[1::2]))
