@@ -28,7 +28,7 @@ class Pair:
     ----------
     names : (str, str)
     ours, theirs : Figures
-        Of the first and of the second.
+        Figures of the first and of the second.
     levels : sequence of str
         Names of the light levels, in the study's order; one alone stands for no light axis.
     light_cd_m2 : sequence of float or None

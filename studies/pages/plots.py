@@ -110,9 +110,9 @@ def name_at_ends(axes: Axes, ends: Sequence[tuple[str, float, str]]) -> None:
     Parameters
     ----------
     axes : Axes
-        With its scales and limits set.
+        Axes whose scales and limits are set.
     ends : sequence of (name, y, colour)
-        Where each line ends.
+        Name, end and colour of each line.
     """
     box = axes.transLimits
     high = CHART[1] * 0.7  # height of the axes, about [points]

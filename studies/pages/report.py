@@ -229,7 +229,7 @@ def render_report(report: ReportData, pictures: ReportPictures) -> str:
     ----------
     report : ReportData
     pictures : ReportPictures
-        By the names that cells and truths have for them.
+        Pictures by the names that cells and truths have for them.
 
     Returns
     -------

@@ -225,7 +225,7 @@ def comparison_markdown(report: ReportData, command: str, a: int) -> str:
     ----------
     report : ReportData
     command : str
-        That makes the page.
+        Command that makes the page.
     a : int
         The value, by its place.
     """

@@ -45,7 +45,7 @@ class ReportRender:
     Attributes
     ----------
     relative_mc_error : float
-        Of the scene under its own lights.
+        Relative Monte Carlo error of the scene under its own lights.
     """
 
     scene: str
@@ -71,7 +71,7 @@ class ReportCell:
     rows : tuple of Row or None
         One for each seed, in the study's order; None for one that isn't made yet.
     picture : str or None
-        Among the page's pictures; None where the page leaves it out.
+        Name among the page's pictures; None where the page leaves the picture out.
     """
 
     level: int
@@ -139,13 +139,13 @@ class ReportData:
     stages : mapping of str to float
         Seconds by stage.
     environment, configuration : mapping of str to str
-        What made the numbers, and what the study asked for.
+        Versions and engines that made the numbers, and the study's settings.
     left_out : tuple of str
-        What the model leaves out, each ``effect: cost``.
+        Effects that the model leaves out, each as ``effect: cost``.
     notes : tuple of str
-        What fell back or is missing.
+        Notes on what fell back or is missing.
     pictures_left_out : str
-        Which pictures aren't in the page; empty where all are.
+        A sentence on the pictures that aren't in the page; empty where all are.
     looked_at : (int, int)
         Column and row of the first picture that the loupe shows at first.
     denoised : bool

@@ -46,7 +46,7 @@ def read_pictures(
     Parameters
     ----------
     folder : Path
-        Of the sweep.
+        Folder of the sweep.
     pairs : sequence of (str, str)
         Each picture and its truth, by their names; those that the page shows at first come first.
     true : mapping of str to (h, w, 3) uint8
@@ -57,7 +57,7 @@ def read_pictures(
     Returns
     -------
     ReportPictures, str
-        And what the page has to say of those that it leaves out.
+        The pictures, and a sentence on those that the page leaves out.
     """
     files = {name: as_webp(truth, **LOSSLESS) for name, truth in true.items()}
     halves = {name: seen(truth / 255.0) for name, truth in true.items()}

@@ -47,14 +47,15 @@ def sweep_report(
     Parameters
     ----------
     folder : Path
-        Of the sweep.
+        Folder of the sweep.
     most_pictures : int, optional
-        Beside the truths; left out, as many as a page may hold. The numbers are of all cells in any case.
+        Most pictures beside the truths; left out, as many as a page may hold. The numbers are those of all cells in any
+        case.
     where : mapping of str to str, optional
         Axes, and the one value of each that is shown. Of a study of more than `MOST_CELLS` pictures a part is shown,
         and a note says which.
     run : LastRun, optional
-        Of the folder; left out, it is read.
+        Last run of the folder; left out, it is read.
 
     Raises
     ------

@@ -33,10 +33,10 @@ class Panel:
     title : str
         Values of the axes that the sweep varies beside light, the lines' axis and the seeds.
     light : (level,) float64
-        Of the levels, in `unit`.
+        Light of the levels, in `unit`.
     unit : str
     lines : mapping of str to (level, seed) float64
-        By the name of each line; NaN where the sweep has no figure.
+        Figures by the name of each line; NaN where the sweep has no figure.
     """
 
     title: str
