@@ -100,7 +100,7 @@ def claims_held(bayer: Mapping[float, Best], interleaved: Mapping[float, Best], 
     Parameters
     ----------
     bayer, interleaved : mapping
-        By level [cd/m^2].
+        Best exposures by level [cd/m^2].
     more_light : float
         Electrons of the RGBW tile over those of Bayer's.
     """

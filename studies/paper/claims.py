@@ -35,14 +35,14 @@ class ClaimCheck:
     Attributes
     ----------
     condition : str
-        Where or how: a reading of Table 1, a light, an exposure.
+        What the number was computed for: a reading of Table 1, a light, an exposure.
     value : float
     low, high : float
         Range in which the claim holds, ends included; infinite where it has no end.
     unit : str
-        In the words of the page, such as ``dB``.
+        Unit in the words of the page, such as ``dB``.
     default : float or None
-        What the default camera, `interleaved`, gives where the paper's own method, `interleaved_paper`, gives `value`.
+        Value of the default camera, `interleaved`, where `value` is that of the paper's method, `interleaved_paper`.
         It has no part in the verdict.
     margin : float
         Half of the value's 95 % interval over exposures; 0 where it doesn't scatter.
@@ -77,7 +77,7 @@ class Claim:
     checks : tuple of ClaimCheck
         One or more, each under a condition of its own.
     note : str
-        How the numbers were got, and what was ours to choose.
+        How the numbers were computed, and which choices are ours.
     """
 
     where: str

@@ -84,7 +84,7 @@ def signal_claims(ratios: Mapping[str, Ratios], least: float) -> tuple[Claim, ..
     ratios : mapping
         `signal_ratios` by light.
     least : float
-        Of `coverage`.
+        As from `coverage`.
     """
     return (
         judge_claim(10, {"W over the largest of the three, at its least": least}),
@@ -107,7 +107,7 @@ def snr_claims(moon: Gains, bright: Gains, pure: Gains) -> tuple[Claim, ...]:
     moon, bright : mapping
         `snr_gains` in moonlight, and with W nearly full.
     pure : mapping
-        As `bright`, without fixed pattern.
+        As `bright`, but without fixed pattern.
     """
     roots = {channel: sqrt(value) for channel, value in signal_ratios("D65").items()}
     return (

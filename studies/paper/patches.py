@@ -77,7 +77,7 @@ def triplets(raw: RawImage, columns: NDArray[np.intp]) -> Triplets:
     Parameters
     ----------
     columns : (h,) intp
-        Of `edge_columns`.
+        As from `edge_columns`.
     """
     plane = white_plane(raw)
     half = PATCH // 2

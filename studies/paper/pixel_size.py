@@ -104,11 +104,11 @@ def claims_1b(shot_db: float, all_db: Mapping[str, float], psnr_gain_db: Image) 
     Parameters
     ----------
     shot_db : float
-        With shot noise alone.
+        Gain with shot noise alone.
     all_db : mapping
-        With all of the sensor's noise, by reading.
+        Gain with all of the sensor's noise, by reading.
     psnr_gain_db : (seed,) float64
-        Of the developed pictures.
+        Gain of the developed pictures.
     """
     shown_db = {"shot noise alone": shot_db} | {f"{name}, all noise": value for name, value in all_db.items()}
     return (

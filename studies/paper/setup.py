@@ -135,9 +135,9 @@ class Camera:
     ----------
     reading, processor : str
     pitch_um : int, optional
-        As `table1_sensor` takes it.
+        As in `table1_sensor`.
     shake : str, optional
-        As `sensor.shake.held_lens` takes it.
+        As in `sensor.shake.held_lens`.
     """
 
     reading: str

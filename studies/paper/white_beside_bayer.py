@@ -65,9 +65,9 @@ def claims_6(
     Parameters
     ----------
     bayer, interleaved : mapping
-        By reading and exposure, such as ``table1_pixel, 5ms``.
+        Outcomes by reading and exposure, such as ``table1_pixel, 5ms``.
     swaps : mapping
-        By reading.
+        Effects of substitution by reading.
     """
     noises = {name: camera.noise / bayer[name].noise for name, camera in interleaved.items()}
     gains_db = {name: camera.psnr_db - bayer[name].psnr_db for name, camera in interleaved.items()}

@@ -42,7 +42,7 @@ class Bright:
     result_correlation, white_correlation : float
         Correlation of luminance with the truth where W is full and no colour is: of the result, and of W itself.
     full_correlation : float
-        Of the result where a colour is full as well.
+        Correlation of the result where a colour is full as well.
     """
 
     white_full: float
