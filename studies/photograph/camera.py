@@ -56,7 +56,7 @@ def calibrate(sensor: SensorConfig, light: Spectrum) -> ColourCalibration:
         The first three channels of its mosaic, R, G and B where it has them, tell colours. Channels beyond these get a
         fitted column from XYZ, and carry no colour back. One or two channels give grey.
     light : Spectrum
-        What the camera's white balance is set to.
+        Light that the camera's white balance is set to.
 
     Raises
     ------
@@ -186,17 +186,17 @@ def develop_to_scale(
     ----------
     raw : RawImage
     processor : Processor
-        Of `isp.processors.own.processor_of`.
+        Processor as from `isp.processors.own.processor_of`.
     colours : ColourFit
-        Of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
+        Fit of the processor's balanced colours; the paper's literal camera has a (3, 3) matrix in its place.
     sensor : SensorConfig
-        That took the exposure.
+        The sensor that took the exposure.
     neutral : (channel,) float64
         `studies.metrics.truth.neutral_electrons` of the light and the exposure's time: 1 cd/m^2.
     white_cd_m2 : float
         Luminance shown as white [cd m^-2].
     **options
-        Of the processor.
+        Options of the processor.
 
     Returns
     -------
@@ -232,7 +232,7 @@ def balance_delta_e(
     raw : RawImage
         The exposure.
     colours : ColourFit
-        Of the processor's balanced colours.
+        Fit of the processor's balanced colours.
     sensor : SensorConfig
         The sensor that took the exposure.
     light : Light
@@ -298,7 +298,7 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
         0 or more [s], or a time such as ``"66ms"``; left out, by the rule ``auto:information`` of
         `sensor.exposure.exposed_by_rule`, which may raise the gain of a camera that states a `SensorConfig.gain_limit`.
     device, rng, exact, samples_per_pixel
-        As `sensor.capture.photograph_radiance` takes them.
+        As in `sensor.capture.photograph_radiance`.
     light : Spectrum or str, optional
         That the camera's neutral and colour matrix are set to; left out, the lamp that the radiance states, else D65,
         as `reference_picture` has it. Where the mosaic tells no colours under it the raw image holds none, and

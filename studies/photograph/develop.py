@@ -124,14 +124,14 @@ def develop_file(
     path : path, or sequence of them
         Frames of a burst or bracket are merged (`sensor.burst.merged_raw`) before they are developed.
     isp, trust_code
-        As `processor` and `trust_code` of `develop`.
+        As `processor` and `trust_code` in `develop`.
     ev : float, optional
         Brightness in stops: at 0 green's full well is white. Left out, `sensor.raw_files.brightness.stops_to_white`, by
         which the exposure's 99th percentile of luminance comes to 90 % of white; for looking, not for measuring.
     white_balance : str, optional
-        As of `develop`.
+        As in `develop`.
     encoding : str
-        Of `isp.colour.encoding.ENCODINGS`.
+        Name in `isp.colour.encoding.ENCODINGS`.
     height, width : int, optional
         Pixels of the picture, at most the raw file's, each the mean of the linear light on its area; one of them alone
         keeps the proportions.

@@ -53,9 +53,9 @@ def lamp_parts(
     ----------
     transport : Transport
     spectra, level : mapping
-        As `Transport.relight` takes them.
+        As in `Transport.relight`.
     flicker : mapping of str to Waveform
-        Of `flicker_of`.
+        As from `flicker_of`.
     """
     apart = list(dict.fromkeys(flicker.values()))
     if len(apart) == 1 and (ALL in flicker or set(flicker) == set(transport.groups)):

@@ -28,11 +28,11 @@ def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: i
     Parameters
     ----------
     sensor : SensorConfig
-        Its `row_time_us` parts the rows' starts; photodiodes that bin are exposed together.
+        Sensor whose `row_time_us` separates the rows' starts; photodiodes that bin are exposed together.
     rows : int
-        Of photodiodes.
+        Number of rows of photodiodes.
     exposure_s : float
-        Of a row, above 0.
+        Exposure time of a row, above 0.
     count : int
 
     Returns
@@ -52,7 +52,7 @@ def centred_shares(sensor: SensorConfig, rows: int, exposure_s: float, whole_s: 
     Parameters
     ----------
     sensor, rows, exposure_s
-        As of `rolling_moments`.
+        As in `rolling_moments`.
     whole_s : float
         Length of the longer exposure, from the first row's start to the last row's end; it has `count` times.
     count : int
@@ -98,7 +98,7 @@ def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transpor
     ----------
     transports : iterable of Transport
     shares : (time, row) float64
-        Of `rolling_moments`, for the transports' rows.
+        Shares from `rolling_moments`, for the transports' rows.
 
     Raises
     ------
@@ -119,7 +119,7 @@ def time_average(transports: Iterable[Transport]) -> Transport:
     Parameters
     ----------
     transports : iterable of Transport
-        Of one size, bands and light groups. Of a generator one at a time is held in memory.
+        Transports of one size, with the same bands and light groups. A generator's are in memory one at a time.
 
     Raises
     ------

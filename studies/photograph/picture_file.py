@@ -97,7 +97,7 @@ def write_picture(
     bits : int
         8 or 16 a channel.
     encoding : str
-        Of `isp.colour.encoding.ENCODINGS`; that of an array.
+        Name in `isp.colour.encoding.ENCODINGS`; for an array, the encoding that it has.
 
     Raises
     ------

@@ -229,16 +229,16 @@ class Checked:
     moving : tuple of Scene
         The scene at each time of the exposure; empty where it stands still.
     shares : (time, row) float64 or None
-        Of each time in a row's exposure, where rows roll (`studies.photograph.moments.rolling_moments`).
+        Share of each time in a row's exposure, where rows roll (`studies.photograph.moments.rolling_moments`).
     exposure_s : float or None
-        None by a rule.
+        Exposure time; None if a rule chooses it.
     ready : Ready or None
         Light that is there already.
     samples : int
         Samples of the light along each side of a pixel.
     cost : PictureCost
     flicker : mapping of str to Waveform
-        Of lamps that flicker, by light group.
+        Waveforms of lamps that flicker, by light group.
     """
 
     order: Order
@@ -260,7 +260,8 @@ def take(order: Order, step: Step | None = None) -> Taken:
     ----------
     order : Order
     step : callable, optional
-        Called with what is being done and the share that is done; left out, a notebook shows a bar for the render.
+        Function that is called with what is being done and the share that is done; left out, a notebook shows a bar for
+        the render.
 
     Raises
     ------
@@ -285,11 +286,11 @@ class _Subject:
     Attributes
     ----------
     transport : callable
-        Gives its light, which may be rendered here, and notes on that.
+        Function that returns the subject's light, which it may have to render, and notes on that.
     spectra, level : dict
-        As `Transport.relight` takes them.
+        As in `Transport.relight`.
     light : Spectrum
-        That the camera's colours are set to, unless another is asked for.
+        The light that the camera's colours are set to, unless another is asked for.
     notes : tuple of str
     """
 
@@ -307,13 +308,13 @@ class _Electrons:
     Attributes
     ----------
     per_second_e : (h, w, channel) float64
-        Behind every filter.
+        Electrons per second behind every filter.
     error_e, expected_e : (h, w) float64, or None
         One draw of a render's error, and the mean, of the raw image's pixels in the exposure; None for a stored
         picture.
     exposure_s : float
     sensor : SensorConfig
-        At the gain that the exposure takes.
+        The sensor at the gain that the exposure takes.
     """
 
     per_second_e: NDArray[np.float64]

@@ -26,9 +26,9 @@ class LightForSnr:
     electrons : float
         Photo-electrons then; inf where no light is enough.
     luminance_cd_m2 : float
-        Of an even neutral field.
+        Luminance of an even neutral field.
     illuminance_lux : float
-        On a grey card of 18 % that has this luminance.
+        Illuminance of a grey card of 18 % that has this luminance.
     """
 
     channel: str
