@@ -25,9 +25,10 @@ def picture_range(shoot: Callable[[float, int], Plane], noise: float) -> float:
     Parameters
     ----------
     shoot : callable
-        Takes an even field's reflectance, 1 at a perfect white, and a frame's number; returns the picture's luminance.
+        Function of an even field's reflectance, 1 for a perfect white, and of a frame's number; returns the picture's
+        luminance.
     noise : float
-        Of the camera's own dark, as a reflectance.
+        Noise of the camera's own dark, as a reflectance.
     """
     # The least luminance: noise that changes between frames, over the slope from black to a little light.
     dark = [shoot(0.0, frame) for frame in (0, 1)]

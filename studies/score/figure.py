@@ -19,12 +19,12 @@ class Merit:
     Attributes
     ----------
     name : str
-        By which `only` asks for it, such as ``iso_12232.noise_speed_10``.
+        Name by which `only` asks for it, such as ``iso_12232.noise_speed_10``.
     title, unit : str
     standard : str
-        Which document defines it, with the clause where it has one.
+        Document that defines it, with the clause where it has one.
     conditions : str
-        What was photographed, and how each choice was made that the standard leaves open.
+        What was photographed, and each choice that the standard leaves open.
     computed : float
         In closed form; nan where there is none: of the camera, or of what a processor does.
     measured, low, high : float

@@ -26,7 +26,7 @@ class AtLight:
     Attributes
     ----------
     lux : float
-        On an 18 % grey card.
+        Illuminance of an 18 % grey card.
     snr_db, measured_snr_db : float
         Ratio of a pixel's samples of the card, in closed form and on one simulated frame; nan where the well is full.
     accuracy, measured_accuracy : float

@@ -72,13 +72,13 @@ def score(
     only : sequence of str
         Groups, such as ``iso_12232``, or whole names; all figures by default.
     seed : int
-        Of the chips and frames.
+        Seed of the chips and frames.
     processor : str, optional
-        Of `rodcone.processors()`, or ``mine.py:develop``: whose pictures are measured too (``developed``).
+        Name in `rodcone.processors()`, or ``mine.py:develop``; its pictures are measured too (``developed``).
     trust_code : bool
         Consent to run ``mine.py``, which may do all that its user may.
     step : callable, optional
-        Takes what is measured, and the share of the work that is done, 0 to 1.
+        Function that is called with what is measured, and the share of the work that is done, 0 to 1.
 
     Returns
     -------
