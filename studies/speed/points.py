@@ -107,7 +107,7 @@ def stage_json(
     ----------
     name, question : str
     reference : str
-        What errors are differences from, and what the times are divided by.
+        Choice from which errors are differences, and by whose times times are divided.
     noise_e : float
         Root mean square of the sensor's own noise, to compare the errors with.
     points : sequence of Measured
