@@ -57,7 +57,7 @@ class PictureCost:
     times : int
         Renders of so many samples each, of a scene that moves, whose mean is taken.
     light_arrays : int, optional
-        Of what makes the light's bands one at a time, as `rodcone.memory.memory` takes it.
+        Arrays of the light where its bands are made one at a time, as in `rodcone.memory.memory`.
     """
 
     size: tuple[int, int]

@@ -18,7 +18,7 @@ def in_focus(
     Parameters
     ----------
     scene : Scene
-        Its lengths are in metres.
+        A scene whose lengths are in metres.
     sensor : SensorConfig
         Gives the f-number of its lens, and its pixels.
     size : (int, int)

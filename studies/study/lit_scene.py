@@ -58,7 +58,7 @@ class OpenedScene:
     ----------
     choice : SceneChoice
     scene : Scene or None
-        None for a picture file, which needs no render.
+        The scene; None for a picture file, which needs no render.
     size : (int, int)
         Height and width; (0, 0) for a picture file, which is read only when it is needed.
     identity : str
@@ -193,11 +193,11 @@ def make_transport(
     Parameters
     ----------
     model : RenderModel or None
-        None for a picture file.
+        How the scene is rendered; None for a picture file.
     cache : Path
         Folder of renders: a coarser one is continued, a finer one is taken.
     progress : callable
-        As of `render.engine.render`; called before it with an infinite error, since the first passes may compile.
+        As in `render.engine.render`; called before it with an infinite error, because the first passes may compile.
     share : callable, optional
         Noise variance of a render over the sensor's own, for a study with a `noise_share`.
     samples : int
@@ -207,7 +207,8 @@ def make_transport(
     Raises
     ------
     InputError
-        As `render.engine.render` and `open_radiance_file`; where a render made here disagrees with the reference light.
+        As for `render.engine.render` and `open_radiance_file`; where a render made here disagrees with the reference
+        light.
     KeyboardInterrupt
         Where Ctrl-C ended the render; what was rendered is in `cache`.
     """

@@ -18,7 +18,7 @@ class RenderFacts:
         Samples per pixel, in the mean.
     bands : int
     relative_mc_error, relative_level_error : float or None
-        Of the lit scene, as `render.radiance.SpectralRadiance`.
+        Errors of the lit scene, as in `render.radiance.SpectralRadiance`.
     first_nm, last_nm, width_nm : float
         Centres of the first and the last band, and the width of the first.
     """

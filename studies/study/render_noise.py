@@ -93,7 +93,7 @@ def monte_carlo_bound(
         product is its whole squared error, and its upper limit is charged (`render.denoised.relight`).
     expected_e : (h, w) float64
     readings : sequence of PlainReading
-        That the camera takes of the frame (`sensor.readings.resolve.resolve`).
+        Readings that the camera takes of the frame (`sensor.readings.resolve.resolve`).
     """
     variance_e2, inside = _noise_and_room(expected_e, readings)
     if not inside.any():
@@ -168,7 +168,7 @@ def noise_note(share: float, spp: float, speckles: NDArray[np.float64] | None = 
     spp : float
         Samples per pixel of the render; 0 of a file, for which no number of samples can be given.
     speckles : (pixel,) float64, optional
-        Of `speckle_sizes`.
+        As from `speckle_sizes`.
     """
     if share >= 1:
         times = f"{share:.2g}" if share < 10 else f"{share:.0f}"
@@ -206,7 +206,7 @@ def render_quietly(
     max_seconds : float or None
         Time, at most.
     **options
-        Of `render.engine.render`: bands, seed, cache, progress.
+        Options of `render.engine.render`: bands, seed, cache, progress.
     """
     transport = None
     most_samples = min(FIRST_SPP, max_spp)

@@ -194,7 +194,7 @@ def open_radiance_file(path: str | Path, white: AdoptedWhite, spectra: str = SUR
     white : AdoptedWhite
         Light of the file's reflectances.
     spectra : str
-        Of a photograph's colours, as `render.radiance_files.photo.read_photo` takes it.
+        How a photograph's colours become spectra, as in `render.radiance_files.photo.read_photo`.
 
     Raises
     ------
