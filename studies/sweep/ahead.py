@@ -48,7 +48,7 @@ class Ahead(Generic[Result]):
     Attributes
     ----------
     share : float
-        How much of it is done, as its progress told last.
+        Share of it that is done, as its progress last reported.
     """
 
     def __init__(self, call: Callable[[Spans, Progress], Result]) -> None:
@@ -78,7 +78,7 @@ class Ahead(Generic[Result]):
         Raises
         ------
         BaseException
-            That the call raised.
+            The error that the call raised.
         """
         start = time.perf_counter()
         while not wait([self._future], LOOK_S).done:

@@ -30,7 +30,7 @@ class RenderRecord:
     brightest_share : float or None
         Monte Carlo share in the brightest light, for a study that asks for one (`RenderLimits.noise_share`).
     notes : tuple of str
-        What had to be assumed of the scene, and what fell back.
+        Notes on what had to be assumed of the scene, and on what fell back.
     """
 
     content: str
@@ -61,24 +61,24 @@ class Cell:
     luminance_cd_m2 : float
         Mean scene luminance.
     illuminance_lux : float or None
-        On the reference plane; None without one.
+        Illuminance of the reference plane; None without one.
     exposure_s : float
     frame : UnitFrame
-        Its sensor has the processor's mosaic and the lens that is modelled.
+        Frame whose sensor has the processor's mosaic and the modelled lens.
     made_by : Provenance
-        Of the process that asks; a worker with other versions or engines refuses the cell.
+        Provenance in the process that asks; a worker with other versions or engines refuses the cell.
     colours : ColourFit or None
-        Of the processor's balanced planes, under the scene's light; a cell that is made has them.
+        Fit of the processor's balanced planes under the scene's light; a cell has it once it is to be made.
     white_cd_m2 : float
         Luminance shown as white.
     pictures : Path
         Folder that the picture goes to, under the hash of its content.
     render : RenderRecord
-        For the row.
+        The render, for the row.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
     flicker : Waveform or None
-        Of all lamps; None where they are steady.
+        Waveform of all lamps; None where they are steady.
     """
 
     key: str

@@ -30,9 +30,9 @@ def on_cluster(address: str, patience_s: float = PATIENCE_S) -> Iterator[Callabl
     Parameters
     ----------
     address : str
-        Of the scheduler: ``tcp://127.0.0.1:8786``, or ``tls://...`` with dask's own settings for TLS.
+        Address of the scheduler: ``tcp://127.0.0.1:8786``, or ``tls://...`` with dask's own settings for TLS.
     patience_s : float
-        How long to wait for it: a batch job may start its scheduler a moment before its sweep.
+        Time to wait for it [s]: a batch job may start its scheduler a moment before its sweep.
 
     Raises
     ------

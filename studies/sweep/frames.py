@@ -44,9 +44,9 @@ class UnitFrame:
     ----------
     key : str
     sensor : SensorConfig
-        With the modelled lens.
+        The sensor with the modelled lens.
     light : Light
-        That the cameras' colours are set to.
+        The light that the cameras' colours are set to.
     white_cd_m2 : float
         Luminance shown as white.
     lux_per_cd_m2 : float or None
@@ -92,14 +92,14 @@ def frame_key(
     render : str
         Digest of the render's content.
     opened : OpenedScene
-        Whose own lights count.
+        The opened scene, whose own lights count.
     spectrum : str
     study : Study
-        Of its levels it only counts whether one is in lux, because a frame states lux per cd/m^2 then.
+        The study; of its levels it only counts whether one is in lux, because a frame then states lux per cd/m^2.
     preset, sensor : SensorConfig
         The preset, by which the exposure is set, and the sensor as it is modelled.
     exposure : str
-        For a scene that moves, because it is blurred by how long the exposure takes; empty for others.
+        Exposure of a scene that moves, because its length blurs the scene; empty for other scenes.
     """
     light = illuminant(spectrum) if is_curve_file(spectrum) else spectrum
     area = [] if study.equal_area is None else [study.equal_area]
@@ -137,11 +137,11 @@ def make_frames(
     transport : Transport
         Lit by `studies.study.lit_scene.under`.
     light : Light
-        That the cameras' colours are set to.
+        The light that the cameras' colours are set to.
     wanted : mapping of str to (SensorConfig, SensorConfig)
-        By key: the preset, whose auto exposure it is whatever mosaic and lens it gets, and the sensor as modelled.
+        By key: the preset, whose auto exposure counts for every mosaic and lens, and the sensor as modelled.
     study : Study
-        Its levels, and the sensors' size.
+        The study, whose levels and sensors' size count.
     samples : int
         Samples of the light along each side of a pixel.
     still : Transport, optional

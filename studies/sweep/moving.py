@@ -26,10 +26,10 @@ class MovingLight:
     Attributes
     ----------
     opened : OpenedScene
-        Of a scene that moves.
+        A scene that moves.
     study : Study
     model : RenderModel
-        Of each time.
+        How each time is rendered.
     cache : Path
     samples : int
         Samples of the light along each side of a pixel.

@@ -151,7 +151,7 @@ def make_scene(job: Job, opened: OpenedScene, clock: StageClock, progress: Progr
     Parameters
     ----------
     clock : StageClock
-        Of the thread that makes the scene.
+        Clock of the thread that makes the scene.
 
     Raises
     ------

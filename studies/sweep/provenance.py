@@ -67,11 +67,11 @@ class Provenance:
     Attributes
     ----------
     variant : str
-        Of Mitsuba, that rendered the scene; ``none`` for a picture file.
+        Variant of Mitsuba that rendered the scene; ``none`` for a picture file.
     readout_engine, development_engine : str
         ``cuda``, ``llvm`` or ``numpy``.
     versions : str
-        Of rodcone with its sources, of the packages that it computes with and of LLVM, as JSON.
+        Versions of rodcone with its sources, of the packages that compute and of LLVM, as JSON.
     """
 
     variant: str

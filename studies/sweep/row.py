@@ -10,9 +10,9 @@ class Row:
     Attributes
     ----------
     key : str
-        Of `Cell`.
+        Key of the `Cell`.
     scene ... seed
-        Where the cell lies in its study; scene and sensor files by their names.
+        Place of the cell in its study; scene and sensor files by their names.
     luminance_cd_m2, illuminance_lux, exposure_s : float
         The level in both units (lux where the scene states a plane), and the time of one frame.
     gain_factor, iso : float
@@ -21,19 +21,19 @@ class Row:
         Samples per pixel of the render, in the mean; where the render is finer than the sensor's pixels (an edge's),
         per pixel of the render.
     bands : int
-        Of the render.
+        Number of bands of the render.
     render : str
-        What else is known of it, as JSON: `studies.sweep.cells.render_text`.
+        Further facts of the render, as JSON: `studies.sweep.cells.render_text`.
     lens : str
         Terms of the modelled lens, as JSON.
     budget_share : float or None
         Share of the noise variance that a plan predicts for its approximations.
     psnr_db, ssim, delta_e_median, delta_e_p95 : float
-        Of `studies.metrics.appearance.Quality`.
+        As in `studies.metrics.appearance.Quality`.
     s_cielab_median, s_cielab_p95, flip_mean, pu21_psnr_db : float
-        Of `studies.metrics.appearance.Appearance`.
+        As in `studies.metrics.appearance.Appearance`.
     mtf50_cy_per_px, chart_delta_e_mean, patch_snr_db : float or None
-        Of `studies.metrics.target_figures.TargetFigures`.
+        As in `studies.metrics.target_figures.TargetFigures`.
     mc_share : float
         Monte Carlo variance over the sensor's own, means over the pixels below saturation.
     snr_db : float or None
@@ -47,19 +47,19 @@ class Row:
         the exposure's white balance: 0 as shot, what Gray World misses the light by else; None of a processor that
         tells no balance.
     balance, mean_electrons : str
-        By channel, as JSON.
+        Balance and mean electrons by channel, as JSON.
     variant, readout_engine, development_engine, versions : str
-        Of `studies.sweep.provenance.Provenance`; the engines as raw image and picture tell them.
+        As in `studies.sweep.provenance.Provenance`; the engines are those that raw image and picture state.
     picture, truth : str
         Files of the developed and the noise-free picture below the folder of pictures.
     render_s : float
-        Of the render that the cell shares with others.
+        Seconds of the render that the cell shares with others.
     capture_s, develop_s, measure_s : float or None
-        Of the cell's own steps; None of a step that was the first of its kind in the process.
+        Seconds of the cell's own steps; None for a step that was the first of its kind in the process.
     first_s : float
-        Of those first steps, which compile and load.
+        Seconds of those first steps, which compile and load.
     threads : int
-        Of Dr.Jit's kernels in the process.
+        Threads of Dr.Jit's kernels in the process.
     finished : str
         UTC.
     host, machine : str

@@ -115,9 +115,9 @@ class SweepResult:
     cells, made : int
         Cells of the study, and how many of them this run made; the others were stored before.
     seconds : float
-        Of the whole run.
+        Seconds of the whole run.
     notes : tuple of str
-        What had to be assumed.
+        Notes on what had to be assumed.
     """
 
     out: Path
@@ -151,11 +151,11 @@ def sweep(
         Of `studies.budget.plan.plan` or of `studies.budget.starting_points`; left out, of `plan`, whose pilots stay in
         the folder.
     runner : callable, optional
-        Takes cells, gives rows as they come; left out, cells are made in this process.
+        Function of cells that yields rows as they come; left out, cells are made in this process.
     step : callable, optional
-        Called with what is being done and the share that is done; left out, a notebook shows a bar.
+        Function that is called with what is being done and the share that is done; left out, a notebook shows a bar.
     clock : Clock, optional
-        That began when the work did, where something was done before.
+        Clock that was started when the work began, if something was done before.
     ahead : bool
         Render the next scene while the cells of one are made, for a runner whose cells are made in other processes.
 

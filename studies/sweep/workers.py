@@ -89,7 +89,7 @@ def run(
         Cells in the executor's hands: as many as it has workers, for each to make the cells of a condition one after
         the other; twice as many where a worker would wait long for the next.
     threads : int, optional
-        For Dr.Jit in each worker.
+        Threads of Dr.Jit in each worker.
     make : callable
         Makes the result of a task; of a cell its row.
 
