@@ -44,7 +44,7 @@ def train_spectral_prior(kind: str, seed: int, path: Path) -> str:
     kind : str
         "drawn", drawn pictures and photographs, or "photographs" alone.
     seed : int
-        Of the pictures, their patches and the fit's start.
+        Seed of the pictures, their patches and the fit's start.
     path : Path
         File to write (.npz).
     """

@@ -65,9 +65,9 @@ def fit_prior(
     Parameters
     ----------
     patches : (patch, number) float32
-        Of `draw_patches`, or of coefficients of reflectance (`studies.training.spectral`).
+        Patches from `draw_patches`, or of coefficients of reflectance (`studies.training.spectral`).
     neutrals_e, source
-        As `isp.ple.prior.Prior`.
+        As in `isp.ple.prior.Prior`.
     """
     mean = patches.mean(axis=0)
     centred = patches - mean
@@ -134,11 +134,11 @@ def train_prior(sensor: SensorConfig, name: str, seed: int) -> Prior:
     Parameters
     ----------
     sensor : SensorConfig
-        Its responses count, and nothing else of it.
+        A sensor, of which only the responses count.
     name : str
-        What the provenance calls it.
+        Name of the prior in the provenance.
     seed : int
-        Of the pictures, their patches and the fit's start.
+        Seed of the pictures, their patches and the fit's start.
     """
     digest = sha256()
     pictures = []
