@@ -42,7 +42,7 @@ class TwinFigure:
     Attributes
     ----------
     name, place : str
-        Which figure, and of which frames.
+        Name of the figure, and the frames that it was measured on.
     camera, twin : float
     low, high : float
         Ends of the 95 % interval of twin over camera.
@@ -84,7 +84,7 @@ class Response:
     gain_dn_per_e : float
         DN per electron of a full well.
     source : str
-        Where the bend comes from, or why it is 0.
+        Source of the bend, or why it is 0.
     """
 
     bend: float
@@ -117,7 +117,7 @@ class Twin:
     Attributes
     ----------
     figures : FrameFigures
-        What the camera's frames tell.
+        Figures of the camera's frames.
     numbers : PixelNumbers
         The preset's numbers, each with its source.
     sensor : SensorConfig
