@@ -89,8 +89,6 @@ def find_effects(
     They are the effects on the light. Crosstalk is left out: it spreads an effect as it spreads charge, and makes no
     mean square larger.
 
-    They are those of the light: crosstalk, which spreads an effect as it spreads charge, makes no mean square larger.
-
     Parameters
     ----------
     transport : Transport

@@ -61,8 +61,6 @@ def make_pilot(opened: OpenedScene, study: Study, counts: Iterable[int], cache: 
     """Render a scene's pilot, and group its fine bands into wide ones, for each number in `counts`.
 
     A picture file keeps its own bands; if it is larger than `FILE_SIDE`, whole blocks of pixels are averaged into one.
-
-    A picture file keeps its own bands; of a larger one than `FILE_SIDE`, whole blocks of pixels become one.
     """
     if opened.scene is None:
         transport = open_radiance_file(opened.choice.source, opened.white, opened.choice.spectra or SURFACES)[0]

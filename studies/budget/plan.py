@@ -93,7 +93,7 @@ def _chosen_models(choice: Choice, pilot: Pilot, study: Study) -> Plan:
 
 
 def _choice_of(named: Plan, rows: Sequence[ScaledEffects], pilot: Pilot) -> Choice:
-    """Say what a starting point has chosen for the scene of a pilot that knows its number of bands alone."""
+    """Return a starting point's choice for a pilot's scene; the pilot has one number of bands, the starting point's."""
     (count,) = pilot.groups
     left_out = {}
     for row in rows:

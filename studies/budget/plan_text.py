@@ -46,10 +46,6 @@ def plan_table(plan: Plan) -> Table:
     A share in brackets belongs to an effect that is modelled. The table is narrow: its title holds what all conditions
     have in common, conditions with the same figures share a line, and a line below names the terms that are under
     `LEAST_SHOWN` everywhere.
-
-    A share in brackets is of an effect that is modelled. The table is narrow: its title holds what all conditions have
-    in common, conditions with the same figures share a line, and a line below names the terms that are under
-    `LEAST_SHOWN` everywhere.
     """
     worse = [max((x for x in plan.ledgers if x.condition == of), key=lambda row: row.share) for of in plan.images]
     words = [condition_words(row) for row in worse]
