@@ -47,7 +47,7 @@ App = Callable[[Scope, Any, Any], Awaitable[None]]
 
 
 def make_app(session: Session, port: int, token: str) -> App:
-    """Make the ASGI application; it refuses what isn't asked under the token, by this host's name, from its own page.
+    """Make the ASGI application; it refuses requests without the token, under another host's name or from another page.
 
     Parameters
     ----------

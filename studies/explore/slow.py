@@ -26,10 +26,10 @@ def is_slow(processor: str) -> bool:
 
 
 def stand_in(controls: Controls, pixels: int) -> Controls:
-    """Return the controls whose picture stands in until a slow processor is done; those given if it is quick.
+    """Return the controls whose picture is shown until a slow processor is done; the given ones if it is quick.
 
-    In place of a slow processor ``any_mosaic``, which develops every mosaic: two cameras under one slow method stand in
-    by one quick method. In place of wide settings the processor's own.
+    A slow processor is replaced by ``any_mosaic``, which develops every mosaic, so that two cameras with one slow
+    method are shown by one quick method. Settings that take too long are replaced by the processor's own.
     """
     if is_slow(controls.processor):
         return replace(controls, processor="any_mosaic", settings={})
