@@ -22,7 +22,7 @@ EVEN, DOT = 1.0, 5.0  # CIEDE2000: by less the truth of an even surface varies, 
 
 @dataclass(frozen=True)
 class Blemishes:
-    """Counts of pixels, and of those among which dots are sought.
+    """Numbers of pixels with each blemish, and of those on even surfaces, among which dots are sought.
 
     Attributes
     ----------
@@ -45,9 +45,10 @@ class Blemishes:
 def count_blemishes(picture: NDArray[np.float64], truth: NDArray[np.float64]) -> Blemishes:
     """Count the blemishes of an encoded sRGB picture (h, w, 3) in [0, 1] beside the truth.
 
-    Spots are compared at the truth's lightness, so that noise of light alone is none; they differ from the median of
-    the picture's 5 x 5 pixels as well, so that a wrong cast over an area is none. Even is a pixel whose truth in
-    5 x 5 pixels is its own within one CIEDE2000; a dot differs by five from the picture's median there.
+    A spot is compared with the truth at the truth's lightness, so that noise of lightness alone makes none. It must
+    also differ from the median of the picture's 5 x 5 pixels, so that a wrong cast over an area makes none. A pixel is
+    even if the truth in its 5 x 5 pixels is within one CIEDE2000 of its own; a dot differs by five from the picture's
+    median there.
 
     Raises
     ------

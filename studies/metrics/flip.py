@@ -97,7 +97,7 @@ def flip(
 
 
 def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_per_degree: float) -> Image:
-    """Blur a plane by a sum of Gaussians of sum 1; beyond the border the border's pixels go on."""
+    """Blur a plane by a sum of Gaussians with the sum 1; pixels at the border are repeated beyond it."""
     reach = ceil(3 * np.sqrt(WIDEST / (2 * pi**2)) * pixels_per_degree)
     degrees = np.arange(-reach, reach + 1) / pixels_per_degree
     lines = [np.exp(-(pi**2) * degrees**2 / b) for _, b in gaussians]
@@ -110,7 +110,7 @@ def _blurred(plane: Image, gaussians: tuple[tuple[float, float], ...], pixels_pe
 
 
 def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]:
-    """Return the strength of edges and of points: the gradient's length by first and second derivatives (4.2.1).
+    """Return the strength of edges and of points: the length of the gradient of first and second derivatives (4.2.1).
 
     Each derivative's positive taps sum to 1, and its negative ones to -1.
     """
@@ -129,7 +129,7 @@ def _features(luminance: Image, pixels_per_degree: float) -> tuple[Image, Image]
 
 
 def _along(plane: Image, taps: Floats, axis: int) -> Image:
-    """Return a plane after a filter along one axis, the border's pixels going on beyond it."""
+    """Filter a plane along one axis; pixels at the border are repeated beyond it."""
     return np.asarray(scipy.ndimage.correlate1d(plane, taps, axis=axis, mode="nearest"))
 
 
@@ -145,13 +145,13 @@ def _hunt_lab(linear: Image) -> Image:
 
 
 def _hyab(first: Image, second: Image) -> Image:
-    """Return the distance of colours by HyAB: of lightness by its size, of a and b Euclid's (equation 8)."""
+    """Return the HyAB distance of colours: |dL| plus the Euclidean distance in a and b (equation 8)."""
     lightness, a, b = first - second
     return np.asarray(np.abs(lightness) + np.hypot(a, b))
 
 
 def _redistributed(distance: Image) -> Image:
-    """Return colour distances mapped to [0, 1]: up to p_c of the largest by one line, then by a flat one (4.1.3)."""
+    """Map colour distances to [0, 1]: steeply up to p_c of the largest, then along a flatter line (4.1.3)."""
     green, blue = (_hunt_lab(np.array(colour)) for colour in ([0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
     largest = float(_hyab(green, blue)) ** Q_COLOUR
     knee = P_COLOUR * largest
