@@ -125,7 +125,7 @@ def _runs(words: Sequence[object]) -> list[tuple[int, int]]:
 
 
 def _where(levels: Sequence[str], first: int, last: int) -> str:
-    """Name a run of levels; one level alone needs no name, nor does a comparison of levels themselves."""
+    """Name a run of levels; the text is empty where there is only one level, or where levels are what is compared."""
     if len(levels) == 1:
         return ""
     if last == first:

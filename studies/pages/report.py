@@ -142,7 +142,7 @@ def viewer_data(report: ReportData, groups: Sequence[GroupView]) -> dict[str, An
 
 
 def single_group(report: ReportData) -> str:
-    """Say how a study does in which nothing competes: its PSNR from the first level to the last."""
+    """Describe a study in which nothing competes: its PSNR from the first level to the last."""
     cells = [cell for cell in report.by_group[0] if isfinite(cell.mean("psnr_db"))]
     ends = [
         f"{text.figure_text(cell, 'psnr_db', 1, 'dB')} at {report.levels[cell.level].name}"
@@ -152,7 +152,7 @@ def single_group(report: ReportData) -> str:
 
 
 def seen_level(report: ReportData) -> int:
-    """Return the darkest level at which some camera's picture, of the first group, shows more scene than noise."""
+    """Return the darkest level at which some camera's picture in the first group shows more scene than noise."""
     for cell in report.by_group[0]:
         if cell.mean("psnr_db") >= SEEN_DB:
             return cell.level
@@ -181,7 +181,7 @@ def place_name(report: ReportData, groups: Sequence[GroupView], place: int) -> s
 
 
 def render_warning(report: ReportData, groups: Sequence[GroupView]) -> str:
-    """Say where the render's noise exceeds the sensor's the most, as every command does; empty where nowhere."""
+    """Say where the render's noise exceeds the sensor's most, as every command does; empty if it does so nowhere."""
     shares = known_shares(report)
     over = sum(share >= 1 for share, _ in shares)
     if not over:
@@ -200,9 +200,9 @@ def budget_share(report: ReportData) -> float | None:
 
 
 def speed_rows(report: ReportData) -> list[tuple[str, str, float, float]]:
-    """Return camera and sensor, and the mean seconds of capture and of development, those of first calls left out.
+    """Return camera and sensor with the mean seconds of capture and of development; first calls don't count.
 
-    NaN where a picture isn't made, or where first calls alone are.
+    A time is NaN where a picture isn't made, or where there are only first calls.
     """
     cells = grid(report)
     rows = []

@@ -65,10 +65,10 @@ def axes_of(report: ReportData) -> tuple[Axis, ...]:
 
 
 def first_comparison(report: ReportData) -> Comparison:
-    """Choose what is compared before the reader does: cameras where there are several, else the next of `RIVALS`.
+    """Choose the comparison that a page shows at first: of cameras if there are several, else by the next of `RIVALS`.
 
-    The pair that the study names comes first, else the same method on both mosaics where the study
-    holds it. Where nothing competes it is the one camera.
+    Of cameras it takes the pair that the study names, else the same method on both mosaics if the study has both. Where
+    nothing competes, it is the one camera.
     """
     several = [index for index, axis in enumerate(axes_of(report)) if len(axis.values) > 1]
 
@@ -129,7 +129,10 @@ def comparison_words(
 
 
 def means_over_scenes(report: ReportData, groups: Sequence[Group]) -> list[Group]:
-    """Return groups whose figures are means over scenes, those that were drawn apart; without cells of their own."""
+    """Return groups whose figures are means over scenes; scenes that were drawn at random have groups of their own.
+
+    These groups have no cells.
+    """
     drawn = [scene.name.startswith(DRAWN) for scene in report.scenes]
     rest = len(groups) // len(report.scenes)
     means = []
@@ -168,10 +171,11 @@ def comparisons(report: ReportData) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        By "i j", i < j: ``leads``, by metric outcomes (their first letters), leads and half widths in all places but
-        for this axis. Of axes in `RIVALS`, by "i j": ``counts``, by metric ahead, level and behind over the groups,
-        equal light once; ``means``, for each mean over scenes its title and by metric what ``leads`` has, by light. And
-        by "a b": ``answers``, for each group the words.
+        ``leads``, by "i j" with i < j and by metric: outcomes (their first letters), leads and half widths in all
+        places along the other axes. For axes in `RIVALS` also: ``counts``, by "i j" and metric: how often the first is
+        ahead, level and behind over the groups, where levels of the same light count once; ``means``, by "i j": for
+        each mean over scenes its title, and by metric the same as ``leads``, by light; ``answers``, by "a b": the words
+        for each group.
     """
     cells = grid(report)
     metrics = shown_metrics(report.cells)

@@ -80,9 +80,10 @@ def read_pictures(
 
 
 def view_order(shape: Sequence[int], of: Comparison) -> list[int]:
-    """Return the cells, by place, so that those which the page shows at first come first.
+    """Return the places of the cells in the order in which a page fills with their pictures.
 
-    First the two that are compared, all along; then the others that they may be compared with; then the other rows.
+    First come the two values that are compared, along their whole axis; then the other values of that axis; then the
+    other rows.
 
     Parameters
     ----------
@@ -118,9 +119,9 @@ def flip_map(picture: NDArray[np.uint8], truth: Seen) -> NDArray[np.uint8]:
 
 
 def busiest(truth: NDArray[np.uint8]) -> tuple[int, int]:
-    """Return column and row of the middle of the loupe's rectangle in which a picture (h, w, 3) has the most edges.
+    """Return the column and row of the middle of that rectangle of the loupe's size where the truth has most edges.
 
-    There cameras differ most: a chart's, where the scene has one.
+    Cameras differ most there: on the chart, if the scene has one.
     """
     values = truth.astype(np.float64).mean(axis=2)
     edges = sum(np.abs(np.gradient(values, axis=axis)) for axis in (0, 1) if values.shape[axis] > 1)

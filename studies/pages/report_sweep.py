@@ -235,7 +235,7 @@ def _further(row: Row) -> dict[str, Any]:
 
 
 def sensor_of(name: str) -> ReportSensor:
-    """Return a sensor's numbers; none of a file that is no longer there."""
+    """Return a sensor's numbers; None in their place for a file that is no longer there."""
     try:
         return ReportSensor(label(name), preset(name))
     except InputError:
@@ -257,7 +257,7 @@ def environment_of(rows: Sequence[Row]) -> dict[str, str]:
 
 
 def lenses_left_out(rows: Sequence[Row], sensors: Sequence[str]) -> tuple[str, ...]:
-    """Return what the lenses, as they were modelled, leave out, each once; of a sensor file that is gone nothing."""
+    """Return what the lenses as modelled leave out, each effect once, and nothing for a sensor file that is gone."""
     lines: list[str] = []
     for scene, name, lens in dict.fromkeys((row.scene, row.sensor, row.lens) for row in rows):
         try:

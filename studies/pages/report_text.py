@@ -85,7 +85,7 @@ def substitution_text(share: float | None) -> str:
 
 
 def camera_name(camera: str) -> str:
-    """Return a camera's name as prose writes it: a person's own processor by its file, ``develop`` going unsaid."""
+    """Return a camera's name as prose writes it; a user's processor goes by its file, without ``develop``."""
     own = user_file(camera)
     if own is None:
         return CAMERA_NAMES.get(camera, camera)
@@ -95,7 +95,7 @@ def camera_name(camera: str) -> str:
 
 
 def plain_name(name: str) -> str:
-    """Return a sensor's name without its file's ending, which parts a preset's copy from the preset."""
+    """Return a sensor's name without its file's ending, by which a copy of a preset differs from the preset."""
     plain = name.removesuffix(".toml")
     return name if plain in preset_names() else plain
 
@@ -108,7 +108,7 @@ def with_signs(words: str) -> str:
 
 
 def exposure_name(exposure: str) -> str:
-    """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"; after a comma what goes on."""
+    """Write an exposure as prose does: ``auto`` as "automatic", ``10ms`` as "10 ms"; words after a comma stay."""
     time, comma, balance = exposure.partition(", ")
     seconds = parse_exposure(time)
     return (AUTOMATIC[time] if seconds is None else duration_text(seconds)) + comma + balance
