@@ -300,8 +300,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     device, rng, exact, samples_per_pixel
         As in `sensor.capture.photograph_radiance`.
     light : Spectrum or str, optional
-        That the camera's neutral and colour matrix are set to; left out, the lamp that the radiance states, else D65,
-        as `reference_picture` has it. Where the mosaic tells no colours under it the raw image holds none, and
+        Light that the camera's neutral and colour matrix are set to; left out, the lamp that the radiance states, else
+        D65, as in `reference_picture`. If the mosaic tells no colours under it, the raw image holds no calibration, and
         `calibrate` says why.
     shake : str, optional
         ``hand`` for a camera held in the hand (`sensor.shake`); left out, what the sensor's lens states.
@@ -310,8 +310,8 @@ def capture(  # noqa: PLR0913  its calls in README and tutorials go on
     iso : float, optional
         Saturation-based speed in the gain's place.
     flicker : Waveform or str, optional
-        Of the lamps, such as ``"fluorescent@100Hz"``; `radiance` is then their mean. `rng` gives the time at which the
-        exposure starts by the lamps' clock. Bands appear where the sensor's `row_time_us` isn't 0.
+        Flicker of the lamps, such as ``"fluorescent@100Hz"``; `radiance` is then their mean. `rng` decides the moment
+        in the lamps' cycle at which the exposure starts. Bands appear where the sensor's `row_time_us` isn't 0.
 
     Raises
     ------

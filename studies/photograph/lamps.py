@@ -47,8 +47,6 @@ def lamp_parts(
 
     None stands for the whole light, where all lamps have one waveform.
 
-    None stands for the whole light, where one waveform is that of every lamp.
-
     Parameters
     ----------
     transport : Transport

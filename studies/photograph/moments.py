@@ -18,12 +18,12 @@ from studies.study.motion import moments_s, site_starts_s
 
 
 def rolling_moments(sensor: SensorConfig, rows: int, exposure_s: float, count: int) -> tuple[Floats, Floats]:
-    """Give the times of a scene that moves while rows roll, and what each row's exposure takes of them.
+    """Return the times at which to render a scene that moves while rows roll, and each row's shares of these times.
 
-    The times are the middles of equal parts of the time from the first row's start, 0, to the last row's end. Between
-    two of them the light goes over from the one to the other in a straight line, so that a row's edge lies where it is
-    in the middle of the row's own exposure; before the first and after the last it stays. With rows that start together
-    each time counts the same.
+    The times are the middles of equal parts of the time from the first row's start, at 0, to the last row's end.
+    Between two times the light is interpolated linearly, so that an edge in a row lies where it is in the middle of
+    that row's own exposure; before the first and after the last time it is constant. If all rows start together, each
+    time counts the same.
 
     Parameters
     ----------
@@ -90,9 +90,9 @@ def _shares(starts_s: Floats, exposure_s: float, whole_s: float, count: int) -> 
 
 
 def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transport:
-    """Average the light of a scene at several times, each row by its own shares of them.
+    """Average the light of a scene over several times, each row by its own shares of them.
 
-    A lens blurs what is known of each row's own time: over the width of its blur the rows' times count as one.
+    A lens in front of the sensor blurs the average, which mixes the times of rows within the width of the blur.
 
     Parameters
     ----------
@@ -111,10 +111,10 @@ def rolling_average(transports: Iterable[Transport], shares: Floats) -> Transpor
 def time_average(transports: Iterable[Transport]) -> Transport:
     """Average the light of a scene at times that are spread evenly over an exposure.
 
-    A sensor sums light, so that the mean over k times is what it collects of a scene that stays for 1 / k of the time
-    at each. What moves by s pixels in the whole exposure is blurred into k edges s / k pixels apart: with k of at least
-    s the steps are smaller than a pixel. The renders' errors must be independent, which other seeds make them; the
-    variance of the mean is theirs over k.
+    A sensor sums light, so that the mean over k times is what it collects from a scene that stays at each of them for 1
+    / k of the exposure. An edge that moves by s pixels in the whole exposure becomes k edges s / k pixels apart: with k
+    of at least s the steps are smaller than a pixel. The renders' errors must be independent, which different seeds
+    ensure; the variance of the mean is then theirs over k.
 
     Parameters
     ----------
@@ -175,10 +175,10 @@ def _parts(shares: Floats | None, count: int) -> float | Floats:
 
 
 def _with(mean: Transport, each: Transport, count: int, parts: float | Floats) -> Transport:
-    """Return the mean over `count` times, from the mean over all but the last one, and the last one.
+    """Return the mean over `count` times, from the mean m over all but the last one, and the last one x.
 
-    m + (x - m) / k; of independent errors the variance is ((k - 1)^2 v_m + v_x) / k^2. What has rows has `parts` of
-    `_parts` for k.
+    With k = `count`, it is m + (x - m) / k, and the variance of independent errors is ((k - 1)^2 v_m + v_x) / k^2.
+    Arrays with rows have the `parts` from `_parts` in place of k.
     """
 
     def mixed(first: Any, last: Any, k: float | Floats = count) -> Any:
