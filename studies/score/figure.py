@@ -88,7 +88,7 @@ def measured(definition: Definition, seed: int) -> list[Merit]:
 def stream(name: str) -> int:
     """Return the number of a figure's own random stream, so that a figure doesn't depend on which others are asked for.
 
-    It is of the whole name: with a stream in common figures miss their intervals together.
+    It is a hash of the whole name, because figures with a common stream would miss their intervals together.
     """
     return zlib.crc32(name.encode())
 

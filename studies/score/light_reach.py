@@ -25,7 +25,7 @@ def unlit(sensor: SensorConfig, light: str) -> str:
 
 
 def without_light(definitions: Iterable[Definition], reason: str) -> Iterator[Definition]:
-    """Leave out the figures of a light that gives nothing; SNR1s has a lamp of its own."""
+    """Leave out the figures of a light that gives the camera nothing; SNR1s stays, because it has a lamp of its own."""
     for definition in definitions:
         if definition.merits[0].name.startswith("snr1s."):
             yield definition
@@ -35,7 +35,7 @@ def without_light(definitions: Iterable[Definition], reason: str) -> Iterator[De
 
 
 def with_reach(definition: Definition, sensor: SensorConfig, light: str) -> Definition:
-    """Tell in the conditions of a light's figures where its table ends before the camera's window does."""
+    """Add to the conditions of a light's figures where the light's table ends before the camera's window does."""
     return replace(definition, merits=tuple(_told(merit, sensor, light) for merit in definition.merits))
 
 

@@ -67,7 +67,7 @@ def over_light(
 
 
 def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[EvenField], Floats] | None:
-    """Return what visual noise is measured on; None of a camera that tells no colours in the light."""
+    """Return the fields and the matrix that visual noise is measured with; None if the camera tells no colours."""
     try:
         return colour_fields(sensor, light, exposure_s) if len(sensor.channels) >= 3 else None
     except InputError:
@@ -77,7 +77,7 @@ def _colours(sensor: SensorConfig, light: str, exposure_s: float) -> tuple[list[
 def _visual_noise(
     fields: Sequence[EvenField], matrix: Floats, white_cd_m2: float, rng: np.random.Generator
 ) -> tuple[float, float]:
-    """Return visual noise in closed form and on frames; none in the dark and of a full channel."""
+    """Return visual noise in closed form and on frames; NaN in the dark, and where a channel is full."""
     electrons = [GREY * white_cd_m2 * field.electrons_per_cd_m2 for field in fields]
     if white_cd_m2 <= 0 or any(e >= field.headroom_e for e, field in zip(electrons, fields, strict=True)):
         return nan, nan

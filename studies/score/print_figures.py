@@ -125,7 +125,7 @@ def _at(field: EvenField, gain: float) -> EvenField:
 
 
 def _margins(field: EvenField) -> list[float]:
-    """Return by how many dB, stops and bits a camera has more than the low-light speed asks for."""
+    """Return by how many dB, stops and bits a camera exceeds what the low-light speed requires."""
     grey_e = np.array([GREY_SHARE * field.headroom_e])
     ratio = float(snr(grey_e, field.sensor, field.exposure_s, field.channel)[0])
     margins = [20 * log10(ratio) - LEAST_DB, _stops(field, 1.0) - LEAST_STOPS]
@@ -144,7 +144,7 @@ def _stops(field: EvenField, ratio: float) -> float:
 
 
 def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) -> float:
-    """Divide what an overexposed field reads by what the field reads that has the ratio."""
+    """Measure the range in stops: what an overexposed field reads over what a field with the given ratio reads."""
     about = electrons_at_snr(ratio, field.sensor, field.exposure_s, field.channel) / field.electrons_per_cd_m2
     found = light_for(lambda x: ratio_at(field, x, rng), ratio, about)
     bright = field.shoot(1.3 * field.headroom_e / field.electrons_per_cd_m2, field.draw_chip(rng), rng)
@@ -153,20 +153,21 @@ def _measured_stops(field: EvenField, ratio: float, rng: np.random.Generator) ->
 
 
 def _colours(field: EvenField) -> Sequence[str]:
-    """Return the three channels that tell colours; none of a camera whose third the light doesn't reach."""
+    """Return the three channels that tell colours; none if the light doesn't reach all of them."""
     return field.sensor.channels[:3] if len(field.means_e) >= 3 and np.all(field.means_e[:3] > 0) else ()
 
 
 def _white_cd_m2(field: EvenField) -> float:
-    """Return the luminance at which the first of the three channels is full to the share of a white."""
+    """Return the luminance of white, at which the first of the three channels is full to `WHITE_SHARE` [cd/m^2]."""
     channels = (replace(field, channel=name) for name in _colours(field))
     return min(WHITE_SHARE * one.headroom_e / one.electrons_per_cd_m2 for one in channels)
 
 
 def _bits(field: EvenField) -> float:
-    """Return log2 of the integrals of 1 / noise over the three channels' signals: a matrix cancels in their product.
+    """Return the bits of colour: log2 of the product of the three channels' integrals of 1 / noise over the signal.
 
-    Of signals s = t u^2 up to t each is 2 t u / noise over u from 0 to 1.
+    A matrix between the channels cancels in that product. With the signal s = t u^2 up to t, each integral is that of 2
+    t u / noise over u from 0 to 1.
     """
     return _bits_of(field, _noise_e)
 
@@ -190,7 +191,7 @@ def _measured_bits(field: EvenField, rng: np.random.Generator) -> float:
 
 
 def _steps(field: EvenField, top_e: float) -> Floats:
-    """Return the ends of the steps of u from 0 to 1 between which noise has no jump: the merge's seams are such."""
+    """Return the ends of the steps of u from 0 to 1 within which noise doesn't jump, as it does at a merge's seams."""
     handovers_e = seams(field.readings).handover_e[:-1] if several(field.readings) else np.empty(0)
     return np.unique([0.0, *np.sqrt(np.clip(handovers_e / top_e, 0.0, 1.0)), 1.0])
 
