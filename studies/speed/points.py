@@ -199,7 +199,10 @@ def pooled_share(squared_e2: Image, yard: NoiseReference) -> Image:
 
 
 def mean_error(image_e: Image, yard: NoiseReference) -> tuple[float, float]:
-    """Return the RMS error [e-] and the mean share, over pixels and channels; 0 where noise leaves less than that."""
+    """Return the RMS error [e-] and the mean share, over pixels and channels.
+
+    Both are estimated without the references' noise, which may leave less than 0; they are 0 then.
+    """
     first, second = yard.references
     squared_e2 = float(((image_e - first) * (image_e - second))[yard.inside].mean())
     share = float(np.nanmean(share_map(image_e, yard)))
