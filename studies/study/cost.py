@@ -36,26 +36,26 @@ KERNELS = Path.home() / ".drjit"
 
 @dataclass(frozen=True)
 class PictureCost:
-    """What a picture costs that is to be made.
+    """Cost of a picture before it is made.
 
     Attributes
     ----------
     size : (int, int)
-        Height and width in pixels; of a file, whose header isn't read yet, 1 and their number.
+        Height and width in pixels; for a file, whose header isn't read yet, 1 and the number of its pixels.
     bands, groups : int
         Bands and light groups.
     spp : float or None
-        Samples per pixel of the render, at most; 0 where the light is there already, None where a render goes on until
-        it reaches an error.
+        Most samples per pixel of the render; 0 where the light is there already, None where a render goes on until it
+        reaches an error.
     after_s : float
         Processor seconds per pixel and band of what follows the light.
     denoised : bool
     max_seconds : float, optional
-        Time of the render, at most.
+        Longest time of the render.
     through : str
-        The lens that the scene is rendered through, in words; none for a pinhole.
+        The lens that the scene is rendered through, in words; empty for a pinhole.
     times : int
-        Renders of so many samples each, of a scene that moves, whose mean is taken.
+        Number of renders whose mean is taken, each with so many samples, for a scene that moves.
     light_arrays : int, optional
         Arrays of the light where its bands are made one at a time, as in `rodcone.memory.memory`.
     """

@@ -24,8 +24,8 @@ class EqualArea:
     side_um : float
         Longer side of every sensor.
     coarsest_um : float
-        Greatest pitch among them, of a sensor that bins that of its raw image: pictures are compared at such pixels, so
-        that none is interpolated.
+        Largest pitch among the sensors; for a sensor that bins, the pitch of its raw image. Pictures are compared at
+        pixels of this pitch, so that none is interpolated.
     """
 
     side_um: float

@@ -165,7 +165,7 @@ def _at(choice: SceneChoice, time_s: float | None) -> SceneFile:
 
 
 def _in_focus(scene: Scene, choice: SceneChoice, study: Study, size: tuple[int, int]) -> Scene:
-    """Return a scene as the sensors' lens sees it, of which all must have one."""
+    """Return a scene as the lens of the sensors sees it; all sensors must have the same lens."""
     cameras = [study.lens.behind(preset(name)) for name in study.sensors]
     apart = dict.fromkeys(f"f/{camera.lens.f_number:g}" for camera in cameras)
     if choice.focal_length_mm is None:

@@ -89,8 +89,9 @@ def monte_carlo_bound(
     Parameters
     ----------
     errors_e : (1 or 2, h, w) array
-        One draw of the unbiased light's error [e-]; or what denoised light differs by from two folds: the mean of their
-        product is its whole squared error, and its upper limit is charged (`render.denoised.relight`).
+        One draw of the unbiased light's error [e-]; or the differences of denoised light from two folds. The mean of
+        the product of these is the whole squared error, of which the upper limit is counted
+        (`render.denoised.relight`).
     expected_e : (h, w) float64
     readings : sequence of PlainReading
         Readings that the camera takes of the frame (`sensor.readings.resolve.resolve`).
@@ -148,10 +149,10 @@ def render_share(
 def speckle_sizes(
     error_e: NDArray[np.floating], expected_e: NDArray[np.float64], sensor: SensorConfig, exposure_s: float
 ) -> NDArray[np.float64]:
-    """Return the errors beyond `SPECKLE`, over the sensor's own standard deviation, below saturation, (pixel,).
+    """Return the errors larger than `SPECKLE`, over the sensor's own standard deviation, below saturation, (pixel,).
 
-    Where the render's noise is under the sensor's only single bright samples reach so far. Parameters as of
-    `monte_carlo_share`, of one frame.
+    If the render's noise is smaller than the sensor's, only single bright samples cause so large errors. Parameters are
+    those of `monte_carlo_share`, for one frame.
     """
     variance_e2, inside = _noise_and_room(expected_e, resolve(sensor, expected_e, exposure_s))
     size = np.abs(error_e) / np.sqrt(variance_e2)

@@ -424,7 +424,7 @@ def _check_shares_and_sizes(study: Study) -> None:
 
 
 def _check_moments(study: Study) -> None:
-    """Check that the exposures of scenes that move are times, and each a single one of a render that is kept whole."""
+    """Check that exposures of scenes that move are times, not rules, and that no setting excludes motion."""
     moving = [scene for scene in study.scenes if scene.moments is not None]
     if not moving:
         return

@@ -75,7 +75,7 @@ def read_study(path: str | Path, changes: Sequence[str] = (), *, trust_code: boo
 
 
 def _set(content: dict[str, Any], change: str) -> None:
-    """Put one ``key=value`` into the content; a value that is no TOML stands for the text that it is."""
+    """Put one ``key=value`` into the content; a value that isn't TOML is taken as a text."""
     key, equals, text = change.partition("=")
     if not equals or not key:
         raise InputError(f"set: {change!r} is not allowed; write KEY=VALUE, such as render.spp=64")
